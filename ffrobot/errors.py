@@ -1,0 +1,21 @@
+"""The two ways a run can fail, each with the exit code the command line returns for it."""
+
+from __future__ import annotations
+
+
+class FfrobotError(Exception):
+    """Base of all errors whose message is meant for the user: shown without a traceback."""
+
+    exit_code = 1
+
+
+class InputError(FfrobotError):
+    """A file, key or value given by the user is wrong: the message names file, key, expected and found."""
+
+    exit_code = 2
+
+
+class SolveError(FfrobotError):
+    """An analysis could not be completed: the message says where, why and what to try next."""
+
+    exit_code = 1
