@@ -1,0 +1,6 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+// One function per header of the core; module.cpp calls them. Default arguments live in Python, never here.
+void bind_time_function(nanobind::module_ &m);
