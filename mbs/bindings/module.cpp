@@ -5,4 +5,6 @@
 NB_MODULE(_core, m) {
   m.doc() = "Compiled core of ffrobot: planar floating-frame dynamics.";
   bind_time_function(m);
+  bind_system(m);
+  bind_run(m);
 }
