@@ -334,4 +334,5 @@ def check_domain(function: TimeFunction, times: NDArray[np.float64], describe: s
         quantity = ("value", "velocity", "acceleration")[row]
         raise InputError(
             f"{describe}: expected a finite {quantity} during the whole run, found none at t = {times[first]:.9g} s"
+            " (a domain error, an overflow, or a time that the waypoints do not cover)"
         )
