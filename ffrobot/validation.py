@@ -88,7 +88,10 @@ def _merge(problems: Sequence[_Problem]) -> list[str]:
         alternatives = expected.setdefault((problem.key, problem.found), [])
         if problem.expected not in alternatives:
             alternatives.append(problem.expected)
-    return [f"{key}: {' or '.join(texts)}{found}" for (key, found), texts in expected.items()]
+    return [
+        f"{key}: {' or '.join(texts).replace(' or expected ', ' or ')}{found}"
+        for (key, found), texts in expected.items()
+    ]
 
 
 _EXPECTED = {
@@ -137,17 +140,14 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
     if kind == "union_tag_invalid":
         key = f"{key}.{context['discriminator']}".replace("'", "")
         found = context["tag"]
-    expected = _EXPECTED.get(kind, _plain(item["msg"])).format_map(context)
+    template = _EXPECTED.get(kind)
+    expected = template.format_map(context) if template else item["msg"].removeprefix("Input should be ")
+    expected = expected.replace("'", '"')  # as TOML writes it
     hint = ""
     if kind in ("literal_error", "union_tag_invalid") and isinstance(found, str):
         choices = context.get("expected") or context.get("expected_tags", "")
         hint = did_you_mean(found, choices.replace("'", "").replace(" or ", ", ").split(", "))
     return _Problem(key, f"expected {expected}", f", found {_show(found)}{hint}")
-
-
-def _plain(message: str) -> str:
-    """What pydantic calls expected, with the quotes of TOML; for the kinds not in `_EXPECTED`."""
-    return message.removeprefix("Input should be ").replace("'", '"').replace("{", "{{").replace("}", "}}")
 
 
 def _show(value: object) -> str:
