@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, ValidationInfo
+from pydantic_core import ErrorDetails
 
 from .errors import InputError
 
 
 class Record(BaseModel):
-    """Base of every record of an input file: immutable, no unknown keys, finite numbers, no silent conversions."""
+    """Base of every record of an input file: immutable, no unknown keys, finite numbers, no silent conversions.
+
+    Validators of a record raise `ValueError("expected …, found …")`; `validate` puts file and key in front.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 R = TypeVar("R", bound=Record)
+
+
+def _existing_file(path: Path, info: ValidationInfo) -> Path:
+    """Resolve `path` against the folder of the input file it is written in, and make sure that it is there."""
+    folder: Path = (info.context or {}).get("folder", Path())
+    resolved = folder / path
+    if not resolved.is_file():
+        present = [entry.name for entry in resolved.parent.iterdir()] if resolved.parent.is_dir() else []
+        hint = did_you_mean(path.name, present)
+        raise ValueError(f'expected an existing file, found "{path}", which is not in {folder.absolute()}{hint}')
+    return resolved
+
+
+InputFile = Annotated[Path, AfterValidator(_existing_file)]
+"""A file named by an input file, relative to it; it exists."""
 
 
 def load_toml(path: Path, kind: str) -> dict[str, Any]:
@@ -35,12 +57,139 @@ def load_toml(path: Path, kind: str) -> dict[str, Any]:
 def validate(record: type[R], data: dict[str, Any], path: Path) -> R:
     """Build `record` from `data`, read from `path`; an `InputError` lists every wrong key."""
     try:
-        return record.model_validate(data)
+        # By way of JSON, whose strict mode reads lists as tuples and text as paths; TOML has no types for these either.
+        return record.model_validate_json(json.dumps(data, default=str), context={"folder": path.parent})
     except ValidationError as error:
-        lines = [_describe(item, record, data) for item in error.errors(include_url=False)]
-        raise InputError("\n".join(f"{path}: {line}" for line in dict.fromkeys(lines))) from None
+        problems = [_describe(item, record, data) for item in error.errors(include_url=False)]
+        raise InputError("\n".join(f"{path}: {line}" for line in _merge(problems))) from None
 
 
-def _describe(item: Any, record: type[BaseModel], data: dict[str, Any]) -> str:
-    # TODO: key path, expected, found, did-you-mean for unknown keys
-    return f"{'.'.join(str(part) for part in item['loc'])}: {item['msg']}"
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """` (did you mean "…"?)`, or nothing when no known word is close."""
+    close = get_close_matches(word, list(known), n=1)
+    return f' (did you mean "{close[0]}"?)' if close else ""
+
+
+def quoted(words: Iterable[str]) -> str:
+    """`"a", "b"`, for the list of what is known; "none" when empty."""
+    return ", ".join(f'"{word}"' for word in words) or "none"
+
+
+class _Problem(NamedTuple):
+    key: str
+    expected: str
+    found: str
+
+
+def _merge(problems: Sequence[_Problem]) -> list[str]:
+    """One line for each wrong key: the alternatives of a union come as one problem each."""
+    expected: dict[tuple[str, str], list[str]] = {}
+    for problem in problems:
+        alternatives = expected.setdefault((problem.key, problem.found), [])
+        if problem.expected not in alternatives:
+            alternatives.append(problem.expected)
+    return [f"{key}: {' or '.join(texts)}{found}" for (key, found), texts in expected.items()]
+
+
+_EXPECTED = {
+    "missing": "a value, since this key is required",
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "string_type": "text in quotes",
+    "path_type": "a file name in quotes",
+    "bool_type": "true or false",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "finite_number": "a finite number",
+    "too_short": "at least {min_length} entries",
+    "too_long": "at most {max_length} entries",
+    "string_too_short": "text that is not empty",
+    "greater_than": "a number greater than {gt}",
+    "greater_than_equal": "a number of at least {ge}",
+    "less_than": "a number less than {lt}",
+    "less_than_equal": "a number of at most {le}",
+    "union_tag_invalid": "one of {expected_tags}",
+    "union_tag_not_found": "a table with the key {discriminator}",
+}
+
+
+def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any]) -> _Problem:
+    """Where pydantic's `item` is in the user's file, and what is wrong there, in the user's terms."""
+    kind, loc, context = item["type"], item["loc"], item.get("ctx", {})
+    key = _key_path(loc, data, kind)
+    if kind == "value_error":
+        return _Problem(key, str(context["error"]), "")
+    if kind == "extra_forbidden":
+        known = _known_keys(record, loc[:-1])
+        return _Problem(
+            key,
+            f"expected one of the keys {', '.join(known)}",
+            ", found an unknown key" + did_you_mean(str(loc[-1]), known),
+        )
+    if kind == "missing":
+        return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
+    found = item["input"]
+    if kind == "union_tag_invalid":
+        key = f"{key}.{context['discriminator']}".replace("'", "")
+        found = context["tag"]
+    expected = _EXPECTED.get(kind, item["msg"].removeprefix("Input should be ")).format_map(context)
+    hint = ""
+    if kind in ("literal_error", "union_tag_invalid") and isinstance(found, str):
+        choices = context.get("expected") or context.get("expected_tags", "")
+        hint = did_you_mean(found, choices.replace("'", "").replace(" or ", ", ").split(", "))
+    return _Problem(key, f"expected {expected}", f", found {_show(found)}{hint}")
+
+
+def _show(value: object) -> str:
+    """`value` as TOML writes it, shortened."""
+    text = json.dumps(value, default=str, ensure_ascii=False)
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def _key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str) -> str:
+    """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass").
+
+    Parts that name the alternative of a union rather than a key of the file are left out.
+    """
+    path = ""
+    here: Any = data
+    for k, part in enumerate(loc):
+        is_missing_key = kind == "missing" and k == len(loc) - 1
+        if isinstance(here, list) and isinstance(part, int) and part < len(here):
+            here = here[part]
+            path += f" {_label(here, part)}: " if isinstance(here, dict) else f"[{part}]"
+        elif isinstance(here, dict) and (part in here or is_missing_key):
+            here = here.get(part)
+            path += ("." if path and not path.endswith(" ") else "") + str(part)
+    return path.removesuffix(": ")
+
+
+def _label(table: dict[str, Any], index: int) -> str:
+    """What an entry of an array of tables is called: by its name, its body, or its place in the file."""
+    name = table.get("name", table.get("body"))
+    return f'"{name}"' if isinstance(name, str) else f"no. {index + 1}"
+
+
+def _known_keys(record: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
+    """The keys of the table at `loc`."""
+    candidates = [record]
+    for part in loc:
+        if not isinstance(part, str):
+            continue
+        inner = [
+            model for c in candidates if part in c.model_fields for model in _models(c.model_fields[part].annotation)
+        ]
+        # A part that is no key tells which alternative of a union was taken.
+        tagged = [c for c in candidates if any(part in get_args(f.annotation) for f in c.model_fields.values())]
+        candidates = inner or tagged or candidates
+    return list(dict.fromkeys(field.alias or name for c in candidates for name, field in c.model_fields.items()))
+
+
+def _models(annotation: object) -> list[type[BaseModel]]:
+    """Every record in `annotation`, inside optionals, unions, lists and tables too."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for argument in get_args(annotation) for model in _models(argument)]

@@ -1,1 +1,108 @@
 #pragma once
+
+#include <cstdint>
+#include <span>
+#include <variant>
+#include <vector>
+
+namespace ffrobot {
+
+/// A function of time at one instant, with its exact first and second time derivative.
+struct Jet {
+  double value;
+  double rate;
+  double acceleration;
+};
+
+/// Instructions of an Expression. Operands stand on the stack in the order in which they are written.
+enum class Op : std::uint8_t {
+  constant, // pushes the next entry of the list of constants
+  time,     // pushes t
+  add,
+  subtract,
+  multiply,
+  divide,
+  power, // constant integer exponents are exact for any base; all others need a positive base
+  negate,
+  sin,
+  cos,
+  tan,
+  exp,
+  log,
+  sqrt,
+  abs, // at a zero of its operand: the derivatives from the right, in the direction of time
+  tanh,
+  less, // comparisons and logic give 1 or 0, with zero derivatives
+  less_equal,
+  greater,
+  greater_equal,
+  logical_and,
+  logical_or,
+  logical_not,
+  select, // condition, a, b → a where the condition is not 0, else b; the other branch may be NaN
+};
+
+/// The same value at all times.
+class Constant {
+public:
+  explicit Constant(double value) : value_(value) {}
+  Jet operator()(double) const { return {value_, 0.0, 0.0}; }
+
+private:
+  double value_;
+};
+
+/// A postfix program over jets: derivatives are propagated by Taylor arithmetic, so they are exact.
+/// Evaluation allocates nothing.
+class Expression {
+public:
+  static constexpr int max_depth = 64;
+
+  /// Throws std::invalid_argument unless the program leaves exactly one value, stays within `max_depth` and
+  /// uses exactly the given constants.
+  Expression(std::span<const Op> program, std::span<const double> constants);
+
+  Jet operator()(double t) const;
+
+private:
+  struct Instruction {
+    Op op;
+    double constant;
+  };
+  std::vector<Instruction> program_;
+};
+
+/// Polynomials between breaks, in powers of (t − left break).
+///
+/// It is defined on [first break, last break], plus a margin for rounding; NaN elsewhere. Neither clamping nor
+/// extrapolating would be right: the one jumps in velocity, the other runs away.
+class PiecewisePolynomial {
+public:
+  /// Breaks (k+1), strictly increasing; coefficients (k × order), interval by interval, highest power first.
+  /// Throws std::invalid_argument on anything else, and on numbers that are not finite.
+  PiecewisePolynomial(std::vector<double> breaks, std::vector<double> coefficients);
+
+  Jet operator()(double t) const;
+
+private:
+  std::vector<double> breaks_;
+  std::vector<double> coefficients_;
+  std::size_t order_;
+  double margin_;
+};
+
+/// Any prescribed function of time. Components that are not finite (domain error, overflow, out of range) are NaN:
+/// callers check.
+class TimeFunction {
+public:
+  TimeFunction(Constant function) : function_(function) {}
+  TimeFunction(Expression function) : function_(std::move(function)) {}
+  TimeFunction(PiecewisePolynomial function) : function_(std::move(function)) {}
+
+  Jet operator()(double t) const;
+
+private:
+  std::variant<Constant, Expression, PiecewisePolynomial> function_;
+};
+
+} // namespace ffrobot

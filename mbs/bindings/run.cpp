@@ -1,0 +1,72 @@
+#include "core/replay.h"
+#include "core/run.h"
+
+#include <nanobind/eigen/dense.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/function.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings/bindings.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace ffrobot;
+
+void bind_run(nb::module_ &m) {
+  nb::enum_<IntegrationStatus>(m, "IntegrationStatus", "How an integration ended.")
+      .value("completed", IntegrationStatus::completed)
+      .value("step_underflow", IntegrationStatus::step_underflow)
+      .value("too_many_steps", IntegrationStatus::too_many_steps)
+      .value("interrupted", IntegrationStatus::interrupted);
+
+  nb::class_<Recording>(m, "Recording", "The accepted steps of a run, from which its dense output can be made again.")
+      .def(nb::init<>())
+      .def_prop_ro("steps", [](const Recording &r) { return r.times.size(); });
+
+  nb::class_<ActuationResolver>(m, "ActuationResolver", "Trajectory forces as motor forces and modal forces.")
+      .def(nb::init<const System &, std::vector<bool>, std::vector<Row>>(), "system"_a, "trajectory"_a, "motors"_a,
+           nb::keep_alive<1, 2>());
+
+  nb::enum_<AppliedActuation>(m, "AppliedActuation", "What of a recorded actuation a forward run applies.")
+      .value("trajectory", AppliedActuation::trajectory)
+      .value("joints", AppliedActuation::joints)
+      .value("joints_and_patches", AppliedActuation::joints_and_patches);
+
+  nb::class_<Steering>(m, "Steering", "Steers a system from outside.");
+  nb::class_<ReplayedActuation, Steering>(m, "ReplayedActuation", "Actuation from the dense output of a recorded run.")
+      .def(nb::init<const System &, const Recording &, ActuationResolver, std::vector<bool>, AppliedActuation,
+                    std::vector<Eigen::MatrixXd>>(),
+           "inverse"_a, "recording"_a, "resolver"_a, "trajectory"_a, "applied"_a, "projector"_a,
+           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
+
+  nb::class_<Run>(m, "Run", "Outputs of an analysis, one row per output time reached, and how it went.")
+      .def_prop_ro("status", [](const Run &r) { return r.report.status; })
+      .def_prop_ro("time_reached", [](const Run &r) { return r.report.time; })
+      .def_prop_ro("steps", [](const Run &r) { return r.report.steps; })
+      .def_prop_ro("rejected", [](const Run &r) { return r.report.rejected; })
+      .def_prop_ro("evaluations", [](const Run &r) { return r.report.evaluations; })
+      .def_prop_ro("q", [](const Run &r) { return r.outputs.q; })
+      .def_prop_ro("v", [](const Run &r) { return r.outputs.v; })
+      .def_prop_ro("a", [](const Run &r) { return r.outputs.a; })
+      .def_prop_ro("lambda_", [](const Run &r) { return r.outputs.lambda; })
+      .def_prop_ro("tau", [](const Run &r) { return r.outputs.tau; })
+      .def_prop_ro("F_p", [](const Run &r) { return r.outputs.F_p; })
+      .def_prop_ro("residual", [](const Run &r) { return r.outputs.residual; });
+
+  m.def("run",
+        [](const System &system, std::vector<int> group, std::vector<bool> moment, Steering *steering,
+           const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double tolerance,
+           unsigned long max_steps, ActuationResolver *resolver, const std::function<bool(double)> &carry_on,
+           Recording *recording) {
+          const nb::gil_scoped_release unlocked;
+          ConstrainedMotion motion(system, std::move(group), std::move(moment), steering);
+          const auto ask = [&](double t) {
+            const nb::gil_scoped_acquire locked;
+            return carry_on(t);
+          };
+          return run(motion, times, q, v, {tolerance, max_steps}, steering, resolver, ask, recording);
+        },
+        "system"_a, "group"_a, "moment"_a, "steering"_a.none(), "times"_a, "q"_a, "v"_a, "tolerance"_a, "max_steps"_a,
+        "resolver"_a.none(), "carry_on"_a, "recording"_a.none(),
+        "Integrates the motion from (q, v) and reports it at `times`.");
+}

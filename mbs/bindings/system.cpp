@@ -1,0 +1,140 @@
+#include "core/system.h"
+
+#include <nanobind/eigen/dense.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings/bindings.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace ffrobot;
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::VectorXd;
+
+namespace {
+
+void check_size(const char *name, Eigen::Index got, Eigen::Index expected) {
+  if (got != expected)
+    throw nb::value_error((std::string(name) + ": expected size " + std::to_string(expected) + ", got " +
+                           std::to_string(got))
+                              .c_str());
+}
+
+PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
+                     const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
+                     const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions) {
+  const auto n = stiffness.size();
+  check_size("W rows", W.rows(), 3 + 3 * static_cast<Eigen::Index>(marker_positions.size()));
+  check_size("W columns", W.cols(), n);
+  for (const auto &[name, size] : {std::pair("damping", damping.rows()), {"j", j.size()}, {"S_tilde", S_tilde.rows()}, {"m_xy", m_xy.rows()}})
+    if (size)
+      check_size(name, size, n);
+  return {mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions};
+}
+
+// (a, lambda) at one state
+std::tuple<VectorXd, VectorXd> evaluate_state(const System &system, double t, const VectorXd &q, const VectorXd &v) {
+  check_size("q", q.size(), system.coordinates);
+  check_size("v", v.size(), system.coordinates);
+  Workspace w(system);
+  VectorXd a(system.coordinates);
+  accelerations(system, t, q.data(), v.data(), w, a.data());
+  return {a, w.lambda};
+}
+
+// (C, C_dot, C_q) at one state
+std::tuple<VectorXd, VectorXd, MatrixXd> constraints(const System &system, double t, const VectorXd &q,
+                                                     const VectorXd &v) {
+  check_size("q", q.size(), system.coordinates);
+  check_size("v", v.size(), system.coordinates);
+  Workspace w(system);
+  const auto m = static_cast<Eigen::Index>(system.constraints.size());
+  VectorXd value(m), rate(m);
+  constraint_residuals(system, t, q.data(), v.data(), w, value.data(), rate.data());
+  return {value, rate, constraint_jacobian(system, w)};
+}
+
+VectorXd force_at_rest(const System &system, double t, const VectorXd &q) {
+  check_size("q", q.size(), system.coordinates);
+  Workspace w(system);
+  VectorXd Q(system.coordinates);
+  static_force(system, t, q.data(), w, Q.data());
+  return Q;
+}
+
+// (kinetic, strain, gravitational, dissipated power) of the system, one row per state
+MatrixXd energies(const System &system, const MatrixXd &q, const MatrixXd &v) {
+  check_size("q columns", q.cols(), system.coordinates);
+  MatrixXd result = MatrixXd::Zero(q.rows(), 4);
+  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+    const VectorXd q_i = q.row(i), v_i = v.row(i);
+    for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+      const auto first = system.first_coordinate[b];
+      const Energy e = energy(system.bodies[b], q_i.data() + first, v_i.data() + first, system.gravity);
+      result.row(i) += Eigen::RowVector4d(e.kinetic, e.strain, e.gravitational, e.dissipated_power);
+    }
+  }
+  return result;
+}
+
+} // namespace
+
+void bind_system(nb::module_ &m) {
+  nb::class_<MarkerReference>(m, "Marker", "A marker of a body (body index, marker index), or a point of the ground.")
+      .def(nb::init<int, int, Vector2d>(), "body"_a, "marker"_a, "ground"_a)
+      .def_ro("body", &MarkerReference::body)
+      .def_ro("marker", &MarkerReference::marker);
+  nb::enum_<RowKind>(m, "RowKind", "What a row measures between its two markers.")
+      .value("x", RowKind::x)
+      .value("y", RowKind::y)
+      .value("angle", RowKind::angle)
+      .value("slide", RowKind::slide);
+  nb::class_<Row>(m, "Row", "A scalar function of the motion of two markers: that of b relative to a.")
+      .def(nb::init<RowKind, MarkerReference, MarkerReference, Vector2d, double>(), "kind"_a, "a"_a, "b"_a,
+           "direction"_a, "offset"_a)
+      .def_ro("kind", &Row::kind)
+      .def_ro("a", &Row::a)
+      .def_ro("b", &Row::b);
+
+  nb::class_<System>(m, "System", "Bodies, constraints and drives; call finish() once after adding them.")
+      .def("__init__", [](System *s, const Vector2d &gravity) { (new (s) System())->gravity = gravity; }, "gravity"_a)
+      .def("add_body",
+           [](System &s, double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
+              const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
+              const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions) {
+             s.bodies.push_back(
+                 make_body(mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions));
+           },
+           "mass"_a, "inertia"_a, "first_moment"_a, "stiffness"_a, "damping"_a, "W"_a, "j"_a, "S_tilde"_a, "m_xy"_a,
+           "marker_positions"_a)
+      .def("add_constraint", [](System &s, const Row &row, const TimeFunction &f) { s.constraints.push_back({row, f}); },
+           "row"_a, "target"_a)
+      .def("add_drive", [](System &s, const Row &row, const TimeFunction &f) { s.drives.push_back({row, f}); }, "row"_a,
+           "size"_a)
+      .def("add_modal_drive",
+           [](System &s, int body, const VectorXd &vector, const TimeFunction &f) {
+             s.modal_drives.push_back({body, vector, f});
+           },
+           "body"_a, "vector"_a, "size"_a)
+      .def("finish", &System::finish)
+      .def_ro("coordinates", &System::coordinates)
+      .def_ro("first_coordinate", &System::first_coordinate)
+      .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a, "Accelerations (coordinates,) and multipliers (constraints,).")
+      .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q.")
+      .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces of gravity, elasticity and drives.")
+      .def("energies", &energies, "q"_a, "v"_a, "Kinetic, strain, gravitational energy and dissipated power (T, 4).");
+
+  m.def("time_evaluations",
+        [](const System &system, double t, const VectorXd &q, const VectorXd &v, int repetitions) {
+          Workspace w(system);
+          VectorXd a(system.coordinates);
+          for (int i = 0; i < repetitions; ++i)
+            accelerations(system, t, q.data(), v.data(), w, a.data());
+          return a[0];
+        },
+        "system"_a, "t"_a, "q"_a, "v"_a, "repetitions"_a, "Evaluates the accelerations many times, for benchmarks.");
+}

@@ -1,0 +1,92 @@
+#include "core/time_function.h"
+
+#include <cmath>
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings/bindings.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace ffrobot;
+
+namespace {
+
+using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Samples = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
+
+/// Coefficients arrive as (k, order): interval by interval, as the core keeps them.
+TimeFunction polynomial(Vector breaks, Matrix coefficients) {
+  if (coefficients.shape(0) + 1 != breaks.shape(0))
+    throw nb::value_error("polynomial: expected coefficients (k, order) for k + 1 breaks");
+  return PiecewisePolynomial({breaks.data(), breaks.data() + breaks.size()},
+                             {coefficients.data(), coefficients.data() + coefficients.size()});
+}
+
+Samples sample(const TimeFunction &function, Vector times) {
+  const std::size_t count = times.shape(0);
+  auto *data = new double[3 * count];
+  nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<double *>(p); });
+  for (std::size_t i = 0; i < count; ++i) {
+    const Jet jet = function(times.data()[i]);
+    data[i] = jet.value;
+    data[count + i] = jet.rate;
+    data[2 * count + i] = jet.acceleration;
+  }
+  return Samples(data, {3, count}, owner);
+}
+
+} // namespace
+
+void bind_time_function(nb::module_ &m) {
+  nb::enum_<Op>(m, "Op", "Instructions of an expression in postfix order.")
+      .value("constant", Op::constant)
+      .value("time", Op::time)
+      .value("add", Op::add)
+      .value("subtract", Op::subtract)
+      .value("multiply", Op::multiply)
+      .value("divide", Op::divide)
+      .value("power", Op::power)
+      .value("negate", Op::negate)
+      .value("sin", Op::sin)
+      .value("cos", Op::cos)
+      .value("tan", Op::tan)
+      .value("exp", Op::exp)
+      .value("log", Op::log)
+      .value("sqrt", Op::sqrt)
+      .value("abs", Op::abs)
+      .value("tanh", Op::tanh)
+      .value("less", Op::less)
+      .value("less_equal", Op::less_equal)
+      .value("greater", Op::greater)
+      .value("greater_equal", Op::greater_equal)
+      .value("logical_and", Op::logical_and)
+      .value("logical_or", Op::logical_or)
+      .value("logical_not", Op::logical_not)
+      .value("select", Op::select);
+
+  nb::class_<TimeFunction>(m, "TimeFunction",
+                           "A function of time with exact first and second derivatives; NaN where it has none.")
+      .def_static(
+          "constant", [](double value) -> TimeFunction { return Constant(value); }, "value"_a)
+      .def_static(
+          "expression",
+          [](const std::vector<Op> &ops, const std::vector<double> &constants) -> TimeFunction {
+            return Expression(ops, constants);
+          },
+          "ops"_a, "constants"_a, "Postfix program; raises ValueError when it is malformed or too deep.")
+      .def_static("polynomial", &polynomial, "breaks"_a, "coefficients"_a,
+                  "Breaks (k+1,) and coefficients (k, order), highest power first, in powers of t − left break.")
+      .def(
+          "__call__",
+          [](const TimeFunction &function, double t) {
+            const Jet jet = function(t);
+            return std::tuple(jet.value, jet.rate, jet.acceleration);
+          },
+          "t"_a, "(value, rate, acceleration) at time t (s).")
+      .def("sample", &sample, "t"_a, "Value, rate and acceleration (3, T) at the times t (T,).");
+}

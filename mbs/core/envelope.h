@@ -1,0 +1,30 @@
+// LDL^T of a symmetric positive definite matrix stored by row envelopes (lower triangle, from the first nonzero).
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace ffrobot {
+
+class EnvelopeMatrix {
+public:
+  EnvelopeMatrix() = default;
+
+  // first[i] <= i: column of the first entry of row i that may be nonzero
+  explicit EnvelopeMatrix(std::vector<Eigen::Index> first);
+
+  Eigen::Index size() const { return static_cast<Eigen::Index>(first_.size()); }
+  void set_zero();
+  double *entry(Eigen::Index row, Eigen::Index column); // column >= first[row]
+
+  void factorise(); // in place; unpivoted
+  void solve(double *x) const; // after factorise; x: right-hand side in, solution out
+
+private:
+  std::vector<Eigen::Index> first_;
+  std::vector<Eigen::Index> start_; // rows_[start_[i] + j] is entry (i, j)
+  std::vector<double> rows_;
+  std::vector<double> inverse_; // 1 / D
+};
+
+} // namespace ffrobot

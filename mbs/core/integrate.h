@@ -1,0 +1,44 @@
+// Adaptive integration with output at given times, written against OdeSystem only.
+#pragma once
+
+#include "core/dop853.h"
+#include "core/ode.h"
+
+#include <functional>
+#include <vector>
+
+namespace ffrobot {
+
+// The accepted steps of a run: with them its dense output can be made again at any time (see replay.h).
+struct Recording {
+  std::vector<double> times;
+  std::vector<double> states; // one after the other
+};
+
+enum class IntegrationStatus {
+  completed,
+  step_underflow, // no step size meets the tolerance
+  too_many_steps,
+  interrupted,    // by the caller
+};
+
+struct IntegrationReport {
+  IntegrationStatus status = IntegrationStatus::completed;
+  double time = 0; // reached
+  unsigned long steps = 0, rejected = 0, evaluations = 0;
+  std::size_t outputs = 0; // delivered
+};
+
+struct IntegrationControls {
+  double tolerance = 1e-6;
+  unsigned long max_steps = 0; // 0: no limit
+};
+
+// Integrates y from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
+// carry_on(t) is asked about every thousand steps. y ends at the last accepted step.
+IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
+                            const IntegrationControls &controls,
+                            const std::function<void(std::size_t, double, const double *)> &output,
+                            const std::function<bool(double)> &carry_on, Recording *recording);
+
+} // namespace ffrobot

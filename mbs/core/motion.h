@@ -1,0 +1,53 @@
+// The equations of motion of a System as an OdeSystem: all coordinates are integrated (y = (q, q_dot), index 1) and
+// projected onto C = 0 and C_dot = 0 after every step.
+#pragma once
+
+#include "core/ode.h"
+#include "core/system.h"
+
+namespace ffrobot {
+
+// Steers a system from outside: sets workspace.external_drive and external_modal for time t.
+class Steering {
+public:
+  virtual ~Steering() = default;
+  virtual void steer(double t, Workspace &workspace) = 0;
+};
+
+class ConstrainedMotion final : public OdeSystem {
+public:
+  // group[i]: constraints whose multipliers are judged together (the force of a joint, the moment of a joint …);
+  // moment[i]: whether constraint i carries a moment. steering may be null.
+  ConstrainedMotion(const System &system, std::vector<int> group, std::vector<bool> moment, Steering *steering);
+
+  Eigen::Index size() const override { return 2 * system_.coordinates; }
+  void slope(double t, const double *y, double *dy) override;
+  bool correct(double t, double *y) override;
+  double error_size(double t, const double *y, const double *e) override;
+  void accepted(double t, const double *y, const double *dy) override;
+  double initial_step() const override;
+  unsigned long evaluations() const override { return workspace_.evaluations; }
+
+  const System &system() const { return system_; }
+  Workspace &workspace() { return workspace_; }
+
+private:
+  const System &system_;
+  Workspace workspace_;
+  std::vector<int> group_;
+  std::vector<bool> group_is_moment_;
+  Steering *steering_;
+  double length_ = 0; // of the system: what positions are compared with
+  std::vector<Eigen::VectorXd> frequency_; // of each body's modes, rad/s
+
+  // peaks so far
+  struct BodyPeaks {
+    double velocity = 0, angular_velocity = 0, modal = 0, modal_velocity = 0;
+  };
+  std::vector<BodyPeaks> body_peaks_;
+  std::vector<double> multiplier_peaks_; // of each group
+  Eigen::VectorXd lambda_, shifted_, shifted_slope_;
+  bool has_lambda_ = false;
+};
+
+} // namespace ffrobot

@@ -1,0 +1,416 @@
+#include "core/planar_body.h"
+
+#include <cmath>
+
+namespace ffrobot {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using VectorMap = Eigen::Map<const Eigen::VectorXd>;
+
+constexpr Index register_width = 4; // doubles: rows of W are padded to a multiple of it
+
+Vector2d perpendicular(const Vector2d &v) { return {-v.y(), v.x()}; }
+
+Vector2d rotate(const PlanarBodyState &s, const Vector2d &v) {
+  return {s.cosine * v.x() - s.sine * v.y(), s.sine * v.x() + s.cosine * v.y()};
+}
+
+Vector2d rotate_back(const PlanarBodyState &s, const Vector2d &v) {
+  return {s.cosine * v.x() + s.sine * v.y(), -s.sine * v.x() + s.cosine * v.y()};
+}
+
+// W p, W p_dot and W (K p + D p_dot) in one pass. A row count known to the compiler keeps the sums in registers.
+template <int Rows>
+void project_fixed(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
+  using Sum = Eigen::Array<double, Rows, 1>;
+  Sum Wp = Sum::Zero(), Wp_dot = Sum::Zero(), Wk = Sum::Zero();
+  const double *column = s.W.data();
+  const double *stiffness = body.stiffness.data();
+  const double *damping = body.damping.cols() == 1 ? body.damping.data() : nullptr;
+  for (Index i = 0; i < body.modes(); ++i, column += Rows) {
+    const auto w = Eigen::Map<const Sum>(column);
+    double k = stiffness[i] * p[i];
+    if (damping)
+      k += damping[i] * p_dot[i];
+    Wp += w * p[i];
+    Wp_dot += w * p_dot[i];
+    Wk += w * k;
+  }
+  s.Wp = Wp;
+  s.Wp_dot = Wp_dot;
+  s.Wk = Wk;
+}
+
+void project(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
+  switch (s.padded_rows) {
+  case 4:
+    return project_fixed<4>(body, p, p_dot, s);
+  case 8:
+    return project_fixed<8>(body, p, p_dot, s);
+  case 12:
+    return project_fixed<12>(body, p, p_dot, s);
+  case 16:
+    return project_fixed<16>(body, p, p_dot, s);
+  }
+  const Index n = body.modes();
+  s.Wp.noalias() = s.W * VectorMap(p, n);
+  s.Wp_dot.noalias() = s.W * VectorMap(p_dot, n);
+  s.Wk.setZero();
+  for (Index i = 0; i < n; ++i)
+    s.Wk += s.W.col(i) * (body.stiffness[i] * p[i] + (body.damping.cols() == 1 ? body.damping(i, 0) * p_dot[i] : 0.0));
+}
+
+// m_thetaf = h + p^T S_tilde replaces the row h of W where S_tilde is not zero.
+void update_rotation_row(const PlanarBody &body, const double *p, PlanarBodyState &s) {
+  const Index n = body.modes();
+  s.W.row(2).noalias() = body.W.row(2) + VectorMap(p, n).transpose() * body.S_tilde;
+  s.W_transposed.col(2) = s.W.row(2).transpose();
+  s.G.row(2).noalias() = s.W.row(2) * s.W.transpose();
+  s.G.col(2) = s.G.row(2).transpose();
+}
+
+// Modal forces that the common case (mass-orthonormal planar modes, diagonal damping, no modal load) has not.
+bool collect_extra(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
+  const Index n = body.modes();
+  const double theta_dot_squared = s.theta_dot * s.theta_dot;
+  bool any = false;
+  const auto start = [&] {
+    if (!any)
+      s.extra.setZero();
+    any = true;
+  };
+  if (s.has_modal_load) {
+    start();
+    s.extra += s.modal_load;
+  }
+  if (body.j.size()) {
+    start();
+    s.extra += theta_dot_squared * body.j;
+  }
+  if (body.S_tilde.size()) {
+    start();
+    s.extra.noalias() += (2 * s.theta_dot) * (body.S_tilde * VectorMap(p_dot, n));
+  }
+  if (body.m_xy.size()) { // theta_dot^2 p is in the common case already
+    start();
+    s.extra.noalias() += theta_dot_squared * (body.m_xy * VectorMap(p, n));
+    s.extra -= theta_dot_squared * VectorMap(p, n);
+  }
+  if (body.damping.cols() > 1) {
+    start();
+    s.extra.noalias() -= body.damping * VectorMap(p_dot, n);
+  }
+  if (any)
+    s.W_extra.noalias() = s.W * s.extra;
+  return any;
+}
+
+struct Factor { // L D L^T of the 3 x 3 mass matrix of the frame, p eliminated
+  Vector3d L, D_inverse;
+};
+
+Factor factorise(const Matrix3d &M) {
+  const double d0 = 1 / M(0, 0);
+  const double l10 = M(1, 0) * d0, l20 = M(2, 0) * d0;
+  const double d1 = 1 / (M(1, 1) - l10 * M(1, 0));
+  const double l21 = (M(2, 1) - l20 * M(1, 0)) * d1;
+  const double d2 = 1 / (M(2, 2) - l20 * M(2, 0) - l21 * l21 / d1);
+  return {{l10, l20, l21}, {d0, d1, d2}};
+}
+
+Vector3d forward(const Vector3d &L, Vector3d b) {
+  b[1] -= L[0] * b[0];
+  b[2] -= L[1] * b[0] + L[2] * b[1];
+  return b;
+}
+
+Vector3d backward(const Vector3d &L, Vector3d b) {
+  b[1] -= L[2] * b[2];
+  b[0] -= L[0] * b[1] + L[1] * b[2];
+  return b;
+}
+
+// p^T m_xy q
+double weighted(const PlanarBody &body, const double *p, const double *q) {
+  const Index n = body.modes();
+  const VectorMap p_(p, n);
+  if (body.m_xy.size() == 0)
+    return p_.dot(VectorMap(q, n));
+  double sum = 0;
+  for (Index i = 0; i < n; ++i)
+    sum += body.m_xy.col(i).dot(p_) * q[i];
+  return sum;
+}
+
+// out += W^T z over the rows that carry anything
+void accumulate_rows(const PlanarBodyState &s, const Eigen::VectorXd &z, Index rows, Index n, double *out) {
+  Index i = 0;
+  for (; i + 2 < rows; i += 3) {
+    const double *w0 = s.W_transposed.data() + i * n, *w1 = w0 + n, *w2 = w1 + n;
+    const double z0 = z[i], z1 = z[i + 1], z2 = z[i + 2];
+    for (Index k = 0; k < n; ++k)
+      out[k] += z0 * w0[k] + z1 * w1[k] + z2 * w2[k];
+  }
+}
+
+} // namespace
+
+PlanarBodyState::PlanarBodyState(const PlanarBody &body) : markers(static_cast<std::size_t>(body.markers())) {
+  const Index n = body.modes(), rows = body.W.rows();
+  padded_rows = (rows + register_width - 1) / register_width * register_width;
+  W = Eigen::MatrixXd::Zero(padded_rows, n);
+  W.topRows(rows) = body.W;
+  W_transposed = W.transpose();
+  G = W * W_transposed;
+  for (auto *v : {&Wp, &Wp_dot, &Wk, &W_extra, &z, &z_response})
+    *v = Eigen::VectorXd::Zero(padded_rows);
+  extra = modal_load = Eigen::VectorXd::Zero(n);
+  for (auto *m : {&wrench, &free_acceleration, &B_transposed, &Z_transposed})
+    *m = Eigen::Matrix3Xd::Zero(3, m == &B_transposed || m == &Z_transposed ? 3 * body.markers() : body.markers());
+  mobility = Eigen::MatrixXd::Zero(3 * body.markers(), 3 * body.markers());
+}
+
+void kinematics(const PlanarBody &body, const double *q, const double *v, PlanarBodyState &s) {
+  s.cosine = std::cos(q[2]);
+  s.sine = std::sin(q[2]);
+  s.theta_dot = v[2];
+  if (body.S_tilde.size())
+    update_rotation_row(body, q + 3, s);
+  project(body, q + 3, v + 3, s);
+  const Vector2d R(q[0], q[1]), R_dot(v[0], v[1]);
+  for (std::size_t k = 0; k < s.markers.size(); ++k) {
+    auto &m = s.markers[k];
+    const double *u = s.Wp.data() + 3 + 3 * k, *u_dot = s.Wp_dot.data() + 3 + 3 * k;
+    const Vector2d arm = body.marker_positions[k] + Vector2d(u[0], u[1]);
+    m.arm = rotate(s, arm);
+    m.position = R + m.arm;
+    m.velocity = R_dot + rotate(s, s.theta_dot * perpendicular(arm) + Vector2d(u_dot[0], u_dot[1]));
+    m.angle = q[2] + u[2];
+    m.angular_velocity = s.theta_dot + u_dot[2];
+  }
+}
+
+void free_motion(const PlanarBody &body, const double *q, const double *v, const Vector2d &gravity,
+                 PlanarBodyState &s) {
+  const double *p = q + 3, *p_dot = v + 3;
+  const double theta_dot = s.theta_dot, theta_dot_squared = theta_dot * theta_dot;
+  const Index K = body.markers();
+  const Vector2d g = rotate_back(s, gravity);
+  const Vector2d moment = body.first_moment + s.Wp.head<2>(); // s = s0 + S_bar p
+
+  // Known part of the modal forces: Q_f = theta_dot^2 p - K p - D p_dot + W^T z + extra
+  s.z.setZero();
+  s.z.head<2>() = g;
+  Vector3d Q; // (Q_R in body axes, Q_theta)
+  Q.head<2>() = body.mass * g + theta_dot_squared * moment - 2 * theta_dot * perpendicular(s.Wp_dot.head<2>());
+  Q[2] = -2 * theta_dot * weighted(body, p, p_dot) + perpendicular(moment).dot(g);
+  if (body.j.size())
+    Q[2] -= 2 * theta_dot * body.j.dot(VectorMap(p_dot, body.modes()));
+  if (s.has_wrench)
+    for (Index k = 0; k < K; ++k) {
+      const Vector2d f = s.wrench.col(k).head<2>();
+      s.z.segment<2>(3 + 3 * k) = rotate_back(s, f);
+      s.z[5 + 3 * k] = s.wrench(2, k);
+      Q.head<2>() += s.z.segment<2>(3 + 3 * k);
+      Q[2] += perpendicular(s.markers[static_cast<std::size_t>(k)].arm).dot(f) + s.wrench(2, k);
+    }
+  auto &WQ = s.Wk; // W Q_f, in place of W (K p + D p_dot)
+  WQ = theta_dot_squared * s.Wp - s.Wk + s.G.col(0) * g.x() + s.G.col(1) * g.y();
+  if (s.has_wrench)
+    WQ.noalias() += s.G.rightCols(s.padded_rows - 3) * s.z.tail(s.padded_rows - 3);
+  if (collect_extra(body, p, p_dot, s))
+    WQ += s.W_extra;
+  else
+    s.extra.setZero();
+
+  // Mass matrix and force of the frame after elimination
+  const Vector2d lever = perpendicular(moment);
+  double inertia = body.inertia + weighted(body, p, p);
+  if (body.j.size())
+    inertia += 2 * body.j.dot(VectorMap(p, body.modes()));
+  Matrix3d M;
+  M << body.mass, 0, lever.x(), 0, body.mass, lever.y(), lever.x(), lever.y(), inertia;
+  M -= s.G.topLeftCorner<3, 3>();
+  const Factor factor = factorise(M);
+  s.L = factor.L;
+  s.D_inverse = factor.D_inverse;
+  s.free_frame = backward(s.L, forward(s.L, Q - WQ.head<3>()).cwiseProduct(s.D_inverse));
+
+  // Markers: acceleration = B (a, alpha) + Phi p_ddot + velocity terms, with p_ddot from the eliminated rows
+  for (Index k = 0; k < K; ++k) {
+    const auto &m = s.markers[static_cast<std::size_t>(k)];
+    const Index row = 3 + 3 * k;
+    const Matrix3d G = s.G.block<3, 3>(row, 0);
+    const Vector2d arm = rotate_back(s, m.arm);
+    Matrix3d B = -G;
+    B(0, 0) += 1;
+    B(1, 1) += 1;
+    B(0, 2) -= arm.y();
+    B(1, 2) += arm.x();
+    B(2, 2) += 1;
+    Vector3d a = B * s.free_frame + WQ.segment<3>(row);
+    a.head<2>() += -theta_dot_squared * arm + 2 * theta_dot * perpendicular(s.Wp_dot.segment<2>(row));
+    const Vector2d a_global = rotate(s, a.head<2>());
+    s.free_acceleration.col(k) << a_global, a[2];
+    for (int c = 0; c < 3; ++c) {
+      const double x = B(0, c), y = B(1, c);
+      B(0, c) = s.cosine * x - s.sine * y;
+      B(1, c) = s.sine * x + s.cosine * y;
+    }
+    for (int r = 0; r < 3; ++r)
+      s.Z_transposed.col(3 * k + r) = forward(s.L, B.row(r).transpose());
+  }
+
+  // Mobility = Z D^-1 Z^T + (Phi Phi^T in global axes), lower block triangle mirrored
+  for (Index k = 0; k < K; ++k)
+    for (Index l = 0; l <= k; ++l) {
+      const double *g0 = s.G.data() + (3 + 3 * l) * s.padded_rows + 3 + 3 * k;
+      const double *g1 = g0 + s.padded_rows, *g2 = g1 + s.padded_rows;
+      const double c = s.cosine, sn = s.sine;
+      // rows rotated
+      const double a00 = c * g0[0] - sn * g0[1], a10 = sn * g0[0] + c * g0[1];
+      const double a01 = c * g1[0] - sn * g1[1], a11 = sn * g1[0] + c * g1[1];
+      const double a02 = c * g2[0] - sn * g2[1], a12 = sn * g2[0] + c * g2[1];
+      Matrix3d E;
+      E << c * a00 - sn * a01, sn * a00 + c * a01, a02, //
+          c * a10 - sn * a11, sn * a10 + c * a11, a12,  //
+          c * g0[2] - sn * g1[2], sn * g0[2] + c * g1[2], g2[2];
+      for (int j = 0; j < 3; ++j) {
+        const Vector3d zl = s.Z_transposed.col(3 * l + j).cwiseProduct(s.D_inverse);
+        for (int i = 0; i < 3; ++i)
+          E(i, j) += s.Z_transposed.col(3 * k + i).dot(zl);
+      }
+      s.mobility.block<3, 3>(3 * k, 3 * l) = E;
+      if (l != k)
+        s.mobility.block<3, 3>(3 * l, 3 * k) = E.transpose();
+    }
+}
+
+namespace {
+
+// (a, alpha) in body axes caused by wrenches on the markers, and the rows of W^T they load.
+Vector3d frame_response(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, PlanarBodyState &s,
+                        Eigen::VectorXd &z) {
+  Vector3d b = Vector3d::Zero();
+  for (Index k = 0; k < body.markers(); ++k) {
+    const auto f = wrench.col(k);
+    b += s.Z_transposed.middleCols<3>(3 * k) * f;
+    z[3 + 3 * k] = s.cosine * f[0] + s.sine * f[1];
+    z[4 + 3 * k] = -s.sine * f[0] + s.cosine * f[1];
+    z[5 + 3 * k] = f[2];
+  }
+  const Vector3d x = backward(s.L, b.cwiseProduct(s.D_inverse));
+  z.head<3>() = -x;
+  return x;
+}
+
+} // namespace
+
+void accelerations(const PlanarBody &body, const double *q, const double *v, const Eigen::Matrix3Xd &constraint_wrench,
+                   PlanarBodyState &s, double *a) {
+  const Index n = body.modes(), rows = body.W.rows();
+  const Vector3d x = s.free_frame + frame_response(body, constraint_wrench, s, s.z_response);
+  s.z_response += s.z;
+  s.z_response.head<2>() -= s.free_frame.head<2>();
+  s.z_response[2] -= s.free_frame[2];
+  const Vector2d R_ddot = rotate(s, x.head<2>());
+  a[0] = R_ddot.x();
+  a[1] = R_ddot.y();
+  a[2] = x[2];
+  const double theta_dot_squared = s.theta_dot * s.theta_dot;
+  const double *p = q + 3, *p_dot = v + 3, *stiffness = body.stiffness.data(), *extra = s.extra.data();
+  double *p_ddot = a + 3;
+  for (Index i = 0; i < n; ++i)
+    p_ddot[i] = (theta_dot_squared - stiffness[i]) * p[i] + extra[i];
+  if (body.damping.cols() == 1)
+    for (Index i = 0; i < n; ++i)
+      p_ddot[i] -= body.damping(i, 0) * p_dot[i];
+  accumulate_rows(s, s.z_response, rows, n, p_ddot);
+}
+
+Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, Index k, const double *a, double &size) {
+  const Index row = 3 + 3 * k;
+  const Vector3d Phi_p_ddot = body.W.middleRows<3>(row) * VectorMap(a + 3, body.modes());
+  const Vector2d &arm = s.markers[static_cast<std::size_t>(k)].arm;
+  const Vector2d elastic = rotate(s, Phi_p_ddot.head<2>());
+  const Vector2d coriolis = rotate(s, 2 * s.theta_dot * perpendicular(s.Wp_dot.segment<2>(row)));
+  const Vector2d frame = Vector2d(a[0], a[1]), turn = a[2] * perpendicular(arm);
+  const Vector2d centripetal = -s.theta_dot * s.theta_dot * arm;
+  size = frame.norm() + turn.norm() + centripetal.norm() + coriolis.norm() + elastic.norm() + std::abs(a[2]) +
+         std::abs(Phi_p_ddot[2]);
+  Vector3d acceleration;
+  acceleration << frame + turn + centripetal + coriolis + elastic, a[2] + Phi_p_ddot[2];
+  return acceleration;
+}
+
+void respond(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, PlanarBodyState &s, double *dq) {
+  const Vector3d x = frame_response(body, wrench, s, s.z_response);
+  const Vector2d dR = rotate(s, x.head<2>());
+  dq[0] = dR.x();
+  dq[1] = dR.y();
+  dq[2] = x[2];
+  std::fill(dq + 3, dq + 3 + body.modes(), 0.0);
+  accumulate_rows(s, s.z_response, body.W.rows(), body.modes(), dq + 3);
+}
+
+void add_modal_force(const PlanarBody &body, const PlanarBodyState &s, const Eigen::Matrix3Xd &wrench,
+                     Eigen::Ref<Eigen::VectorXd> modal_force) {
+  for (Index k = 0; k < body.markers(); ++k) {
+    const Vector2d f = rotate_back(s, wrench.col(k).head<2>());
+    modal_force += body.W.middleRows<3>(3 + 3 * k).transpose() * Vector3d(f.x(), f.y(), wrench(2, k));
+  }
+}
+
+void static_force(const PlanarBody &body, const double *q, const Vector2d &gravity, PlanarBodyState &s, double *Q) {
+  const Index n = body.modes();
+  const Vector2d g = rotate_back(s, gravity);
+  const Vector2d moment = body.first_moment + s.Wp.head<2>();
+  Q[0] = body.mass * gravity.x();
+  Q[1] = body.mass * gravity.y();
+  Q[2] = perpendicular(moment).dot(g);
+  Eigen::Map<Eigen::VectorXd> Q_f(Q + 3, n);
+  Q_f = -body.stiffness.cwiseProduct(VectorMap(q + 3, n)) + body.W.topRows<2>().transpose() * g;
+  if (s.has_modal_load)
+    Q_f += s.modal_load;
+  if (s.has_wrench) {
+    for (Index k = 0; k < body.markers(); ++k) {
+      Q[0] += s.wrench(0, k);
+      Q[1] += s.wrench(1, k);
+      Q[2] += perpendicular(s.markers[static_cast<std::size_t>(k)].arm).dot(s.wrench.col(k).head<2>()) + s.wrench(2, k);
+    }
+    add_modal_force(body, s, s.wrench, Q_f);
+  }
+}
+
+Energy energy(const PlanarBody &body, const double *q, const double *v, const Vector2d &gravity) {
+  const Index n = body.modes();
+  const VectorMap p(q + 3, n), p_dot(v + 3, n);
+  const double c = std::cos(q[2]), s = std::sin(q[2]), theta_dot = v[2];
+  const auto to_body = [&](const Vector2d &u) { return Vector2d(c * u.x() + s * u.y(), -s * u.x() + c * u.y()); };
+  const Vector2d R_dot = to_body({v[0], v[1]});
+  const Vector2d moment = body.first_moment + body.W.topRows<2>() * p;
+  const Vector2d S_p_dot = body.W.topRows<2>() * p_dot;
+  double inertia = body.inertia + weighted(body, q + 3, q + 3);
+  if (body.j.size())
+    inertia += 2 * body.j.dot(p);
+  double coupling = body.W.row(2).dot(p_dot); // m_thetaf p_dot
+  if (body.S_tilde.size())
+    coupling += p.dot(body.S_tilde * p_dot);
+  Energy e;
+  e.kinetic = 0.5 * (body.mass * R_dot.squaredNorm() + inertia * theta_dot * theta_dot + p_dot.squaredNorm()) +
+              theta_dot * R_dot.dot(perpendicular(moment)) + R_dot.dot(S_p_dot) + theta_dot * coupling;
+  e.strain = 0.5 * p.dot(body.stiffness.cwiseProduct(p));
+  e.gravitational = -(body.mass * gravity.dot(Vector2d(q[0], q[1])) + to_body(gravity).dot(moment));
+  if (body.damping.cols() == 1)
+    e.dissipated_power = p_dot.dot(body.damping.col(0).cwiseProduct(p_dot));
+  else if (body.damping.cols() > 1)
+    e.dissipated_power = p_dot.dot(body.damping * p_dot);
+  return e;
+}
+
+} // namespace ffrobot

@@ -1,0 +1,110 @@
+// A planar flexible body in the floating frame of reference: coordinates (R, theta, p).
+//
+// What a body contributes to the system is independent of the space it moves in: the free accelerations of its
+// markers, and their mobility (the acceleration of marker k per unit wrench at marker l). Constraints, elimination
+// and integrators use nothing else, so that a spatial body can stand beside this one.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace ffrobot {
+
+// Constants of one body. Formulas: Shabana, Dynamics of Multibody Systems, ch. 5; symbols as there.
+//
+// The p-block of the mass matrix is the identity (mass-orthonormal modes), so p is eliminated exactly:
+// p_ddot = Q_f - S_bar^T a - m_thetaf^T alpha + sum of Phi_k^T f_k. Everything the elimination needs are products with
+//   W = [S_bar_x; S_bar_y; h; Phi_x, Phi_y, Phi_rotation of marker 1; of marker 2; ...]     (3 + 3 markers) x n
+// and its Gram matrix G = W W^T, both constant in the body frame (row h moves with p where S_tilde is not zero).
+struct PlanarBody {
+  double mass = 0;
+  double inertia = 0;                              // J2_11 + J2_22, about the origin of the frame
+  Eigen::Vector2d first_moment;                    // s0
+  Eigen::VectorXd stiffness;                       // (n) diagonal of K_ff
+  Eigen::MatrixXd damping;                         // (n, 1) diagonal of D_ff, or (n, n)
+  Eigen::MatrixXd W;                               // (3 + 3 markers, n)
+  Eigen::VectorXd j;                               // (n) I_bar_11 + I_bar_22; empty where it vanishes
+  Eigen::MatrixXd S_tilde;                         // (n, n) S_bar_12 - S_bar_21, skew; empty where it vanishes
+  Eigen::MatrixXd m_xy;                            // (n, n) S_bar_11 + S_bar_22; empty where it is the identity
+  std::vector<Eigen::Vector2d> marker_positions;   // undeformed, body frame
+
+  Eigen::Index modes() const { return W.cols(); }
+  Eigen::Index markers() const { return static_cast<Eigen::Index>(marker_positions.size()); }
+  Eigen::Index coordinates() const { return 3 + modes(); }
+};
+
+// Motion of one marker in the global frame.
+struct MarkerMotion {
+  Eigen::Vector2d arm;      // from the frame's origin, deformed
+  Eigen::Vector2d position;
+  Eigen::Vector2d velocity;
+  double angle;
+  double angular_velocity;
+};
+
+// Workspace of one body; nothing is allocated after construction.
+struct PlanarBodyState {
+  explicit PlanarBodyState(const PlanarBody &body);
+
+  // kinematics
+  double cosine = 1, sine = 0, theta_dot = 0;
+  std::vector<MarkerMotion> markers;
+
+  // applied loads, set between kinematics and free_motion
+  Eigen::Matrix3Xd wrench; // (force x, force y, moment) at each marker, global
+  Eigen::VectorXd modal_load; // (n) generalized forces on p
+  bool has_wrench = false, has_modal_load = false;
+
+  // free motion
+  Eigen::Matrix3Xd free_acceleration; // of each marker, global (x, y, angular), before constraint forces
+  Eigen::MatrixXd mobility;           // (3 markers, 3 markers), global
+
+  // internals of the elimination
+  Eigen::Index padded_rows;         // rows of W, padded for vector registers
+  Eigen::MatrixXd W;                // (padded_rows, n)
+  Eigen::MatrixXd W_transposed;     // (n, padded_rows)
+  Eigen::MatrixXd G;                // (padded_rows, padded_rows)
+  Eigen::VectorXd Wp, Wp_dot, Wk;   // W p, W p_dot, W (K p + D p_dot)
+  Eigen::VectorXd extra, W_extra;   // modal forces outside the common fast path, and W times them
+  Eigen::VectorXd z;                // multipliers of the rows of W in p_ddot
+  Eigen::VectorXd z_response;
+  Eigen::Matrix3Xd B_transposed;    // (3, 3 markers): marker acceleration per (a, alpha), p eliminated; global rows
+  Eigen::Matrix3Xd Z_transposed;    // L^-1 B^T, with the eliminated mass matrix = L D L^T
+  Eigen::Vector3d L;                // (L_10, L_20, L_21)
+  Eigen::Vector3d D_inverse;
+  Eigen::Vector3d free_frame;       // free (a, alpha) of the body frame, body axes
+};
+
+// Positions and velocities of the markers for q = (R, theta, p), v = its rates.
+void kinematics(const PlanarBody &body, const double *q, const double *v, PlanarBodyState &state);
+
+// Eliminates p under gravity and the applied loads: free marker accelerations and mobility. After kinematics.
+void free_motion(const PlanarBody &body, const double *q, const double *v, const Eigen::Vector2d &gravity,
+                 PlanarBodyState &state);
+
+// Accelerations of (R, theta, p) once the constraint wrenches on the markers are known. After free_motion.
+void accelerations(const PlanarBody &body, const double *q, const double *v, const Eigen::Matrix3Xd &constraint_wrench,
+                   PlanarBodyState &state, double *a);
+
+// Acceleration (x, y, angular) of marker k for accelerations a of the coordinates, and the sum of its terms' sizes.
+Eigen::Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &state, Eigen::Index k,
+                                    const double *a, double &size);
+
+// M^-1 times the generalized force of wrenches on the markers (mass metric of the last free_motion).
+void respond(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, PlanarBodyState &state, double *dq);
+
+// Generalized force on p of wrenches on the markers (global axes): F_p += sum Phi_k^T A^T f_k + ...
+void add_modal_force(const PlanarBody &body, const PlanarBodyState &state, const Eigen::Matrix3Xd &wrench,
+                     Eigen::Ref<Eigen::VectorXd> modal_force);
+
+// Generalized forces Q_R, Q_theta, Q_f of gravity and elasticity at rest (static equilibrium).
+void static_force(const PlanarBody &body, const double *q, const Eigen::Vector2d &gravity, PlanarBodyState &state,
+                  double *Q);
+
+// Kinetic, strain and gravitational energy.
+struct Energy {
+  double kinetic = 0, strain = 0, gravitational = 0, dissipated_power = 0;
+};
+Energy energy(const PlanarBody &body, const double *q, const double *v, const Eigen::Vector2d &gravity);
+
+} // namespace ffrobot

@@ -1,0 +1,234 @@
+#include "core/system.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ffrobot {
+
+using Eigen::Index;
+
+void System::finish() {
+  first_coordinate.clear();
+  coordinates = 0;
+  for (const auto &body : bodies) {
+    first_coordinate.push_back(coordinates);
+    coordinates += body.coordinates();
+  }
+  couplings.clear();
+  envelope.clear();
+  const auto count = static_cast<int>(constraints.size());
+  for (int r = 0; r < count; ++r) {
+    const Row &row = constraints[static_cast<std::size_t>(r)].row;
+    Index first = r;
+    for (int s = 0; s <= r; ++s) {
+      const Row &other = constraints[static_cast<std::size_t>(s)].row;
+      for (const bool r_is_b : {false, true})
+        for (const bool s_is_b : {false, true}) {
+          const MarkerReference &m = r_is_b ? row.b : row.a, &o = s_is_b ? other.b : other.a;
+          if (m.body < 0 || m.body != o.body)
+            continue;
+          couplings.push_back({r, s, m.body, m.marker, o.marker, r_is_b, s_is_b});
+          first = std::min<Index>(first, s);
+        }
+    }
+    envelope.push_back(first);
+  }
+}
+
+Workspace::Workspace(const System &system)
+    : rows(system.constraints.size()), drive_rows(system.drives.size()), targets(system.constraints.size()),
+      external_drive(system.drives.size(), 0.0), schur(system.envelope),
+      lambda(Eigen::VectorXd::Zero(static_cast<Index>(system.constraints.size()))),
+      correction(Eigen::VectorXd::Zero(system.coordinates)) {
+  for (const auto &body : system.bodies) {
+    bodies.emplace_back(body);
+    wrench.emplace_back(Eigen::Matrix3Xd::Zero(3, body.markers()));
+    external_modal.emplace_back(Eigen::VectorXd::Zero(body.modes()));
+  }
+}
+
+namespace {
+
+void update_kinematics(const System &system, const double *q, const double *v, Workspace &w) {
+  for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+    const Index i = system.first_coordinate[b];
+    kinematics(system.bodies[b], q + i, v + i, w.bodies[b]);
+  }
+}
+
+void apply_drives(const System &system, double t, Workspace &w) {
+  if (!system.drives.empty()) {
+    for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+      w.wrench[b].setZero();
+      w.bodies[b].has_wrench = true;
+    }
+    for (std::size_t d = 0; d < system.drives.size(); ++d) {
+      const Drive &drive = system.drives[d];
+      evaluate(drive.row, w.bodies, w.drive_rows[d]);
+      add_wrench(drive.row, w.drive_rows[d], drive.size(t).value + w.external_drive[d], w.wrench);
+    }
+    for (std::size_t b = 0; b < system.bodies.size(); ++b)
+      w.bodies[b].wrench = w.wrench[b];
+  }
+  if (!system.modal_drives.empty() || w.has_external_modal) {
+    for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+      w.bodies[b].modal_load = w.external_modal[b];
+      w.bodies[b].has_modal_load = true;
+    }
+    for (const ModalDrive &drive : system.modal_drives)
+      w.bodies[static_cast<std::size_t>(drive.body)].modal_load += drive.size(t).value * drive.vector;
+  }
+}
+
+// w.lambda <- (C M^-1 C^T)^-1 w.lambda, and its wrenches -C^T lambda on the markers
+void solve_multipliers(const System &system, Workspace &w) {
+  w.schur.solve(w.lambda.data());
+  for (auto &wrench : w.wrench)
+    wrench.setZero();
+  for (std::size_t r = 0; r < system.constraints.size(); ++r)
+    add_wrench(system.constraints[r].row, w.rows[r], -w.lambda[static_cast<Index>(r)], w.wrench);
+}
+
+void assemble_schur(const System &system, Workspace &w) {
+  w.schur.set_zero();
+  for (const auto &c : system.couplings) {
+    const auto &mobility = w.bodies[static_cast<std::size_t>(c.body)].mobility;
+    const Row &r = system.constraints[static_cast<std::size_t>(c.r)].row;
+    const Row &s = system.constraints[static_cast<std::size_t>(c.s)].row;
+    double &entry = *w.schur.entry(c.r, c.s);
+    if (r.kind != RowKind::slide && s.kind != RowKind::slide) { // unit coefficients, +1 on b, -1 on a
+      const double m = mobility(3 * c.k + static_cast<int>(r.kind), 3 * c.l + static_cast<int>(s.kind));
+      entry += c.r_is_b == c.s_is_b ? m : -m;
+    } else {
+      const RowMotion &mr = w.rows[static_cast<std::size_t>(c.r)], &ms = w.rows[static_cast<std::size_t>(c.s)];
+      const auto &cr = c.r_is_b ? mr.coefficient_b : mr.coefficient_a;
+      const auto &cs = c.s_is_b ? ms.coefficient_b : ms.coefficient_a;
+      entry += cr.dot(mobility.block<3, 3>(3 * c.k, 3 * c.l) * cs);
+    }
+  }
+  w.schur.factorise();
+}
+
+} // namespace
+
+void accelerations(const System &system, double t, const double *q, const double *v, Workspace &w, double *a) {
+  ++w.evaluations;
+  update_kinematics(system, q, v, w);
+  apply_drives(system, t, w);
+  for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+    const Index i = system.first_coordinate[b];
+    free_motion(system.bodies[b], q + i, v + i, system.gravity, w.bodies[b]);
+  }
+  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+    const auto &[row, target] = system.constraints[r];
+    RowMotion &motion = w.rows[r];
+    evaluate(row, w.bodies, motion);
+    w.targets[r] = target(t);
+    double rhs = motion.bias - w.targets[r].acceleration;
+    for (const auto &[m, c] : {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)})
+      if (m->body >= 0)
+        rhs += c->dot(w.bodies[static_cast<std::size_t>(m->body)].free_acceleration.col(m->marker));
+    w.lambda[static_cast<Index>(r)] = rhs;
+  }
+  assemble_schur(system, w);
+  solve_multipliers(system, w);
+  for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+    const Index i = system.first_coordinate[b];
+    accelerations(system.bodies[b], q + i, v + i, w.wrench[b], w.bodies[b], a + i);
+  }
+}
+
+void constraint_residuals(const System &system, double t, const double *q, const double *v, Workspace &w, double *value,
+                          double *rate) {
+  update_kinematics(system, q, v, w);
+  RowMotion motion;
+  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+    const auto &[row, target] = system.constraints[r];
+    evaluate(row, w.bodies, motion);
+    const Jet f = target(t);
+    value[r] = motion.value - f.value;
+    rate[r] = motion.rate - f.rate;
+  }
+}
+
+double acceleration_residual(const System &system, const double *a, const Workspace &w) {
+  double worst = 0;
+  RowMotion motion;
+  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+    const Row &row = system.constraints[r].row;
+    evaluate(row, w.bodies, motion);
+    double residual = motion.bias - w.targets[r].acceleration, scale = 1 + std::abs(w.targets[r].acceleration);
+    for (const auto &[m, c] : {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)}) {
+      if (m->body < 0)
+        continue;
+      const auto b = static_cast<std::size_t>(m->body);
+      double size = 0;
+      residual += c->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker,
+                                             a + system.first_coordinate[b], size));
+      scale += c->lpNorm<Eigen::Infinity>() * size;
+    }
+    worst = std::max(worst, std::abs(residual) / scale);
+  }
+  return worst;
+}
+
+void static_force(const System &system, double t, const double *q, Workspace &w, double *Q) {
+  w.correction.setZero();
+  update_kinematics(system, q, w.correction.data(), w);
+  apply_drives(system, t, w);
+  for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+    const Index i = system.first_coordinate[b];
+    static_force(system.bodies[b], q + i, system.gravity, w.bodies[b], Q + i);
+  }
+}
+
+double project(const System &system, double t, double *q, double *v, Workspace &w) {
+  constexpr double tolerance = 1e-14;
+  constexpr int refresh_after = 3, most_iterations = 12;
+  const auto m = static_cast<Index>(system.constraints.size());
+  if (m == 0)
+    return 0;
+  Eigen::Map<Eigen::VectorXd> q_(q, system.coordinates), v_(v, system.coordinates);
+  thread_local Eigen::VectorXd value, rate;
+  value.resize(m);
+  rate.resize(m);
+  const auto correct = [&](const Eigen::VectorXd &residual, Eigen::Map<Eigen::VectorXd> &x) {
+    w.lambda = residual;
+    solve_multipliers(system, w);
+    for (std::size_t b = 0; b < system.bodies.size(); ++b)
+      respond(system.bodies[b], w.wrench[b], w.bodies[b], w.correction.data() + system.first_coordinate[b]);
+    x += w.correction;
+  };
+  double left = 0, previous = 1e300;
+  for (int i = 0; i < most_iterations; ++i) {
+    constraint_residuals(system, t, q, v, w, value.data(), rate.data());
+    const double position = value.lpNorm<Eigen::Infinity>(), velocity = rate.lpNorm<Eigen::Infinity>();
+    const double scale_q = 1 + q_.lpNorm<Eigen::Infinity>(), scale_v = 1 + v_.lpNorm<Eigen::Infinity>();
+    left = std::max(position / scale_q, velocity / scale_v);
+    if (!(left > tolerance) || (left < 1e-12 && left > 0.2 * previous)) // done, at the rounding floor, or NaN
+      break;
+    previous = left;
+    if (i >= refresh_after) {
+      accelerations(system, t, q, v, w, w.correction.data());
+      --w.evaluations;
+    }
+    correct(rate, v_);
+    if (position > tolerance * scale_q)
+      correct(value, q_);
+  }
+  return left;
+}
+
+Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w) {
+  const auto m = static_cast<Index>(system.constraints.size());
+  Eigen::MatrixXd C_q = Eigen::MatrixXd::Zero(system.coordinates, m); // transposed: gradients are columns
+  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+    RowMotion motion;
+    evaluate(system.constraints[r].row, w.bodies, motion);
+    jacobian(system.constraints[r].row, motion, system.bodies, w.bodies, system.first_coordinate,
+             C_q.col(static_cast<Index>(r)));
+  }
+  return C_q.transpose();
+}
+
+} // namespace ffrobot
