@@ -165,7 +165,9 @@ def _timoshenko(link: BeamLink, mesh: Mesh, stations: Floats, second_moment: Pro
     )
 
 
-def _values(V: fem.FunctionSpace, element: ElementName, degree: int, points: Floats, derivative: int = 0) -> sp.csr_matrix:
+def _values(
+    V: fem.FunctionSpace, element: ElementName, degree: int, points: Floats, derivative: int = 0
+) -> sp.csr_matrix:
     """(k, dofs): value, or x-derivative, of a function of V at `points` (k,) from its degrees of freedom."""
     cells, X = cells_containing(V.mesh, points)
     first, second = cell_vertices(V.mesh)[cells].T

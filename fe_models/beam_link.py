@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -79,7 +79,7 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
     )
 
 
-def select(models: dict[Family, FamilyModel], wanted: list[int]) -> Modes:
+def select(models: dict[Family, FamilyModel], wanted: Sequence[int]) -> Modes:
     """The modes numbered `wanted` (1 is the lowest of all families together, ascending), mass-orthonormal.
 
     Equal frequencies (bending of a square or round section) are told apart by the order of the families, not by
@@ -123,7 +123,7 @@ def _element_boundaries(link: BeamLink) -> Floats:
     return graded_nodes(link.geometry.breakpoints, link.mesh.elements)
 
 
-def _wanted(link: BeamLink, models: dict[Family, FamilyModel], path: Path) -> list[int]:
+def _wanted(link: BeamLink, models: dict[Family, FamilyModel], path: Path) -> Sequence[int]:
     """Numbers of the modes asked for, from 1, ascending."""
     wanted = link.modes.indices or list(range(1, (link.modes.count or 0) + 1))
     available = sum(model.K.shape[0] for model in models.values())

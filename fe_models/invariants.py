@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -100,13 +101,14 @@ def shape_integrals(link: BeamLink, stations: StationSpace, fields: Floats) -> I
     moments: list[Property] = [lambda s: s.area, lambda s: s.I_yy, lambda s: s.I_zz]
     weights = [_weighted(link, stations, moment, rho) for moment in (moments[:1] if line_mass else moments)]
 
+    n = fields.shape[2]
     S_bar = np.einsum("i,lin->ln", weights[0] @ one, Phi[0])
-    second_moment, I_bar, S_bar_kl = 0.0, 0.0, 0.0
+    second_moment, I_bar, S_bar_kl = np.zeros((3, 3)), np.zeros((3, 3, n)), np.zeros((3, 3, n, n))
     for W, x, shape in zip(weights, position, Phi, strict=False):
         W_x, W_shape = np.stack([W @ row for row in x]), np.stack([W @ component for component in shape])
-        second_moment = second_moment + np.einsum("ki,li->kl", x, W_x)
-        I_bar = I_bar + np.einsum("ki,lin->kln", W_x, shape)
-        S_bar_kl = S_bar_kl + np.einsum("kim,lin->klmn", shape, W_shape)
+        second_moment += np.einsum("ki,li->kl", x, W_x)
+        I_bar += np.einsum("ki,lin->kln", W_x, shape)
+        S_bar_kl += np.einsum("kim,lin->klmn", shape, W_shape)
     if line_mass and "torsion" in link.families:
         S_bar_kl[2, 2] += fields[R_X].T @ _weighted(link, stations, lambda s: s.I_p, rho) @ fields[R_X]
     first = float(stations.x @ (weights[0] @ one))
@@ -154,9 +156,7 @@ def geometric_stiffness(
     matrices["omega_zz"] = matrices["omega_yy"].copy()
     for name, position in interfaces.items():
         if position > 0:
-            matrices[f"force/{name}/x"] = _stiffness_of(
-                stations, fields, lambda _, middle, p=position: 1.0 * (middle < p)
-            )
+            matrices[f"force/{name}/x"] = _stiffness_of(stations, fields, partial(_up_to, position))
     return matrices
 
 
@@ -172,6 +172,11 @@ def _stiffness_of(stations: StationSpace, fields: Floats, axial_force: AxialForc
     G = stations.matrix(N * a.dx(0) * b.dx(0) * ufl.dx)
     total = sum(fields[row].T @ (G @ fields[row]) for row in (U_Y, U_Z))
     return np.asarray(0.5 * (total + total.T))
+
+
+def _up_to(position: float, x: Floats, middle: Floats) -> Floats:
+    """1 in the cells between the root and `position`, 0 beyond."""
+    return np.where(middle < position, 1.0, 0.0)
 
 
 def _mass_beyond(link: BeamLink, x: Floats, power: int) -> Floats:

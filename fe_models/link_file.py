@@ -1,14 +1,15 @@
 """The link file: what stage 1 reads, checked key by key.
 
-A stepped beam gives `[[geometry.segment]]` tables in place of `section`: each with the `section` that holds from the end
-of the segment before (from the root, for the first) to `until` (m from the root); the last one ends at `length`.
+A stepped beam gives `[[geometry.segment]]` tables in place of `section`: each with the `section` that holds from the
+end of the segment before (from the root, for the first) to `until` (m from the root); the last one ends at `length`.
 `[mesh] nodes = [0.0, …, length]` sets the element boundaries one by one in place of `elements`.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Annotated, Literal, NoReturn
 
 from pydantic import Field
 
@@ -71,7 +72,7 @@ class BeamGeometry(Record):
     kind: Literal["beam"]
     length: Positive  # m
     section: SectionRecord | None = None
-    segment: Annotated[list[Segment], Field(min_length=1)] | None = None
+    segment: Annotated[tuple[Segment, ...], Field(min_length=1)] | None = None
 
     @property
     def breakpoints(self) -> list[float]:
@@ -85,7 +86,7 @@ class BeamMesh(Record):
     """Element boundaries: `elements` of them as equal as the steps of the section allow, or the list of `nodes`."""
 
     elements: Annotated[int, Field(ge=1)] | None = None
-    nodes: Annotated[list[float], Field(min_length=2)] | None = None  # m from the root
+    nodes: Annotated[tuple[float, ...], Field(min_length=2)] | None = None  # m from the root
 
 
 class BeamModel(Record):
@@ -106,15 +107,15 @@ class Modes(Record):
     """The lowest `count` modes of a family, or those numbered `indices` (1 is the lowest)."""
 
     count: Annotated[int, Field(ge=1)] | None = None
-    indices: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1)] | None = None
+    indices: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
     family: Family | Literal["all"] = "all"
 
 
 class Damping(Record):
     """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK."""
 
-    ratio: NotNegative | list[NotNegative] | None = None
-    rayleigh: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = None
+    ratio: NotNegative | tuple[NotNegative, ...] | None = None
+    rayleigh: tuple[NotNegative, NotNegative] | None = None
 
 
 class NamedInterface(Record):
@@ -136,7 +137,7 @@ class BeamLink(Record):
     reference: Reference
     modes: Modes
     damping: Damping = Damping()
-    interface: list[NamedInterface] = []
+    interface: tuple[NamedInterface, ...] = ()
 
     @property
     def families(self) -> tuple[Family, ...]:
@@ -147,8 +148,10 @@ class BeamLink(Record):
     def sections(self) -> list[Section]:
         """Section properties of each segment. Without Poisson's ratio, J and k belong to ν = 0: nothing uses them."""
         nu = self.material.poissons_ratio or 0.0
-        records = [segment.section for segment in self.geometry.segment or ()] or [self.geometry.section]
-        return [_properties(record, nu) for record in records if record is not None]
+        records = [segment.section for segment in self.geometry.segment or ()]
+        if self.geometry.section is not None:
+            records.append(self.geometry.section)
+        return [_properties(record, nu) for record in records]
 
 
 # A solid link adds its record here: `kind` picks what the whole file must look like, mesh and model included.
@@ -177,7 +180,7 @@ def _check_geometry(link: BeamLink, path: Path) -> None:
     if (geometry.section is None) == (geometry.segment is None):
         _reject(path, "geometry", "either section or [[geometry.segment]]", _both_or_neither(geometry.section))
     ends = [segment.until for segment in geometry.segment or ()]
-    if any(after <= before for before, after in zip(ends, ends[1:], strict=False)):
+    if any(after <= before for before, after in pairwise(ends)):
         _reject(path, "geometry.segment", "ascending values of until", ends)
     if ends and ends[-1] != geometry.length:
         _reject(path, "geometry.segment", f"the last until at the length, {geometry.length}", ends[-1])
@@ -195,7 +198,7 @@ def _check_mesh(link: BeamLink, path: Path) -> None:
         _reject(path, "mesh.elements", f"at least one per segment, {len(breakpoints) - 1}", mesh.elements)
     if mesh.nodes is None:
         return
-    if any(after - before <= 1e-9 * length for before, after in zip(mesh.nodes, mesh.nodes[1:], strict=False)):
+    if any(after - before <= 1e-9 * length for before, after in pairwise(mesh.nodes)):
         _reject(path, "mesh.nodes", "strictly ascending positions, apart by more than 1e-9 of the length", mesh.nodes)
     if mesh.nodes[0] != 0.0 or mesh.nodes[-1] != length:
         _reject(path, "mesh.nodes", f"from 0 to the length, {length}", f"{mesh.nodes[0]} to {mesh.nodes[-1]}")
@@ -220,12 +223,12 @@ def _check_modes(link: BeamLink, path: Path) -> None:
     modes, damping = link.modes, link.damping
     if (modes.count is None) == (modes.indices is None):
         _reject(path, "modes", "either count or indices", _both_or_neither(modes.count))
-    if modes.indices and sorted(set(modes.indices)) != modes.indices:
+    if modes.indices and sorted(set(modes.indices)) != list(modes.indices):
         _reject(path, "modes.indices", "ascending numbers, each once", modes.indices)
     if damping.ratio is not None and damping.rayleigh is not None:
         _reject(path, "damping", "either ratio or rayleigh", "both")
     number = modes.count or len(modes.indices or ())
-    if isinstance(damping.ratio, list) and len(damping.ratio) != number:
+    if isinstance(damping.ratio, tuple) and len(damping.ratio) != number:
         _reject(path, "damping.ratio", f"one number, or one for each of the {number} modes", len(damping.ratio))
 
 
@@ -249,5 +252,5 @@ def _both_or_neither(value: object) -> str:
     return "neither" if value is None else "both"
 
 
-def _reject(path: Path, key: str, expected: str, found: Any) -> NoReturn:
+def _reject(path: Path, key: str, expected: str, found: object) -> NoReturn:
     raise InputError(f"{path}: {key}: expected {expected}, found {found}")

@@ -215,6 +215,8 @@ def _freeze(record: DataclassInstance) -> None:
 def _frozen(value: object) -> object:
     if not isinstance(value, np.ndarray):
         return value
+    if value.ndim == 0:
+        return float(value)
     copy = np.array(value, dtype=np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64)
     copy.setflags(write=False)
     return copy

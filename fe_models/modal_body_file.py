@@ -6,7 +6,9 @@ import os
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import MISSING, fields
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -14,6 +16,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, SolveError
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 FORMAT = "ffrobot-modal-body"
 FORMAT_VERSION = 1
@@ -111,23 +116,23 @@ def _check_format(path: Path, attributes: h5py.AttributeManager) -> None:
 
 
 def _body(file: h5py.File) -> ModalBody:
+    values: dict[str, Any] = {name: _text(file.attrs[name]) for name in _ATTRIBUTES}
+    values |= {name: _array(file, dataset) for name, dataset in _DATASETS.items()}
+    stations, interfaces = file["stations"], file["interfaces"]
     return ModalBody(
-        **{name: _text(file.attrs[name]) for name in _ATTRIBUTES},
-        **{name: _array(file, dataset) for name, dataset in _DATASETS.items()},
+        **values,
         family=tuple(_text(name) for name in file["modes/family"][()]),
         geometric_stiffness=_geometric_stiffness(file),
-        interfaces={
-            name: Interface(*(_array(group, item) for item in ("position", "translation", "rotation")))
-            for name, group in file["interfaces"].items()
-        },
-        stations=Stations(
-            *(_array(file["stations"], item) for item in ("position", "translation", "rotation", "height")),
-            element=np.asarray(file["stations/element"][()]) if "element" in file["stations"] else None,
-        ),
-        mesh=PictureMesh(
-            _array(file, "mesh/points"), np.asarray(file["mesh/cells"][()]), _array(file, "mesh/mode_shapes")
-        ),
+        interfaces={name: Interface(**_arrays(interfaces[name], Interface)) for name in interfaces},
+        stations=Stations(**_arrays(stations, Stations)),
+        mesh=PictureMesh(**_arrays(file["mesh"], PictureMesh)),
     )
+
+
+def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any]:
+    """The datasets of `group` that are fields of `record`; those without default must be there."""
+    required = {item.name: item.default is MISSING for item in fields(record)}
+    return {name: group[name][()] for name, needed in required.items() if needed or name in group}
 
 
 def _geometric_stiffness(file: h5py.File) -> dict[str, NDArray[np.float64]]:
