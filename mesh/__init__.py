@@ -1,0 +1,1 @@
+"""Meshes of the links: what a finite element model stands on."""

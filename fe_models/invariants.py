@@ -1,0 +1,189 @@
+"""Inertia shape integrals and geometric stiffness of a beam, from its fields at the stations.
+
+The stations are the cubic Lagrange points of the station mesh, so values at stations *are* the degrees of freedom of
+the fields and every integral is a product with a mass or stiffness matrix, without error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
+
+from ..mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
+from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
+from .link_file import BeamLink
+
+Floats = NDArray[np.float64]
+# N in N at x (m), and at which cell by its middle: N may jump from cell to cell.
+AxialForce = Callable[[Floats, Floats], Floats]
+
+
+@dataclass(frozen=True)
+class Invariants:
+    """Shapes and meaning as in `ModalBody`."""
+
+    mass: float
+    first_moment: Floats
+    second_moment: Floats
+    S_bar: Floats
+    I_bar: Floats
+    S_bar_kl: Floats
+
+
+@dataclass(frozen=True)
+class StationSpace:
+    """Continuous cubics on the station mesh, numbered along the axis.
+
+    Attributes:
+        space: the dolfinx space.
+        order: (k,) its degree of freedom at each station.
+        x: (k,) where the stations lie, in m.
+        element: (e, 4) stations of each cell, both ascending.
+    """
+
+    space: fem.FunctionSpace
+    order: NDArray[np.int64]
+    x: Floats
+    element: NDArray[np.int64]
+
+    def matrix(self, form: ufl.Form) -> sp.csr_matrix:
+        """(k, k): a bilinear form of two fields given by their values at the stations."""
+        return assemble_matrix(form)[self.order][:, self.order]
+
+
+def station_space(mesh: Mesh) -> StationSpace:
+    """Stations at the vertices of the station mesh (exactly) and at two points inside each cell."""
+    space = function_space(mesh, "P", 3)
+    x = space.tabulate_dof_coordinates()[:, 0].copy()
+    order = np.argsort(x)
+    rank = np.argsort(order)
+    cells = cell_dofs(space)
+    x[cells[:, :2]] = cell_vertices(mesh)  # as given, not as mapped from the reference cell
+    element = np.sort(rank[cells], axis=1)
+    return StationSpace(space, order, x[order], element[np.argsort(element[:, 0])])
+
+
+def shape_integrals(link: BeamLink, stations: StationSpace, fields: Floats) -> Invariants:
+    """Integrals of formulation.md, section 3, over axis and cross section.
+
+    With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
+    Φ0 = (u, v, w), Φy = (−θ_z, 0, φ), Φz = (θ_y, −φ, 0); principal axes leave ∫y = ∫z = ∫yz = 0.
+
+    Euler–Bernoulli links are a line of mass on the axis, ∫y² = ∫z² = 0 in all that bends or turns as a whole. Their
+    torsion modes keep their own ρI_p, booked in S̄_33: no planar invariant then holds any rotary inertia, and
+    m_ff = S̄_11 + S̄_22 + S̄_33 stays true.
+
+    Args:
+        link: for density and sections.
+        stations: k of them.
+        fields: (6, k, n) rows U_X … R_Z at the stations.
+    """
+    rho = link.material.density
+    line_mass = link.model.theory == "euler-bernoulli"
+    zero = np.zeros_like(fields[U_X])
+    Phi = [
+        fields[[U_X, U_Y, U_Z]],
+        np.stack([-fields[R_Z], zero, fields[R_X]]),
+        np.stack([fields[R_Y], -fields[R_X], zero]),
+    ]
+    # Position likewise: x e1 + y e2 + z e3, per unit of (1, y, z).
+    one = np.ones_like(stations.x)
+    position = np.zeros((3, 3, stations.x.size))
+    position[0, 0], position[1, 1], position[2, 2] = stations.x, one, one
+    moments: list[Property] = [lambda s: s.area, lambda s: s.I_yy, lambda s: s.I_zz]
+    weights = [_weighted(link, stations, moment, rho) for moment in (moments[:1] if line_mass else moments)]
+
+    n = fields.shape[2]
+    S_bar = np.einsum("i,lin->ln", weights[0] @ one, Phi[0])
+    second_moment, I_bar, S_bar_kl = np.zeros((3, 3)), np.zeros((3, 3, n)), np.zeros((3, 3, n, n))
+    for W, x, shape in zip(weights, position, Phi, strict=False):
+        W_x, W_shape = np.stack([W @ row for row in x]), np.stack([W @ component for component in shape])
+        second_moment += np.einsum("ki,li->kl", x, W_x)
+        I_bar += np.einsum("ki,lin->kln", W_x, shape)
+        S_bar_kl += np.einsum("kim,lin->klmn", shape, W_shape)
+    if line_mass and "torsion" in link.families:
+        S_bar_kl[2, 2] += fields[R_X].T @ _weighted(link, stations, lambda s: s.I_p, rho) @ fields[R_X]
+    first = float(stations.x @ (weights[0] @ one))
+    symmetric = 0.5 * (S_bar_kl + S_bar_kl.transpose(1, 0, 3, 2))
+    return Invariants(
+        mass=float(one @ (weights[0] @ one)),
+        first_moment=np.array([first, 0.0, 0.0]),
+        second_moment=second_moment,
+        S_bar=S_bar,
+        I_bar=I_bar,
+        S_bar_kl=symmetric,
+    )
+
+
+def _weighted(link: BeamLink, stations: StationSpace, moment: Property, rho: float) -> sp.csr_matrix:
+    """(k, k): ∫ρ·moment·a b dx of two fields a, b at the stations."""
+    a, b = ufl.TrialFunction(stations.space), ufl.TestFunction(stations.space)
+    weight = cellwise(link, stations.space.mesh, lambda s: rho * moment(s))
+    return stations.matrix(weight * a * b * ufl.dx)
+
+
+def geometric_stiffness(
+    link: BeamLink, stations: StationSpace, fields: Floats, interfaces: dict[str, float]
+) -> dict[str, Floats]:
+    """(n, n) ∫N(x) (v'v' + w'w') dx of the axial force N that each unit load causes, positive in tension.
+
+    Loads (formulation.md, section 3) on the undeformed link, held axially at its root: inertia of unit frame
+    acceleration `t_x` … `t_z`, of unit angular acceleration `r_x` …, of unit products of angular velocity `omega_xx` …;
+    `force/NAME/x` … and `moment/NAME/x` …. Those that load a straight axis across, or twist it, leave N = 0: zero.
+
+    Args:
+        link: for density and sections.
+        stations: k of them; every interface is a vertex of their mesh.
+        fields: (6, k, n).
+        interfaces: position of each in m.
+    """
+    n = fields.shape[2]
+    names = [f"{kind}_{axis}" for kind in "tr" for axis in "xyz"]
+    names += [f"omega_{pair}" for pair in ("xx", "yy", "zz", "xy", "xz", "yz")]
+    names += [f"{kind}/{name}/{axis}" for name in interfaces for kind in ("force", "moment") for axis in "xyz"]
+    matrices = {name: np.zeros((n, n)) for name in names}
+    # D'Alembert: a frame that accelerates along x pushes the link together; spinning about y or z pulls it apart.
+    matrices["t_x"] = _stiffness_of(stations, fields, lambda x, _: -_mass_beyond(link, x, 0))
+    matrices["omega_yy"] = _stiffness_of(stations, fields, lambda x, _: _mass_beyond(link, x, 1))
+    matrices["omega_zz"] = matrices["omega_yy"].copy()
+    for name, position in interfaces.items():
+        if position > 0:
+            matrices[f"force/{name}/x"] = _stiffness_of(stations, fields, partial(_up_to, position))
+    return matrices
+
+
+def _stiffness_of(stations: StationSpace, fields: Floats, axial_force: AxialForce) -> Floats:
+    """∫N (v'v' + w'w') dx for N = axial_force(x, middle of the cell of x), at most quadratic in each cell."""
+    mesh = stations.space.mesh
+    N = fem.Function(function_space(mesh, "P", 2, discontinuous=True))
+    dofs = cell_dofs(N.function_space)
+    x = N.function_space.tabulate_dof_coordinates()[dofs, 0]
+    middles = np.broadcast_to(cell_vertices(mesh).mean(axis=1)[:, None], x.shape)
+    N.x.array[dofs] = axial_force(x, middles)
+    a, b = ufl.TrialFunction(stations.space), ufl.TestFunction(stations.space)
+    G = stations.matrix(N * a.dx(0) * b.dx(0) * ufl.dx)
+    total = sum(fields[row].T @ (G @ fields[row]) for row in (U_Y, U_Z))
+    return np.asarray(0.5 * (total + total.T))
+
+
+def _up_to(position: float, x: Floats, middle: Floats) -> Floats:
+    """1 in the cells between the root and `position`, 0 beyond."""
+    return np.where(middle < position, 1.0, 0.0)
+
+
+def _mass_beyond(link: BeamLink, x: Floats, power: int) -> Floats:
+    """∫_x^L ρA sᵖ ds for each x, in kg·mᵖ."""
+    total = np.zeros_like(x)
+    points = link.geometry.breakpoints
+    for start, end, section in zip(points[:-1], points[1:], link.sections, strict=True):
+        lower = np.clip(x, start, end)
+        total += link.material.density * section.area * (end ** (power + 1) - lower ** (power + 1)) / (power + 1)
+    return total

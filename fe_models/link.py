@@ -1,0 +1,135 @@
+"""Stage 1 as a command: link file in, modal body file out, and nothing computed that is already there.
+
+Importing this loads no finite element library; they are loaded where a link must be computed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+from ..errors import FfrobotError, InputError
+from .link_file import BeamLink, read_link
+from .modal_body import ModalBody
+from .modal_body_file import FORMAT_VERSION, is_modal_body_file, read_modal_body, write_modal_body
+
+Progress = Callable[[str], None]
+
+# To be raised whenever the same link file gives other numbers than before.
+ALGORITHM_VERSION = 1
+
+
+@dataclass(frozen=True)
+class LinkOutcome:
+    """What stage 1 did.
+
+    Attributes:
+        path: the modal body file.
+        body: what it holds.
+        computed: False where it was up to date.
+        seconds: of wall time, reading and writing included.
+    """
+
+    path: Path
+    body: ModalBody
+    computed: bool
+    seconds: float
+
+
+def input_hash(link: BeamLink) -> str:
+    """SHA-256 of what a modal body depends on: the link as checked, defaults filled in, and the program's algorithm.
+
+    Comments, the order of keys, 1 for 1.0 and dates of files change nothing.
+    """
+    content = {"format": FORMAT_VERSION, "algorithm": ALGORITHM_VERSION, "link": link.model_dump(mode="json")}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def make_link(
+    link_path: Path, output: Path | None = None, force: bool = False, progress: Progress | None = None
+) -> LinkOutcome:
+    """Bring the modal body file of a link up to date.
+
+    Args:
+        link_path: the link file.
+        output: where to write; LINK.h5 beside the link file if None.
+        force: compute and overwrite in any case.
+        progress: is told what is being done, one line a step.
+
+    Raises:
+        InputError: the link file is wrong, or `output` is some other file that would be lost.
+        SolveError: the modes cannot be computed, or the file cannot be written.
+    """
+    start = time.perf_counter()
+    link = read_link(link_path)
+    path = output if output is not None else link_path.with_suffix(".h5")
+    digest = input_hash(link)
+    if not force and (body := _up_to_date(path, digest)) is not None:
+        return LinkOutcome(path, body, False, time.perf_counter() - start)
+    _check_target(path, force)
+    return _compute(link, link_path, path, digest, start, progress)
+
+
+def cached_modal_body(link_path: Path, progress: Progress | None = None) -> LinkOutcome:
+    """The modal body of a link: from an up-to-date LINK.h5 beside it, else from the user's cache, else computed.
+
+    Cache entries are named by content: LINK's hash under `ffrobot/links` in the XDG cache folder. A damaged entry is
+    computed again.
+
+    Raises:
+        InputError: the link file is wrong.
+        SolveError: the modes cannot be computed, or the cache cannot be written.
+    """
+    start = time.perf_counter()
+    link = read_link(link_path)
+    digest = input_hash(link)
+    path = user_cache_path("ffrobot") / "links" / f"{digest}.h5"
+    for candidate in (link_path.with_suffix(".h5"), path):
+        if (body := _up_to_date(candidate, digest)) is not None:
+            return LinkOutcome(candidate, body, False, time.perf_counter() - start)
+    return _compute(link, link_path, path, digest, start, progress, make_folder=True)
+
+
+def _compute(
+    link: BeamLink,
+    link_path: Path,
+    path: Path,
+    digest: str,
+    start: float,
+    progress: Progress | None,
+    make_folder: bool = False,
+) -> LinkOutcome:
+    from .beam_link import beam_modal_body
+
+    body = beam_modal_body(link, link_path, digest, progress or _silent)
+    write_modal_body(path, body, make_folder=make_folder)
+    return LinkOutcome(path, body, True, time.perf_counter() - start)
+
+
+def _up_to_date(path: Path, digest: str) -> ModalBody | None:
+    """The modal body in `path` if it is sound and made from the same input."""
+    try:
+        body = read_modal_body(path)
+    except FfrobotError:
+        return None
+    return body if body.input_hash == digest else None
+
+
+def _check_target(path: Path, force: bool) -> None:
+    """Refuse, before any work, an output that cannot be written or that would overwrite some other file."""
+    if path.is_dir():
+        raise InputError(f"{path}: output: expected a file name, found a folder")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
+    if path.exists() and not force and not is_modal_body_file(path):
+        raise InputError(f"{path}: output: a file that is not a modal body is there; use another name or --force")
+
+
+def _silent(_: str) -> None:
+    pass

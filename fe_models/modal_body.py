@@ -1,0 +1,309 @@
+"""The modal body: all that the dynamics knows of a flexible link. NumPy only; no finite element library is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# m_ff = I and the identities between invariants must hold to this.
+IDENTITY_TOLERANCE = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """What the modes do at one point of the axis, in the link's frame.
+
+    Attributes:
+        position: (3,) in m, undeformed.
+        translation: (3, n) displacement of mode l in column l, in m per unit of its modal coordinate.
+        rotation: (3, n) small rotation of the cross section, in rad per unit of modal coordinate.
+    """
+
+    position: Floats
+    translation: Floats
+    rotation: Floats
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """Points along the axis, ascending in x, at which the modes are known.
+
+    Attributes:
+        position: (k, 3) in m.
+        translation: (k, 3, n), as in `Interface`.
+        rotation: (k, 3, n), as in `Interface`.
+        height: (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1.
+        element: (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known.
+    """
+
+    position: Floats
+    translation: Floats
+    rotation: Floats
+    height: Floats
+    element: Integers | None = None
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class PictureMesh:
+    """What a picture of the link needs.
+
+    Attributes:
+        points: (p, 3) in m.
+        cells: (c, v) points of each cell.
+        mode_shapes: (p, 3, n) displacement per unit of modal coordinate.
+    """
+
+    points: Floats
+    cells: Integers
+    mode_shapes: Floats
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class ModalBody:
+    """A flexible link in mass-orthonormal modal coordinates; immutable, checked when made. SI units, the link's frame.
+
+    Symbols: formulation.md, section 3 (Shabana, Dynamics of Multibody Systems, ch. 5); n modes.
+
+    Attributes:
+        name: of the link.
+        kind: "beam" or "solid".
+        reference_condition: "cantilever" or "simply-supported".
+        length: in m.
+        mass: m in kg.
+        first_moment: (3,) ∫ρ x dV in kg·m.
+        second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
+        frequency: (n,) in Hz.
+        stiffness: (n, n) K_ff = diag(ω²).
+        modal_mass: (n, n) m_ff = I to 1e-8.
+        damping_ratio: (n,) ζ.
+        family: n names.
+        S_bar: (3, n) ∫ρ Φ dV.
+        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
+        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
+        geometric_stiffness: (n, n) for each unit load, by its name.
+        interfaces: by name; `root` and `tip` always.
+        stations: along the axis.
+        mesh: for pictures.
+        input_hash: of the link file's content.
+        ffrobot_version: that made it.
+
+    Raises:
+        InputError: shapes do not fit together, something is not finite, or an identity does not hold.
+    """
+
+    name: str
+    kind: str
+    reference_condition: str
+    length: float
+    mass: float
+    first_moment: Floats
+    second_moment: Floats
+    frequency: Floats
+    stiffness: Floats
+    modal_mass: Floats
+    damping_ratio: Floats
+    family: tuple[str, ...]
+    S_bar: Floats
+    I_bar: Floats
+    S_bar_kl: Floats
+    interfaces: Mapping[str, Interface]
+    stations: Stations
+    mesh: PictureMesh
+    geometric_stiffness: Mapping[str, Floats] = field(default_factory=dict)
+    input_hash: str = ""
+    ffrobot_version: str = ""
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+        _check(self)
+
+    @property
+    def mode_count(self) -> int:
+        """Number of modes, n."""
+        return len(self.family)
+
+    def interpolate(self, x: float) -> Interface:
+        """What the modes do at `x` (m from the root) on the axis.
+
+        Where the stations of each element are known (files made here) all six components are the cubic through the
+        four stations of the element: exactly the finite element functions of a beam, of either theory. Where they are
+        not, y and z motion is the cubic Hermite polynomial of (translation, rotation) between two stations, exact for
+        Euler–Bernoulli, and axial motion and twist are the cubic through the four nearest stations.
+
+        Raises:
+            InputError: x is outside the body.
+        """
+        positions = self.stations.position[:, 0]
+        slack = 1e-9 * self.length
+        if not positions[0] - slack <= x <= positions[-1] + slack:
+            raise InputError(
+                f"modal body {self.name}: x: expected {positions[0]:g} … {positions[-1]:g} m, the body's, found {x:g} m"
+            )
+        x = float(np.clip(x, positions[0], positions[-1]))
+        element = self.stations.element
+        if element is None:
+            return _hermite(self.stations, x)
+        index = np.clip(np.searchsorted(positions[element[:, 0]], x, side="right") - 1, 0, len(element) - 1)
+        return _through(self.stations, element[index], x)
+
+
+def _through(stations: Stations, members: Integers, x: float) -> Interface:
+    """The polynomial through the stations `members`, at x (Lagrange)."""
+    nodes = stations.position[members, 0]
+    weights = np.array(
+        [np.prod((x - np.delete(nodes, i)) / (node - np.delete(nodes, i))) for i, node in enumerate(nodes)]
+    )
+    return Interface(
+        weights @ stations.position[members],
+        np.einsum("i,ikn->kn", weights, stations.translation[members]),
+        np.einsum("i,ikn->kn", weights, stations.rotation[members]),
+    )
+
+
+def _hermite(stations: Stations, x: float) -> Interface:
+    """Cubic Hermite on v with v' = rotation_z and on w with w' = −rotation_y; the rest through four stations."""
+    positions = stations.position[:, 0]
+    k = positions.size
+    i = int(np.clip(np.searchsorted(positions, x, side="right") - 1, 0, k - 2))
+    near = _through(
+        stations, np.arange(np.clip(i - 1, 0, max(k - 4, 0)), min(np.clip(i - 1, 0, max(k - 4, 0)) + 4, k)), x
+    )
+    h = positions[i + 1] - positions[i]
+    s = (x - positions[i]) / h
+    translation, rotation = near.translation.copy(), near.rotation.copy()
+    for axis, turn, sign in ((1, 2, 1.0), (2, 1, -1.0)):
+        values = stations.translation[i : i + 2, axis]
+        slopes = sign * h * stations.rotation[i : i + 2, turn]
+        rise = values[1] - values[0]
+        translation[axis] = values[0] + rise * s**2 * (3 - 2 * s) + s * (1 - s) * ((1 - s) * slopes[0] - s * slopes[1])
+        derivative = 6 * s * (1 - s) * rise + (1 - s) * (1 - 3 * s) * slopes[0] + s * (3 * s - 2) * slopes[1]
+        rotation[turn] = sign * derivative / h
+    return Interface(near.position, translation, rotation)
+
+
+def _freeze(record: DataclassInstance) -> None:
+    """Own read-only copies of all arrays of a frozen dataclass, and read-only views of its mappings."""
+    for item in fields(record):
+        value = getattr(record, item.name)
+        if isinstance(value, Mapping):
+            value = MappingProxyType({key: _frozen(entry) for key, entry in value.items()})
+        object.__setattr__(record, item.name, _frozen(value))
+
+
+def _frozen(value: object) -> object:
+    if not isinstance(value, np.ndarray):
+        return value
+    if value.ndim == 0:
+        return float(value)
+    copy = np.array(value, dtype=np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64)
+    copy.setflags(write=False)
+    return copy
+
+
+def _check(body: ModalBody) -> None:
+    """All that must hold of a modal body, in one place."""
+    n, k, p = body.mode_count, body.stations.position.shape[0], body.mesh.points.shape[0]
+    for name, array, shape in _expected_shapes(body, n, k, p):
+        if np.shape(array) != shape:
+            _fail(body, f"{name}: expected shape {shape}, found {np.shape(array)}")
+        if not np.all(np.isfinite(array)):
+            _fail(body, f"{name}: expected finite numbers, found NaN or infinity")
+    for name in ("root", "tip"):
+        if name not in body.interfaces:
+            _fail(body, f"interfaces: expected one named {name}, found {', '.join(body.interfaces) or 'none'}")
+    for name, value in (("length", body.length), ("mass", body.mass)):
+        if not value > 0:
+            _fail(body, f"{name}: expected a positive number, found {value}")
+    if k < 2 or np.any(np.diff(body.stations.position[:, 0]) <= 0):
+        _fail(body, "stations.position: expected at least two, ascending in x")
+    element = body.stations.element
+    if element is not None and not _is_chain(element, k):
+        _fail(body, "stations.element: expected four ascending stations for each element, from the first to the last")
+    if np.any(body.frequency <= 0):
+        _fail(body, "frequency: expected positive numbers")
+    if np.any(body.damping_ratio < 0):
+        _fail(body, "damping_ratio: expected numbers not below 0")
+    _check_identities(body, np.eye(n))
+
+
+def _check_identities(body: ModalBody, unit: Floats) -> None:
+    squares = (2 * np.pi * body.frequency) ** 2
+    total = body.S_bar_kl[0, 0] + body.S_bar_kl[1, 1] + body.S_bar_kl[2, 2]
+    identities = [
+        ("second_moment", "symmetric", body.second_moment, body.second_moment.T),
+        ("stiffness", "diag((2π frequency)²)", body.stiffness, np.diag(squares)),
+        ("modal_mass", "the identity", body.modal_mass, unit),
+        ("S_bar_kl", "S_bar_kl[l, k] = S_bar_kl[k, l]ᵀ", body.S_bar_kl, body.S_bar_kl.transpose(1, 0, 3, 2)),
+        ("S_bar_kl", "a sum S_bar_11 + S_bar_22 + S_bar_33 equal to modal_mass", total, body.modal_mass),
+        *((f"geometric_stiffness/{k}", "symmetric", v, v.T) for k, v in body.geometric_stiffness.items()),
+    ]
+    for name, expected, left, right in identities:
+        error = np.max(np.abs(left - right), initial=0.0)
+        if error > IDENTITY_TOLERANCE * np.max(np.abs(right), initial=0.0):
+            _fail(body, f"{name}: expected {expected} to {IDENTITY_TOLERANCE:g}, found a difference of {error:.2g}")
+
+
+def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str, Any, tuple[int, ...]]]:
+    shapes: list[tuple[str, Any, tuple[int, ...]]] = [
+        ("length", body.length, ()),
+        ("mass", body.mass, ()),
+        ("first_moment", body.first_moment, (3,)),
+        ("second_moment", body.second_moment, (3, 3)),
+        ("frequency", body.frequency, (n,)),
+        ("stiffness", body.stiffness, (n, n)),
+        ("modal_mass", body.modal_mass, (n, n)),
+        ("damping_ratio", body.damping_ratio, (n,)),
+        ("S_bar", body.S_bar, (3, n)),
+        ("I_bar", body.I_bar, (3, 3, n)),
+        ("S_bar_kl", body.S_bar_kl, (3, 3, n, n)),
+        ("stations.position", body.stations.position, (k, 3)),
+        ("stations.translation", body.stations.translation, (k, 3, n)),
+        ("stations.rotation", body.stations.rotation, (k, 3, n)),
+        ("stations.height", body.stations.height, (k,)),
+        ("mesh.points", body.mesh.points, (p, 3)),
+        ("mesh.mode_shapes", body.mesh.mode_shapes, (p, 3, n)),
+    ]
+    shapes += [(f"geometric_stiffness/{load}", matrix, (n, n)) for load, matrix in body.geometric_stiffness.items()]
+    for name, interface in body.interfaces.items():
+        shapes.append((f"interfaces/{name}/position", interface.position, (3,)))
+        shapes.append((f"interfaces/{name}/translation", interface.translation, (3, n)))
+        shapes.append((f"interfaces/{name}/rotation", interface.rotation, (3, n)))
+    return shapes
+
+
+def _is_chain(element: Integers, stations: int) -> bool:
+    """Whether the elements (e, 4) cover all intervals between stations, one after the other."""
+    return (
+        element.ndim == 2
+        and element.shape[0] > 0
+        and element.shape[1] == 4
+        and bool(np.all(np.diff(element, axis=1) > 0))
+        and bool(np.all(element[1:, 0] == element[:-1, 3]))
+        and bool(element[0, 0] == 0 and element[-1, 3] == stations - 1)
+    )
+
+
+def _fail(body: ModalBody, message: str) -> None:
+    raise InputError(f"modal body {body.name}: {message}")

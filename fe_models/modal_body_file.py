@@ -1,0 +1,189 @@
+"""Modal bodies in HDF5 files (interfaces.md, "Modal body file"); needs h5py, no finite element library."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, SolveError
+from .modal_body import Interface, ModalBody, PictureMesh, Stations
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+FORMAT = "ffrobot-modal-body"
+FORMAT_VERSION = 1
+
+_ATTRIBUTES = ("name", "kind", "reference_condition", "ffrobot_version", "input_hash")
+# Field of ModalBody → dataset.
+_DATASETS = {
+    "length": "length",
+    "mass": "mass",
+    "first_moment": "first_moment",
+    "second_moment": "second_moment",
+    "frequency": "modes/frequency",
+    "stiffness": "modes/stiffness",
+    "modal_mass": "modes/mass",
+    "damping_ratio": "modes/damping_ratio",
+    "S_bar": "invariants/S_bar",
+    "I_bar": "invariants/I_bar",
+    "S_bar_kl": "invariants/S_bar_kl",
+}
+_UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": "kg m2", "modes/frequency": "Hz"}
+
+
+def write_modal_body(path: Path, body: ModalBody, *, make_folder: bool = False) -> None:
+    """Write `body` to `path`, replacing what is there only once the new file is complete.
+
+    The HDF5 image is made in memory: a full disk then is an ordinary failed write, which HDF5 itself does not survive.
+
+    Raises:
+        SolveError: the file cannot be written; names file and reason.
+    """
+    image = _image(body)
+    temporary: Path | None = None
+    try:
+        if make_folder:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
+        temporary = Path(name)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(image)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.chmod(0o666 & ~_umask())  # mkstemp's own mode is private
+        temporary.replace(path)
+    except OSError as error:
+        if temporary is not None:
+            with suppress(OSError):
+                temporary.unlink()
+        raise SolveError(f"{path}: cannot write the modal body file: {error.strerror or error}") from None
+
+
+def read_modal_body(path: Path) -> ModalBody:
+    """Read and check the modal body file at `path`.
+
+    Raises:
+        InputError: there is no such file, it is not a modal body file, is damaged or newer than this program, or what
+            it holds is not a valid modal body; names the file and what is wrong.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: modal body file not found")
+    try:
+        with h5py.File(path, "r") as file:
+            _check_format(path, file.attrs)
+            return _body(file)
+    except InputError as error:
+        raise InputError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from None
+    except KeyError as error:
+        raise InputError(f"{path}: damaged modal body file: {error.args[0]}") from None
+    except (OSError, RuntimeError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: not a modal body file, or a damaged one: {error}") from None
+
+
+def is_modal_body_file(path: Path) -> bool:
+    """Whether `path` holds a modal body, or an HDF5 file too damaged to tell: what may be overwritten unasked."""
+    try:
+        with path.open("rb") as stream:
+            if stream.read(8) != b"\x89HDF\r\n\x1a\n":
+                return False
+        with h5py.File(path, "r") as file:
+            return bool(file.attrs.get("format") == FORMAT)
+    except OSError:
+        return True
+
+
+def _check_format(path: Path, attributes: h5py.AttributeManager) -> None:
+    if attributes.get("format") != FORMAT:
+        raise InputError(f'{path}: expected format "{FORMAT}", found {attributes.get("format", "no such attribute")!r}')
+    version = attributes["format_version"]
+    if not isinstance(version, int | np.integer) or version < 1:
+        raise InputError(f"{path}: format_version: expected a whole number, found {version!r}")
+    if version > FORMAT_VERSION:
+        raise InputError(
+            f"{path}: written by a newer ffrobot ({attributes.get('ffrobot_version', 'unknown')}): "
+            f"format_version: expected at most {FORMAT_VERSION}, found {version}"
+        )
+
+
+def _body(file: h5py.File) -> ModalBody:
+    values: dict[str, Any] = {name: _text(file.attrs[name]) for name in _ATTRIBUTES}
+    values |= {name: _array(file, dataset) for name, dataset in _DATASETS.items()}
+    stations, interfaces = file["stations"], file["interfaces"]
+    return ModalBody(
+        **values,
+        family=tuple(_text(name) for name in file["modes/family"][()]),
+        geometric_stiffness=_geometric_stiffness(file),
+        interfaces={name: Interface(**_arrays(interfaces[name], Interface)) for name in interfaces},
+        stations=Stations(**_arrays(stations, Stations)),
+        mesh=PictureMesh(**_arrays(file["mesh"], PictureMesh)),
+    )
+
+
+def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any]:
+    """The datasets of `group` that are fields of `record`; those without default must be there."""
+    required = {item.name: item.default is MISSING for item in fields(record)}
+    return {name: group[name][()] for name, needed in required.items() if needed or name in group}
+
+
+def _geometric_stiffness(file: h5py.File) -> dict[str, NDArray[np.float64]]:
+    found: dict[str, NDArray[np.float64]] = {}
+
+    def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
+        if isinstance(item, h5py.Dataset):
+            found[name] = np.asarray(item[()], dtype=np.float64)
+
+    if "geometric_stiffness" in file:
+        file["geometric_stiffness"].visititems(collect)
+    return found
+
+
+def _array(group: h5py.Group, name: str) -> NDArray[np.float64]:
+    return np.asarray(group[name][()], dtype=np.float64)
+
+
+def _text(value: object) -> str:
+    return value.decode("utf-8") if isinstance(value, bytes) else str(value)
+
+
+def _image(body: ModalBody) -> bytes:
+    """The HDF5 file as bytes; the same body always gives the same bytes."""
+    with h5py.File("modal body", "w", driver="core", backing_store=False) as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = FORMAT_VERSION
+        for name in _ATTRIBUTES:
+            file.attrs[name] = getattr(body, name)
+        for name, dataset in _DATASETS.items():
+            file[dataset] = getattr(body, name)
+        for dataset, unit in _UNITS.items():
+            file[dataset].attrs["unit"] = unit
+        file["modes"].create_dataset("family", data=list(body.family), dtype=h5py.string_dtype())
+        _write_arrays(file.create_group("geometric_stiffness"), body.geometric_stiffness)
+        for name, interface in body.interfaces.items():
+            _write_arrays(file.create_group(f"interfaces/{name}"), vars(interface))
+        _write_arrays(file.create_group("stations"), vars(body.stations))
+        _write_arrays(file.create_group("mesh"), vars(body.mesh))
+        file.flush()
+        image: bytes = file.id.get_file_image()
+        return image
+
+
+def _write_arrays(group: h5py.Group, arrays: Mapping[str, NDArray[np.generic] | None]) -> None:
+    for name, array in arrays.items():
+        if array is not None:
+            group[name] = array
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

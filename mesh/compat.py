@@ -1,0 +1,125 @@
+"""The few calls that differ between dolfinx 0.5 (Debian 12) and 0.9 (Debian 13); all else is written once.
+
+Nothing outside this module asks for a dolfinx version. Importing it loads dolfinx.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Literal
+
+import numpy as np
+import petsc4py
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import SolveError
+
+# Before dolfinx does it: PETSc's own signal handlers would answer Ctrl-C or a closed pipe with a page on debuggers.
+petsc4py.init(["ffrobot", "-no_signal_handler"])
+
+import basix  # noqa: E402
+import dolfinx  # noqa: E402
+import ufl  # noqa: E402
+from dolfinx import fem  # noqa: E402
+from dolfinx.fem import FunctionSpace  # noqa: E402
+from dolfinx.mesh import Mesh, create_mesh  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+
+_OLD = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 7)
+
+if _OLD:
+    from basix import ufl_wrapper as basix_ufl
+else:
+    from basix import ufl as basix_ufl
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+ElementName = Literal["Hermite", "P"]
+
+_INTERVAL = basix.CellType.interval
+_FAMILIES = {"Hermite": basix.ElementFamily.Hermite, "P": basix.ElementFamily.P}
+
+
+def basix_element(family: ElementName, degree: int) -> basix.finite_element.FiniteElement:
+    """Basix element on the reference interval [0, 1]; Lagrange ("P") with Gauss–Lobatto–Legendre points."""
+    if family == "P":
+        return basix.create_element(_FAMILIES["P"], _INTERVAL, degree, basix.LagrangeVariant.gll_warped)
+    return basix.create_element(_FAMILIES[family], _INTERVAL, degree)
+
+
+def function_space(mesh: Mesh, family: ElementName, degree: int, *, discontinuous: bool = False) -> FunctionSpace:
+    """Scalar space on an interval mesh, with the same basis functions as `basix_element(family, degree)`."""
+    options: dict[str, Any] = {"discontinuous": discontinuous}
+    if family == "P":
+        options["lagrange_variant"] = basix.LagrangeVariant.gll_warped
+    with _compiling():
+        if _OLD:
+            return fem.FunctionSpace(mesh, basix_ufl.create_element(_FAMILIES[family], _INTERVAL, degree, **options))
+        return fem.functionspace(mesh, basix_ufl.element(_FAMILIES[family], _INTERVAL, degree, **options))
+
+
+def create_interval_mesh(points: Floats, cells: Integers) -> Mesh:
+    """Serial dolfinx mesh of intervals on a line.
+
+    Args:
+        points: (m,) coordinates of the vertices.
+        cells: (c, 2) vertices of each cell; either order.
+    """
+    if _OLD:
+        domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell("interval", geometric_dimension=1), 1))
+    else:
+        domain = ufl.Mesh(basix_ufl.element("Lagrange", "interval", 1, shape=(1,)))
+    with _compiling():
+        return create_mesh(MPI.COMM_SELF, np.asarray(cells, dtype=np.int64), points.reshape(-1, 1), domain)
+
+
+def cell_vertices(mesh: Mesh) -> Floats:
+    """(c, 2) coordinates of each cell's vertices, in the order of the reference cell."""
+    dofmap = mesh.geometry.dofmap
+    corners = dofmap.array.reshape(-1, 2) if _OLD else np.asarray(dofmap)
+    vertices: Floats = mesh.geometry.x[corners, 0]
+    return vertices
+
+
+def cell_dofs(space: FunctionSpace) -> Integers:
+    """(c, d) degrees of freedom of each cell, in the order of `basix_element`'s basis."""
+    dofs = space.dofmap.list
+    cells = space.mesh.topology.index_map(1).size_local
+    return np.asarray(dofs.array if _OLD else dofs, dtype=np.int64).reshape(cells, -1)
+
+
+def assemble_matrix(form: ufl.Form) -> sp.csr_matrix:
+    """Assemble a bilinear form, without boundary conditions, to (test, trial) dofs."""
+    with _compiling():
+        compiled = fem.form(form)
+    matrix = fem.assemble_matrix(compiled)
+    if _OLD:
+        matrix.finalize()
+    else:
+        matrix.scatter_reverse()
+    test, trial = (argument.ufl_function_space().dofmap.index_map.size_local for argument in form.arguments())
+    # Copies: dolfinx owns the arrays that it shows.
+    return sp.csr_matrix((matrix.data.copy(), matrix.indices.copy(), matrix.indptr.copy()), shape=(test, trial))
+
+
+@contextmanager
+def _compiling() -> Iterator[None]:
+    """FFCx compiles what it does not find in its cache (`fenics` in the XDG cache folder): mute its and gcc's log.
+
+    Raises:
+        SolveError: another run holds the cache's lock, or once died with it.
+    """
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
+    try:
+        yield
+    except TimeoutError:
+        raise SolveError(
+            "compiling the finite element forms: another run seems to be compiling the same form, or was interrupted "
+            "while it did; wait for it, or delete the folder `fenics` in your cache folder (~/.cache/fenics)"
+        ) from None
+    finally:
+        logging.disable(before)
