@@ -1,0 +1,47 @@
+"""Where the nodes of a beam lie, and the mesh on them."""
+
+import numpy as np
+import pytest
+from ffrobot.mesh.compat import cell_vertices
+from ffrobot.mesh.interval import cells_containing, graded_nodes, interval_mesh, with_points
+
+
+def test_a_uniform_mesh_is_uniform():
+    np.testing.assert_allclose(graded_nodes([0.0, 2.0], 7), np.linspace(0, 2, 8), atol=1e-15)
+
+
+def test_steps_are_nodes_and_a_uniform_mesh_that_meets_them_is_kept():
+    nodes = graded_nodes([0.0, 0.3, 0.4, 1.0], 20)
+    np.testing.assert_allclose(nodes, np.linspace(0, 1, 21), atol=1e-15)
+    assert {0.0, 0.3, 0.4, 1.0} <= set(nodes)
+
+
+def test_the_longest_element_is_as_short_as_possible():
+    nodes = graded_nodes([0.0, 0.1, 1.0], 4)
+    np.testing.assert_allclose(nodes, [0.0, 0.1, 0.4, 0.7, 1.0])
+
+
+def test_fewer_elements_than_segments_is_refused():
+    with pytest.raises(ValueError, match="3 segments need at least 3 elements, found 2"):
+        graded_nodes([0.0, 0.3, 0.4, 1.0], 2)
+
+
+def test_points_are_added_once():
+    nodes = with_points(np.array([0.0, 0.5, 1.0]), [0.5, 0.5 + 1e-12, 0.25, 1.0])
+    np.testing.assert_array_equal(nodes, [0.0, 0.25, 0.5, 1.0])
+
+
+@pytest.mark.parametrize("flipped", [(), (0, 3, 4)])
+def test_points_are_found_in_their_cells(flipped):
+    nodes = np.array([0.0, 0.1, 0.35, 0.6, 0.62, 1.0])
+    mesh = interval_mesh(nodes, flipped)
+    points = np.concatenate([nodes, np.linspace(0, 1, 57)])
+    cells, X = cells_containing(mesh, points)
+    vertices = cell_vertices(mesh)[cells]
+    assert np.all((X >= 0) & (X <= 1))
+    np.testing.assert_allclose(vertices[:, 0] + X * (vertices[:, 1] - vertices[:, 0]), points, atol=1e-15)
+
+
+def test_flipped_cells_run_backwards():
+    vertices = cell_vertices(interval_mesh(np.linspace(0, 1, 6), flipped=[2]))
+    assert np.sum(vertices[:, 1] < vertices[:, 0]) == 1
