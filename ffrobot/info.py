@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from io import StringIO
 from pathlib import Path
 
@@ -53,13 +54,11 @@ def _modal_body(body: ModalBody) -> str:
 
 def _results(file: h5py.File) -> str:
     lines = [f"results of scene {file.attrs['name']!r}, made by ffrobot {file.attrs['ffrobot_version']}"]
-    for name, body in file["modal_bodies"].items():
-        lines.append(f"body {name}: {body.attrs['path'] or 'rigid'} {body.attrs['sha256'][:12]}".rstrip())
+    for name, body in json.loads(file.attrs["modal_bodies"]).items():
+        lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
     analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "wall (s)")
     datasets = Table("dataset", "shape")
     for name, group in file.items():
-        if name == "modal_bodies":
-            continue
         time, attributes = group["time"], group.attrs
         analyses.add_row(
             name, attributes["kind"], attributes["status"], f"{len(time)}", f"{time[-1]:g}", f"{attributes['steps']}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import h5py
@@ -35,11 +36,7 @@ def write_results(solution: Solution, path: Path) -> None:
         file.attrs["name"] = solution.scene.name
         file.attrs["scene"] = solution.scene.text
         file.attrs["skipped"] = list(solution.skipped)
-        for name, body in solution.bodies.items():
-            group = file.create_group(f"modal_bodies/{name}")
-            group.attrs["sha256"] = body.file_hash
-            group.attrs["path"] = str(body.path or "")
-            group.attrs["input_hash"] = body.modal.input_hash if body.modal else ""
+        file.attrs["modal_bodies"] = json.dumps(_modal_files(solution))
         for name, outcome in solution.outcomes.items():
             group = file.create_group(name)
             _write_attributes(group, outcome)
@@ -50,6 +47,15 @@ def write_results(solution: Solution, path: Path) -> None:
         file.flush()
         image: bytes = file.id.get_file_image()
     write_atomically(path, image, "results file")
+
+
+def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
+    """Path and hashes of the modal body file behind each flexible body."""
+    return {
+        name: {"path": str(body.path), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
+        for name, body in solution.bodies.items()
+        if body.modal is not None
+    }
 
 
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
