@@ -125,7 +125,7 @@ def _element_boundaries(link: BeamLink) -> Floats:
 
 def _wanted(link: BeamLink, models: dict[Family, FamilyModel], path: Path) -> Sequence[int]:
     """Numbers of the modes asked for, from 1, ascending."""
-    wanted = link.modes.indices or list(range(1, (link.modes.count or 0) + 1))
+    wanted = link.modes.indices or range(1, (link.modes.count or 0) + 1)
     available = sum(model.K.shape[0] for model in models.values())
     if wanted[-1] > available:
         key = "count" if link.modes.indices is None else "indices"
