@@ -88,7 +88,7 @@ def select(models: dict[Family, FamilyModel], wanted: Sequence[int]) -> Modes:
     candidates = []
     for number, (family, model) in enumerate(models.items()):
         count = min(wanted[-1], model.K.shape[0])
-        omega2, X = lowest_modes(model.K, model.M, count)
+        omega2, X = lowest_modes(model.K, model.M, model.strain, count)
         candidates += [(float(f"{omega2[k]:.9e}"), number, family, omega2[k], X[:, k]) for k in range(count)]
     candidates.sort(key=lambda candidate: candidate[:2])
     chosen = [candidates[index - 1] for index in wanted]

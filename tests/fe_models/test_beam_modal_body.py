@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from ffrobot.fe_models.link import make_link
 
-from ffrobot.errors import InputError
+from ffrobot.errors import InputError, SolveError
 
 STEPPED = """
 [[geometry.segment]]
@@ -234,6 +234,17 @@ def test_geometric_stiffness_of_axial_loads(modal_body):
 def test_more_modes_than_available(link_file):
     path = link_file(elements=4, count=9)
     with pytest.raises(InputError, match=r"modes\.count: expected at most 8.*found 9"):
+        make_link(path)
+    assert not path.with_suffix(".h5").exists()
+
+
+@pytest.mark.parametrize(
+    "change", [("2.068427e11", "1e300"), ("7850.0", "1e-320"), ("length = 1.0", "length = 1e-200")]
+)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_values_beyond_double_precision(link_file, change):
+    path = link_file(replace=dict([change]))
+    with pytest.raises(SolveError, match="check the units"):
         make_link(path)
     assert not path.with_suffix(".h5").exists()
 
