@@ -27,7 +27,7 @@ class Record(BaseModel):
 R = TypeVar("R", bound=Record)
 
 
-def _existing_file(path: Path, info: ValidationInfo) -> Path:
+def existing_file(path: Path, info: ValidationInfo) -> Path:
     """Resolve `path` against the folder of the input file it is written in, and make sure that it is there."""
     folder: Path = (info.context or {}).get("folder", Path())
     resolved = folder / path
@@ -38,7 +38,7 @@ def _existing_file(path: Path, info: ValidationInfo) -> Path:
     return resolved
 
 
-InputFile = Annotated[Path, AfterValidator(_existing_file)]
+InputFile = Annotated[Path, AfterValidator(existing_file)]
 """A file named by an input file, relative to it; it exists."""
 
 
@@ -88,7 +88,10 @@ def _merge(problems: Sequence[_Problem]) -> list[str]:
         alternatives = expected.setdefault((problem.key, problem.found), [])
         if problem.expected not in alternatives:
             alternatives.append(problem.expected)
-    return [f"{key}: {' or '.join(texts)}{found}" for (key, found), texts in expected.items()]
+    return [
+        f"{key}: {' or '.join(texts).replace(' or expected ', ' or ')}{found}"
+        for (key, found), texts in expected.items()
+    ]
 
 
 _EXPECTED = {
@@ -107,10 +110,10 @@ _EXPECTED = {
     "too_short": "at least {min_length} entries",
     "too_long": "at most {max_length} entries",
     "string_too_short": "text that is not empty",
-    "greater_than": "a number greater than {gt}",
-    "greater_than_equal": "a number of at least {ge}",
-    "less_than": "a number less than {lt}",
-    "less_than_equal": "a number of at most {le}",
+    "greater_than": "a number greater than {gt:g}",
+    "greater_than_equal": "a number of at least {ge:g}",
+    "less_than": "a number less than {lt:g}",
+    "less_than_equal": "a number of at most {le:g}",
     "union_tag_invalid": "one of {expected_tags}",
     "union_tag_not_found": "a table with the key {discriminator}",
 }
@@ -129,13 +132,17 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
             f"expected one of the keys {', '.join(known)}",
             ", found an unknown key" + did_you_mean(str(loc[-1]), known),
         )
+    if kind == "missing" and isinstance(loc[-1], int):
+        return _Problem(key, "expected a list with more entries", f", found {_show(item['input'])}")
     if kind == "missing":
         return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
     found = item["input"]
     if kind == "union_tag_invalid":
         key = f"{key}.{context['discriminator']}".replace("'", "")
         found = context["tag"]
-    expected = _EXPECTED.get(kind, item["msg"].removeprefix("Input should be ")).format_map(context)
+    template = _EXPECTED.get(kind)
+    expected = template.format_map(context) if template else item["msg"].removeprefix("Input should be ")
+    expected = expected.replace("'", '"')  # as TOML writes it
     hint = ""
     if kind in ("literal_error", "union_tag_invalid") and isinstance(found, str):
         choices = context.get("expected") or context.get("expected_tags", "")

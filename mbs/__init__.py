@@ -1,0 +1,1 @@
+"""Stage 2: modal multibody dynamics in the floating frame of reference; loads no finite element library."""

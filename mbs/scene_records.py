@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, PlainValidator, field_validator, model_validator
+from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
-from ..validation import InputFile, Record, quoted
-from .time_functions import TimeFunction, Waypoints, load_waypoints, parse_expression
+from ..validation import InputFile, Record, existing_file, quoted
+from ._core import TimeFunction
+from .time_functions import Waypoints, load_waypoints, parse_expression
 
 GROUND = "ground"
 MAX_OUTPUTS = 10_000_000
+
+T = TypeVar("T")
 
 
 def split_point(reference: str) -> tuple[str, str]:
@@ -46,6 +49,27 @@ def _point(value: str) -> str:
     return value
 
 
+def _side(value: str) -> str:
+    if value != GROUND:
+        split_point(value)
+    return value
+
+
+def _waypoints(value: object, info: ValidationInfo) -> Waypoints:
+    if isinstance(value, Waypoints):
+        return value
+    if not isinstance(value, str):
+        raise ValueError(f"expected the name of a CSV file in quotes, found {value!r}")
+    return load_waypoints(existing_file(Path(value), info))
+
+
+def _not_empty(entries: tuple[T, ...]) -> tuple[T, ...]:
+    # Not a min_length: pydantic would complain about that, too, whenever an entry is wrong.
+    if not entries:
+        raise ValueError("expected at least one entry, found none")
+    return entries
+
+
 def _one_of(record: Record, keys: tuple[str, ...], why: str = "") -> str:
     """The one key of `keys` that is set. Raises `ValueError` when there is none or more than one."""
     found = [key for key in keys if getattr(record, key) is not None]
@@ -64,10 +88,12 @@ def _only(record: Record, subject: str, allowed: tuple[str, ...], optional: tupl
 
 Name = Annotated[str, AfterValidator(_name)]
 PointReference = Annotated[str, AfterValidator(_point)]
+Side = Annotated[str, AfterValidator(_side)]
 Vector2 = tuple[float, float]
 Positive = Annotated[float, Field(gt=0.0)]
 Expression = Annotated[TimeFunction, PlainValidator(_time_function)]
-WaypointTable = Annotated[InputFile, AfterValidator(lambda path: load_waypoints(path))]
+WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints)]
+NotEmpty = AfterValidator(_not_empty)
 
 
 class RigidBody(Record):
@@ -112,7 +138,7 @@ class Joint(Record):
 
     name: Name
     type: Literal["revolute", "prismatic", "weld"]
-    between: tuple[str, str]
+    between: tuple[Side, Side]
     at: Vector2 = (0.0, 0.0)
     axis: Vector2 | None = None
     motor: bool | None = None
@@ -188,7 +214,7 @@ class PztLayout(Record):
 
     body: str
     count: Annotated[int, Field(gt=0)] | None = None
-    centers: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
+    centers: Annotated[tuple[float, ...], NotEmpty] | None = None
     length: Positive
     width: Positive
     thickness: Positive
@@ -321,14 +347,14 @@ class SceneKeys(Record):
     space: Literal["planar", "spatial"] = "planar"
     gravity: Vector2
     motors: Literal["section", "frame"] = "section"
-    body: Annotated[tuple[Body, ...], Field(min_length=1)]
+    body: Annotated[tuple[Body, ...], NotEmpty]
     joint: tuple[Joint, ...] = ()
     trajectory: tuple[Trajectory, ...] = ()
     pzt: tuple[PztLayout, ...] = ()
     load: tuple[Load, ...] = ()
     payload: tuple[Payload, ...] = ()
     initial: Initial = Initial()
-    analysis: Annotated[tuple[Analysis, ...], Field(min_length=1)]
+    analysis: Annotated[tuple[Analysis, ...], NotEmpty]
 
 
 class Scene(SceneKeys):

@@ -88,8 +88,10 @@ def parse_expression(text: str) -> TimeFunction:
         tree = ast.parse(body, mode="eval").body
     except SyntaxError as error:
         raise ExpressionError(text, offset + (error.offset or 1), *_explain(body, error)) from None
-    except (ValueError, MemoryError, RecursionError) as error:
-        raise ExpressionError(text, 1, str(error) or "nested too deeply") from None
+    except ValueError as error:
+        raise ExpressionError(text, 1, str(error)) from None
+    except (MemoryError, RecursionError):
+        raise ExpressionError(text, 1, "nested too deeply") from None
     translation = _Translation(flat, offset)
     if translation.number(tree, 0):
         return TimeFunction.constant(translation.constants[0])
@@ -334,4 +336,5 @@ def check_domain(function: TimeFunction, times: NDArray[np.float64], describe: s
         quantity = ("value", "velocity", "acceleration")[row]
         raise InputError(
             f"{describe}: expected a finite {quantity} during the whole run, found none at t = {times[first]:.9g} s"
+            " (a domain error, an overflow, or a time that the waypoints do not cover)"
         )

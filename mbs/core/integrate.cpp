@@ -7,16 +7,35 @@ namespace ffrobot {
 
 namespace {
 
-// Step control of Hairer, Norsett, Wanner (1993), sec. II.4: elementary, with the usual safety factor and limits.
-constexpr double safety = 0.9, smallest_factor = 0.2, largest_factor = 6.0;
+constexpr double order = Dop853::error_order;
+constexpr double target = 0.4; // of the largest error allowed: leaves room for its scatter from step to step
 constexpr unsigned long steps_between_questions = 1000;
 
-double step_factor(double error) {
-  if (!std::isfinite(error))
-    return smallest_factor;
-  return std::clamp(safety * std::pow(std::max(error, 1e-30), -1.0 / Dop853::error_order), smallest_factor,
-                    largest_factor);
-}
+// Step control by the digital filter H211b, b = 4 (G. Soderlind, ACM Trans. Math. Softw. 29, 2003): the elementary
+// controller rejects every third step where fast vibration makes the error scatter.
+class StepControl {
+public:
+  double after_accepted(double step, double error) {
+    constexpr double b = 4, exponent = 1 / (b * order);
+    error = std::max(error, 1e-12);
+    double factor = std::pow(target / error, exponent);
+    factor *= previous_step_ > 0 ? std::pow(target / previous_error_, exponent) * std::pow(step / previous_step_, -1 / b)
+                                 : factor;
+    previous_step_ = step;
+    previous_error_ = error;
+    return step * (1 + std::atan(factor - 1));
+  }
+
+  static double after_rejected(double step, double error) {
+    constexpr double smallest_factor = 0.2, largest_factor = 0.9;
+    if (!std::isfinite(error))
+      return step * smallest_factor;
+    return step * std::clamp(std::pow(target / error, 1 / order), smallest_factor, largest_factor);
+  }
+
+private:
+  double previous_step_ = 0, previous_error_ = 1;
+};
 
 } // namespace
 
@@ -26,7 +45,7 @@ IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times,
                             const std::function<bool(double)> &carry_on, Recording *recording) {
   Dop853 method(system.size());
   Eigen::VectorXd error(system.size()), y_output(system.size());
-  const double end = times.back();
+  const double end = times.back(), duration = end - times.front();
   IntegrationReport report;
   double t = times.front();
   double h = std::min(system.initial_step(), end - t);
@@ -40,7 +59,7 @@ IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times,
   system.accepted(t, y.data(), method.first_slope());
   record();
   output(report.outputs++, t, y.data());
-  bool just_rejected = false;
+  StepControl control;
   while (report.outputs < times.size()) {
     if (controls.max_steps && report.steps + report.rejected >= controls.max_steps) {
       report.status = IntegrationStatus::too_many_steps;
@@ -64,12 +83,13 @@ IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times,
     if (system.correct(t_end, method.end())) {
       system.slope(t_end, method.end(), method.last_slope());
       const double damping = method.estimate(step, error);
-      size = system.error_size(t_end, method.end(), error.data()) * damping / controls.tolerance;
+      // Errors of single steps add up like a random walk: their share of the tolerance is sqrt(step / duration).
+      const double share = controls.tolerance * std::sqrt(step / duration);
+      size = system.error_size(t_end, method.end(), error.data()) * damping / share;
     }
     if (!(size <= 1)) {
       ++report.rejected;
-      just_rejected = true;
-      h = step * std::min(step_factor(size), 0.9);
+      h = StepControl::after_rejected(step, size);
       continue;
     }
     ++report.steps;
@@ -90,9 +110,7 @@ IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times,
     std::copy_n(method.last_slope(), system.size(), method.first_slope());
     system.accepted(t, y.data(), method.first_slope());
     record();
-    const double factor = step_factor(size);
-    h = step * (just_rejected ? std::min(factor, 1.0) : factor);
-    just_rejected = false;
+    h = control.after_accepted(step, size);
   }
   report.time = t;
   report.evaluations = system.evaluations();

@@ -1,0 +1,112 @@
+"""The command line: `ffrobot link | solve | info | plot`. Heavy imports happen inside the commands that need them."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import click
+
+from .errors import FfrobotError
+
+FILE = click.Path(path_type=Path)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="ffrobot")
+def cli() -> None:
+    """What motors and piezoelectric patches must do so that a flexible robot follows its path.
+
+    \b
+    Stage 1:  ffrobot link  LINK.toml     finite elements → modes → modal body file
+    Stage 2:  ffrobot solve SCENE.toml    modal bodies → dynamics → moments and voltages
+    Then:     ffrobot info, ffrobot plot
+    """
+
+
+@cli.command()
+@click.argument("link_file", metavar="LINK.toml", type=FILE)
+@click.option("-o", "--output", metavar="BODY.h5", type=FILE, help="Where to write; LINK.h5 beside the input if absent.")
+@click.option("--force", is_flag=True, help="Compute even if the file is up to date.")
+def link(link_file: Path, output: Path | None, force: bool) -> None:
+    """Compute the modal body file of one link (stage 1).
+
+    Mesh, finite element model, modes under the reference condition of the link file, and the invariants that the
+    dynamics needs. Nothing is computed when the output is up to date with the content of LINK.toml.
+    """
+    from .fe_models.link import make_link
+    from .progress import Display
+
+    with Display() as display:
+        outcome = make_link(link_file, output, force, display.stage)
+    body = outcome.body
+    verb = f"computed in {outcome.seconds:.2f} s" if outcome.computed else "up to date"
+    click.echo(f"{outcome.path}: {verb}; {body.mode_count} modes, {body.frequency[0]:.6g} … {body.frequency[-1]:.6g} Hz")
+
+
+@cli.command()
+@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@click.option(
+    "-o", "--output", metavar="RESULTS.h5", type=FILE, help="Where to write; SCENE.results.h5 beside the input if absent."
+)
+def solve(scene_file: Path, output: Path | None) -> None:
+    """Run the analyses of a scene (stage 2).
+
+    Links given as .toml are taken through stage 1 first where they are not up to date. Prints a summary: time per
+    stage, steps, constraint violation, and the largest voltage against its limit.
+    """
+    from rich.console import Console
+
+    from .files import check_writable
+    from .progress import Display
+    from .results import write_results
+    from .solve import solve as solve_scene
+    from .summary import print_summary
+
+    path = output or scene_file.with_suffix(".results.h5")
+    check_writable(path)
+    with Display() as display:
+        solution = solve_scene(scene_file, display)
+    began = time.perf_counter()
+    write_results(solution, path)
+    seconds = {**solution.seconds, "writing": time.perf_counter() - began}
+    print_summary(solution, path, seconds, Console())
+    for outcome in solution.outcomes.values():
+        outcome.check_completed()
+
+
+@cli.command()
+@click.argument("file", metavar="FILE.h5", type=FILE)
+def info(file: Path) -> None:
+    """Say what a modal body file or a results file holds."""
+    from .info import describe
+
+    click.echo(describe(file))
+
+
+@cli.command()
+@click.argument("results_file", metavar="RESULTS.h5", type=FILE)
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; RESULTS.figures if absent.")
+def plot(results_file: Path, output: Path | None) -> None:
+    """Draw the standard figures of a results file, as PNG and PDF."""
+    from .figures import plot_results
+
+    folder = output or results_file.with_suffix(".figures")
+    for path in plot_results(results_file, folder):
+        click.echo(path)
+
+
+def main() -> None:
+    """Run the command line: exit code 0, 1 where a solve failed, 2 for wrong input."""
+    try:
+        cli(standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except click.exceptions.Abort:
+        click.echo("stopped", err=True)
+        sys.exit(130)
+    except FfrobotError as error:
+        click.echo(f"ffrobot: {error}", err=True)
+        sys.exit(error.exit_code)

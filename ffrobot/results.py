@@ -1,0 +1,113 @@
+"""Results files (HDF5): one group per analysis, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from . import __version__
+from .actuation.patches import PatchArray
+from .actuation.voltages import Voltages
+from .files import write_atomically
+from .mbs.analyses import Outcome
+from .mbs.observation import (
+    body_motion,
+    energies,
+    joint_forces,
+    point_motion,
+    trajectory_force,
+    trajectory_target,
+)
+from .solve import Solution
+
+FORMAT = "ffrobot-results"
+FORMAT_VERSION = 1
+
+
+def write_results(solution: Solution, path: Path) -> None:
+    """Write every analysis of a solution to `path`. Raises `SolveError` where that fails; no half file is left."""
+    with h5py.File("results", "w", driver="core", backing_store=False) as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = FORMAT_VERSION
+        file.attrs["ffrobot_version"] = __version__
+        file.attrs["name"] = solution.scene.name
+        file.attrs["scene"] = solution.scene.text
+        file.attrs["skipped"] = list(solution.skipped)
+        file.attrs["modal_bodies"] = json.dumps(_modal_files(solution))
+        for name, outcome in solution.outcomes.items():
+            group = file.create_group(name)
+            _write_attributes(group, outcome)
+            _write_motion(group, outcome)
+            _write_forces(group, outcome)
+            for body_name, voltages in solution.voltages.get(name, {}).items():
+                _write_voltages(group.create_group(f"pzt/{body_name}"), solution.patches[body_name], voltages)
+        file.flush()
+        image: bytes = file.id.get_file_image()
+    write_atomically(path, image, "results file")
+
+
+def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
+    """Path and hashes of the modal body file behind each flexible body."""
+    return {
+        name: {"path": str(body.path), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
+        for name, body in solution.bodies.items()
+        if body.modal is not None
+    }
+
+
+def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
+    analysis = outcome.analysis
+    group.attrs["kind"] = analysis.kind
+    group.attrs["integrator"] = "none" if analysis.kind == "static" else analysis.integrator
+    group.attrs["tolerance"] = analysis.tolerance
+    group.attrs["actuation"] = analysis.actuation or ""
+    group.attrs["apply"] = analysis.apply or ""
+    for key in ("steps", "rejected", "evaluations", "wall_seconds", "status"):
+        group.attrs[key] = getattr(outcome, key)
+
+
+def _write_motion(group: h5py.Group, outcome: Outcome) -> None:
+    group["time"] = outcome.time
+    for body in outcome.assembly.model.bodies:
+        for key, values in vars(body_motion(outcome, body)).items():
+            group[f"bodies/{body.name}/{key}"] = values
+        for label in body.points:
+            point = f"{body.name}.{label}"
+            for key, values in vars(point_motion(outcome, point)).items():
+                group[f"points/{point}/{key}"] = values
+    for key, values in energies(outcome).items():
+        group[f"energy/{key}"] = values
+    violation = group.create_dataset("constraint_violation", data=outcome.residual)
+    violation.attrs["columns"] = ["position", "velocity", "acceleration"]
+
+
+def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
+    held = {c.owner for c in outcome.assembly.constraints if c.is_trajectory}
+    for trajectory in outcome.assembly.model.scene.trajectory:
+        if trajectory.name in held:
+            entry = group.create_group(f"trajectories/{trajectory.name}")
+            entry["force"] = trajectory_force(outcome, trajectory.name)
+            entry["target"] = trajectory_target(outcome, trajectory.name)
+            entry.attrs["components"] = list(trajectory.components)
+    for joint in outcome.assembly.model.scene.joint:
+        forces = joint_forces(outcome, joint.name)
+        entry = group.create_group(f"joints/{joint.name}")
+        entry.attrs["type"] = joint.type
+        entry["reaction"] = forces.reaction
+        if forces.reaction_moment is not None:
+            entry["reaction_moment"] = forces.reaction_moment
+        if forces.motor is not None:
+            entry["moment"] = forces.motor
+
+
+def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) -> None:
+    group["voltage"] = voltages.within_limit
+    group["required_voltage"] = voltages.required
+    group["residual"] = voltages.residual
+    group["edges"] = patches.edges
+    group["moment_per_volt"] = patches.moment_per_volt
+    group.attrs["condition_number"] = patches.condition_number
+    group.attrs["limit"] = np.inf if patches.limit is None else patches.limit

@@ -1,0 +1,183 @@
+"""Stage 2 from a scene file: bodies, model, analyses, voltages."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from .actuation.patches import PatchArray, patch_array
+from .actuation.voltages import Voltages, solve_voltages
+from .errors import InputError
+from .fe_models.modal_body import ModalBody
+from .fe_models.modal_body_file import read_modal_body
+from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
+from .mbs.model import ModalLoad, Model, build_model
+from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
+from .mbs.scene_file import load_scene
+from .mbs.scene_records import Analysis, Scene, split_point
+
+
+class Watcher:
+    """Is told how a solve goes; the command line shows it, a library user need not care."""
+
+    def stage(self, title: str) -> None:
+        """Something that may take long begins."""
+
+    def advance(self, t: float, end: float) -> bool:
+        """An analysis has reached time t of `end`; False stops it."""
+        return True
+
+
+@dataclass(frozen=True)
+class LoadedBody:
+    """A body of the scene: its modal body and file (None where rigid) and its planar equations."""
+
+    planar: PlanarBody
+    modal: ModalBody | None
+    path: Path | None
+    computed: bool = False
+
+    @property
+    def file_hash(self) -> str:
+        """SHA-256 of the modal body file; empty where rigid."""
+        return hashlib.sha256(self.path.read_bytes()).hexdigest() if self.path else ""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Everything a solve computed.
+
+    Attributes:
+        outcomes: by analysis, in the order of the scene.
+        voltages: by analysis and body.
+        seconds: wall time by stage.
+        skipped: what the scene did not need, one line each.
+    """
+
+    scene: Scene
+    model: Model
+    bodies: Mapping[str, LoadedBody]
+    patches: Mapping[str, PatchArray]
+    outcomes: dict[str, Outcome] = field(default_factory=dict)
+    voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    skipped: tuple[str, ...] = ()
+
+
+def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
+    """Run every analysis of a scene; stage 1 runs first for links that are not up to date.
+
+    An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
+    Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
+    """
+    watcher = watcher or Watcher()
+    began = time.perf_counter()
+    scene = load_scene(scene_path)
+    bodies = {body.name: loaded for body, loaded in zip(scene.body, _load_bodies(scene, watcher), strict=True)}
+    loaded = time.perf_counter()
+    patches = {
+        layout.body: patch_array(scene.path, layout, modal, bodies[layout.body].planar)
+        for layout in scene.pzt
+        if (modal := bodies[layout.body].modal) is not None
+    }
+    model = build_model(scene, [body.planar for body in bodies.values()], _voltage_loads(scene, patches))
+    solution = Solution(scene, model, bodies, patches, skipped=tuple(_skipped(scene, bodies)))
+    solution.seconds["links and files"] = loaded - began
+    for analysis in scene.analysis:
+        started = time.perf_counter()
+        outcome = _run(solution, analysis, watcher)
+        solution.outcomes[analysis.name] = outcome
+        if outcome.F_p is not None:
+            solution.voltages[analysis.name] = {
+                body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
+                for body, array in patches.items()
+            }
+        solution.seconds[analysis.name] = time.perf_counter() - started
+        if outcome.status != "completed":
+            break
+    return solution
+
+
+def _run(solution: Solution, analysis: Analysis, watcher: Watcher) -> Outcome:
+    model, end = solution.model, analysis.end
+    watcher.stage(f'analysis "{analysis.name}"')
+
+    def progress(t: float) -> bool:
+        try:
+            return watcher.advance(t, end)
+        except KeyboardInterrupt:  # ends the analysis; what it has computed is kept
+            return False
+
+    if analysis.kind == "static":
+        return run_static(model, analysis)
+    if analysis.kind == "pcid":
+        replayed = any(later.actuation == analysis.name for later in solution.scene.analysis)
+        return run_pcid(model, analysis, replayed, progress)
+    source = solution.outcomes[analysis.actuation] if analysis.actuation else None
+    if source is not None and analysis.apply != "trajectory" and source.tau is None:
+        raise InputError(
+            f'{solution.scene.path}: analysis "{analysis.name}": apply: expected motors that fit the mechanism'
+            f" ({model.rigid_freedom} of them) for {analysis.apply!r}, found {len(model.motors)}; name them with"
+            ' motor = true, or use apply = "trajectory"'
+        )
+    projector = {name: array.projector for name, array in solution.patches.items()}
+    return run_forward(model, analysis, source, projector, progress)
+
+
+def _load_bodies(scene: Scene, watcher: Watcher) -> list[LoadedBody]:
+    loaded = []
+    for body in scene.body:
+        if body.rigid is not None:
+            loaded.append(LoadedBody(from_rigid_body(body.name, body.rigid), None, None))
+        elif body.modal is not None:
+            modal = read_modal_body(body.modal)
+            loaded.append(LoadedBody(from_modal_body(body.name, modal), modal, body.modal))
+        else:
+            from .fe_models.link import cached_modal_body
+
+            assert body.link is not None
+            outcome = cached_modal_body(body.link, watcher.stage)
+            planar = from_modal_body(body.name, outcome.body)
+            loaded.append(LoadedBody(planar, outcome.body, outcome.path, outcome.computed))
+    return [_with_payloads(scene, body) for body in loaded]
+
+
+def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
+    planar = body.planar
+    for payload in scene.payload:
+        name, point = split_point(payload.point)
+        if name != planar.name:
+            continue
+        if point not in planar.points:
+            raise InputError(
+                f"{scene.path}: payload: point: expected one of {', '.join(planar.points)}, found \"{payload.point}\""
+            )
+        planar = with_payload(planar, point, payload.mass, payload.inertia)
+    return LoadedBody(planar, body.modal, body.path, body.computed)
+
+
+def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> list[ModalLoad]:
+    return [
+        ModalLoad(load.pzt, patches[load.pzt].Phi_V[:, k], function)
+        for load in scene.load
+        if load.pzt is not None
+        for k, function in enumerate(load.components.values())
+    ]
+
+
+def _skipped(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[str]:
+    lines = [f"{name}: stage 1, up to date" for name, b in bodies.items() if b.modal is not None and not b.computed]
+    for name, body in bodies.items():
+        if body.modal is None:
+            continue
+        idle = body.modal.mode_count - body.planar.n_modes
+        if idle:
+            lines.append(f"{name}: {idle} of {body.modal.mode_count} modes, which do not move in the plane")
+    if not any(np.any(body.planar.damping) for body in bodies.values()):
+        lines.append("damping, which is zero")
+    return lines

@@ -1,0 +1,189 @@
+"""The analyses of a scene: partially constrained inverse dynamics, forward dynamics, statics."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import SolveError
+from . import _core
+from .initial_state import State, check_reach, undeformed_state
+from .model import Array, Assembly, Model
+from .rows import Row
+from .scene_records import Analysis
+from .statics import static_equilibrium
+
+Progress = Callable[[float], bool]
+"""Called now and then with the time reached; False stops the run."""
+
+_STATUS = {
+    _core.IntegrationStatus.completed: "completed",
+    _core.IntegrationStatus.step_underflow: "step underflow",
+    _core.IntegrationStatus.too_many_steps: "too many steps",
+    _core.IntegrationStatus.interrupted: "interrupted",
+}
+_ADVICE = {
+    "step underflow": "no step is small enough there: the motion turns singular (a stretched arm, a jump in a"
+    " trajectory) or the load grows without bound",
+    "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
+    "interrupted": "stopped on request",
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What an analysis computed, one row per output time; bodies side by side in the columns of q, v, a, F_p."""
+
+    analysis: Analysis
+    assembly: Assembly
+    time: Array  # (T,)
+    q: Array  # (T, coordinates)
+    v: Array
+    a: Array
+    lambda_: Array  # (T, constraints)
+    tau: Array | None  # (T, motors) N·m (N for prismatic joints); None where motors do not fit the mechanism
+    F_p: Array | None  # (T, modes of all bodies)
+    residual: Array  # (T, 3) of C, Ċ, C̈, relative to their terms
+    status: str
+    steps: int
+    rejected: int
+    evaluations: int
+    wall_seconds: float
+    recording: _core.Recording | None = field(default=None, repr=False)
+
+    def coordinates(self, body: str) -> slice:
+        """Columns of (R, θ, p) of a body in q, v and a."""
+        i = self.assembly.index[body]
+        first = int(self.assembly.first[i])
+        return slice(first, first + 3 + self.assembly.model.bodies[i].n_modes)
+
+    def modal_columns(self, body: str) -> slice:
+        """Columns of a body in `F_p`."""
+        i = self.assembly.index[body]
+        first = int(self.assembly.first[i]) - 3 * i
+        return slice(first, first + self.assembly.model.bodies[i].n_modes)
+
+    def check_completed(self) -> None:
+        """Raise `SolveError` with advice unless the run reached its end."""
+        if self.status != "completed":
+            raise SolveError(
+                f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {self.time[-1]:g} s'
+                f" ({self.status}): {_ADVICE[self.status]}"
+            )
+
+
+def run_pcid(model: Model, analysis: Analysis, keep_recording: bool, progress: Progress) -> Outcome:
+    """Partially constrained inverse dynamics (Shaban 2022, sec. 5): C_m and C_s hold, p is free.
+
+    Raises `InputError` where the trajectories cannot be followed.
+    """
+    assembly = Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+    start = initial_state(assembly)
+    check_reach(assembly, undeformed_state(assembly), analysis.times)
+    resolver = None
+    if model.trajectories and len(model.motors) == model.rigid_freedom:
+        resolver = _core.ActuationResolver(assembly.system, assembly.is_trajectory, assembly.motor_rows)
+    recording = _core.Recording() if keep_recording else None
+    return _integrate(assembly, analysis, start, None, resolver, recording, progress)
+
+
+def run_forward(
+    model: Model,
+    analysis: Analysis,
+    source: Outcome | None,
+    projector: Mapping[str, Array],
+    progress: Progress,
+) -> Outcome:
+    """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one.
+
+    `projector[body]` (n, n) is what the patches of a body make of the modal forces asked of them.
+    """
+    steered, applied = _steered_rows(model, analysis, source)
+    zero = _core.TimeFunction.constant(0.0)
+    assembly = Assembly(model, model.joints, [*((row, zero) for row in steered), *model.loads])
+    steering = None
+    if source is not None:
+        assert source.recording is not None
+        inverse = source.assembly
+        resolver = _core.ActuationResolver(inverse.system, inverse.is_trajectory, inverse.motor_rows)
+        steering = _core.ReplayedActuation(
+            inverse.system,
+            source.recording,
+            resolver,
+            inverse.is_trajectory,
+            applied,
+            [projector.get(body.name, np.zeros((0, 0))) for body in model.bodies],
+        )
+        start = _transfer(source)
+    else:
+        start = initial_state(assembly)
+    return _integrate(assembly, analysis, start, steering, None, None, progress)
+
+
+def run_static(model: Model, analysis: Analysis) -> Outcome:
+    """Equilibrium under gravity, loads and the trajectory constraints at t = 0."""
+    assembly = Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+    began = time.perf_counter()
+    state, lambda_ = static_equilibrium(assembly, undeformed_state(assembly))
+    C, _, _ = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))
+    residual = np.array([[np.abs(C).max(initial=0.0), 0.0, 0.0]])
+    row = state.q[None]
+    seconds = time.perf_counter() - began
+    still = np.zeros_like(row)
+    return Outcome(
+        analysis, assembly, np.zeros(1), row, still, still, lambda_[None], None, None, residual,
+        "completed", 0, 0, 0, seconds,
+    )  # fmt: skip
+
+
+def initial_state(assembly: Assembly) -> State:
+    """The initial state the scene asks for."""
+    start = undeformed_state(assembly)
+    if assembly.model.scene.initial.state == "static":
+        start, _ = static_equilibrium(assembly, start)
+    return start
+
+
+def _steered_rows(model: Model, analysis: Analysis, source: Outcome | None) -> tuple[list[Row], _core.AppliedActuation]:
+    """Rows along which the recorded actuation acts, in the order in which the core replays it."""
+    match analysis.apply:
+        case "trajectory":
+            assert source is not None
+            rows = [c.row for c in source.assembly.constraints if c.is_trajectory]
+            return rows, _core.AppliedActuation.trajectory
+        case "joints+pzt":
+            return list(model.motors.values()), _core.AppliedActuation.joints_and_patches
+        case "joints":
+            return list(model.motors.values()), _core.AppliedActuation.joints
+    return [], _core.AppliedActuation.joints
+
+
+def _transfer(source: Outcome) -> State:
+    """The first state of an earlier analysis: bodies and their order are the same."""
+    return State(source.q[0].copy(), source.v[0].copy())
+
+
+def _integrate(
+    assembly: Assembly,
+    analysis: Analysis,
+    start: State,
+    steering: _core.Steering | None,
+    resolver: _core.ActuationResolver | None,
+    recording: _core.Recording | None,
+    progress: Progress,
+) -> Outcome:
+    began = time.perf_counter()
+    run = _core.run(
+        assembly.system, assembly.groups, assembly.moments, steering, analysis.times.tolist(), start.q, start.v,
+        analysis.tolerance, analysis.max_steps or 0, resolver, progress, recording,
+    )  # fmt: skip
+    seconds = time.perf_counter() - began
+    reached = len(run.q)
+    return Outcome(
+        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.lambda_,
+        run.tau if resolver else None, run.F_p if resolver else None, run.residual,
+        _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, recording,
+    )  # fmt: skip

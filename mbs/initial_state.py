@@ -1,0 +1,192 @@
+"""Where a run starts: coordinates and velocities that meet the constraints, and whether that can go on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .model import Array, Assembly, Constraint
+from .rows import End
+from .scene_records import GROUND, Joint, split_point
+
+TOLERANCE = 1e-13  # of constraints at the start, m and rad
+SINGULAR = 1e-6  # ratio of singular values below which a configuration counts as singular
+REDUNDANT = 1e-10  # likewise for rows that repeat each other in every configuration
+MOST_ITERATIONS = 50
+LARGEST_TURN = 0.5  # rad (and m per metre) a Newton step may move: keeps to the branch of the guess
+REACH_CHECKS = 200
+
+
+@dataclass(frozen=True)
+class State:
+    """Coordinates q = (R, θ, p of each body) and their rates v."""
+
+    q: Array
+    v: Array
+
+
+def undeformed_state(assembly: Assembly) -> State:
+    """The state with p = ṗ = 0 that meets all constraints at t = 0, next to the guessed angles and rates.
+
+    Raises `InputError` for constraints that repeat or contradict each other, a target out of reach, and a singular
+    configuration, naming the trajectory or joints.
+    """
+    guess = _chain_guess(assembly)
+    _check_redundancy(assembly, guess.q)
+    q = _newton(assembly, 0.0, guess.q)
+    if q is None:
+        raise InputError(_unreachable(assembly, 0.0, guess.q))
+    if _is_singular(assembly, 0.0, q):
+        raise InputError(
+            f"{assembly.model.scene.path}: initial: expected a configuration in which the links can follow"
+            f" {_names(assembly.constraints)} in every direction, found a singular one (an arm stretched or folded?):"
+            " bend it, or move the start of the trajectory"
+        )
+    _, rate, C_q = assembly.system.constraints(0.0, q, guess.v)
+    r = assembly.rigid_coordinates
+    v = guess.v.copy()
+    v[r] -= np.linalg.lstsq(C_q[:, r], rate, rcond=None)[0]
+    return State(q, v)
+
+
+def check_reach(assembly: Assembly, start: State, times: Array) -> None:
+    """Raise `InputError` with the first time at which the undeformed robot cannot follow its trajectories.
+
+    A flexible arm would stretch its small-deformation modes beyond all sense instead of failing; better to say so.
+    """
+    if not any(assembly.is_trajectory) or len(assembly.constraints) > len(assembly.rigid_coordinates):
+        return
+    q = start.q
+    for t in times[:: max(1, len(times) // REACH_CHECKS)]:
+        following = _newton(assembly, float(t), q)
+        if following is None or _is_singular(assembly, float(t), following):
+            raise InputError(_unreachable(assembly, float(t), q))
+        q = following
+
+
+def _newton(assembly: Assembly, t: float, q: Array) -> Array | None:
+    """(R, θ) moved onto C(q, t) = 0 by steps of least size, p kept; None where that does not converge."""
+    q, r = q.copy(), assembly.rigid_coordinates
+    rest = np.zeros_like(q)
+    for _ in range(MOST_ITERATIONS):
+        C, _, C_q = assembly.system.constraints(t, q, rest)
+        size = 1.0 + np.abs(q).max(initial=0.0)
+        if np.abs(C).max(initial=0.0) <= TOLERANCE * size:
+            return q
+        step = np.linalg.lstsq(C_q[:, r], C, rcond=None)[0]
+        largest = np.abs(step).max()
+        if not np.isfinite(largest):
+            return None
+        q[r] -= step * min(1.0, LARGEST_TURN * size / largest) if largest else step
+    return q if np.abs(C).max() <= 1e3 * TOLERANCE * size else None
+
+
+def _is_singular(assembly: Assembly, t: float, q: Array) -> bool:
+    """Whether the mechanism with rigid links has lost a direction that its constraints need."""
+    _, _, C_q = assembly.system.constraints(t, q, np.zeros_like(q))
+    J = C_q[:, assembly.rigid_coordinates]
+    if not len(J) or len(J) > J.shape[1]:
+        return False
+    values = np.linalg.svd(J, compute_uv=False)
+    return bool(values[-1] < SINGULAR * values[0])
+
+
+def _check_redundancy(assembly: Assembly, q: Array) -> None:
+    """Rows that depend on each other in a configuration chosen at random depend on each other in all."""
+    if not assembly.constraints:
+        return
+    shift = np.random.default_rng(0).uniform(-0.3, 0.3, len(q))
+    for position in assembly.first:  # deformations stay small
+        shift[position + 3 :] *= 1e-3
+    _, _, C_q = assembly.system.constraints(0.0, q + shift, np.zeros_like(q))
+    left, values, _ = np.linalg.svd(C_q / np.linalg.norm(C_q, axis=1, keepdims=True))
+    rank = int(np.count_nonzero(values > REDUNDANT * values[0]))
+    if rank == len(assembly.constraints):
+        return
+    involved = np.abs(left[:, rank:]).max(axis=1) > 1e-6
+    rows = [c for c, is_involved in zip(assembly.constraints, involved, strict=True) if is_involved]
+    C, _, _ = assembly.system.constraints(0.0, q, np.zeros_like(q))
+    raise InputError(
+        f"{assembly.model.scene.path}: expected independent constraints, found {len(assembly.constraints) - rank} too"
+        f" many among {'; '.join(c.row.label for c in rows)}: they repeat or contradict each other"
+    )
+
+
+def _unreachable(assembly: Assembly, t: float, q: Array) -> str:
+    """Which trajectory (or joints) the links cannot meet at time t."""
+    trajectories = [c for c in assembly.constraints if c.is_trajectory]
+    if trajectories and _newton(_only_joints(assembly), t, q) is not None:
+        return (
+            f"{assembly.model.scene.path}: {_names(trajectories)}: expected a target within reach, found one at"
+            f" t = {t:g} s that the undeformed links cannot reach (or only stretched)"
+        )
+    return (
+        f"{assembly.model.scene.path}: expected joints that can be closed, found that {_names(assembly.constraints)}"
+        f" cannot be met at t = {t:g} s from the initial angles"
+    )
+
+
+def _only_joints(assembly: Assembly) -> Assembly:
+    return Assembly(assembly.model, assembly.model.joints)
+
+
+def _names(constraints: Sequence[Constraint]) -> str:
+    trajectories = [c for c in constraints if c.is_trajectory] or constraints
+    kind = "trajectory" if trajectories and trajectories[0].is_trajectory else "joint"
+    return ", ".join(dict.fromkeys(f'{kind} "{c.owner}"' for c in trajectories))
+
+
+def _chain_guess(assembly: Assembly) -> State:
+    """Frames placed from joint to joint with the guessed angles and rates; loops are left to Newton."""
+    model = assembly.model
+    q, v = np.zeros(assembly.system.coordinates), np.zeros(assembly.system.coordinates)
+    for name, i in assembly.index.items():
+        q[assembly.first[i] + 2] = model.scene.initial.angles.get(name, 0.0)
+        v[assembly.first[i] + 2] = model.scene.initial.rates.get(name, 0.0)
+
+    placed = {GROUND}
+    while True:
+        joint = next((j for j in _firm_first(model.scene.joint) if _one_side_placed(j, placed)), None)
+        if joint is None:
+            return State(q, v)
+        sides = [(side, side.partition(".")[0]) for side in joint.between]
+        (known, _), (side, body) = sides if sides[0][1] in placed else sides[::-1]
+        at, rate = _motion(assembly, q, v, known, joint.at)
+        arm, turn = _arm(assembly, q, side)
+        i = assembly.first[assembly.index[body]]
+        q[i : i + 2] = at - arm
+        v[i : i + 2] = rate - v[i + 2] * turn
+        placed.add(body)
+
+
+def _firm_first(joints: Sequence[Joint]) -> list[Joint]:
+    """Prismatic joints last: they leave the place along their axis open."""
+    return sorted(joints, key=lambda joint: joint.type == "prismatic")
+
+
+def _one_side_placed(joint: Joint, placed: set[str]) -> bool:
+    return sum(side.partition(".")[0] in placed for side in joint.between) == 1
+
+
+def _arm(assembly: Assembly, q: Array, side: str) -> tuple[Array, NDArray[np.float64]]:
+    """A x of a point of an undeformed body, and A_θ x."""
+    end = End(*split_point(side))
+    assert end.body is not None
+    body = assembly.index[end.body]
+    x, y = assembly.model.bodies[body].points[end.point].position
+    theta = q[assembly.first[body] + 2]
+    arm = np.array([np.cos(theta) * x - np.sin(theta) * y, np.sin(theta) * x + np.cos(theta) * y])
+    return arm, np.array([-arm[1], arm[0]])
+
+
+def _motion(assembly: Assembly, q: Array, v: Array, side: str, at: tuple[float, float]) -> tuple[Array, Array]:
+    """Position and velocity of a placed point, or of a place on the ground."""
+    if side == GROUND:
+        return np.array(at), np.zeros(2)
+    arm, turn = _arm(assembly, q, side)
+    i = assembly.first[assembly.index[split_point(side)[0]]]
+    return q[i : i + 2] + arm, v[i : i + 2] + v[i + 2] * turn

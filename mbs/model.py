@@ -1,0 +1,206 @@
+"""From a scene and its bodies to the systems of equations that the core evaluates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..validation import did_you_mean, quoted
+from . import _core
+from .planar_body import PlanarBody, PlanarPoint, core_arguments
+from .rows import FRAME, End, Row, joint_coordinate, joint_rows, motor_joints, trajectory_rows
+from .scene_records import GROUND, Scene, split_point
+from .time_functions import TimeFunction
+
+Array = NDArray[np.float64]
+ZERO = _core.TimeFunction.constant(0.0)
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A row that is held at `target`(t); `group` numbers the force or moment of one joint or trajectory."""
+
+    row: Row
+    target: TimeFunction
+    owner: str
+    component: str
+    is_trajectory: bool
+
+
+@dataclass(frozen=True)
+class ModalLoad:
+    """Modal forces `vector` (n,) times `size`(t) on one body, in the coordinates of its `PlanarBody`."""
+
+    body: str
+    vector: Array
+    size: TimeFunction
+
+
+@dataclass(frozen=True)
+class Model:
+    """A scene with its bodies: everything analyses share."""
+
+    scene: Scene
+    bodies: tuple[PlanarBody, ...]
+    modal_loads: tuple[ModalLoad, ...]
+    joints: tuple[Constraint, ...]
+    trajectories: tuple[Constraint, ...]
+    motors: dict[str, Row]
+    loads: tuple[tuple[Row, TimeFunction], ...]
+
+    def body(self, name: str) -> PlanarBody:
+        """The body of that name."""
+        return next(body for body in self.bodies if body.name == name)
+
+    @property
+    def rigid_freedom(self) -> int:
+        """Degrees of freedom of the mechanism with rigid links, counted: coordinates less joint constraints."""
+        return 3 * len(self.bodies) - len(self.joints)
+
+
+def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequence[ModalLoad] = ()) -> Model:
+    """Check every reference of the scene to points of its bodies and lay out rows.
+
+    Raises `InputError` when a point does not exist, or named motors do not fit the mechanism.
+    """
+    _check_points(scene, {body.name: body for body in bodies})
+    joints = tuple(
+        Constraint(row, ZERO, joint.name, row.label.rpartition(", ")[2], is_trajectory=False)
+        for joint in scene.joint
+        for row in joint_rows(scene, joint)
+    )
+    trajectories = tuple(
+        Constraint(row, trajectory.components[component], trajectory.name, component, is_trajectory=True)
+        for trajectory in scene.trajectory
+        for component, row in trajectory_rows(scene, trajectory).items()
+    )
+    motors = {joint.name: joint_coordinate(scene, joint) for joint in motor_joints(scene)}
+    model = Model(
+        scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(_load_rows(scene))
+    )
+    named = any(joint.motor for joint in scene.joint)
+    if named and trajectories and len(motors) != model.rigid_freedom:
+        raise InputError(
+            f"{scene.path}: joint: expected as many motors as the mechanism has degrees of freedom"
+            f" ({model.rigid_freedom}), found {len(motors)} ({quoted(motors)})"
+        )
+    return model
+
+
+def _load_rows(scene: Scene) -> Iterator[tuple[Row, TimeFunction]]:
+    kinds = {"x": _core.RowKind.x, "y": _core.RowKind.y, "moment": _core.RowKind.angle}
+    joints = {joint.name: joint for joint in scene.joint}
+    for load in scene.load:
+        if load.joint is not None:
+            yield joint_coordinate(scene, joints[load.joint]), load.components["moment"]
+        elif load.point is not None:
+            for component, size in load.components.items():
+                yield Row(f'load on "{load.point}"', kinds[component], End(None), End(*split_point(load.point))), size
+
+
+def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
+    """Raise `InputError` for a reference to a point that its body has not."""
+    references = [(f'joint "{joint.name}": between', side) for joint in scene.joint for side in joint.between]
+    references += [(f'trajectory "{t.name}": point', t.point) for t in scene.trajectory if t.point]
+    references += [(f'trajectory "{t.name}": angle', t.angle) for t in scene.trajectory if t.angle and "." in t.angle]
+    references += [("load: point", load.point) for load in scene.load if load.point]
+    references += [("payload: point", payload.point) for payload in scene.payload]
+    for key, reference in references:
+        if reference == GROUND:
+            continue
+        body, point = split_point(reference)
+        known = bodies[body].points
+        if point not in known:
+            raise InputError(
+                f'{scene.path}: {key}: expected a point of "{body}" ({quoted(known)}), found "{reference}"'
+                + did_you_mean(point, known)
+            )
+
+
+class Assembly:
+    """A core `System` with the numbering that leads back from its rows to the scene.
+
+    `constraints` are in the core's order: joints and trajectories sorted for a small envelope of C M⁻¹ Cᵀ.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        constraints: Sequence[Constraint],
+        drives: Sequence[tuple[Row, TimeFunction]] = (),
+        motors: Sequence[Row] = (),
+    ) -> None:
+        self.model = model
+        self.index = {body.name: i for i, body in enumerate(model.bodies)}
+        self._markers: list[list[str]] = [[] for _ in model.bodies]
+        self.constraints = tuple(constraints[i] for i in envelope_order([c.row for c in constraints]))
+        constraint_rows = [self._core_row(c.row) for c in self.constraints]
+        drive_rows = [(self._core_row(row), size) for row, size in drives]
+        self.motor_rows = [self._core_row(row) for row in motors]
+        self.system = _core.System(np.array(model.scene.gravity))
+        for body, markers in zip(model.bodies, self._markers, strict=True):
+            self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers]))
+        for constraint, row in zip(self.constraints, constraint_rows, strict=True):
+            self.system.add_constraint(row, constraint.target)
+        for row, size in drive_rows:
+            self.system.add_drive(row, size)
+        for load in model.modal_loads:
+            self.system.add_modal_drive(self.index[load.body], load.vector, load.size)
+        self.system.finish()
+        self.first = np.array(self.system.first_coordinate, dtype=int)
+
+    @property
+    def rigid_coordinates(self) -> NDArray[np.intp]:
+        """Indices of (R, θ) of all bodies in q (3 bodies,)."""
+        return (self.first[:, None] + np.arange(3)).ravel()
+
+    @property
+    def is_trajectory(self) -> list[bool]:
+        """For each constraint, whether it belongs to C_s."""
+        return [c.is_trajectory for c in self.constraints]
+
+    @property
+    def moments(self) -> list[bool]:
+        """For each constraint, whether its multiplier is a moment."""
+        return [c.row.carries_moment for c in self.constraints]
+
+    @property
+    def groups(self) -> list[int]:
+        """For each constraint, the number of the force or moment it is a component of."""
+        keys = [(c.is_trajectory, c.owner, c.row.carries_moment) for c in self.constraints]
+        numbers = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+        return [numbers[key] for key in keys]
+
+    def _core_row(self, row: Row) -> _core.Row:
+        return _core.Row(row.kind, self._marker(row.a), self._marker(row.b), np.array(row.direction), row.offset)
+
+    def _marker(self, end: End) -> _core.Marker:
+        if end.body is None:
+            return _core.Marker(-1, 0, np.array(end.position))
+        body = self.index[end.body]
+        markers = self._markers[body]
+        if end.point not in markers:
+            markers.append(end.point)
+        return _core.Marker(body, markers.index(end.point), np.zeros(2))
+
+
+def _point(body: PlanarBody, name: str) -> PlanarPoint:
+    if name != FRAME:
+        return body.points[name]
+    return PlanarPoint(np.zeros(2), np.zeros((2, body.n_modes)), np.zeros(body.n_modes))
+
+
+def envelope_order(rows: Sequence[Row]) -> list[int]:
+    """Order of constraint rows that keeps the envelope of C M⁻¹ Cᵀ small: reverse Cuthill–McKee on shared bodies."""
+    touched = [{end.body for end in (row.a, row.b)} - {None} for row in rows]
+    if len({body for bodies in touched for body in bodies}) <= 2:
+        return list(range(len(rows)))
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    graph = np.array([[not a.isdisjoint(b) for b in touched] for a in touched], dtype=float)
+    return [int(i) for i in reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True)]

@@ -1,0 +1,177 @@
+# shellcheck shell=bash
+# Sourced by demo.sh and test.sh: installs whatever is missing and leaves the environment in .venv/ at the repo root.
+#
+# Each step runs only when what it depends on has changed since it last succeeded; its key is then written to
+# .venv/*.stamp. When nothing has changed no step runs, and neither apt nor pip is called.
+
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+# What a user's shell may carry that does not belong in here: other Pythons, other install targets, threads in BLAS
+# that slow these small systems down.
+unset PYTHONPATH PYTHONHOME PYTHONSTARTUP VIRTUAL_ENV PIP_TARGET PIP_PREFIX PIP_CONSTRAINT
+export PYTHONNOUSERSITE=1 PIP_USER=0 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1
+export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"
+
+# python3-dolfinx is known by no pip, and only Debian's own Python sees it, whichever python3 stands first on PATH.
+readonly DEBIAN_PYTHON=/usr/bin/python3
+readonly DEBIAN_PACKAGES=(
+  python3 python3-venv python3-dev g++ cmake ninja-build libeigen3-dev
+  python3-dolfinx python3-dolfinx-real python3-petsc4py python3-slepc4py libopenblas0-serial
+  gmsh python3-gmsh python3-meshio python3-h5py python3-scipy python3-numpy
+)
+readonly SETUP_LOG=.venv/setup.log
+
+# die MESSAGE: what is wrong and what to do about it.
+die() {
+  printf '\nset-up: %s\n' "$1" >&2
+  exit 1
+}
+
+# step TITLE COMMAND…: runs it with one line on the screen and its output in the log, which a failure shows.
+step() {
+  local title=$1 start=$SECONDS from
+  shift
+  mkdir -p .venv
+  touch "$SETUP_LOG"
+  from=$(($(wc -l <"$SETUP_LOG") + 1))
+  printf '  %-52s' "$title …"
+  if "$@" </dev/null >>"$SETUP_LOG" 2>&1; then
+    printf ' %3d s\n' $((SECONDS - start))
+  else
+    printf ' failed\n\n' >&2
+    tail -n "+$from" "$SETUP_LOG" | tail -n 40 >&2
+    die "the step \"$title\" failed; its output is above and in $SETUP_LOG"
+  fi
+}
+
+# once NAME KEY TITLE COMMAND…: a step that is left out while KEY is the one of its last success.
+once() {
+  local stamp=.venv/$1.stamp key=$2
+  shift 2
+  [[ -f $stamp && $(<"$stamp") == "$key" ]] && return
+  rm -f "$stamp"
+  step "$@"
+  printf '%s' "$key" >"$stamp"
+}
+
+digest() { sha256sum | cut -c 1-64; }
+
+# Name and version of every listed Debian package that is installed, one a line.
+installed_packages() {
+  dpkg-query -W -f '${db:Status-Status} ${Package} ${Version}\n' "${DEBIAN_PACKAGES[@]}" 2>/dev/null |
+    sed -n 's/^installed //p' || true
+}
+
+missing_packages() {
+  local installed package
+  installed=" $(installed_packages | cut -d ' ' -f 1 | tr '\n' ' ')"
+  for package in "${DEBIAN_PACKAGES[@]}"; do
+    [[ $installed == *" $package "* ]] || printf '%s\n' "$package"
+  done
+}
+
+install_packages() {
+  local as_root=()
+  ((EUID == 0)) || as_root=(sudo)
+  local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=600)
+  "${apt[@]}" update && "${apt[@]}" install -y --no-install-recommends "$@"
+}
+
+debian_step() {
+  type -P dpkg-query apt-get >/dev/null ||
+    die "this is no Debian system; ffrobot's FE stage uses Debian's packages (12 or later): ${DEBIAN_PACKAGES[*]}"
+  local missing
+  mapfile -t missing < <(missing_packages)
+  ((${#missing[@]})) || return 0
+  if ((EUID != 0)); then
+    command -v sudo >/dev/null || die "these Debian packages are missing, and there is neither root nor sudo:
+  apt-get install --no-install-recommends ${missing[*]}"
+    sudo -v || die "sudo refused; as root: apt-get install --no-install-recommends ${missing[*]}"
+  fi
+  step "installing ${#missing[@]} Debian packages" install_packages "${missing[@]}"
+  mapfile -t missing < <(missing_packages)
+  ((${#missing[@]} == 0)) || die "apt-get left these packages uninstalled: ${missing[*]}"
+}
+
+make_venv() {
+  "$DEBIAN_PYTHON" -I -m venv --system-site-packages .venv && .venv/bin/python -m pip --version
+}
+
+# Everything that pyproject.toml asks for, held to Debian's own numpy, scipy and h5py: dolfinx is compiled against them.
+install_dependencies() {
+  .venv/bin/python -I - <<'PYTHON' || return
+import tomllib
+from importlib.metadata import distributions
+from pathlib import Path
+
+project = tomllib.loads(Path("pyproject.toml").read_text())
+extras = project["project"]["optional-dependencies"]
+wanted = project["build-system"]["requires"] + project["project"]["dependencies"] + extras["plot"] + extras["test"]
+Path(".venv/requirements.txt").write_text("\n".join(wanted) + "\n")
+
+debian = distributions(path=["/usr/lib/python3/dist-packages"])
+held = sorted({f"{d.name}=={d.version}" for d in debian if d.name in {"numpy", "scipy", "h5py"}})
+Path(".venv/constraints.txt").write_text("\n".join(held) + "\n")
+PYTHON
+  .venv/bin/python -m pip install -r .venv/requirements.txt -c .venv/constraints.txt
+}
+
+# Python files are seen as they are edited; C++ sources and new files are taken in here.
+build_package() {
+  .venv/bin/python -m pip install --no-deps --no-build-isolation -e .
+}
+
+# The environment as a user of .venv/bin/ffrobot will find it.
+check_environment() {
+  env -u PYTHONNOUSERSITE .venv/bin/python - <<'PYTHON'
+import sys
+from pathlib import Path
+
+import numpy
+
+held = Path(".venv/constraints.txt").read_text()
+if f"numpy=={numpy.__version__}\n" not in held:
+    sys.exit(f"numpy {numpy.__version__} in {numpy.__file__} hides Debian's numpy, against which dolfinx is compiled: uninstall it")
+
+import dolfinx  # noqa: F401
+from petsc4py import PETSc
+
+if numpy.issubdtype(PETSc.ScalarType, numpy.complexfloating):
+    sys.exit("PETSc with complex numbers is selected: 'update-alternatives --config petsc' (and slepc) and choose the real one")
+
+import ffrobot  # noqa: F401
+import ffrobot.mbs._core  # noqa: F401
+PYTHON
+}
+
+# What the compiled core and the installed file list depend on.
+build_key() {
+  {
+    printf '%s\n' "${CXX:-}" "${CXXFLAGS:-}"
+    find ffrobot mesh fe_models mbs actuation -name '*.py' -o -name '*.pyi' | LC_ALL=C sort
+    find mbs CMakeLists.txt pyproject.toml '(' -name '*.h' -o -name '*.cpp' -o -name 'CMakeLists.txt' \
+      -o -name pyproject.toml ')' -print0 | LC_ALL=C sort -z | xargs -0 sha256sum
+  } | digest
+}
+
+setup() {
+  exec 9<.
+  flock 9 # one set-up at a time in this folder
+  debian_step
+
+  local venv_key dependencies_key
+  venv_key="$PWD $(readlink -f "$DEBIAN_PYTHON")"
+  if [[ ! -f .venv/venv.stamp || $(<.venv/venv.stamp) != "$venv_key" ]] || ! .venv/bin/python -c '' 2>/dev/null; then
+    rm -rf .venv
+  fi
+  once venv "$venv_key" "making the virtual environment .venv" make_venv
+
+  dependencies_key=$({ installed_packages && cat pyproject.toml scripts/setup.sh; } | digest)
+  once dependencies "$dependencies_key" "installing Python packages" install_dependencies
+  once build "$(build_key) $dependencies_key" "building ffrobot" build_package
+  once check "$(<.venv/build.stamp)" "checking the environment" check_environment
+  exec 9<&-
+}
+
+setup

@@ -1,0 +1,301 @@
+"""Scene files: what is read, and what is said about each kind of mistake."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from ffrobot.errors import InputError
+from ffrobot.mbs.scene_file import load_scene, split_point
+
+SCENE = """
+name = "two_link"
+space = "planar"
+gravity = [0.0, -9.81]
+
+[[body]]
+name = "link1"
+link = "link1.toml"
+
+[[body]]
+name = "link2"
+modal = "link2.h5"
+
+[[body]]
+name = "hand"
+rigid = { mass = 2, inertia = 0.1, center = [0.1, 0], points = { root = [0.0, 0.0], grip = [0.2, 0.0] } }
+
+[[joint]]
+name = "O"
+type = "revolute"
+between = ["ground", "link1.root"]
+at = [0.5, 0]
+
+[[joint]]
+name = "A"
+type = "revolute"
+between = ["link1.tip", "link2.root"]
+
+[[joint]]
+name = "W"
+type = "weld"
+between = ["link2.tip", "hand.root"]
+
+[initial]
+angles = { link1 = 0, link2 = 1.0471975511965976 }
+
+[[trajectory]]
+name = "tip"
+point = "link2.tip"
+x = "1.5*cos(pi*t/4)"
+y = "sqrt(3)/2*cos(pi*t/4)"
+
+[[pzt]]
+body = "link1"
+count = 2
+length = 0.05
+width = 0.025
+thickness = 0.75e-3
+modulus = 63e9
+d31 = 110e-12
+
+[[load]]
+pzt = "link1"
+voltage = ["10*t", 5]
+
+[[payload]]
+point = "hand.grip"
+mass = 0.5
+
+[[analysis]]
+name = "inverse"
+kind = "pcid"
+end = 1.0
+output_step = 0.001
+
+[[analysis]]
+name = "forward"
+kind = "forward"
+actuation = "inverse"
+apply = "joints+pzt"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("link1.toml", "link2.h5"):
+        (tmp_path / name).touch()
+    (tmp_path / "path.csv").write_text("t,x,y\n0,1.5,0.8\n0.5,1.4,0.7\n1,1.3,0.6\n")
+    (tmp_path / "short.csv").write_text("t,x,y\n0,1.5,0.8\n0.5,1.4,0.7\n")
+    (tmp_path / "value.csv").write_text("t,value\n0,0\n1,1\n")
+    return tmp_path
+
+
+def load(folder, text):
+    path = folder / "scene.toml"
+    path.write_text(text)
+    return load_scene(path)
+
+
+def test_scene_is_read_key_by_key(folder):
+    scene = load(folder, SCENE)
+    assert scene.gravity == (0.0, -9.81)
+    assert scene.motors == "section"
+    assert [body.name for body in scene.body] == ["link1", "link2", "hand"]
+    assert scene.body[0].link == folder / "link1.toml"
+    assert scene.body[1].modal == folder / "link2.h5"
+    assert scene.body[2].rigid.points["grip"] == (0.2, 0.0)
+    assert scene.joint[0].between == ("ground", "link1.root")
+    assert scene.joint[0].at == (0.5, 0.0)
+    assert scene.joint[0].motor is None
+    assert scene.initial.state == "undeformed"
+    assert scene.initial.angles["link2"] == 1.0471975511965976
+    assert scene.pzt[0].patch_count == 2
+    assert scene.payload[0].inertia == 0.0
+    assert [function(2.0)[:2] for function in scene.load[0].components.values()] == [(20.0, 10.0), (5.0, 0.0)]
+    assert scene.trajectory[0].components["x"](0.0)[0] == 1.5
+    assert scene.path == folder / "scene.toml"
+    assert scene.text == SCENE
+
+
+def test_forward_takes_over_the_times_of_its_actuation(folder):
+    inverse, forward = load(folder, SCENE).analysis
+    assert (forward.end, forward.output_step) == (inverse.end, inverse.output_step)
+    shorter = load(folder, SCENE.replace('"joints+pzt"', '"joints"\nend = 0.5')).analysis[1]
+    assert (shorter.end, shorter.output_step) == (0.5, 0.001)
+
+
+def test_output_times_are_exact_multiples_that_end_at_the_end(folder):
+    times = load(folder, SCENE).analysis[0].times
+    assert times.shape == (1001,)
+    assert times[-1] == 1.0
+    np.testing.assert_array_equal(times[:-1], np.arange(1000) * 0.001)
+    static = 'kind = "static"'
+    pcid = 'kind = "pcid"\nend = 1.0\noutput_step = 0.001'
+    alone = SCENE.replace(pcid, static).split('[[analysis]]\nname = "forward"')[0]
+    np.testing.assert_array_equal(load(folder, alone).analysis[0].times, [0.0])
+
+
+def test_waypoints_replace_expressions(folder):
+    text = SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', 'waypoints = "path.csv"')
+    components = load(folder, text).trajectory[0].components
+    assert components["x"](0.5)[0] == pytest.approx(1.4)
+    assert list(components) == ["x", "y"]
+
+
+def test_scene_is_immutable(folder):
+    scene = load(folder, SCENE)
+    with pytest.raises(ValueError, match="frozen"):
+        scene.body[0].name = "other"
+
+
+TIP = 'point = "link2.tip"\nx = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"'
+
+# What is replaced in the scene, by what, and the start of the line (after "scene.toml: ") that tells about it.
+# ruff: noqa: E501 (one line for each mistake)
+MISTAKES = [
+    ("gravity", "gravty", "gravty: expected one of the keys name, space, gravity, ", '(did you mean "gravity"?)'),
+    ("[0.0, -9.81]", '"down"', 'gravity: expected a list, found "down"', ""),
+    ("[0.0, -9.81]", "[0.0, nan]", "gravity[1]: expected a finite number, found ", ""),
+    ('"planar"', '"spatial"', 'space: expected "planar", found "spatial"', "not available yet"),
+    ('"planar"', '"plane"', 'space: expected "planar" or "spatial", found "plane"', '"planar"?'),
+    ("[[payload]]", "[[paylod]]", "paylod: expected one of the keys", '(did you mean "payload"?)'),
+    ("[initial]", "[[initial]]", "initial: expected a table, found [", ""),
+    # bodies
+    ('"link1.toml"', '"lnk1.toml"', 'body "link1": link: expected an existing file, found "lnk1.toml"', '"link1.toml"?'),
+    ('link = "link1.toml"', "", 'body "link1": expected exactly one of the keys "link", "modal", "rigid", found none', ""),
+    ("modal =", 'link = "link1.toml"\nmodal =', 'body "link2": expected exactly one of', 'found "link", "modal"'),
+    ("mass = 2", "mass = -2", 'body "hand": rigid.mass: expected a number greater than 0, found -2', ""),
+    ("inertia = 0.1", "inertia = 0.0", 'body "hand": rigid.inertia: expected a moment of inertia greater than 0', "[[payload]]"),
+    ("inertia = 0.1", "inrtia = 0.1", 'body "hand": rigid.inrtia: expected one of the keys mass, inertia', '"inertia"?'),
+    ("grip =", "grab =", 'payload no. 1: point: expected one of the points "root", "grab" of "hand"', 'found "hand.grip"'),
+    ('name = "hand"', 'name = "ha/nd"', 'body "ha/nd": name: expected a name without', 'found "ha/nd"'),
+    ('name = "hand"', 'name = ""', 'body "": name: expected a name without', 'found ""'),
+    ('name = "hand"', 'name = "link2"', 'body "link2": expected one body of this name, found 2', ""),
+    ('name = "hand"', 'name = "ground"', 'body "ground": name: expected any other name', 'found "ground"'),
+    # joints
+    ('"weld"', '"wled"', 'joint "W": type: expected "revolute", "prismatic" or "weld", found "wled"', '"weld"?'),
+    ('"weld"', '"weld"\nmotor = true', 'joint "W": expected no motor', "found motor = true"),
+    ('"weld"', '"prismatic"', 'joint "W": expected an axis that is not zero', "found none"),
+    ('"weld"', '"weld"\naxis = [1, 0]', 'joint "W": expected the key "axis" only in prismatic', "found it in a weld"),
+    ('"weld"', '"weld"\nat = [1, 0]', 'joint "W": expected the key "at" only in joints to "ground"', "found it between"),
+    ('"link1.root"', '"link1"', 'joint "O": between[1]: expected a point as "BODY.POINT", found "link1"', ""),
+    ('"link1.root"', '"ground"', 'joint "O": expected at most one "ground"', "found two"),
+    ('"link2.root"', '"link1.root"', 'joint "A": expected two bodies in between, found "link1" twice', ""),
+    ('"link2.root"', '"lnk2.root"', 'joint "A": between[1]: expected one of the bodies "link1", ', '"link2"?'),
+    ('name = "A"', 'name = "O"', 'joint "O": expected one joint of this name, found 2', ""),
+    # initial
+    ("link2 = 1.04", "link3 = 1.04", 'initial.angles: expected one of the bodies "link1", "link2", "hand"', 'found "link3"'),
+    ("link1 = 0,", 'link1 = "0",', 'initial.angles.link1: expected a number, found "0"', ""),
+    # trajectories
+    ("1.5*cos(", "1.5*csh(", 'trajectory "tip": x: expected an expression in t, found', "at character 5 (did you mean"),
+    ("1.5*cos(pi*t/4)", "1/(t - 0.25)", 'trajectory "tip": x: expected a finite value', "found none at t = 0.25 s"),
+    ("1.5*cos(pi*t/4)", "sqrt(t)", 'trajectory "tip": x: expected a finite velocity', "found none at t = 0 s"),
+    ('point = "link2.tip"', 'point = "link2.tip"\njoint = "O"', 'trajectory "tip": expected exactly one', '"point", "joint"'),
+    ('point = "link2.tip"', 'joint = "O"', 'trajectory "tip": expected the keys "value", "waypoints" beside "joint"', '"x", "y"'),
+    ('point = "link2.tip"', 'point = "link3.tip"', 'trajectory "tip": point: expected one of the bodies', '"link3.tip"'),
+    (TIP, 'joint = "B"\nvalue = "t"', 'trajectory "tip": joint: expected one of the joints "O", "A"', '"B"'),
+    (TIP, 'angle = "B"\nvalue = "t"', 'trajectory "tip": angle: expected one of the bodies', '"B"'),
+    ('x = "1.5*cos(pi*t/4)"', 'waypoints = "path.csv"', 'trajectory "tip": expected either waypoints or expr', '"y", "way'),
+    ('x = "1.5*cos(pi*t/4)"', 'waypoints = "pth.csv"', 'trajectory "tip": waypoints: expected an existing', '"path.csv"?'),
+    # patches and loads
+    ("count = 2", "count = 2.5", 'pzt "link1": count: expected a whole number, found 2.5', ""),
+    ("count = 2", "count = 0", 'pzt "link1": count: expected a number greater than 0, found 0', ""),
+    ("count = 2", "centers = []", 'pzt "link1": centers: expected at least one entry, found none', ""),
+    ("count = 2", "count = 2\ncenters = [0.1]", 'pzt "link1": expected exactly one of the keys "count", "centers"', "found"),
+    ("d31 = 110e-12", "d31 = 0", 'pzt "link1": expected a d31 other than 0, found 0', ""),
+    ('body = "link1"', 'body = "hand"', 'pzt "hand": body: expected a flexible body, found "hand"', "rigid"),
+    ('pzt = "link1"', 'pzt = "link2"', 'load no. 1: pzt: expected a body with patches, "link1", found "link2"', ""),
+    ('["10*t", 5]', '["10*t"]', "load no. 1: voltage: expected 2 expressions", "found 1"),
+    ('["10*t", 5]', '["10*t", "v"]', "load no. 1: voltage[1]: expected an expression in t, found 'v'", "unknown name"),
+    ('["10*t", 5]', '["log(t)", 5]', "load no. 1: voltage[0]: expected a finite value", "found none at t = 0 s"),
+    ('pzt = "link1"', 'joint = "O"', 'load no. 1: expected the keys "moment" beside "joint", found "voltage"', ""),
+    ("mass = 0.5", "", "payload no. 1: mass: expected a value, since this key is required, found none", ""),
+    # analyses
+    ("end = 1.0", "end = 1.0005", 'analysis "inverse": expected an output_step that divides end = 1.0005', "found 0.001"),
+    ("end = 1.0", "end = 1e9", 'analysis "inverse": expected at most 10000000 outputs, found', ""),
+    ("end = 1.0", "", 'analysis "inverse": expected the key "end" in kind = "pcid", found none', ""),
+    ("end = 1.0", "end = -1.0", 'analysis "inverse": end: expected a number greater than 0, found -1.0', ""),
+    ("end = 1.0", "end = 1.0\ntolerance = 0", 'analysis "inverse": tolerance: expected a number greater than 0', "found 0"),
+    ("end = 1.0", 'end = 1.0\nintegrator = "dop"', 'analysis "inverse": integrator: expected "dop853", found "dop"', ""),
+    ("end = 1.0", 'end = 1.0\nshape = "zero"', 'analysis "inverse": expected the key "shape" only in kind = "fcid"', "found"),
+    ('kind = "pcid"', 'kind = "fcid"', 'analysis "inverse": kind: expected "pcid", "forward" or', "not available yet"),
+    ('kind = "pcid"', 'kind = "pcd"', 'analysis "inverse": kind: expected "pcid", "fcid", "forward" or "static"', '"pcid"?'),
+    ('actuation = "inverse"', 'actuation = "invers"', 'analysis "forward": actuation: expected an earlier', '"inverse"?'),
+    ('actuation = "inverse"', 'actuation = "forward"', 'analysis "forward": actuation: expected', "does not come before"),
+    ('apply = "joints+pzt"', "", 'analysis "forward": expected the keys "actuation" and "apply" together, found only', ""),
+    ('apply = "joints+pzt"', 'apply = "joints"\nend = 2.0', 'analysis "forward": end: expected at most 1', "found 2"),
+    ('name = "forward"', 'name = "inverse"', 'analysis "inverse": expected one analysis of this name, found 2', ""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "start", "says"), MISTAKES, ids=[f"{old} → {new}" for old, new, _, _ in MISTAKES]
+)
+def test_mistake_is_named(folder, old, new, start, says):
+    assert old in SCENE
+    with pytest.raises(InputError) as caught:
+        load(folder, SCENE.replace(old, new, 1))
+    lines = str(caught.value).splitlines()
+    prefix = f"{folder / 'scene.toml'}: "
+    assert all(line.startswith(prefix) for line in lines)
+    assert any(line.startswith(prefix + start) and says in line for line in lines), str(caught.value)
+
+
+def test_joints_and_pzt_need_patches(folder):
+    start, rest = SCENE.split("[[pzt]]")
+    with pytest.raises(InputError, match=r'apply: expected at least one \[\[pzt\]\] for "joints\+pzt", found none'):
+        load(folder, start + "[[payload]]" + rest.split("[[payload]]")[1])
+
+
+def test_pcid_needs_a_trajectory(folder):
+    start, rest = SCENE.split("[[trajectory]]")
+    with pytest.raises(InputError, match=r"kind: expected at least one \[\[trajectory\]\]"):
+        load(folder, start + "[[pzt]]" + rest.split("[[pzt]]")[1])
+
+
+def test_actuation_comes_from_pcid(folder):
+    with pytest.raises(InputError, match='actuation: expected an analysis of kind "pcid", found "inverse"'):
+        load(folder, SCENE.replace('kind = "pcid"', 'kind = "forward"', 1))
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ("short.csv", "waypoints: expected a finite value .* t = 0.501 s"),
+        ("value.csv", 'header t,x,y, found "t,value"'),
+    ],
+)
+def test_waypoints_must_cover_the_run_and_fit(folder, table, says):
+    text = SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', f'waypoints = "{table}"')
+    with pytest.raises(InputError, match=says):
+        load(folder, text)
+
+
+def test_two_mistakes_give_two_lines(folder):
+    with pytest.raises(InputError) as caught:
+        load(folder, SCENE.replace('"weld"', '"wled"').replace("count = 2", "count = 2.5"))
+    assert len(str(caught.value).splitlines()) == 2
+
+
+def test_missing_scene(tmp_path):
+    with pytest.raises(InputError, match="scene file not found"):
+        load_scene(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("reference", ["link1", "link1.", ".tip", "a.b.c", ""])
+def test_split_point_refuses(reference):
+    with pytest.raises(ValueError, match=r"BODY\.POINT"):
+        split_point(reference)
+
+
+def test_split_point():
+    assert split_point("link1.tip") == ("link1", "tip")
+
+
+def test_import_stays_light():
+    code = "import sys, ffrobot.mbs.scene_file; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "ffrobot.mbs.scene_file" in loaded
+    assert not {"scipy", "h5py", "dolfinx", "gmsh", "petsc4py", "mpi4py", "matplotlib", "rich"} & set(loaded)

@@ -1,0 +1,276 @@
+"""Time functions: exact derivatives, Python's semantics, and nothing but the grammar."""
+
+import math
+import random
+import time
+
+import numpy as np
+import pytest
+
+from ffrobot.errors import InputError
+from ffrobot.mbs._core import Op, TimeFunction
+from ffrobot.mbs.time_functions import ExpressionError, check_domain, load_waypoints, parse_expression
+
+# Expression and its value, first and second derivative, worked out by hand.
+CLOSED_FORMS = [
+    ("3", lambda t: (3.0, 0.0, 0.0)),
+    ("t", lambda t: (t, 1.0, 0.0)),
+    ("-t**2", lambda t: (-t * t, -2 * t, -2.0)),
+    ("t**5", lambda t: (t**5, 5 * t**4, 20 * t**3)),
+    ("t**-1", lambda t: (1 / t, -1 / t**2, 2 / t**3)),
+    ("t**2.5", lambda t: (t**2.5, 2.5 * t**1.5, 3.75 * t**0.5)),
+    ("2**t", lambda t: (2**t, math.log(2) * 2**t, math.log(2) ** 2 * 2**t)),
+    ("t**t", lambda t: (t**t, t**t * (math.log(t) + 1), t**t * ((math.log(t) + 1) ** 2 + 1 / t))),
+    ("1.5*cos(pi*t/4)", lambda t: (1.5 * (c := math.cos(w * t)), -1.5 * w * math.sin(w * t), -1.5 * w * w * c)),
+    ("t*exp(-t)", lambda t: (t * math.exp(-t), (1 - t) * math.exp(-t), (t - 2) * math.exp(-t))),
+    ("1/(1 + t**2)", lambda t: (q := 1 / (1 + t * t), -2 * t * q**2, (6 * t * t - 2) * q**3)),
+    ("log(t)", lambda t: (math.log(t), 1 / t, -1 / t**2)),
+    ("sqrt(t)", lambda t: (t**0.5, 0.5 * t**-0.5, -0.25 * t**-1.5)),
+    ("tan(t)", lambda t: ((f := math.tan(t)), 1 + f * f, 2 * f * (1 + f * f))),
+    ("tanh(t)", lambda t: ((f := math.tanh(t)), 1 - f * f, -2 * f * (1 - f * f))),
+    ("abs(-t)", lambda t: (t, 1.0, 0.0)),
+    ("where(t < 1, t, t**2)", lambda t: (t, 1.0, 0.0) if t < 1 else (t**2, 2 * t, 2.0)),
+]  # fmt: skip
+w = math.pi / 4
+
+
+@pytest.mark.parametrize(("text", "exact"), CLOSED_FORMS, ids=[text for text, _ in CLOSED_FORMS])
+@pytest.mark.parametrize("t", [0.3, 1.0, 1.7])
+def test_derivatives_are_exact(text, exact, t):
+    np.testing.assert_allclose(parse_expression(text)(t), exact(t), rtol=4e-15, atol=4e-15)
+
+
+@pytest.mark.parametrize("n", range(7))
+def test_integer_powers_are_exact_at_zero(n):
+    expected = (0.0**n, n * 0.0 ** (n - 1) if n else 0.0, n * (n - 1) * 0.0 ** (n - 2) if n > 1 else 0.0)
+    assert parse_expression(f"t**{n}")(0.0) == expected
+
+
+def random_expression(rng, depth):
+    """A smooth expression that is safe for all t in [0, 1], and the same text for Python."""
+    if depth == 0:
+        return rng.choice(["t", "pi", f"{rng.uniform(-2, 2):.3f}", "1e-3"])
+    a, b = (random_expression(rng, depth - 1) for _ in range(2))
+    forms = ["({a} + {b})", "({a} - {b})", "{a}*{b}", "({a})/(2 + ({b})**2)", "sin({a})", "cos({a})", "tanh({a})"]
+    forms += [
+        "exp(-({a})**2)",
+        "log(1 + ({a})**2)",
+        "sqrt(1 + ({b})**2)",
+        "-({a})",
+        "({a})**3",
+        "(2 + cos({a}))**({b})",
+    ]
+    forms += ["where({a} < {b}, {a}, {b})", "where(not {a} > 1 and {b} >= 0 or t <= 0.5, {a}, {b})", "abs({a})"]
+    return rng.choice(forms).format(a=a, b=b)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_random_expressions_agree_with_python(seed):
+    rng = random.Random(seed)
+    text = random_expression(rng, 3)
+    names = {name: getattr(math, name) for name in ("sin", "cos", "tanh", "exp", "log", "sqrt", "pi")}
+    names |= {"abs": abs, "where": lambda condition, a, b: a if condition else b}
+    function = parse_expression(text)
+    for t in (0.0, 0.37, 1.0):
+        expected = eval(text, {"__builtins__": {}}, names | {"t": t})
+        assert function(t)[0] == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_random_expressions_have_the_derivatives_of_their_values(seed):
+    function = parse_expression(random_expression(random.Random(seed), 3))
+    t, h = 0.3712, 1e-3
+    # Sixth-order central differences; the rate's own difference tests the acceleration.
+    samples = function.sample(t + h * np.arange(-3, 4))
+    weights = np.array([-1, 9, -45, 0, 45, -9, 1]) / (60 * h)
+    if np.ptp(samples[2]) > 1e3:
+        pytest.skip("a kink of abs or where, or a large higher derivative, within the stencil")
+    scale = 1 + np.abs(samples).max(axis=1)
+    assert samples[0] @ weights == pytest.approx(samples[1, 3], abs=1e-8 * scale[0] * scale[2])
+    assert samples[1] @ weights == pytest.approx(samples[2, 3], abs=1e-8 * scale[0] * scale[2])
+
+
+def test_branch_not_selected_does_not_leak():
+    assert parse_expression("where(t < 1, 1/(1 - t), 0)")(1.0) == (0.0, 0.0, 0.0)
+    assert parse_expression("where(t > 0, sqrt(t), t**2)")(0.0) == (0.0, 0.0, 2.0)
+
+
+def test_conditions_chain_and_combine():
+    function = parse_expression("where(0.2 < t <= 0.5 or not t < 0.9, 1, 0)")
+    assert [function(t)[0] for t in (0.2, 0.3, 0.5, 0.6, 0.9)] == [0, 1, 1, 0, 1]
+
+
+def test_abs_differentiates_forward_in_time():
+    assert parse_expression("abs(t)")(0.0) == (0.0, 1.0, 0.0)
+    assert parse_expression("abs(-t**2)")(0.0) == (0.0, 0.0, 2.0)
+
+
+def test_values_outside_the_domain_are_nan_by_component():
+    assert np.isnan(parse_expression("log(t)")(-1.0)).all()
+    assert np.isnan(parse_expression("1/t")(0.0)).all()
+    assert np.isnan(parse_expression("(t - 2)**0.5")(1.0)).all()
+    value, rate, acceleration = parse_expression("sqrt(t)")(0.0)
+    assert value == 0.0
+    assert math.isnan(rate)
+    assert math.isnan(acceleration)
+
+
+def test_sample_is_the_call_at_each_time():
+    function = parse_expression("exp(sin(t))")
+    times = np.linspace(0, 2, 7)
+    np.testing.assert_array_equal(function.sample(times), np.array([function(t) for t in times]).T)
+
+
+BAD_EXPRESSIONS = [
+    ("", 1, "empty"),
+    ("t +", None, "syntax"),
+    ("2*tt", 3, "did you mean 't'"),
+    ("1.5*cosh(t)", 5, "did you mean 'cos'"),
+    ("2t", None, "2*t"),
+    ("2(t)", 1, "2*(t)"),
+    ("t^2", 1, r"written \*\*"),
+    ("t // 2", 1, "not available"),
+    ("sin", 1, "without its argument"),
+    ("pi(t)", 1, "not a function"),
+    ("sin(t, t)", 1, "takes 1 argument"),
+    ("sin(x=t)", 1, "without names"),
+    ("where(t, 1, 2)", 7, "comparison"),
+    ("where(t == 1, 1, 2)", 7, "< <= > >="),
+    ("t < 1", 1, "where"),
+    ("1 if t else 2", 1, "where"),
+    ("t.real", 1, "attribute"),
+    ("t[0]", 1, "subscript"),
+    ("[t]", 1, "list"),
+    ("__import__('os')", 1, "unknown function"),
+    ("(lambda: 1)()", 1, "known by name"),
+    ("().__class__", 1, "attribute"),
+    ("'a'", 1, "not a real number"),
+    ("True", 1, "not a real number"),
+    ("2j", 1, "not a real number"),
+    ("1e400", 1, "beyond"),
+    ("9" * 3000, 1, "beyond"),
+    ("9**9**9**9", 7, "exponent"),
+    ("t**2000", 4, "exponent"),
+    ("1 + log(-1)", 5, "no real, finite value"),
+    ("t/(1 - 1)*0 + 1/0", 15, "no real, finite value"),
+    ("(-8)**(1/3)", 1, "no real, finite value"),
+    ("exp(1000)", 1, "no real, finite value"),
+    ("t\0", 1, "null"),
+    ("é*t", 1, "unknown name"),
+    ("ｐｉ + xx", 6, "unknown name 'xx'"),  # Python reads wide letters as pi; positions count characters, not bytes
+    ("t" * 1_000_000, None, "longer"),
+    ("(" * 1000 + "t" + ")" * 1000, None, "parentheses"),
+    ("-" * 3000 + "t", None, "deep"),
+    ("sin(" * 90 + "t" + ")" * 90, None, "deep"),
+    ("(t+" * 55 + "t*(" * 40 + "t" + ")" * 95, None, "deep"),
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "position", "says"), BAD_EXPRESSIONS, ids=[text[:20] for text, _, _ in BAD_EXPRESSIONS]
+)
+def test_everything_else_is_refused_at_once(text, position, says):
+    start = time.perf_counter()
+    with pytest.raises(ExpressionError, match=says) as caught:
+        parse_expression(text)
+    assert time.perf_counter() - start < 0.5
+    if position is not None:
+        assert caught.value.position == position
+    assert len(str(caught.value)) < 400
+
+
+def test_long_sums_are_not_deep():
+    text = "+".join(f"{k}*t" for k in range(400))
+    assert parse_expression(text)(1.0) == pytest.approx((400 * 399 / 2, 400 * 399 / 2, 0.0))
+
+
+def test_line_breaks_are_blanks():
+    assert parse_expression("\n t +\n 1\n")(2.0)[0] == 3.0
+
+
+@pytest.mark.parametrize(
+    ("ops", "constants"),
+    [([], []), ([Op.add], []), ([Op.time, Op.time], []), ([Op.constant], []), ([Op.time], [1.0]), ([Op.time] * 65, [])],
+)
+def test_core_refuses_malformed_programs(ops, constants):
+    with pytest.raises(ValueError, match="expression"):
+        TimeFunction.expression(ops, constants)
+
+
+def test_core_refuses_malformed_polynomials():
+    one = np.ones((1, 1))
+    for breaks, coefficients in [([0.0], np.ones((0, 1))), ([1.0, 0.0], one), ([0.0, 1.0], one * np.nan)]:
+        with pytest.raises(ValueError, match="polynomial"):
+            TimeFunction.polynomial(np.array(breaks), coefficients)
+
+
+def test_polynomial_pieces_and_range():
+    # t² on [0, 1], then 1 + 2s + 3s² with s = t − 1.
+    function = TimeFunction.polynomial(np.array([0.0, 1.0, 3.0]), np.array([[1.0, 0.0, 0.0], [3.0, 2.0, 1.0]]))
+    assert function(0.5) == (0.25, 1.0, 2.0)
+    assert function(1.0) == (1.0, 2.0, 6.0)
+    assert function(3.0) == (17.0, 14.0, 6.0)
+    assert function(3.0 + 1e-12)[0] == pytest.approx(17.0)  # a rounding beyond the end is still inside
+    assert np.isnan(function(3.1)).all()
+    assert np.isnan(function(-0.1)).all()
+
+
+def write(path, text):
+    path.write_text(text)
+    return path
+
+
+def test_waypoints_reproduce_a_quintic_at_rest_at_both_ends(tmp_path):
+    # 10 t³ − 15 t⁴ + 6 t⁵ rests at both ends, so the quintic spline through any of its points is itself.
+    times = np.concatenate([[0.0], np.sort(np.random.default_rng(1).uniform(0.0, 1.0, 9)), [1.0]])
+    rows = "".join(f"{t!r},{t**3 * (10 - 15 * t + 6 * t * t)!r},2\n" for t in times.tolist())
+    table = load_waypoints(write(tmp_path / "path.csv", "t,x,y\n" + rows))
+    t = np.linspace(0, 1, 101)
+    exact = [t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2, 60 * t * (1 - t) * (1 - 2 * t)]
+    np.testing.assert_allclose(table.components["x"].sample(t), exact, atol=1e-9)
+    np.testing.assert_allclose(table.components["y"].sample(t), [2 + 0 * t, 0 * t, 0 * t], atol=1e-9)
+    assert (table.start, table.end) == (0.0, 1.0)
+
+
+def test_waypoints_pass_through_and_are_smooth(tmp_path):
+    times, values = [0.0, 0.3, 0.7, 1.0, 2.0], [0.0, 1.0, -1.0, 0.5, 0.0]
+    rows = "".join(f"{t},{v}\n" for t, v in zip(times, values, strict=True))
+    function = load_waypoints(write(tmp_path / "path.csv", "t,value\n" + rows)).components["value"]
+    np.testing.assert_allclose(function.sample(np.array(times))[0], values, atol=1e-12)
+    for inner in times[1:-1]:
+        np.testing.assert_allclose(function(inner - 1e-9), function(inner + 1e-9), atol=1e-4)
+    np.testing.assert_allclose([function(0.0)[1:], function(2.0)[1:]], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "header"),
+        ("x,y\n0,0\n1,1\n", "header"),
+        ("t,x,x\n0,0,0\n1,1,1\n", "header"),
+        ("t,x\n0,0\n", "at least 2"),
+        ("t,x\n0,0\n1,one\n", "line 3: expected 2 finite numbers"),
+        ("t,x\n0,0\n1,nan\n", "line 3"),
+        ("t,x\n0,0\n1,1,1\n", "line 3"),
+        ("t,x\n0,0\n\n1,1\n1,2\n", "line 5: expected times that increase, found t = 1 after 1"),
+    ],
+)
+def test_bad_waypoints_name_file_and_line(tmp_path, text, says):
+    with pytest.raises(InputError, match=says) as caught:
+        load_waypoints(write(tmp_path / "path.csv", text))
+    assert "path.csv" in str(caught.value)
+
+
+def test_missing_waypoints(tmp_path):
+    with pytest.raises(InputError, match="not found"):
+        load_waypoints(tmp_path / "none.csv")
+
+
+def test_check_domain_names_the_first_bad_time():
+    times = np.linspace(0.0, 1.0, 11)
+    check_domain(parse_expression("1/(t + 1)"), times, "tip")
+    with pytest.raises(InputError, match=r"tip: expected a finite value .* t = 0\.5 s"):
+        check_domain(parse_expression("where(t < 0.45, 1, log(0.45 - t))"), times, "tip")
+    with pytest.raises(InputError, match=r"finite velocity .* t = 0 s"):
+        check_domain(parse_expression("sqrt(t)"), times, "tip")
+    check_domain(parse_expression("sqrt(t)"), times, "a load needs no derivatives", derivatives=0)
