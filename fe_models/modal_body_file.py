@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 import h5py
 import numpy as np
@@ -50,23 +50,21 @@ def write_modal_body(path: Path, body: ModalBody, *, make_folder: bool = False) 
         SolveError: the file cannot be written; names file and reason.
     """
     image = _image(body)
-    temporary: Path | None = None
+    target = path.resolve()  # a symbolic link stays one
+    temporary = target.with_name(f".{target.name}.{uuid4().hex}.tmp")
     try:
         if make_folder:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-        temporary = Path(name)
-        with os.fdopen(handle, "wb") as stream:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("xb") as stream:
             stream.write(image)
             stream.flush()
             os.fsync(stream.fileno())
-        temporary.chmod(0o666 & ~_umask())  # mkstemp's own mode is private
-        temporary.replace(path)
+        temporary.replace(target)
     except OSError as error:
-        if temporary is not None:
-            with suppress(OSError):
-                temporary.unlink()
         raise SolveError(f"{path}: cannot write the modal body file: {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def read_modal_body(path: Path) -> ModalBody:
@@ -181,9 +179,3 @@ def _write_arrays(group: h5py.Group, arrays: Mapping[str, NDArray[np.generic] | 
     for name, array in arrays.items():
         if array is not None:
             group[name] = array
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
