@@ -19,8 +19,9 @@ public:
     constexpr double b = 8, exponent = 1 / (b * order);
     error = std::max(error, 1e-12);
     double factor = std::pow(target / error, exponent);
-    factor *= previous_step_ > 0 ? std::pow(target / previous_error_, exponent) * std::pow(step / previous_step_, -1 / b)
-                                 : factor;
+    factor *= previous_step_ > 0
+                  ? std::pow(target / previous_error_, exponent) * std::pow(step / previous_step_, -1 / b)
+                  : factor;
     previous_step_ = step;
     previous_error_ = error;
     return step * (1 + std::atan(factor - 1));

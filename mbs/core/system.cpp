@@ -170,8 +170,8 @@ double acceleration_residual(const System &system, const double *a, const Worksp
         continue;
       const auto b = static_cast<std::size_t>(m->body);
       double size = 0;
-      residual += c->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker,
-                                             a + system.first_coordinate[b], size));
+      residual +=
+          c->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker, a + system.first_coordinate[b], size));
       scale += c->lpNorm<Eigen::Infinity>() * size;
     }
     worst = std::max(worst, std::abs(residual) / scale);
