@@ -26,7 +26,6 @@ public:
 
   const Eigen::VectorXd &tau() const { return tau_; }                      // (motors)
   const std::vector<Eigen::VectorXd> &modal_force() const { return F_p_; } // of each body
-  double condition() const; // smallest over largest pivot of the joint system at the last resolve
 
 private:
   const System &system_;

@@ -63,8 +63,8 @@ struct Workspace {
   bool has_external_modal = false;
   EnvelopeMatrix schur; // C M^-1 C^T, factorised
   Eigen::VectorXd lambda;
-  std::vector<Eigen::Matrix3Xd> wrench; // of the constraints, on the markers of each body
-  Eigen::VectorXd correction;           // of projections
+  std::vector<Eigen::Matrix3Xd> wrench;    // of the constraints, on the markers of each body
+  Eigen::VectorXd correction, value, rate; // of projections
   unsigned long evaluations = 0;
 };
 
