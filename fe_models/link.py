@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from pathlib import Path
 from platformdirs import user_cache_path
 
 from ..errors import FfrobotError, InputError
+from ..files import check_writable
 from .link_file import BeamLink, read_link
 from .modal_body import ModalBody
 from .modal_body_file import FORMAT_VERSION, is_modal_body_file, read_modal_body, write_modal_body
@@ -124,12 +124,7 @@ def _up_to_date(path: Path, digest: str) -> ModalBody | None:
 
 def _check_target(path: Path, force: bool) -> None:
     """Refuse, before any work, an output that cannot be written or that would overwrite some other file."""
-    if path.is_dir():
-        raise InputError(f"{path}: output: expected a file name, found a folder")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path}: output: expected a folder that can be written, found that {path.parent} cannot")
+    check_writable(path)
     if path.exists() and not force and not is_modal_body_file(path):
         raise InputError(f"{path}: output: a file that is not a modal body is there; use another name or --force")
 

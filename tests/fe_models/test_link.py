@@ -6,10 +6,10 @@ import time
 
 import h5py
 import pytest
-from ffrobot.fe_models.link import cached_modal_body, input_hash, make_link
-from ffrobot.fe_models.link_file import read_link
 
 from ffrobot.errors import InputError
+from ffrobot.fe_models.link import cached_modal_body, input_hash, make_link
+from ffrobot.fe_models.link_file import read_link
 
 
 def test_up_to_date_links_are_not_computed_again(link_file):
@@ -126,7 +126,7 @@ except FfrobotError as error:
     finally:
         tmp_path.chmod(0o755)
     assert result.stdout.startswith("2 ")
-    assert "link1.h5: output: expected a folder that can be written" in result.stdout
+    assert "link1.h5: output: expected a writable folder" in result.stdout
 
 
 def test_cache(link_file, cache):
