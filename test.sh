@@ -12,12 +12,14 @@ mapfile -t cpp < <(find mbs -name '*.h' -o -name '*.cpp')
 
 failed=()
 check() {
-  "$@" || failed+=("$*")
+  local title=$1
+  shift
+  "$@" || failed+=("$title")
 }
-check .venv/bin/ruff check --quiet .
-check .venv/bin/ruff format --diff --quiet .
-check env -C build/types ../../.venv/bin/mypy --config-file ../../pyproject.toml --no-error-summary -p ffrobot
-check .venv/bin/clang-format --dry-run --Werror "${cpp[@]}"
+check "ruff check" .venv/bin/ruff check --quiet .
+check "ruff format" .venv/bin/ruff format --diff --quiet .
+check "mypy" env -C build/types ../../.venv/bin/mypy --config-file ../../pyproject.toml --no-error-summary -p ffrobot
+check "clang-format" .venv/bin/clang-format --dry-run --Werror "${cpp[@]}"
 
 status=0
 .venv/bin/python -m pytest "$@" || status=$?
