@@ -14,7 +14,7 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from ..errors import FfrobotError, InputError
+from ..errors import FfrobotError, InputError, SolveError
 from ..files import check_writable
 from .link_file import BeamLink, read_link
 from .modal_body import ModalBody
@@ -106,8 +106,14 @@ def _compute(
     progress: Progress | None,
     make_folder: bool = False,
 ) -> LinkOutcome:
-    from .beam_link import beam_modal_body
-
+    try:
+        from .beam_link import beam_modal_body
+    except ModuleNotFoundError as error:
+        raise SolveError(
+            f"{link_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "
+            "install dolfinx and slepc4py (Debian: python3-dolfinx python3-slepc4py), or use a modal body file made "
+            "elsewhere"
+        ) from None
     body = beam_modal_body(link, link_path, digest, progress or _silent)
     write_modal_body(path, body, make_folder=make_folder)
     return LinkOutcome(path, body, True, time.perf_counter() - start)

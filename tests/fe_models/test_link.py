@@ -49,6 +49,24 @@ print([m for m in ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix",
     assert time.perf_counter() - start < 2.0  # 0.3 s where nothing else runs
 
 
+@pytest.mark.parametrize("missing", ["dolfinx", "petsc4py", "slepc4py"])
+def test_without_the_finite_element_libraries(link_file, missing):
+    path = link_file()
+    code = f"""
+import sys
+from pathlib import Path
+from ffrobot.errors import SolveError
+from ffrobot.fe_models.link import make_link
+sys.modules[{missing!r}] = None  # as if not installed
+try:
+    make_link(Path({str(path)!r}))
+except SolveError as error:
+    print(error)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert f"link1.toml: computing a link needs the finite element libraries, and {missing}" in result.stdout
+
+
 def test_a_run_prints_nothing_and_repeats_bit_for_bit(link_file, tmp_path):
     path = link_file(family="all", count=20)
     make_link(path)
