@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..errors import InputError
+
+# First of all that load dolfinx: mesh.compat sets PETSc up.
 from ..mesh.interval import graded_nodes, interval_mesh, with_points
 from .beam import R_X, U_X, FamilyModel, family_model
 from .eigen import lowest_modes

@@ -1,5 +1,6 @@
 """Stage 1 as a command: computed once, not again; what is in the way is not lost."""
 
+import signal
 import subprocess
 import sys
 import time
@@ -78,6 +79,21 @@ make_link(Path({str(path)!r}), Path({str(tmp_path / "again.h5")!r}))
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (result.stdout, result.stderr) == ("", "")
     assert (tmp_path / "again.h5").read_bytes() == path.with_suffix(".h5").read_bytes()
+
+
+def test_signals_end_the_process_as_ever(link_file):
+    """PETSc installs handlers that print pages and exit with its own code, unless told not to."""
+    path = link_file()
+    code = f"""
+import os, signal
+from pathlib import Path
+from ffrobot.fe_models.link import make_link
+make_link(Path({str(path)!r}), force=True)
+os.kill(os.getpid(), signal.SIGTERM)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert result.returncode == -signal.SIGTERM
+    assert result.stderr == ""
 
 
 def test_progress_is_told(link_file):
