@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from uuid import uuid4
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolveError
+from ..errors import InputError
+from ..files import write_atomically
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
 
 if TYPE_CHECKING:
@@ -44,27 +42,10 @@ _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": 
 def write_modal_body(path: Path, body: ModalBody, *, make_folder: bool = False) -> None:
     """Write `body` to `path`, replacing what is there only once the new file is complete.
 
-    The HDF5 image is made in memory: a full disk then is an ordinary failed write, which HDF5 itself does not survive.
-
     Raises:
         SolveError: the file cannot be written; names file and reason.
     """
-    image = _image(body)
-    target = path.resolve()  # a symbolic link stays one
-    temporary = target.with_name(f".{target.name}.{uuid4().hex}.tmp")
-    try:
-        if make_folder:
-            target.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("xb") as stream:
-            stream.write(image)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(target)
-    except OSError as error:
-        raise SolveError(f"{path}: cannot write the modal body file: {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+    write_atomically(path, _image(body), "modal body file", make_folder=make_folder)
 
 
 def read_modal_body(path: Path) -> ModalBody:

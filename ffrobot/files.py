@@ -6,6 +6,7 @@ import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
+from uuid import uuid4
 
 from .errors import InputError, SolveError
 
@@ -16,23 +17,21 @@ def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool
     HDF5 files are handed over as images made in memory: a full disk then is an ordinary failed write, which HDF5
     itself does not survive. Raises `SolveError` naming the file, `what` it is, and the reason.
     """
-    temporary: Path | None = None
+    target = path.resolve()  # a symbolic link stays one
+    temporary = target.with_name(f".{target.name}.{uuid4().hex}.tmp")
     try:
         if make_folder:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-        temporary = Path(name)
-        with os.fdopen(handle, "wb") as stream:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("xb") as stream:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
-        temporary.chmod(0o666 & ~_umask())  # mkstemp's own mode is private
-        temporary.replace(path)
+        temporary.replace(target)
     except OSError as error:
-        if temporary is not None:
-            with suppress(OSError):
-                temporary.unlink()
         raise SolveError(f"{path}: cannot write the {what}: {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def check_writable(path: Path) -> None:
@@ -46,9 +45,3 @@ def check_writable(path: Path) -> None:
             pass
     except OSError as error:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
