@@ -28,11 +28,13 @@ def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool
             os.fsync(stream.fileno())
         temporary.chmod(0o666 & ~_umask())  # mkstemp's own mode is private
         temporary.replace(path)
+        temporary = None
     except OSError as error:
+        raise SolveError(f"{path}: cannot write the {what}: {error.strerror or error}") from None
+    finally:  # after Ctrl-C too
         if temporary is not None:
             with suppress(OSError):
                 temporary.unlink()
-        raise SolveError(f"{path}: cannot write the {what}: {error.strerror or error}") from None
 
 
 def check_writable(path: Path) -> None:
