@@ -88,7 +88,7 @@ def select(models: dict[Family, FamilyModel], wanted: Sequence[int]) -> Modes:
     candidates = []
     for number, (family, model) in enumerate(models.items()):
         count = min(wanted[-1], model.K.shape[0])
-        omega2, X = lowest_modes(model.K, model.M, count)
+        omega2, X = lowest_modes(model.K, model.M, model.strain, count)
         candidates += [(float(f"{omega2[k]:.9e}"), number, family, omega2[k], X[:, k]) for k in range(count)]
     candidates.sort(key=lambda candidate: candidate[:2])
     chosen = [candidates[index - 1] for index in wanted]
@@ -125,7 +125,7 @@ def _element_boundaries(link: BeamLink) -> Floats:
 
 def _wanted(link: BeamLink, models: dict[Family, FamilyModel], path: Path) -> Sequence[int]:
     """Numbers of the modes asked for, from 1, ascending."""
-    wanted = link.modes.indices or list(range(1, (link.modes.count or 0) + 1))
+    wanted = link.modes.indices or range(1, (link.modes.count or 0) + 1)
     available = sum(model.K.shape[0] for model in models.values())
     if wanted[-1] > available:
         key = "count" if link.modes.indices is None else "indices"

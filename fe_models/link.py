@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -127,6 +128,8 @@ def _check_target(path: Path, force: bool) -> None:
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: output: expected a folder that can be written, found that {path.parent} cannot")
     if path.exists() and not force and not is_modal_body_file(path):
         raise InputError(f"{path}: output: a file that is not a modal body is there; use another name or --force")
 

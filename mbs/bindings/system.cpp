@@ -33,7 +33,7 @@ PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, 
   for (const auto &[name, size] : {std::pair("damping", damping.rows()), {"j", j.size()}, {"S_tilde", S_tilde.rows()}, {"m_xy", m_xy.rows()}})
     if (size)
       check_size(name, size, n);
-  return {mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions};
+  return {mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions, {}};
 }
 
 // (a, lambda) at one state

@@ -27,6 +27,7 @@ struct PlanarBody {
   Eigen::MatrixXd S_tilde;                         // (n, n) S_bar_12 - S_bar_21, skew; empty where it vanishes
   Eigen::MatrixXd m_xy;                            // (n, n) S_bar_11 + S_bar_22; empty where it is the identity
   std::vector<Eigen::Vector2d> marker_positions;   // undeformed, body frame
+  std::vector<int> marker_rows;                    // 3, or 2 where no constraint asks for the marker's rotation
 
   Eigen::Index modes() const { return W.cols(); }
   Eigen::Index markers() const { return static_cast<Eigen::Index>(marker_positions.size()); }
@@ -68,8 +69,8 @@ struct PlanarBodyState {
   Eigen::VectorXd extra, W_extra;   // modal forces outside the common fast path, and W times them
   Eigen::VectorXd z;                // multipliers of the rows of W in p_ddot
   Eigen::VectorXd z_response;
-  Eigen::Matrix3Xd B_transposed;    // (3, 3 markers): marker acceleration per (a, alpha), p eliminated; global rows
-  Eigen::Matrix3Xd Z_transposed;    // L^-1 B^T, with the eliminated mass matrix = L D L^T
+  Eigen::Matrix3Xd Z_transposed;    // (3, 3 markers) L^-1 B^T: B marker acceleration per (a, alpha) with p eliminated,
+                                    // global rows; L D L^T the eliminated mass matrix
   Eigen::Vector3d L;                // (L_10, L_20, L_21)
   Eigen::Vector3d D_inverse;
   Eigen::Vector3d free_frame;       // free (a, alpha) of the body frame, body axes

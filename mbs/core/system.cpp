@@ -14,6 +14,13 @@ void System::finish() {
     first_coordinate.push_back(coordinates);
     coordinates += body.coordinates();
   }
+  for (auto &body : bodies)
+    body.marker_rows.assign(static_cast<std::size_t>(body.markers()), 2);
+  for (const auto &[row, target] : constraints)
+    if (row.kind == RowKind::angle || row.kind == RowKind::slide)
+      for (const auto *m : {&row.a, &row.b})
+        if (m->body >= 0)
+          bodies[static_cast<std::size_t>(m->body)].marker_rows[static_cast<std::size_t>(m->marker)] = 3;
   couplings.clear();
   envelope.clear();
   const auto count = static_cast<int>(constraints.size());
