@@ -55,8 +55,9 @@ def check_writable(path: Path) -> None:
 
 
 def _is_hdf5(path: Path) -> bool:
+    """Whether `path` is an HDF5 file, or an empty one."""
     if not path.is_file():  # a device, say
         return False
     with suppress(OSError), path.open("rb") as stream:
-        return stream.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE
-    return True  # not readable: what it is cannot be told
+        return stream.read(len(HDF5_SIGNATURE)) in (b"", HDF5_SIGNATURE)
+    return False

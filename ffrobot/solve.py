@@ -155,7 +155,7 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
             continue
         if point not in planar.points:
             raise InputError(
-                f"{scene.path}: payload: point: expected one of {', '.join(planar.points)}, found \"{payload.point}\""
+                f'{scene.path}: payload: point: expected one of {", ".join(planar.points)}, found "{payload.point}"'
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
     return LoadedBody(planar, body.modal, body.path, body.computed)
