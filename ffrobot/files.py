@@ -10,6 +10,8 @@ from uuid import uuid4
 
 from .errors import InputError, SolveError
 
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
 
 def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool = False) -> None:
     """Write `content` to a temporary name in the same folder, then rename it to `path`.
@@ -29,19 +31,33 @@ def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool
         temporary.replace(target)
     except OSError as error:
         raise SolveError(f"{path}: cannot write the {what}: {error.strerror or error}") from None
-    finally:
+    finally:  # after Ctrl-C too
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
 
 
 def check_writable(path: Path) -> None:
-    """Refuse, before any work is done, an output that could not be written. Raises `InputError`."""
+    """Refuse, before any work is done, an output that could not be written or would cost a file of another kind.
+
+    Raises `InputError`.
+    """
     if path.is_dir():
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
+    if path.exists() and not _is_hdf5(path):
+        raise InputError(f"{path}: output: expected a new name or an earlier HDF5 file, found a file of another kind")
     try:
-        with tempfile.TemporaryFile(dir=path.parent):
+        with tempfile.TemporaryFile(dir=path.resolve().parent):
             pass
     except OSError as error:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
+
+
+def _is_hdf5(path: Path) -> bool:
+    """Whether `path` is an HDF5 file, or an empty one."""
+    if not path.is_file():  # a device, say
+        return False
+    with suppress(OSError), path.open("rb") as stream:
+        return stream.read(len(HDF5_SIGNATURE)) in (b"", HDF5_SIGNATURE)
+    return False
