@@ -13,6 +13,7 @@ MarkerMotion marker_motion(const MarkerReference &m, const std::vector<PlanarBod
 
 void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMotion &motion) {
   const MarkerMotion a = marker_motion(row.a, bodies), b = marker_motion(row.b, bodies);
+  motion.bias = 0; // what a slide evaluated before may have left
   switch (row.kind) {
   case RowKind::x:
   case RowKind::y: {
