@@ -6,18 +6,21 @@ source scripts/setup.sh
 
 # mypy needs the packages where they are once installed: ffrobot.mesh, not mesh.
 rm -rf build/types
-mkdir -p build/types/ffrobot
-ln -s "$PWD"/ffrobot/* "$PWD"/{mesh,fe_models,mbs,actuation} build/types/ffrobot/
+mkdir -p build/types/ffrobot/mbs
+ln -s "$PWD"/ffrobot/* "$PWD"/{mesh,fe_models,actuation} build/types/ffrobot/
+ln -s "$PWD"/mbs/*.py "$PWD"/.venv/lib/python3*/site-packages/ffrobot/mbs/_core.pyi build/types/ffrobot/mbs/
 mapfile -t cpp < <(find mbs -name '*.h' -o -name '*.cpp')
 
 failed=()
 check() {
-  "$@" || failed+=("$*")
+  local title=$1
+  shift
+  "$@" || failed+=("$title")
 }
-check .venv/bin/ruff check --quiet .
-check .venv/bin/ruff format --diff --quiet .
-check env -C build/types ../../.venv/bin/mypy --config-file ../../pyproject.toml --no-error-summary -p ffrobot
-check .venv/bin/clang-format --dry-run --Werror "${cpp[@]}"
+check "ruff check" .venv/bin/ruff check --quiet .
+check "ruff format" .venv/bin/ruff format --diff --quiet .
+check "mypy" env -C build/types ../../.venv/bin/mypy --config-file ../../pyproject.toml --no-error-summary -p ffrobot
+check "clang-format" .venv/bin/clang-format --dry-run --Werror "${cpp[@]}"
 
 status=0
 .venv/bin/python -m pytest "$@" || status=$?

@@ -16,6 +16,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
+from scipy.special import roots_legendre
 
 from ..mesh.compat import ElementName, assemble_matrix, basix_element, cell_dofs, cell_vertices, function_space
 from ..mesh.interval import cells_containing
@@ -34,11 +35,13 @@ class FamilyModel:
 
     Attributes:
         K, M: (m, m).
+        strain: (s, m) the strains at Gauss points, scaled such that K = strainᵀ strain.
         fields: for each of the rows U_X … R_Z that the family moves, (k, m): the field at k stations from x.
     """
 
     K: sp.csr_matrix
     M: sp.csr_matrix
+    strain: sp.csr_matrix
     fields: Mapping[int, sp.csr_matrix]
 
 
@@ -53,8 +56,8 @@ def family_model(link: BeamLink, family: Family, mesh: Mesh, stations: Floats) -
     second_moment: Property = (lambda s: s.I_yy) if in_plane else (lambda s: s.I_zz)
     row, rotation, sign = (U_Y, R_Z, 1.0) if in_plane else (U_Z, R_Y, -1.0)
     bending = _timoshenko if link.model.theory == "timoshenko" else _euler_bernoulli
-    K, M, deflection, slope = bending(link, mesh, stations, second_moment)
-    return FamilyModel(K, M, {row: deflection, rotation: sign * slope})
+    K, M, strain, deflection, slope = bending(link, mesh, stations, second_moment)
+    return FamilyModel(K, M, strain, {row: deflection, rotation: sign * slope})
 
 
 Property = Callable[[Section], float]
@@ -86,13 +89,17 @@ def _rod(link: BeamLink, mesh: Mesh, stations: Floats, row: int, stiffness: Prop
     V = function_space(mesh, "P", 3)
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     rho = link.material.density
-    K = assemble_matrix(cellwise(link, mesh, stiffness) * u.dx(0) * v.dx(0) * ufl.dx)
+    EA = cellwise(link, mesh, stiffness)
+    K = assemble_matrix(EA * u.dx(0) * v.dx(0) * ufl.dx)
     M = assemble_matrix(cellwise(link, mesh, lambda s: rho * inertia(s)) * u * v * ufl.dx)
+    strain = _at_gauss_points(V, "P", 3, EA, derivative=1)
     free = _all_but(K.shape[0], [_dof_at(V, 0.0)])
-    return FamilyModel(K[free][:, free], M[free][:, free], {row: _values(V, "P", 3, stations)[:, free]})
+    fields = {row: _values(V, "P", 3, stations)[:, free]}
+    return FamilyModel(K[free][:, free], M[free][:, free], strain[:, free], fields)
 
 
-Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]
+# K, M, strain as in FamilyModel; deflection and rotation at the stations.
+Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]
 
 
 def _euler_bernoulli(link: BeamLink, mesh: Mesh, stations: Floats, second_moment: Property) -> Bending:
@@ -110,11 +117,12 @@ def _euler_bernoulli(link: BeamLink, mesh: Mesh, stations: Floats, second_moment
     rhoA = cellwise(link, mesh, lambda s: rho * s.area)
     K = P.T @ assemble_matrix(EI * w.dx(0).dx(0) * v.dx(0).dx(0) * ufl.dx) @ P
     M = P.T @ assemble_matrix(rhoA * w * v * ufl.dx) @ P
+    strain = _at_gauss_points(V, "Hermite", 3, EI, derivative=2) @ P
     last = K.shape[0] - 2
     free = _all_but(K.shape[0], [0, 1] if link.reference.condition == "cantilever" else [0, last])
     deflection = _values(V, "Hermite", 3, stations) @ P
     slope = _values(V, "Hermite", 3, stations, derivative=1) @ P
-    return K[free][:, free], M[free][:, free], deflection[:, free], slope[:, free]
+    return K[free][:, free], M[free][:, free], strain[:, free], deflection[:, free], slope[:, free]
 
 
 def _nodal_to_cell(V: fem.FunctionSpace) -> sp.csr_matrix:
@@ -157,9 +165,12 @@ def _timoshenko(link: BeamLink, mesh: Mesh, stations: Floats, second_moment: Pro
     free = _all_but(K.shape[0], held)
     deflection, rotation = _values(W, "P", 3, stations), _values(T, "P", 2, stations)
     nothing_w, nothing_t = sp.csr_matrix(deflection.shape), sp.csr_matrix(rotation.shape)
+    shear = [_at_gauss_points(W, "P", 3, kGA, derivative=1), -_at_gauss_points(T, "P", 2, kGA)]
+    strain = sp.bmat([[None, _at_gauss_points(T, "P", 2, EI, derivative=1)], shear], format="csr")
     return (
         K[free][:, free],
         M[free][:, free],
+        strain[:, free],
         sp.hstack([deflection, nothing_t], format="csr")[:, free],
         sp.hstack([nothing_w, rotation], format="csr")[:, free],
     )
@@ -177,6 +188,23 @@ def _values(
     dofs = cell_dofs(V)
     rows = np.repeat(np.arange(points.size), dofs.shape[1])
     return sp.csr_matrix((basis.ravel(), (rows, dofs[cells].ravel())), shape=(points.size, dofs.max() + 1))
+
+
+def _at_gauss_points(
+    V: fem.FunctionSpace, element: ElementName, degree: int, weight: fem.Function, derivative: int = 0
+) -> sp.csr_matrix:
+    """B (3c, dofs): a derivative of a function of V at three Gauss points a cell, times √(weight · quadrature weight).
+
+    Bᵀ B is then the matrix of ∫ weight · derivative² dx, exact up to quadratic derivatives.
+    """
+    nodes, weights = roots_legendre(3)
+    vertices = cell_vertices(V.mesh)
+    middle, half = vertices.mean(axis=1), 0.5 * np.abs(vertices[:, 1] - vertices[:, 0])
+    points = middle[:, None] + half[:, None] * nodes
+    values = _values(V, element, degree, points.ravel(), derivative)
+    constant = weight.x.array[cell_dofs(weight.function_space)[:, 0]]
+    scale = np.sqrt((constant * half)[:, None] * weights)
+    return sp.diags(scale.ravel()) @ values
 
 
 def _dof_at(V: fem.FunctionSpace, x: float) -> int:

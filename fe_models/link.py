@@ -14,7 +14,8 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from ..errors import FfrobotError, InputError
+from ..errors import FfrobotError, InputError, SolveError
+from ..files import check_writable
 from .link_file import BeamLink, read_link
 from .modal_body import ModalBody
 from .modal_body_file import FORMAT_VERSION, is_modal_body_file, read_modal_body, write_modal_body
@@ -105,8 +106,14 @@ def _compute(
     progress: Progress | None,
     make_folder: bool = False,
 ) -> LinkOutcome:
-    from .beam_link import beam_modal_body
-
+    try:
+        from .beam_link import beam_modal_body
+    except ModuleNotFoundError as error:
+        raise SolveError(
+            f"{link_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "
+            "install dolfinx and slepc4py (Debian: python3-dolfinx python3-slepc4py), or use a modal body file made "
+            "elsewhere"
+        ) from None
     body = beam_modal_body(link, link_path, digest, progress or _silent)
     write_modal_body(path, body, make_folder=make_folder)
     return LinkOutcome(path, body, True, time.perf_counter() - start)
@@ -123,10 +130,7 @@ def _up_to_date(path: Path, digest: str) -> ModalBody | None:
 
 def _check_target(path: Path, force: bool) -> None:
     """Refuse, before any work, an output that cannot be written or that would overwrite some other file."""
-    if path.is_dir():
-        raise InputError(f"{path}: output: expected a file name, found a folder")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
+    check_writable(path)
     if path.exists() and not force and not is_modal_body_file(path):
         raise InputError(f"{path}: output: a file that is not a modal body is there; use another name or --force")
 

@@ -85,7 +85,7 @@ class BeamGeometry(Record):
 class BeamMesh(Record):
     """Element boundaries: `elements` of them as equal as the steps of the section allow, or the list of `nodes`."""
 
-    elements: Annotated[int, Field(ge=1)] | None = None
+    elements: Annotated[int, Field(ge=1, le=100_000)] | None = None
     nodes: Annotated[tuple[float, ...], Field(min_length=2)] | None = None  # m from the root
 
 
@@ -180,8 +180,8 @@ def _check_geometry(link: BeamLink, path: Path) -> None:
     if (geometry.section is None) == (geometry.segment is None):
         _reject(path, "geometry", "either section or [[geometry.segment]]", _both_or_neither(geometry.section))
     ends = [segment.until for segment in geometry.segment or ()]
-    if any(after <= before for before, after in pairwise(ends)):
-        _reject(path, "geometry.segment", "ascending values of until", ends)
+    if any(after - before <= 1e-9 * geometry.length for before, after in pairwise([0.0, *ends])):
+        _reject(path, "geometry.segment", "ascending values of until, apart by more than 1e-9 of the length", ends)
     if ends and ends[-1] != geometry.length:
         _reject(path, "geometry.segment", f"the last until at the length, {geometry.length}", ends[-1])
     for record in [geometry.section, *(segment.section for segment in geometry.segment or ())]:

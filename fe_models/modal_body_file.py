@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +11,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolveError
+from ..errors import InputError
+from ..files import write_atomically
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
 
 if TYPE_CHECKING:
@@ -44,29 +42,10 @@ _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": 
 def write_modal_body(path: Path, body: ModalBody, *, make_folder: bool = False) -> None:
     """Write `body` to `path`, replacing what is there only once the new file is complete.
 
-    The HDF5 image is made in memory: a full disk then is an ordinary failed write, which HDF5 itself does not survive.
-
     Raises:
         SolveError: the file cannot be written; names file and reason.
     """
-    image = _image(body)
-    temporary: Path | None = None
-    try:
-        if make_folder:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-        temporary = Path(name)
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(image)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.chmod(0o666 & ~_umask())  # mkstemp's own mode is private
-        temporary.replace(path)
-    except OSError as error:
-        if temporary is not None:
-            with suppress(OSError):
-                temporary.unlink()
-        raise SolveError(f"{path}: cannot write the modal body file: {error.strerror or error}") from None
+    write_atomically(path, _image(body), "modal body file", make_folder=make_folder)
 
 
 def read_modal_body(path: Path) -> ModalBody:
@@ -181,9 +160,3 @@ def _write_arrays(group: h5py.Group, arrays: Mapping[str, NDArray[np.generic] | 
     for name, array in arrays.items():
         if array is not None:
             group[name] = array
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -16,7 +16,7 @@ FILE = click.Path(path_type=Path)
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="ffrobot")
 def cli() -> None:
-    """What motors and piezoelectric patches must do so that a flexible robot follows its path.
+    r"""What motors and piezoelectric patches must do so that a flexible robot follows its path.
 
     \b
     Stage 1:  ffrobot link  LINK.toml     finite elements → modes → modal body file
@@ -27,7 +27,9 @@ def cli() -> None:
 
 @cli.command()
 @click.argument("link_file", metavar="LINK.toml", type=FILE)
-@click.option("-o", "--output", metavar="BODY.h5", type=FILE, help="Where to write; LINK.h5 beside the input if absent.")
+@click.option(
+    "-o", "--output", metavar="BODY.h5", type=FILE, help="Where to write; LINK.h5 beside the input if absent."
+)
 @click.option("--force", is_flag=True, help="Compute even if the file is up to date.")
 def link(link_file: Path, output: Path | None, force: bool) -> None:
     """Compute the modal body file of one link (stage 1).
@@ -42,13 +44,19 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
         outcome = make_link(link_file, output, force, display.stage)
     body = outcome.body
     verb = f"computed in {outcome.seconds:.2f} s" if outcome.computed else "up to date"
-    click.echo(f"{outcome.path}: {verb}; {body.mode_count} modes, {body.frequency[0]:.6g} … {body.frequency[-1]:.6g} Hz")
+    click.echo(
+        f"{outcome.path}: {verb}; {body.mode_count} modes, {body.frequency[0]:.6g} … {body.frequency[-1]:.6g} Hz"
+    )
 
 
 @cli.command()
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
 @click.option(
-    "-o", "--output", metavar="RESULTS.h5", type=FILE, help="Where to write; SCENE.results.h5 beside the input if absent."
+    "-o",
+    "--output",
+    metavar="RESULTS.h5",
+    type=FILE,
+    help="Where to write; SCENE.results.h5 beside the input if absent.",
 )
 def solve(scene_file: Path, output: Path | None) -> None:
     """Run the analyses of a scene (stage 2).

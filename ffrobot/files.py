@@ -6,8 +6,11 @@ import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
+from uuid import uuid4
 
 from .errors import InputError, SolveError
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool = False) -> None:
@@ -16,39 +19,45 @@ def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool
     HDF5 files are handed over as images made in memory: a full disk then is an ordinary failed write, which HDF5
     itself does not survive. Raises `SolveError` naming the file, `what` it is, and the reason.
     """
-    temporary: Path | None = None
+    target = path.resolve()  # a symbolic link stays one
+    temporary = target.with_name(f".{target.name}.{uuid4().hex}.tmp")
     try:
         if make_folder:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-        temporary = Path(name)
-        with os.fdopen(handle, "wb") as stream:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("xb") as stream:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
-        temporary.chmod(0o666 & ~_umask())  # mkstemp's own mode is private
-        temporary.replace(path)
+        temporary.replace(target)
     except OSError as error:
-        if temporary is not None:
-            with suppress(OSError):
-                temporary.unlink()
         raise SolveError(f"{path}: cannot write the {what}: {error.strerror or error}") from None
+    finally:  # after Ctrl-C too
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def check_writable(path: Path) -> None:
-    """Refuse, before any work is done, an output that could not be written. Raises `InputError`."""
+    """Refuse, before any work is done, an output that could not be written or would cost a file of another kind.
+
+    Raises `InputError`.
+    """
     if path.is_dir():
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
+    if path.exists() and not _is_hdf5(path):
+        raise InputError(f"{path}: output: expected a new name or an earlier HDF5 file, found a file of another kind")
     try:
-        with tempfile.TemporaryFile(dir=path.parent):
+        with tempfile.TemporaryFile(dir=path.resolve().parent):
             pass
     except OSError as error:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def _is_hdf5(path: Path) -> bool:
+    """Whether `path` is an HDF5 file, or an empty one."""
+    if not path.is_file():  # a device, say
+        return False
+    with suppress(OSError), path.open("rb") as stream:
+        return stream.read(len(HDF5_SIGNATURE)) in (b"", HDF5_SIGNATURE)
+    return False

@@ -15,6 +15,7 @@ from .actuation.voltages import Voltages, solve_voltages
 from .errors import InputError
 from .fe_models.modal_body import ModalBody
 from .fe_models.modal_body_file import read_modal_body
+from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
@@ -73,6 +74,7 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     """Run every analysis of a scene; stage 1 runs first for links that are not up to date.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
+    So does Ctrl-C during an analysis.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
     watcher = watcher or Watcher()
@@ -88,30 +90,28 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     model = build_model(scene, [body.planar for body in bodies.values()], _voltage_loads(scene, patches))
     solution = Solution(scene, model, bodies, patches, skipped=tuple(_skipped(scene, bodies)))
     solution.seconds["links and files"] = loaded - began
-    for analysis in scene.analysis:
-        started = time.perf_counter()
-        outcome = _run(solution, analysis, watcher)
-        solution.outcomes[analysis.name] = outcome
-        if outcome.F_p is not None:
-            solution.voltages[analysis.name] = {
-                body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
-                for body, array in patches.items()
-            }
-        solution.seconds[analysis.name] = time.perf_counter() - started
-        if outcome.status != "completed":
-            break
+    with Interruption() as interruption:
+        for analysis in scene.analysis:
+            started = time.perf_counter()
+            outcome = _run(solution, analysis, watcher, interruption)
+            solution.outcomes[analysis.name] = outcome
+            if outcome.F_p is not None:
+                solution.voltages[analysis.name] = {
+                    body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
+                    for body, array in patches.items()
+                }
+            solution.seconds[analysis.name] = time.perf_counter() - started
+            if outcome.status != "completed":
+                break
     return solution
 
 
-def _run(solution: Solution, analysis: Analysis, watcher: Watcher) -> Outcome:
+def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Outcome:
     model, end = solution.model, analysis.end
     watcher.stage(f'analysis "{analysis.name}"')
 
     def progress(t: float) -> bool:
-        try:
-            return watcher.advance(t, end)
-        except KeyboardInterrupt:  # ends the analysis; what it has computed is kept
-            return False
+        return watcher.advance(t, end) and not interruption.requested
 
     if analysis.kind == "static":
         return run_static(model, analysis)
@@ -155,7 +155,7 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
             continue
         if point not in planar.points:
             raise InputError(
-                f"{scene.path}: payload: point: expected one of {', '.join(planar.points)}, found \"{payload.point}\""
+                f'{scene.path}: payload: point: expected one of {", ".join(planar.points)}, found "{payload.point}"'
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
     return LoadedBody(planar, body.modal, body.path, body.computed)

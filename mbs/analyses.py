@@ -183,7 +183,7 @@ def _integrate(
     seconds = time.perf_counter() - began
     reached = len(run.q)
     return Outcome(
-        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.lambda_,
+        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers,
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
         _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, recording,
     )  # fmt: skip

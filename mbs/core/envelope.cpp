@@ -18,10 +18,6 @@ EnvelopeMatrix::EnvelopeMatrix(std::vector<Index> first)
 
 void EnvelopeMatrix::set_zero() { std::fill(rows_.begin(), rows_.end(), 0.0); }
 
-double *EnvelopeMatrix::entry(Index row, Index column) {
-  return rows_.data() + start_[static_cast<std::size_t>(row)] + column;
-}
-
 void EnvelopeMatrix::factorise() {
   const Index n = size();
   const Index *first = first_.data(), *start = start_.data();

@@ -15,9 +15,11 @@ public:
 
   Eigen::Index size() const { return static_cast<Eigen::Index>(first_.size()); }
   void set_zero();
-  double *entry(Eigen::Index row, Eigen::Index column); // column >= first[row]
+  double *entry(Eigen::Index row, Eigen::Index column) { // column >= first[row]
+    return rows_.data() + start_[static_cast<std::size_t>(row)] + column;
+  }
 
-  void factorise(); // in place; unpivoted
+  void factorise();            // in place; unpivoted
   void solve(double *x) const; // after factorise; x: right-hand side in, solution out
 
 private:

@@ -147,6 +147,39 @@ double weighted(const PlanarBody &body, const double *p, const double *q) {
   return sum;
 }
 
+// Block (k, l) of the mobility, Z D^-1 Z^T + (Phi_k Phi_l^T in global axes), and its mirror.
+void add_mobility(const PlanarBody &body, Index k, Index l, PlanarBodyState &s) {
+  const double *g0 = s.G.data() + (3 + 3 * l) * s.padded_rows + 3 + 3 * k;
+  const double *g1 = g0 + s.padded_rows, *g2 = g1 + s.padded_rows;
+  const double c = s.cosine, sn = s.sine;
+  const double g00 = c * g0[0] - sn * g0[1], g10 = sn * g0[0] + c * g0[1]; // A Phi_k Phi_l^T
+  const double g01 = c * g1[0] - sn * g1[1], g11 = sn * g1[0] + c * g1[1];
+  Matrix3d E = Matrix3d::Zero();
+  E(0, 0) = c * g00 - sn * g01;
+  E(1, 0) = c * g10 - sn * g11;
+  E(0, 1) = sn * g00 + c * g01;
+  E(1, 1) = sn * g10 + c * g11;
+  const int rows = body.marker_rows[static_cast<std::size_t>(k)],
+            columns = body.marker_rows[static_cast<std::size_t>(l)];
+  if (columns == 3) {
+    E(0, 2) = c * g2[0] - sn * g2[1];
+    E(1, 2) = sn * g2[0] + c * g2[1];
+  }
+  if (rows == 3) {
+    E(2, 0) = c * g0[2] - sn * g1[2];
+    E(2, 1) = sn * g0[2] + c * g1[2];
+    E(2, 2) = g2[2];
+  }
+  for (int j = 0; j < columns; ++j) {
+    const Vector3d z = s.Z_transposed.col(3 * l + j).cwiseProduct(s.D_inverse);
+    for (int i = 0; i < rows; ++i)
+      E(i, j) += s.Z_transposed.col(3 * k + i).dot(z);
+  }
+  s.mobility.block<3, 3>(3 * k, 3 * l) = E;
+  if (l != k)
+    s.mobility.block<3, 3>(3 * l, 3 * k) = E.transpose();
+}
+
 // out += W^T z over the rows that carry anything
 void accumulate_rows(const PlanarBodyState &s, const Eigen::VectorXd &z, Index rows, Index n, double *out) {
   Index i = 0;
@@ -170,8 +203,8 @@ PlanarBodyState::PlanarBodyState(const PlanarBody &body) : markers(static_cast<s
   for (auto *v : {&Wp, &Wp_dot, &Wk, &W_extra, &z, &z_response})
     *v = Eigen::VectorXd::Zero(padded_rows);
   extra = modal_load = Eigen::VectorXd::Zero(n);
-  for (auto *m : {&wrench, &free_acceleration, &B_transposed, &Z_transposed})
-    *m = Eigen::Matrix3Xd::Zero(3, m == &B_transposed || m == &Z_transposed ? 3 * body.markers() : body.markers());
+  wrench = free_acceleration = Eigen::Matrix3Xd::Zero(3, body.markers());
+  Z_transposed = Eigen::Matrix3Xd::Zero(3, 3 * body.markers());
   mobility = Eigen::MatrixXd::Zero(3 * body.markers(), 3 * body.markers());
 }
 
@@ -262,33 +295,13 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
       B(0, c) = s.cosine * x - s.sine * y;
       B(1, c) = s.sine * x + s.cosine * y;
     }
-    for (int r = 0; r < 3; ++r)
+    for (int r = 0; r < body.marker_rows[static_cast<std::size_t>(k)]; ++r)
       s.Z_transposed.col(3 * k + r) = forward(s.L, B.row(r).transpose());
   }
 
-  // Mobility = Z D^-1 Z^T + (Phi Phi^T in global axes), lower block triangle mirrored
   for (Index k = 0; k < K; ++k)
-    for (Index l = 0; l <= k; ++l) {
-      const double *g0 = s.G.data() + (3 + 3 * l) * s.padded_rows + 3 + 3 * k;
-      const double *g1 = g0 + s.padded_rows, *g2 = g1 + s.padded_rows;
-      const double c = s.cosine, sn = s.sine;
-      // rows rotated
-      const double a00 = c * g0[0] - sn * g0[1], a10 = sn * g0[0] + c * g0[1];
-      const double a01 = c * g1[0] - sn * g1[1], a11 = sn * g1[0] + c * g1[1];
-      const double a02 = c * g2[0] - sn * g2[1], a12 = sn * g2[0] + c * g2[1];
-      Matrix3d E;
-      E << c * a00 - sn * a01, sn * a00 + c * a01, a02, //
-          c * a10 - sn * a11, sn * a10 + c * a11, a12,  //
-          c * g0[2] - sn * g1[2], sn * g0[2] + c * g1[2], g2[2];
-      for (int j = 0; j < 3; ++j) {
-        const Vector3d zl = s.Z_transposed.col(3 * l + j).cwiseProduct(s.D_inverse);
-        for (int i = 0; i < 3; ++i)
-          E(i, j) += s.Z_transposed.col(3 * k + i).dot(zl);
-      }
-      s.mobility.block<3, 3>(3 * k, 3 * l) = E;
-      if (l != k)
-        s.mobility.block<3, 3>(3 * l, 3 * k) = E.transpose();
-    }
+    for (Index l = 0; l <= k; ++l)
+      add_mobility(body, k, l, s);
 }
 
 namespace {

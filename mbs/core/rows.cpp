@@ -5,14 +5,8 @@ namespace ffrobot {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-MarkerMotion marker_motion(const MarkerReference &m, const std::vector<PlanarBodyState> &bodies) {
-  if (m.body < 0)
-    return {Vector2d::Zero(), m.ground, Vector2d::Zero(), 0, 0};
-  return bodies[static_cast<std::size_t>(m.body)].markers[static_cast<std::size_t>(m.marker)];
-}
-
 void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMotion &motion) {
-  const MarkerMotion a = marker_motion(row.a, bodies), b = marker_motion(row.b, bodies);
+  const MarkerMotion &a = row.a.motion(bodies), &b = row.b.motion(bodies);
   motion.bias = 0; // what a slide evaluated before may have left
   switch (row.kind) {
   case RowKind::x:

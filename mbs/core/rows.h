@@ -10,15 +10,22 @@ namespace ffrobot {
 
 // A marker of a body, or (body < 0) a point and direction fixed to the ground.
 struct MarkerReference {
-  int body = -1;
-  int marker = 0;
-  Eigen::Vector2d ground = Eigen::Vector2d::Zero();
+  MarkerReference(int body, int marker, const Eigen::Vector2d &ground)
+      : body(body), marker(marker), ground{Eigen::Vector2d::Zero(), ground, Eigen::Vector2d::Zero(), 0, 0} {}
+
+  int body;
+  int marker;
+  MarkerMotion ground;
+
+  const MarkerMotion &motion(const std::vector<PlanarBodyState> &bodies) const {
+    return body < 0 ? ground : bodies[static_cast<std::size_t>(body)].markers[static_cast<std::size_t>(marker)];
+  }
 };
 
 enum class RowKind {
   x,     // (r_b - r_a)_x, global
   y,     // (r_b - r_a)_y, global
-  angle, // alpha_b - alpha_a
+  angle, // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
   slide, // n . (r_b - r_a), n fixed to the section of a
 };
 
@@ -35,8 +42,6 @@ struct RowMotion {
   double value = 0, rate = 0, bias = 0;
   Eigen::Vector3d coefficient_a = Eigen::Vector3d::Zero(), coefficient_b = Eigen::Vector3d::Zero();
 };
-
-MarkerMotion marker_motion(const MarkerReference &marker, const std::vector<PlanarBodyState> &bodies);
 
 void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMotion &motion);
 

@@ -1,0 +1,78 @@
+"""How figures look: the width of a printed column, colours that everyone can tell apart."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+SIZE = (3.5, 2.7)  # inches: one column of a journal page
+
+# Okabe and Ito, "Color universal design" (2008), without the yellow that paper swallows.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+MARKERS = ("s", "^", "o", "D", "v", "P", "X")
+DASHES = ("-", "--", "-.", ":")
+MARKERS_A_CURVE = 14
+LEGEND_CHARACTERS = 60  # in a line; 6 stand for the sample of a curve
+ORDERED = "viridis"  # for series with an order: patches along a link, configurations over time
+
+SETTINGS: dict[str, Any] = {
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.grid": True,
+    "axes.formatter.limits": (-3, 5),
+    "axes.formatter.use_mathtext": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.alpha": 0.3,
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.0,
+    "lines.markersize": 3.5,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "savefig.dpi": 200,
+    "pdf.fonttype": 42,
+}
+
+
+def style() -> AbstractContextManager[None]:
+    """The settings of matplotlib within which figures are drawn and written."""
+    return matplotlib.rc_context(SETTINGS)
+
+
+def new_axes(title: str) -> tuple[Figure, Axes]:
+    """An empty figure with its axes."""
+    figure = Figure(figsize=SIZE, layout="constrained")
+    axes = figure.subplots()
+    axes.set_title(title, loc="left")
+    axes.locator_params(axis="x", nbins=6)
+    return figure, axes
+
+
+def line_style(k: int, points: int) -> dict[str, Any]:
+    """Style of the k-th curve, of so many `points`: sparse markers and dashes keep curves that coincide apart."""
+    every = max(1, points // MARKERS_A_CURVE)
+    return {
+        "color": COLORS[k % len(COLORS)],
+        "linestyle": DASHES[k % len(DASHES)],
+        "marker": MARKERS[k % len(MARKERS)],
+        "markevery": ((k * every // 3) % every, every),
+        "markerfacecolor": "white",
+    }
+
+
+def shades(count: int) -> list[Any]:
+    """Colours of `count` ordered series, dark to light."""
+    colormap = matplotlib.colormaps[ORDERED]
+    return [colormap(0.9 * k / max(1, count - 1)) for k in range(count)]
+
+
+def legend(axes: Axes) -> None:
+    """A legend below the axes, where it hides nothing, in as many columns as its texts leave room for."""
+    labels = axes.get_legend_handles_labels()[1]
+    if labels:
+        columns = max(1, min(len(labels), LEGEND_CHARACTERS // (max(map(len, labels)) + 6)))
+        axes.figure.legend(loc="outside lower center", ncols=columns, handlelength=1.8, columnspacing=1.0)

@@ -1,0 +1,32 @@
+"""Ctrl-C while analyses run: a request to stop that keeps what has been computed."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+
+
+class Interruption:
+    """Within its context the first Ctrl-C only sets `requested`; the next one interrupts as usual.
+
+    Python would raise `KeyboardInterrupt` anywhere, in the calls from the core too, and the outputs so far were lost.
+    Signals reach the main thread only: in any other the context does nothing.
+    """
+
+    def __init__(self) -> None:
+        self.requested = False
+        self._is_main = threading.current_thread() is threading.main_thread()
+
+    def __enter__(self) -> Interruption:
+        if self._is_main:
+            self._previous = signal.signal(signal.SIGINT, self._request)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        if self._is_main:
+            signal.signal(signal.SIGINT, self._previous)
+
+    def _request(self, number: int, frame: FrameType | None) -> None:
+        self.requested = True
+        signal.signal(signal.SIGINT, self._previous)

@@ -1,0 +1,128 @@
+"""The paper's two-link manipulator through `ffrobot solve`: what its results file says, number by number."""
+
+import numpy as np
+import pytest
+from checkpoints import check_column, check_layout, reference, with_analyses
+
+CHECKPOINTS = reference("two_link/reference.csv")
+VOLTAGES = reference("two_link/reference_voltages.csv")
+RELATIVE = 1e-6  # of each quantity's peak
+TIMES = np.arange(1001) * 0.001
+TIMES[-1] = 1.0
+PZT = ("link1", "link2")
+
+
+@pytest.fixture(scope="module")
+def frame_motors(solved):
+    """The inverse analysis alone, with joint angles between body frames."""
+    inverse = ['name = "inverse"', 'kind = "pcid"', "end = 1.0", "output_step = 0.001", "tolerance = 1e-7"]
+    return solved(
+        "two_link", lambda text: with_analyses(text.replace('motors = "section"', 'motors = "frame"'), [inverse])
+    )
+
+
+@pytest.mark.parametrize("name", [name for name in CHECKPOINTS if name != "t"])
+def test_checkpoints(two_link, name):
+    times = np.array(CHECKPOINTS["t"], dtype=float)
+    check_column(two_link, "inverse", name, times, CHECKPOINTS[name], RELATIVE)
+
+
+@pytest.mark.parametrize("motors", ["section", "frame"])
+@pytest.mark.parametrize("name", [name for name in VOLTAGES if name.startswith("pzt/")])
+def test_voltages(request, motors, name):
+    case = request.getfixturevalue("two_link" if motors == "section" else "frame_motors")
+    rows = [i for i, value in enumerate(VOLTAGES["motors"]) if value == motors]
+    times = np.array([float(VOLTAGES["t"][i]) for i in rows])
+    check_column(case, "inverse", name, times, [VOLTAGES[name][i] for i in rows], RELATIVE)
+
+
+def test_layout(two_link):
+    analyses = {"inverse": "pcid", "forward": "forward", "joints_only": "forward"}
+    check_layout(two_link, analyses, TIMES, flexible={"link1": 10, "link2": 10}, rigid={})
+    group = two_link.file["inverse"]
+    assert group["trajectories/tip/force"].shape == (1001, 2)
+    for joint in ("O", "A"):
+        assert group[f"joints/{joint}/moment"].shape == (1001,)
+        assert group[f"joints/{joint}/reaction"].shape == (1001, 2)
+    for body in PZT:
+        for name in ("voltage", "required_voltage"):
+            assert group[f"pzt/{body}/{name}"].shape == (1001, 10)
+        assert group[f"pzt/{body}/residual"].shape == (1001,)
+
+
+def test_constraints_hold_at_every_output(two_link):
+    for analysis in two_link.file.values():
+        assert np.max(analysis["constraint_violation"]) < 1e-10
+
+
+def test_tip_is_on_its_path(two_link):
+    """From the outputs alone: position as reported, and from frame, angle and deflection."""
+    group = two_link.file["inverse"]
+    t = group["time"][()]
+    path = np.column_stack([1.5 * np.cos(np.pi * t / 4), np.sqrt(3) / 2 * np.cos(np.pi * t / 4)])
+    np.testing.assert_allclose(group["trajectories/tip/target"], path, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(group["points/link2.tip/position"], path, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(_tip(group, "link2"), path, rtol=0, atol=1e-12)
+    # joint A, from both of its sides
+    np.testing.assert_allclose(_tip(group, "link1"), group["bodies/link2/position"], rtol=0, atol=1e-12)
+
+
+def _tip(group, link):
+    theta = group[f"bodies/{link}/angle"][()]
+    x, y = (np.array([1.0, 0.0]) + group[f"points/{link}.tip/deflection"][()]).T
+    turned = np.column_stack([np.cos(theta) * x - np.sin(theta) * y, np.sin(theta) * x + np.cos(theta) * y])
+    return group[f"bodies/{link}/position"][()] + turned
+
+
+def test_voltages_within_the_limit(two_link):
+    """`voltage` is `required_voltage` cut at 200 V; what that leaves unmet is reported."""
+    for body in PZT:
+        group = two_link.file[f"inverse/pzt/{body}"]
+        required, voltage = group["required_voltage"][()], group["voltage"][()]
+        np.testing.assert_array_equal(voltage, np.clip(required, -200.0, 200.0))
+        assert group.attrs["limit"] == 200.0
+        assert np.all(group["residual"][1:] > 0.0)
+
+
+def test_frame_motors_leave_link_1_to_its_motor(two_link, frame_motors):
+    """The moments are those of the other definition; only the patches of link 1 have nothing left to do."""
+    for joint in ("O", "A"):
+        a, b = (case.file[f"inverse/joints/{joint}/moment"][()] for case in (two_link, frame_motors))
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-6 * np.abs(a).max())
+    assert np.abs(frame_motors.file["inverse/pzt/link1/required_voltage"]).max() < 1e-3
+
+
+def _distance(case, analysis):
+    tip = case.file[f"{analysis}/points/link2.tip/position"][()]
+    return np.linalg.norm(tip - case.file["inverse/points/link2.tip/position"][()], axis=1)
+
+
+def test_full_actuation_stays_on_the_path(two_link):
+    assert _distance(two_link, "forward").max() < 1e-9
+    for body in ("link1", "link2"):
+        difference = (
+            two_link.file[f"forward/bodies/{body}/angle"][()] - two_link.file[f"inverse/bodies/{body}/angle"][()]
+        )
+        assert np.abs(difference).max() < 1e-9
+
+
+def test_joints_alone_leave_the_path(two_link):
+    """The paper's Fig. 17: the links deflect and ring at once, the tip is centimetres off within a second."""
+    distance = _distance(two_link, "joints_only")
+    assert distance[10] > 1e-4
+    assert distance[-1] > 0.05
+
+
+def test_departure_from_the_path_grows_and_falls_with_the_tolerance(solved):
+    """The path is not stable under actuation given over time: differences grow, from a start the tolerance sets."""
+    departures = {}
+    for tolerance in (1e-4, 1e-6):
+        keys = ["end = 0.5", "output_step = 0.001", f"tolerance = {tolerance}"]
+        inverse = ['name = "inverse"', 'kind = "pcid"', *keys]
+        forward = ['name = "forward"', 'kind = "forward"', 'actuation = "inverse"', 'apply = "joints+pzt"', *keys]
+        case = solved("two_link", lambda text, runs=(inverse, forward): with_analyses(text, runs))
+        departures[tolerance] = _distance(case, "forward")
+    loose, tight = departures.values()
+    assert loose[:101].max() < loose.max()
+    assert tight.max() < 0.1 * loose.max()
+    assert tight.max() < 1e-6

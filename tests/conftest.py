@@ -1,0 +1,95 @@
+"""The program as a user runs it: the installed command, the cases of the repository, a cache folder of its own."""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+CASES = Path(__file__).parent.parent / "cases"
+COMMAND = Path(sys.executable).with_name("ffrobot")
+
+
+@dataclass(frozen=True)
+class Command:
+    """Runs `ffrobot` as a process; links are cached in a folder of the test session, empty at its start."""
+
+    cache: Path
+
+    @property
+    def environment(self):
+        return os.environ | {"XDG_CACHE_HOME": str(self.cache), "TERM": "dumb"}
+
+    def __call__(self, *arguments, timeout=120, **options):
+        return subprocess.run(
+            [COMMAND, *map(str, arguments)],
+            env=self.environment,
+            timeout=timeout,
+            capture_output=True,
+            text=True,
+            **options,
+        )
+
+
+@dataclass(frozen=True)
+class SolvedCase:
+    """A case of the repository after `ffrobot solve scene.toml`."""
+
+    folder: Path
+    stdout: str
+    stderr: str
+    file: h5py.File
+
+    def rows(self, analysis, times):
+        """Where in the outputs the given times are."""
+        output = self.file[analysis]["time"][()]
+        rows = np.abs(output[:, None] - times).argmin(axis=0)
+        np.testing.assert_allclose(output[rows], times, rtol=0, atol=1e-12)
+        return rows
+
+
+@pytest.fixture(scope="session")
+def ffrobot(tmp_path_factory):
+    return Command(tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture(scope="session")
+def solved(ffrobot, tmp_path_factory):
+    """Copy a case, edit the text of its scene, run it."""
+
+    def solve(name, edit=lambda text: text):
+        scene = _copy(name, tmp_path_factory.mktemp("solved"))
+        scene.write_text(edit(scene.read_text(encoding="utf-8")), encoding="utf-8")
+        done = ffrobot("solve", "scene.toml", cwd=scene.parent)
+        assert done.returncode == 0, done.stderr
+        file = h5py.File(scene.with_suffix(".results.h5"), "r")
+        return SolvedCase(scene.parent, done.stdout, done.stderr, file)
+
+    return solve
+
+
+@pytest.fixture(scope="session")
+def two_link(solved):
+    return solved("two_link")
+
+
+@pytest.fixture(scope="session")
+def slider_crank(solved):
+    return solved("slider_crank")
+
+
+@pytest.fixture
+def case_copy(tmp_path):
+    """Copy a case by its name; returns the scene file of the copy."""
+    return lambda name: _copy(name, tmp_path)
+
+
+def _copy(name, folder):
+    copy = folder / name
+    shutil.copytree(CASES / name, copy, ignore=shutil.ignore_patterns("*.h5", "*.figures"))
+    return copy / "scene.toml"

@@ -1,0 +1,263 @@
+"""Modal bodies of beams: inertia, signs, stations and their identities."""
+
+import numpy as np
+import pytest
+
+from ffrobot.errors import InputError, SolveError
+from ffrobot.fe_models.link import make_link
+
+STEPPED = """
+[[geometry.segment]]
+until = 0.4
+section = { shape = "rectangle", height = 0.03, width = 0.025 }
+[[geometry.segment]]
+until = 1.0
+section = { shape = "rectangle", height = 15e-3, width = 25e-3 }
+"""
+STEPPED_LINK = {"replace": {'section = { shape = "rectangle", height = 0.015, width = 0.025 }': ""}, "more": STEPPED}
+TIMOSHENKO = '[model]\ntheory = "timoshenko"\n'
+GRIP = '[[interface]]\nname = "grip"\nposition = 0.333\n'
+
+
+@pytest.fixture
+def modal_body(link_file):
+    return lambda **options: make_link(link_file(**options)).body
+
+
+def sampled(body, points=2001):
+    """Φ on the axis at many points through the public interpolation, and Simpson weights of the integral over x."""
+    x = np.linspace(0, body.length, points)
+    weights = np.ones(points)
+    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+    values = [body.interpolate(float(point)) for point in x]
+    return (
+        x,
+        weights * body.length / (points - 1) / 3,
+        np.array([v.translation for v in values]),
+        np.array([v.rotation for v in values]),
+    )
+
+
+def test_the_papers_link(modal_body):
+    """Table 2: mass 2.94375 kg, moment of inertia about the root 0.98125 kg·m² = mL²/3."""
+    body = modal_body()
+    assert body.mass == pytest.approx(2.94375, rel=1e-14)
+    np.testing.assert_allclose(body.first_moment, [2.94375 / 2, 0, 0], rtol=1e-14)
+    np.testing.assert_allclose(body.second_moment, np.diag([0.98125, 0, 0]), rtol=1e-14)
+    np.testing.assert_allclose(2 * np.pi * body.frequency[:3], [219.37434, 877.50293, 1974.43545], rtol=3e-8)
+    np.testing.assert_allclose(body.modal_mass, np.eye(10), atol=1e-13)
+    np.testing.assert_allclose(np.einsum("kkmn->mn", body.S_bar_kl), np.eye(10), atol=1e-13)
+    assert body.family == ("in-plane-bending",) * 10
+    assert np.all(body.stations.height == 0.015)
+
+
+def test_slider_crank_rod(link_file):
+    """Formulation.md, section 10 (the paper's Table 1, steel of 200 GPa): four elements, all digits."""
+    path = link_file(
+        section='{ shape = "circle", diameter = 0.006 }',
+        elements=4,
+        count=6,
+        replace={
+            "length = 1.0": "length = 0.35",
+            "youngs_modulus = 2.068427e11": "youngs_modulus = 2.0e11",
+            "density = 7850.0": "density = 7800.0",
+        },
+    )
+    expected = [612.11831, 2457.49897, 5608.27301, 10867.59568, 17273.99655, 27316.59532]
+    np.testing.assert_allclose(2 * np.pi * make_link(path).body.frequency, expected, rtol=0, atol=6e-6)
+
+
+CASES = {
+    "all": {"family": "all", "count": 30},
+    "all, cantilever": {"family": "all", "count": 30, "condition": "cantilever"},
+    "stepped": {"family": "all", "count": 12, **STEPPED_LINK},
+}
+
+
+@pytest.mark.parametrize("options", CASES.values(), ids=CASES)
+def test_line_mass_invariants_against_direct_integration(modal_body, options):
+    body = modal_body(**options)
+    x, weights, Phi, rotation = sampled(body)
+    width = 0.025
+    height = np.where(x < 0.4, 0.03, 0.015) if "more" in options else np.full_like(x, 0.015)
+    density = 7850.0 * width * height
+    if "more" in options:  # x = 0.4 belongs to both sides
+        density[np.argmin(np.abs(x - 0.4))] = 7850.0 * width * (0.03 + 0.015) / 2
+        height[np.argmin(np.abs(x - 0.4))] = np.nan
+    rhoA = weights * density
+    assert body.mass == pytest.approx(rhoA.sum(), rel=1e-12)
+    assert body.second_moment[0, 0] == pytest.approx(rhoA @ x**2, rel=1e-9)
+    scale = np.sqrt(body.mass)
+    np.testing.assert_allclose(body.S_bar, np.einsum("i,ikn->kn", rhoA, Phi), atol=1e-7 * scale)
+    np.testing.assert_allclose(body.I_bar[0], np.einsum("i,i,ikn->kn", rhoA, x, Phi), atol=1e-7 * scale)
+    assert not np.any(body.I_bar[1:])
+    S_bar_kl = np.einsum("i,ikm,iln->klmn", rhoA, Phi, Phi)
+    planar = body.S_bar_kl[:2, :2]
+    np.testing.assert_allclose(planar, S_bar_kl[:2, :2], atol=1e-6)
+    if "more" not in options:
+        rhoI_p = weights * 7850.0 * (width * 0.015**3 + 0.015 * width**3) / 12
+        S_bar_kl[2, 2] += np.einsum("i,im,in->mn", rhoI_p, rotation[:, 0], rotation[:, 0])
+        np.testing.assert_allclose(body.S_bar_kl, S_bar_kl, atol=1e-6)
+
+
+@pytest.mark.parametrize("condition", ["simply-supported", "cantilever"])
+def test_timoshenko_invariants_against_integration_over_the_volume(modal_body, condition):
+    """Sum over a Gauss grid of the section: points (x, y, z) move by u + θ × (0, y, z)."""
+    body = modal_body(family="all", count=25, condition=condition, more=TIMOSHENKO)
+    x, weights, u, theta = sampled(body)
+    gauss = np.array([-1, 1]) / np.sqrt(3)
+    J2, I_bar, S_bar_kl = np.zeros((3, 3)), np.zeros((3, 3, 25)), np.zeros((3, 3, 25, 25))
+    for y in gauss * 0.015 / 2:
+        for z in gauss * 0.025 / 2:
+            rho = weights * 7850.0 * 0.015 * 0.025 / 4
+            points = np.stack([x, np.full_like(x, y), np.full_like(x, z)], axis=1)
+            arm = np.broadcast_to(np.array([0, y, z])[None, :, None], theta.shape)
+            Phi = u + np.cross(theta, arm, axis=1)
+            J2 += np.einsum("i,ik,il->kl", rho, points, points)
+            I_bar += np.einsum("i,ik,iln->kln", rho, points, Phi)
+            S_bar_kl += np.einsum("i,ikm,iln->klmn", rho, Phi, Phi)
+    np.testing.assert_allclose(body.second_moment, J2, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(body.I_bar, I_bar, atol=1e-7)
+    np.testing.assert_allclose(body.S_bar_kl, S_bar_kl, atol=1e-6)
+    np.testing.assert_allclose(np.einsum("kkmn->mn", body.S_bar_kl), np.eye(25), atol=1e-12)
+
+
+@pytest.mark.parametrize("theory", ["", TIMOSHENKO])
+@pytest.mark.parametrize("condition", ["simply-supported", "cantilever"])
+def test_reference_conditions_hold_exactly(modal_body, condition, theory):
+    body = modal_body(family="all", count=25, condition=condition, more=theory)
+    root, tip = body.interfaces["root"], body.interfaces["tip"]
+    assert not np.any(root.translation)
+    assert not np.any(root.rotation[0])
+    if condition == "cantilever":
+        assert not np.any(root.rotation)
+    else:
+        assert not np.any(tip.translation[1:])
+
+
+def test_all_families_merged_lowest_first(modal_body):
+    every = modal_body(family="all", count=30)
+    assert set(every.family) == {"in-plane-bending", "out-of-plane-bending", "axial", "torsion"}
+    assert np.all(np.diff(every.frequency) >= 0)
+    alone = modal_body(family="torsion", count=2)
+    np.testing.assert_allclose(every.frequency[[f == "torsion" for f in every.family]][:2], alone.frequency, rtol=1e-13)
+    picked = modal_body(family="all", replace={"count = 10": "indices = [2, 5, 30]"})
+    np.testing.assert_allclose(picked.frequency, every.frequency[[1, 4, 29]], rtol=1e-13)
+
+
+def test_equal_frequencies_are_told_apart_by_family(modal_body):
+    body = modal_body(family="all", count=6, section='{ shape = "circle", diameter = 0.02 }')
+    assert body.family == ("in-plane-bending", "out-of-plane-bending") * 3
+
+
+def test_signs_are_canonical(modal_body):
+    body = modal_body(family="all", count=30, condition="cantilever")
+    for k, family in enumerate(body.family):
+        rows = body.stations.rotation if family == "torsion" else body.stations.translation
+        axis = {"in-plane-bending": 1, "out-of-plane-bending": 2}.get(family, 0)
+        values = rows[:, axis, k]
+        assert values[np.argmax(np.abs(values) > np.abs(values).max() / 2)] > 0
+
+
+def test_stations_lie_at_elements_middle_ends_and_interfaces(modal_body):
+    body = modal_body(elements=5, count=3, more=GRIP)
+    x = body.stations.position[:, 0]
+    for point in [*np.linspace(0, 1, 6), 0.5, 0.333]:
+        assert np.min(np.abs(x - point)) < 1e-15
+    assert 0.5 in x
+    assert 0.333 in x
+    grip = body.interpolate(0.333)
+    np.testing.assert_array_equal(grip.translation, body.interfaces["grip"].translation)
+    np.testing.assert_array_equal(grip.rotation, body.interfaces["grip"].rotation)
+
+
+def test_an_interface_inside_an_element_changes_no_mode(modal_body):
+    np.testing.assert_array_equal(modal_body(more=GRIP).frequency, modal_body().frequency)
+
+
+@pytest.mark.parametrize("condition", ["simply-supported", "cantilever"])
+def test_rotations_are_the_slopes(modal_body, condition):
+    """Euler–Bernoulli: rotation = (twist, −w', v'), against central differences of the interpolated displacement."""
+    body = modal_body(family="all", count=20, condition=condition)
+    step = 1e-5
+    for x in (0.1234, 0.51, 0.777):
+        left, right = body.interpolate(x - step), body.interpolate(x + step)
+        slope = (right.translation - left.translation) / (2 * step)
+        rotation = body.interpolate(x).rotation
+        size = np.maximum(np.abs(body.stations.rotation).max(axis=(0, 1)), 1e-3)
+        np.testing.assert_allclose(rotation[2] / size, slope[1] / size, atol=1e-6)
+        np.testing.assert_allclose(rotation[1] / size, -slope[2] / size, atol=1e-6)
+
+
+def test_heights_follow_the_segments(modal_body):
+    body = modal_body(count=3, **STEPPED_LINK)
+    x = body.stations.position[:, 0]
+    np.testing.assert_array_equal(body.stations.height, np.where(x < 0.4, 0.03, 0.015))
+
+
+def test_static_deflection_under_a_tip_force(modal_body):
+    """All modes of a cantilever under a unit tip force give FL³/(3EI), all of a rod FL/(EA): the modes are complete."""
+    bending = modal_body(condition="cantilever", elements=4, count=8)
+    tip = bending.interfaces["tip"].translation[1]
+    EI = 2.068427e11 * 0.025 * 0.015**3 / 12
+    assert tip @ (tip / np.diag(bending.stiffness)) == pytest.approx(1 / (3 * EI), rel=1e-10)
+    axial = modal_body(family="axial", elements=4, count=12)
+    tip = axial.interfaces["tip"].translation[0]
+    assert tip @ (tip / np.diag(axial.stiffness)) == pytest.approx(1 / (2.068427e11 * 0.015 * 0.025), rel=1e-10)
+
+
+def test_geometric_stiffness_of_axial_loads(modal_body):
+    """Against ∫N v'v' by Simpson: spinning, N = ρA(L² − x²)/2; accelerating, N = −ρA(L − x); N = 1 up to a force."""
+    body = modal_body(family="all", count=12, condition="cantilever", more=GRIP)
+    x, weights, _, rotation = sampled(body, 3001)
+    rhoA = 7850.0 * 0.015 * 0.025
+    slopes = np.stack([rotation[:, 2], -rotation[:, 1]], axis=1)
+    on_grip = np.where(x < 0.333 - 1e-9, 1.0, np.where(x > 0.333 + 1e-9, 0.0, 0.5))
+    loads = {
+        "omega_zz": rhoA * (1 - x**2) / 2,
+        "omega_yy": rhoA * (1 - x**2) / 2,
+        "t_x": -rhoA * (1 - x),
+        "force/tip/x": np.ones_like(x),
+    }
+    for name, N in loads.items():
+        expected = np.einsum("i,ikm,ikn->mn", weights * N, slopes, slopes)
+        np.testing.assert_allclose(
+            body.geometric_stiffness[name], expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()
+        )
+    expected = np.einsum("i,ikm,ikn->mn", weights * on_grip, slopes, slopes)
+    difference = np.abs(body.geometric_stiffness["force/grip/x"] - expected).max()
+    assert difference < 1e-3 * np.abs(expected).max()  # Simpson across the jump
+    for name in ("t_y", "r_z", "omega_xx", "omega_xy", "force/tip/y", "moment/tip/z", "force/root/x"):
+        assert not np.any(body.geometric_stiffness[name])
+
+
+def test_more_modes_than_available(link_file):
+    path = link_file(elements=4, count=9)
+    with pytest.raises(InputError, match=r"modes\.count: expected at most 8.*found 9"):
+        make_link(path)
+    assert not path.with_suffix(".h5").exists()
+
+
+@pytest.mark.parametrize(
+    "change", [("2.068427e11", "1e300"), ("7850.0", "1e-320"), ("length = 1.0", "length = 1e-200")]
+)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_values_beyond_double_precision(link_file, change):
+    path = link_file(replace=dict([change]))
+    with pytest.raises(SolveError, match="check the units"):
+        make_link(path)
+    assert not path.with_suffix(".h5").exists()
+
+
+def test_damping(modal_body):
+    each = modal_body(count=3, more="[damping]\nratio = [0.01, 0.02, 0.03]")
+    np.testing.assert_array_equal(each.damping_ratio, [0.01, 0.02, 0.03])
+    rayleigh = modal_body(count=3, more="[damping]\nrayleigh = [2.0, 1e-4]")
+    omega = 2 * np.pi * rayleigh.frequency
+    np.testing.assert_allclose(2 * rayleigh.damping_ratio * omega, 2.0 + 1e-4 * omega**2, rtol=1e-13)
+
+
+def test_user_given_nodes(modal_body):
+    even = modal_body(count=3)
+    given = modal_body(count=3, replace={"elements = 20": f"nodes = {[round(k * 0.05, 10) for k in range(21)]}"})
+    np.testing.assert_allclose(given.frequency, even.frequency, rtol=1e-11)

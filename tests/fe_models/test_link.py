@@ -1,0 +1,185 @@
+"""Stage 1 as a command: computed once, not again; what is in the way is not lost."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import h5py
+import pytest
+
+from ffrobot.errors import InputError
+from ffrobot.fe_models.link import cached_modal_body, input_hash, make_link
+from ffrobot.fe_models.link_file import read_link
+
+
+def test_up_to_date_links_are_not_computed_again(link_file):
+    path = link_file()
+    first = make_link(path)
+    assert first.computed
+    assert first.path == path.with_suffix(".h5")
+    assert not make_link(path).computed
+    path.write_text("# another comment\n" + path.read_text().replace("length = 1.0", "length = 1"))
+    assert not make_link(path).computed
+    assert make_link(path, force=True).computed
+    path.write_text(path.read_text().replace("count = 10", "count = 9"))
+    assert make_link(path).computed
+    assert len(make_link(path).body.frequency) == 9
+
+
+def test_hash_depends_on_every_value(link_file):
+    base = input_hash(read_link(link_file()))
+    others = [{"length = 1.0": "length = 1.0000000001"}, {"count = 10": "indices = [1]"}, {'"link1"': '"link2"'}]
+    hashes = [input_hash(read_link(link_file(replace=change))) for change in others]
+    assert len({base, *hashes}) == 4
+
+
+def test_an_up_to_date_link_loads_no_finite_elements(link_file):
+    path = link_file()
+    make_link(path)
+    code = f"""
+import sys
+from pathlib import Path
+from ffrobot.fe_models.link import make_link
+assert not make_link(Path({str(path)!r})).computed
+print([m for m in ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl") if m in sys.modules])
+"""
+    start = time.perf_counter()
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == "[]\n"
+    assert time.perf_counter() - start < 2.0  # 0.3 s where nothing else runs
+
+
+@pytest.mark.parametrize("missing", ["dolfinx", "petsc4py", "slepc4py"])
+def test_without_the_finite_element_libraries(link_file, missing):
+    path = link_file()
+    code = f"""
+import sys
+from pathlib import Path
+from ffrobot.errors import SolveError
+from ffrobot.fe_models.link import make_link
+sys.modules[{missing!r}] = None  # as if not installed
+try:
+    make_link(Path({str(path)!r}))
+except SolveError as error:
+    print(error)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert f"link1.toml: computing a link needs the finite element libraries, and {missing}" in result.stdout
+
+
+def test_a_run_prints_nothing_and_repeats_bit_for_bit(link_file, tmp_path):
+    path = link_file(family="all", count=20)
+    make_link(path)
+    code = f"""
+from pathlib import Path
+from ffrobot.fe_models.link import make_link
+make_link(Path({str(path)!r}), Path({str(tmp_path / "again.h5")!r}))
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert (result.stdout, result.stderr) == ("", "")
+    assert (tmp_path / "again.h5").read_bytes() == path.with_suffix(".h5").read_bytes()
+
+
+def test_signals_end_the_process_as_ever(link_file):
+    """PETSc installs handlers that print pages and exit with its own code, unless told not to."""
+    path = link_file()
+    code = f"""
+import os, signal
+from pathlib import Path
+from ffrobot.fe_models.link import make_link
+make_link(Path({str(path)!r}), force=True)
+os.kill(os.getpid(), signal.SIGTERM)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert result.returncode == -signal.SIGTERM
+    assert result.stderr == ""
+
+
+def test_progress_is_told(link_file):
+    lines = []
+    make_link(link_file(), progress=lines.append)
+    assert lines
+    assert all(line.startswith("link1: ") for line in lines)
+
+
+def test_another_file_in_the_way_is_kept(link_file, tmp_path):
+    path = link_file()
+    thesis = tmp_path / "thesis.h5"
+    thesis.write_text("three years of work")
+    with pytest.raises(InputError, match=r"thesis\.h5: output: a file that is not a modal body is there"):
+        make_link(path, thesis)
+    results = tmp_path / "results.h5"
+    with h5py.File(results, "w") as file:
+        file.attrs["format"] = "something else"
+    with pytest.raises(InputError, match=r"results\.h5: output"):
+        make_link(path, results)
+    with pytest.raises(InputError, match=r"link1\.toml: output"):
+        make_link(path, path)
+    assert thesis.read_text() == "three years of work"
+    assert make_link(path, thesis, force=True).computed
+
+
+def test_a_truncated_output_is_made_again(link_file):
+    path = link_file()
+    output = make_link(path).path
+    output.write_bytes(output.read_bytes()[:3000])
+    assert make_link(path).computed
+    assert not make_link(path).computed
+
+
+def test_output_that_cannot_be_written(link_file, tmp_path):
+    path = link_file()
+    with pytest.raises(InputError, match=r"output: .*no folder"):
+        make_link(path, tmp_path / "nowhere" / "link.h5")
+    with pytest.raises(InputError, match=r"output: .*found a folder"):
+        make_link(path, tmp_path)
+
+
+def test_read_only_folder(link_file, tmp_path):
+    """As an ordinary user: to root every folder can be written."""
+    path = link_file()
+    tmp_path.chmod(0o555)
+    code = f"""
+import os
+from pathlib import Path
+from ffrobot.errors import FfrobotError
+from ffrobot.fe_models.link import make_link
+if os.geteuid() == 0:
+    os.setgid(65534); os.setuid(65534)
+try:
+    make_link(Path({str(path)!r}))
+except FfrobotError as error:
+    print(error.exit_code, error)
+"""
+    for folder in tmp_path.parents:
+        if folder.owner() == "root" and folder.name.startswith("pytest-"):
+            folder.chmod(0o755)
+    try:
+        result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    finally:
+        tmp_path.chmod(0o755)
+    assert result.stdout.startswith("2 ")
+    assert "link1.h5: output: expected a writable folder" in result.stdout
+
+
+def test_cache(link_file, cache):
+    path = link_file()
+    first = cached_modal_body(path)
+    assert first.computed
+    assert first.path.is_relative_to(cache / "ffrobot")
+    assert not path.with_suffix(".h5").exists()
+    assert not cached_modal_body(path).computed
+    first.path.write_bytes(b"damaged")
+    assert cached_modal_body(path).computed
+    assert not cached_modal_body(path).computed
+
+
+def test_cache_prefers_an_up_to_date_file_beside_the_link(link_file, cache):
+    path = link_file()
+    made = make_link(path)
+    assert cached_modal_body(path).path == made.path
+    assert not (cache / "ffrobot" / "links").exists()
+    made.path.write_bytes(b"damaged")
+    assert cached_modal_body(path).computed
+    assert made.path.read_bytes() == b"damaged"

@@ -1,0 +1,181 @@
+"""The modal body by itself: immutable, checked, interpolated; no finite element library is involved."""
+
+import subprocess
+import sys
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+
+from ffrobot.errors import InputError
+from ffrobot.fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
+
+
+def cubic(x, coefficients):
+    """Value and slope of polynomials with `coefficients` (4, n), lowest first, at x (k,): two arrays (k, n)."""
+    powers = np.stack([x**p for p in range(4)], axis=1)
+    slopes = np.stack([np.zeros_like(x), np.ones_like(x), 2 * x, 3 * x**2], axis=1)
+    return powers @ coefficients, slopes @ coefficients
+
+
+def fields_at(x, coefficients):
+    """(k, 3, n) translation and rotation of a thin beam; `coefficients` (4 fields, 4, n): u, v, w, twist."""
+    (u, _), (v, dv), (w, dw), (twist, _) = (cubic(x, field) for field in coefficients)
+    return np.stack([u, v, w], axis=1), np.stack([twist, -dw, dv], axis=1)
+
+
+@pytest.fixture
+def coefficients():
+    return np.random.default_rng(1).normal(size=(4, 4, 2))
+
+
+@pytest.fixture
+def body(coefficients):
+    x = np.array([0.0, 0.2, 0.5, 0.6, 0.9, 1.0, 1.4])
+    position = np.stack([x, 0 * x, 0 * x], axis=1)
+    translation, rotation = fields_at(x, coefficients)
+    frequency = np.array([1.0, 2.5])
+    S_bar_kl = np.zeros((3, 3, 2, 2))
+    S_bar_kl[1, 1] = np.eye(2)
+    return ModalBody(
+        name="made by hand",
+        kind="beam",
+        reference_condition="cantilever",
+        length=1.4,
+        mass=2.0,
+        first_moment=np.array([1.4, 0, 0]),
+        second_moment=np.diag([1.3, 0, 0]),
+        frequency=frequency,
+        stiffness=np.diag((2 * np.pi * frequency) ** 2),
+        modal_mass=np.eye(2),
+        damping_ratio=np.zeros(2),
+        family=("in-plane-bending",) * 2,
+        S_bar=np.ones((3, 2)),
+        I_bar=np.ones((3, 3, 2)),
+        S_bar_kl=S_bar_kl,
+        interfaces={
+            "root": Interface(position[0], translation[0], rotation[0]),
+            "tip": Interface(position[-1], translation[-1], rotation[-1]),
+        },
+        stations=Stations(position, translation, rotation, np.full(x.size, 0.01)),
+        mesh=PictureMesh(position, np.array([[0, 1]]), translation),
+        geometric_stiffness={"omega_zz": np.eye(2)},
+    )
+
+
+@pytest.mark.parametrize("element", [None, np.array([[0, 1, 2, 3], [3, 4, 5, 6]])], ids=["Hermite", "elements"])
+def test_interpolation_reproduces_cubics(body, coefficients, element):
+    body = replace(body, stations=replace(body.stations, element=element))
+    for x in np.linspace(0, 1.4, 43):
+        found = body.interpolate(float(x))
+        translation, rotation = fields_at(np.array([x]), coefficients)
+        np.testing.assert_allclose(found.position, [x, 0, 0], atol=1e-15)
+        np.testing.assert_allclose(found.translation, translation[0], atol=1e-13)
+        np.testing.assert_allclose(found.rotation, rotation[0], atol=1e-12)
+
+
+def test_hermite_interpolation_needs_no_smoothness_between_stations(body):
+    """v and rotation are exact in each interval on its own, whatever the others do."""
+    translation, rotation = body.stations.translation.copy(), body.stations.rotation.copy()
+    translation[:2], rotation[:2] = 7.0, -3.0
+    changed = replace(body, stations=replace(body.stations, translation=translation, rotation=rotation))
+    for x in (0.55, 0.95, 1.2):
+        np.testing.assert_array_equal(changed.interpolate(x).translation[1:], body.interpolate(x).translation[1:])
+        np.testing.assert_array_equal(changed.interpolate(x).rotation[1:], body.interpolate(x).rotation[1:])
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_few_stations(body, count):
+    stations = body.stations
+    few = Stations(*(getattr(stations, name)[:count] for name in ("position", "translation", "rotation", "height")))
+    assert np.all(np.isfinite(replace(body, stations=few, length=0.2).interpolate(0.1).translation))
+
+
+@pytest.mark.parametrize("x", [-0.01, 1.41, np.nan])
+def test_outside_the_body(body, x):
+    with pytest.raises(InputError, match=r"made by hand: x: expected 0 … 1\.4 m"):
+        body.interpolate(x)
+
+
+def test_immutable(body):
+    source = np.array([1.0, 0, 0])
+    held = replace(body, first_moment=source)
+    source[0] = 9.0
+    assert held.first_moment[0] == 1.0
+    for array in (body.S_bar, body.stations.translation, body.interfaces["tip"].rotation, body.mesh.points):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+    with pytest.raises(FrozenInstanceError):
+        body.mass = 1.0
+    with pytest.raises(TypeError):
+        body.interfaces["grip"] = body.interfaces["tip"]
+
+
+def test_without_modes(body):
+    """A rigid link is a modal body with n = 0."""
+    nothing = np.zeros((0, 0))
+    at = {"translation": np.zeros((3, 0)), "rotation": np.zeros((3, 0))}
+    stations = replace(body.stations, translation=np.zeros((7, 3, 0)), rotation=np.zeros((7, 3, 0)))
+    rigid = replace(
+        body,
+        frequency=np.zeros(0),
+        stiffness=nothing,
+        modal_mass=nothing,
+        damping_ratio=np.zeros(0),
+        family=(),
+        S_bar=np.zeros((3, 0)),
+        I_bar=np.zeros((3, 3, 0)),
+        S_bar_kl=np.zeros((3, 3, 0, 0)),
+        interfaces={name: Interface(interface.position, **at) for name, interface in body.interfaces.items()},
+        stations=stations,
+        mesh=replace(body.mesh, mode_shapes=np.zeros((7, 3, 0))),
+        geometric_stiffness={},
+    )
+    assert rigid.mode_count == 0
+    assert rigid.interpolate(0.3).translation.shape == (3, 0)
+
+
+WRONG = {
+    "mass": (-1.0, "mass: expected a positive number"),
+    "length": (0.0, "length: expected a positive number"),
+    "frequency": (np.array([1.0, 0.0]), "frequency: expected positive numbers"),
+    "first_moment": (np.zeros(2), r"first_moment: expected shape \(3,\), found \(2,\)"),
+    "second_moment": (np.triu(np.ones((3, 3))), "second_moment: expected symmetric"),
+    "stiffness": (np.eye(2), "stiffness: expected diag"),
+    "modal_mass": (np.eye(2) * (1 + 1e-7), "modal_mass: expected the identity"),
+    "damping_ratio": (np.array([0.0, -0.1]), "damping_ratio"),
+    "S_bar": (np.full((3, 2), np.nan), "S_bar: expected finite numbers"),
+    "S_bar_kl": (np.zeros((3, 3, 2, 2)), "S_bar_kl: expected a sum"),
+    "interfaces": ({}, "interfaces: expected one named root, found none"),
+    "geometric_stiffness": ({"t_x": np.triu(np.ones((2, 2)))}, "geometric_stiffness/t_x: expected symmetric"),
+    "family": (("axial",), "expected shape"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_cannot_be_is_refused(body, name):
+    value, message = WRONG[name]
+    with pytest.raises(InputError, match=message):
+        replace(body, **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"position": lambda p: p[::-1]}, "ascending in x"),
+        ({"element": lambda _: np.array([[0, 1, 2, 3]])}, "stations.element"),
+        ({"height": lambda h: h[1:]}, "stations.height: expected shape"),
+        ({"translation": lambda t: t * np.inf}, "stations.translation: expected finite"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_wrong_stations_are_refused(body, changes, message):
+    changed = {name: change(getattr(body.stations, name)) for name, change in changes.items()}
+    with pytest.raises(InputError, match=message):
+        replace(body, stations=replace(body.stations, **changed))
+
+
+def test_import_needs_numpy_only():
+    heavy = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl", "h5py", "scipy", "pydantic")
+    code = f"import sys, ffrobot.fe_models.modal_body; print([m for m in {heavy} if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

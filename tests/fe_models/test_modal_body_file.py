@@ -1,0 +1,168 @@
+"""Modal body files: what is written is read again, what is damaged is refused, what fails leaves nothing behind."""
+
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+from ffrobot.errors import InputError, SolveError
+from ffrobot.fe_models.link import make_link
+from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
+
+
+@pytest.fixture
+def outcome(link_file):
+    return make_link(link_file(family="all", count=12, more='[[interface]]\nname = "grip"\nposition = 0.3\n'))
+
+
+def test_round_trip_is_exact(outcome):
+    read = read_modal_body(outcome.path)
+
+    def compare(left, right):
+        if isinstance(left, np.ndarray):
+            np.testing.assert_array_equal(left, right)
+        elif hasattr(left, "items"):
+            assert set(left) == set(right)
+            for name in left:
+                compare(left[name], right[name])
+        elif hasattr(left, "__dataclass_fields__"):
+            compare(vars(left), vars(right))
+        else:
+            assert left == right
+
+    compare(outcome.body, read)
+    assert isinstance(read.mass, float)
+    assert set(read.interfaces) == {"root", "tip", "grip"}
+    assert "force/grip/x" in read.geometric_stiffness
+
+
+def test_datasets_of_the_interface(outcome):
+    n = 12
+    with h5py.File(outcome.path) as file:
+        assert file.attrs["format"] == "ffrobot-modal-body"
+        for name in ("format_version", "name", "kind", "reference_condition", "ffrobot_version", "input_hash"):
+            assert name in file.attrs
+        shapes = {
+            "mass": (),
+            "first_moment": (3,),
+            "second_moment": (3, 3),
+            "modes/frequency": (n,),
+            "modes/stiffness": (n, n),
+            "modes/mass": (n, n),
+            "modes/damping_ratio": (n,),
+            "modes/family": (n,),
+            "invariants/S_bar": (3, n),
+            "invariants/I_bar": (3, 3, n),
+            "invariants/S_bar_kl": (3, 3, n, n),
+            "geometric_stiffness/omega_zz": (n, n),
+            "interfaces/tip/position": (3,),
+            "interfaces/tip/translation": (3, n),
+            "interfaces/tip/rotation": (3, n),
+        }
+        k = file["stations/position"].shape[0]
+        shapes |= {"stations/translation": (k, 3, n), "stations/rotation": (k, 3, n), "stations/height": (k,)}
+        for name, shape in shapes.items():
+            assert file[name].shape == shape, name
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(InputError, match=r"nothing\.h5: modal body file not found"):
+        read_modal_body(tmp_path / "nothing.h5")
+
+
+@pytest.mark.parametrize("kept", [0, 7, 100, 5000, -1])
+def test_truncated_file(outcome, kept):
+    outcome.path.write_bytes(outcome.path.read_bytes()[:kept])
+    with pytest.raises(InputError, match=r"link1\.h5: not a modal body file, or a damaged one"):
+        read_modal_body(outcome.path)
+
+
+def test_foreign_files(tmp_path):
+    text = tmp_path / "text.h5"
+    text.write_text("not HDF5 at all")
+    with pytest.raises(InputError, match=r"text\.h5: not a modal body file"):
+        read_modal_body(text)
+    other = tmp_path / "other.h5"
+    with h5py.File(other, "w") as file:
+        file["mass"] = 1.0
+    with pytest.raises(InputError, match=r'other\.h5: expected format "ffrobot-modal-body", found'):
+        read_modal_body(other)
+
+
+def test_newer_version(outcome):
+    with h5py.File(outcome.path, "a") as file:
+        file.attrs["format_version"] = 99
+    with pytest.raises(InputError, match=r"newer ffrobot.*format_version: expected at most 1, found 99"):
+        read_modal_body(outcome.path)
+
+
+@pytest.mark.parametrize(
+    "name", ["invariants/S_bar", "modes/frequency", "stations/rotation", "interfaces/tip/position"]
+)
+def test_nan_is_refused(outcome, name):
+    with h5py.File(outcome.path, "a") as file:
+        values = file[name][()]
+        values.flat[0] = np.nan
+        file[name][...] = values
+    with pytest.raises(InputError, match=rf"link1\.h5: .*{name.split('/')[-1]}: expected finite numbers"):
+        read_modal_body(outcome.path)
+
+
+@pytest.mark.parametrize(
+    "name", ["mass", "modes/family", "stations", "interfaces/root", "mesh/cells", "invariants/I_bar"]
+)
+def test_missing_dataset(outcome, name):
+    with h5py.File(outcome.path, "a") as file:
+        del file[name]
+    with pytest.raises(InputError, match=r"link1\.h5: "):
+        read_modal_body(outcome.path)
+
+
+@pytest.mark.parametrize("value", ["text", np.ones(3), np.ones((7, 7))])
+def test_wrong_dataset(outcome, value):
+    with h5py.File(outcome.path, "a") as file:
+        del file["modes/stiffness"]
+        file["modes/stiffness"] = value
+    with pytest.raises(InputError, match=r"link1\.h5: "):
+        read_modal_body(outcome.path)
+
+
+def test_disk_full_leaves_the_old_file_and_nothing_else(outcome):
+    """The limit on the size of files makes the kernel refuse the write halfway, as a full disk does."""
+    before = outcome.path.read_bytes()
+    code = f"""
+import resource, sys
+from pathlib import Path
+from ffrobot.errors import SolveError
+from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
+path = Path({str(outcome.path)!r})
+body = read_modal_body(path)
+resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
+try:
+    write_modal_body(path, body)
+except SolveError as error:
+    print(error)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "link1.h5: cannot write the modal body file: File too large" in result.stdout
+    assert result.stderr == ""
+    assert outcome.path.read_bytes() == before
+    assert {entry.name for entry in outcome.path.parent.iterdir()} == {"link1.toml", "link1.h5"}
+
+
+def test_unwritable_folder(outcome, tmp_path):
+    with pytest.raises(SolveError, match=r"cannot write the modal body file"):
+        write_modal_body(tmp_path / "nowhere" / "link1.h5", outcome.body)
+
+
+def test_reading_needs_no_finite_elements(outcome):
+    code = f"""
+import sys
+from pathlib import Path
+from ffrobot.fe_models.modal_body_file import read_modal_body
+read_modal_body(Path({str(outcome.path)!r}))
+print([m for m in ("dolfinx", "gmsh", "petsc4py", "mpi4py", "scipy", "pydantic") if m in sys.modules])
+"""
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
