@@ -26,7 +26,7 @@ def resolved(assembly, seed=0):
         assembly.system, assembly.groups, assembly.moments, None, [0.0, 1e-6], q, v, 1e-6, 1, resolver, always, None
     )  # fmt: skip
     assert run.residual[0].max() < 1e-12
-    return run.q[0], run.v[0], run.lambda_[0], run.tau[0], run.F_p[0]
+    return run.q[0], run.v[0], run.multipliers[0], run.tau[0], run.F_p[0]
 
 
 def split_rows(assembly, mechanism, q, v):
