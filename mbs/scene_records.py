@@ -288,7 +288,7 @@ class Analysis(Record):
     kind: Literal["pcid", "fcid", "forward", "static"]
     end: Positive = 0.0
     output_step: Positive = 0.0
-    tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-6
+    tolerance: Annotated[float, Field(ge=1e-12, lt=1.0)] = 1e-6  # below, rounding is larger
     actuation: str | None = None
     apply: Literal["joints", "joints+pzt", "trajectory"] | None = None
     shape: Literal["zero", "static", "given"] | None = None
