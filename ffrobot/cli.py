@@ -66,14 +66,14 @@ def solve(scene_file: Path, output: Path | None) -> None:
     """
     from rich.console import Console
 
-    from .files import check_writable
+    from .files import check_output
     from .progress import Display
-    from .results import write_results
+    from .results import FORMAT, write_results
     from .solve import solve as solve_scene
     from .summary import print_summary
 
     path = output or scene_file.with_suffix(".results.h5")
-    check_writable(path)
+    check_output(path, FORMAT)
     with Display() as display:
         solution = solve_scene(scene_file, display)
     began = time.perf_counter()
