@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
 from pathlib import Path
+from types import FrameType
 
 import click
 
@@ -102,15 +104,25 @@ def plot(results_file: Path, output: Path | None) -> None:
 
 
 def main() -> None:
-    """Run the command line: exit code 0, 1 where a solve failed, 2 for wrong input."""
+    """Run the command line: exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C."""
+    stopped = False
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal stopped
+        stopped = True
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, stop)
     try:
         cli(standalone_mode=False)
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
-    except click.exceptions.Abort:
-        click.echo("stopped", err=True)
-        sys.exit(130)
-    except FfrobotError as error:
+    except Exception as error:
+        if stopped:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
+            click.echo("ffrobot: stopped", err=True)
+            sys.exit(130)
+        if not isinstance(error, FfrobotError):
+            raise
         click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)
