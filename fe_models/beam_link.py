@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
 from ..errors import InputError
+
+# First of all that load dolfinx: mesh.compat sets PETSc up.
 from ..mesh.interval import graded_nodes, interval_mesh, with_points
 from .beam import R_X, U_X, FamilyModel, family_model
 from .eigen import lowest_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
-from .link_file import BeamLink, Family
+from .link_file import FAMILIES, BeamLink, Family
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Modes:
-    """n modes: ω² (n,) in rad²/s², the family of each, the six rows U_X … R_Z at k stations (6, k, n), XᵀMX (n, n)."""
+class Mode(NamedTuple):
+    """One mode: ω² in rad²/s², its family, and x (m,), the degrees of freedom of that family's model, xᵀMx = 1."""
 
-    omega2: Floats
-    family: tuple[Family, ...]
-    fields: Floats
-    modal_mass: Floats
+    omega2: float
+    family: Family
+    x: Floats
 
 
 def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progress) -> ModalBody:
@@ -46,19 +46,18 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
     # The fields are read on a mesh of their own: there also the middle and the interfaces are vertices.
     station_mesh = interval_mesh(with_points(nodes, [0.5 * length, *named.values()]))
     stations = station_space(station_mesh)
-    models = {}
+    models: dict[Family, FamilyModel] = {}
     for family in link.families:
         progress(f"{link.name}: assembling {family}")
         models[family] = family_model(link, family, mesh, stations.x)
     progress(f"{link.name}: solving for the modes")
-    modes = canonical(select(models, _wanted(link, models, path)))
+    modes = select(models, _wanted(link, models, path))
+    fields = canonical(station_fields(models, modes, stations.x.size))
     progress(f"{link.name}: integrating the inertia")
-    integrals = shape_integrals(link, stations, modes.fields)
-    omega = np.sqrt(modes.omega2)
-    interfaces = {name: _interface(stations, modes.fields, position) for name, position in named.items()}
-    translation, rotation = (np.moveaxis(rows, 0, 1) for rows in (modes.fields[:R_X], modes.fields[R_X:]))
+    integrals = shape_integrals(link, stations, fields)
+    omega = np.sqrt([mode.omega2 for mode in modes])
+    translation, rotation = np.moveaxis(fields[:R_X], 0, 1), np.moveaxis(fields[R_X:], 0, 1)
     position = _on_axis(stations.x)
-    vertices = stations.element[:, [0, 3]]
     return ModalBody(
         name=link.name,
         kind=link.geometry.kind,
@@ -66,54 +65,66 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         length=length,
         **vars(integrals),
         frequency=omega / (2 * np.pi),
-        stiffness=np.diag(modes.omega2),
-        modal_mass=modes.modal_mass,
+        stiffness=np.diag(omega**2),
+        modal_mass=modal_mass(models, modes),
         damping_ratio=_damping_ratio(link, omega),
-        family=modes.family,
-        geometric_stiffness=geometric_stiffness(link, stations, modes.fields, named),
-        interfaces=interfaces,
+        family=tuple(mode.family for mode in modes),
+        geometric_stiffness=geometric_stiffness(link, stations, fields, named),
+        interfaces={name: _interface(stations, fields, place) for name, place in named.items()},
         stations=Stations(position, translation, rotation, _heights(link, stations.x), stations.element),
-        mesh=PictureMesh(position, vertices, translation),
+        mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         input_hash=input_hash,
         ffrobot_version=__version__,
     )
 
 
-def select(models: dict[Family, FamilyModel], wanted: Sequence[int]) -> Modes:
-    """The modes numbered `wanted` (1 is the lowest of all families together, ascending), mass-orthonormal.
+def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[Mode]:
+    """The modes numbered `wanted` (ascending; 1 is the lowest of all families together).
 
     Equal frequencies (bending of a square or round section) are told apart by the order of the families, not by
     rounding errors: the choice is the same on every machine.
     """
-    candidates = []
-    for number, (family, model) in enumerate(models.items()):
-        count = min(wanted[-1], model.K.shape[0])
-        omega2, X = lowest_modes(model.K, model.M, model.strain, count)
-        candidates += [(float(f"{omega2[k]:.9e}"), number, family, omega2[k], X[:, k]) for k in range(count)]
-    candidates.sort(key=lambda candidate: candidate[:2])
-    chosen = [candidates[index - 1] for index in wanted]
-    stations = next(iter(next(iter(models.values())).fields.values())).shape[0]
-    fields = np.zeros((6, stations, len(chosen)))
-    modal_mass = np.eye(len(chosen))
-    for k, (_, _, family, _, x) in enumerate(chosen):
-        for row, values in models[family].fields.items():
-            fields[row, :, k] = values @ x
-        for j, (_, _, other, _, y) in enumerate(chosen[: k + 1]):
-            if other == family:
-                modal_mass[j, k] = modal_mass[k, j] = y @ (models[family].M @ x)
-    return Modes(np.array([entry[3] for entry in chosen]), tuple(entry[2] for entry in chosen), fields, modal_mass)
+    modes = []
+    for family, model in models.items():
+        omega2, X = lowest_modes(model.K, model.M, model.strain, min(wanted[-1], model.K.shape[0]))
+        modes += [Mode(square, family, x) for square, x in zip(omega2, X.T, strict=True)]
+    modes.sort(key=lambda mode: (float(f"{mode.omega2:.9e}"), FAMILIES.index(mode.family)))
+    return [modes[number - 1] for number in wanted]
 
 
-def canonical(modes: Modes) -> Modes:
-    """Signs as in formulation.md, section 1; a mode without translation has its twist positive in the same sense."""
-    signs = np.ones(len(modes.family))
+def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], stations: int) -> Floats:
+    """(6, k, n) displacement and rotation, rows U_X … R_Z, of n modes at k stations."""
+    fields = np.zeros((6, stations, len(modes)))
+    for k, mode in enumerate(modes):
+        for row, values in models[mode.family].fields.items():
+            fields[row, :, k] = values @ mode.x
+    return fields
+
+
+def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> Floats:
+    """(n, n) m_ff = xᵀMx as assembled; families do not couple."""
+    products = np.zeros((len(modes), len(modes)))
+    for i, one in enumerate(modes):
+        for j, other in enumerate(modes[: i + 1]):
+            if one.family == other.family:
+                products[i, j] = products[j, i] = one.x @ (models[one.family].M @ other.x)
+    return products
+
+
+def canonical(fields: Floats) -> Floats:
+    """`fields` (6, k, n) with the sign of each mode as formulation.md, section 1, wants it.
+
+    The dominant translation is positive at the station nearest the root where it exceeds half its largest value; of a
+    mode without translation, the twist.
+    """
+    signs = np.ones(fields.shape[2])
     for k in range(signs.size):
-        rows = modes.fields[U_X:R_X, :, k]
+        rows = fields[U_X:R_X, :, k]
         if not np.any(rows):
-            rows = modes.fields[R_X:, :, k]
+            rows = fields[R_X:, :, k]
         dominant = rows[np.argmax(np.abs(rows).max(axis=1))]
         signs[k] = np.sign(dominant[np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max())])
-    return Modes(modes.omega2, modes.family, modes.fields * signs, modes.modal_mass * np.outer(signs, signs))
+    return fields * signs
 
 
 def _element_boundaries(link: BeamLink) -> Floats:
@@ -123,7 +134,7 @@ def _element_boundaries(link: BeamLink) -> Floats:
     return graded_nodes(link.geometry.breakpoints, link.mesh.elements)
 
 
-def _wanted(link: BeamLink, models: dict[Family, FamilyModel], path: Path) -> Sequence[int]:
+def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) -> Sequence[int]:
     """Numbers of the modes asked for, from 1, ascending."""
     wanted = link.modes.indices or range(1, (link.modes.count or 0) + 1)
     available = sum(model.K.shape[0] for model in models.values())

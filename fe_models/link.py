@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,10 +14,11 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from ..errors import FfrobotError, InputError
+from ..errors import FfrobotError, SolveError
+from ..files import check_output
 from .link_file import BeamLink, read_link
 from .modal_body import ModalBody
-from .modal_body_file import FORMAT_VERSION, is_modal_body_file, read_modal_body, write_modal_body
+from .modal_body_file import FORMAT, FORMAT_VERSION, read_modal_body, write_modal_body
 
 Progress = Callable[[str], None]
 
@@ -73,7 +73,7 @@ def make_link(
     digest = input_hash(link)
     if not force and (body := _up_to_date(path, digest)) is not None:
         return LinkOutcome(path, body, False, time.perf_counter() - start)
-    _check_target(path, force)
+    check_output(path, FORMAT, force=force)
     return _compute(link, link_path, path, digest, start, progress)
 
 
@@ -106,8 +106,14 @@ def _compute(
     progress: Progress | None,
     make_folder: bool = False,
 ) -> LinkOutcome:
-    from .beam_link import beam_modal_body
-
+    try:
+        from .beam_link import beam_modal_body
+    except ModuleNotFoundError as error:
+        raise SolveError(
+            f"{link_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "
+            "install dolfinx and slepc4py (Debian: python3-dolfinx python3-slepc4py), or use a modal body file made "
+            "elsewhere"
+        ) from None
     body = beam_modal_body(link, link_path, digest, progress or _silent)
     write_modal_body(path, body, make_folder=make_folder)
     return LinkOutcome(path, body, True, time.perf_counter() - start)
@@ -120,18 +126,6 @@ def _up_to_date(path: Path, digest: str) -> ModalBody | None:
     except FfrobotError:
         return None
     return body if body.input_hash == digest else None
-
-
-def _check_target(path: Path, force: bool) -> None:
-    """Refuse, before any work, an output that cannot be written or that would overwrite some other file."""
-    if path.is_dir():
-        raise InputError(f"{path}: output: expected a file name, found a folder")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path}: output: expected a folder that can be written, found that {path.parent} cannot")
-    if path.exists() and not force and not is_modal_body_file(path):
-        raise InputError(f"{path}: output: a file that is not a modal body is there; use another name or --force")
 
 
 def _silent(_: str) -> None:

@@ -187,9 +187,8 @@ def _hermite(stations: Stations, x: float) -> Interface:
     positions = stations.position[:, 0]
     k = positions.size
     i = int(np.clip(np.searchsorted(positions, x, side="right") - 1, 0, k - 2))
-    near = _through(
-        stations, np.arange(np.clip(i - 1, 0, max(k - 4, 0)), min(np.clip(i - 1, 0, max(k - 4, 0)) + 4, k)), x
-    )
+    first = min(max(i - 1, 0), max(k - 4, 0))
+    near = _through(stations, np.arange(first, min(first + 4, k)), x)
     h = positions[i + 1] - positions[i]
     s = (x - positions[i]) / h
     translation, rotation = near.translation.copy(), near.rotation.copy()

@@ -42,8 +42,6 @@ _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": 
 def write_modal_body(path: Path, body: ModalBody, *, make_folder: bool = False) -> None:
     """Write `body` to `path`, replacing what is there only once the new file is complete.
 
-    The HDF5 image is made in memory: a full disk then is an ordinary failed write, which HDF5 itself does not survive.
-
     Raises:
         SolveError: the file cannot be written; names file and reason.
     """
@@ -69,18 +67,6 @@ def read_modal_body(path: Path) -> ModalBody:
         raise InputError(f"{path}: damaged modal body file: {error.args[0]}") from None
     except (OSError, RuntimeError, ValueError, TypeError) as error:
         raise InputError(f"{path}: not a modal body file, or a damaged one: {error}") from None
-
-
-def is_modal_body_file(path: Path) -> bool:
-    """Whether `path` holds a modal body, or an HDF5 file too damaged to tell: what may be overwritten unasked."""
-    try:
-        with path.open("rb") as stream:
-            if stream.read(8) != b"\x89HDF\r\n\x1a\n":
-                return False
-        with h5py.File(path, "r") as file:
-            return bool(file.attrs.get("format") == FORMAT)
-    except OSError:
-        return True
 
 
 def _check_format(path: Path, attributes: h5py.AttributeManager) -> None:

@@ -64,14 +64,14 @@ def solve(scene_file: Path, output: Path | None) -> None:
     Links given as .toml are taken through stage 1 first where they are not up to date. Prints a summary: time per
     stage, steps, constraint violation, and the largest voltage against its limit.
     """
-    from .files import check_writable
+    from .files import check_output
     from .progress import Display
-    from .results import write_results
+    from .results import FORMAT, write_results
     from .solve import solve as solve_scene
     from .summary import print_summary, summary_console
 
     path = output or scene_file.with_suffix(".results.h5")
-    check_writable(path)
+    check_output(path, FORMAT)
     with Display() as display:
         solution = solve_scene(scene_file, display)
     began = time.perf_counter()

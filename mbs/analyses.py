@@ -178,12 +178,12 @@ def _integrate(
     began = time.perf_counter()
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, steering, analysis.times.tolist(), start.q, start.v,
-        analysis.tolerance, analysis.max_steps or 0, resolver, progress, recording,
+        analysis.tolerance, analysis.max_steps, resolver, progress, recording,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     reached = len(run.q)
     return Outcome(
-        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.lambda_,
+        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers,
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
         _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, recording,
     )  # fmt: skip

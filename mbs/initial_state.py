@@ -109,7 +109,6 @@ def _check_redundancy(assembly: Assembly, q: Array) -> None:
         return
     involved = np.abs(left[:, rank:]).max(axis=1) > 1e-6
     rows = [c for c, is_involved in zip(assembly.constraints, involved, strict=True) if is_involved]
-    C, _, _ = assembly.system.constraints(0.0, q, np.zeros_like(q))
     raise InputError(
         f"{assembly.model.scene.path}: expected independent constraints, found {len(assembly.constraints) - rank} too"
         f" many among {'; '.join(c.row.label for c in rows)}: they repeat or contradict each other"

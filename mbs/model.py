@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..validation import did_you_mean, quoted
 from . import _core
+from ._core import TimeFunction
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
 from .rows import FRAME, End, Row, joint_coordinate, joint_rows, motor_joints, trajectory_rows
 from .scene_records import GROUND, Scene, split_point
-from .time_functions import TimeFunction
 
 Array = NDArray[np.float64]
 ZERO = _core.TimeFunction.constant(0.0)
@@ -79,9 +79,7 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
         for component, row in trajectory_rows(scene, trajectory).items()
     )
     motors = {joint.name: joint_coordinate(scene, joint) for joint in motor_joints(scene)}
-    model = Model(
-        scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(_load_rows(scene))
-    )
+    model = Model(scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(_load_rows(scene)))
     named = any(joint.motor for joint in scene.joint)
     if named and trajectories and len(motors) != model.rigid_freedom:
         raise InputError(
@@ -156,7 +154,8 @@ class Assembly:
     @property
     def rigid_coordinates(self) -> NDArray[np.intp]:
         """Indices of (R, θ) of all bodies in q (3 bodies,)."""
-        return (self.first[:, None] + np.arange(3)).ravel()
+        indices: NDArray[np.intp] = (self.first[:, None] + np.arange(3)).ravel()
+        return indices
 
     @property
     def is_trajectory(self) -> list[bool]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,7 +171,7 @@ def _diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:
     )
 
 
-def core_arguments(body: PlanarBody, markers: list[PlanarPoint]) -> dict[str, object]:
+def core_arguments(body: PlanarBody, markers: list[PlanarPoint]) -> dict[str, Any]:
     """Arguments of `_core.System.add_body`; terms that vanish are passed as empty arrays, which the core skips."""
     n = body.n_modes
     size = np.sqrt(body.mass) * max((float(np.linalg.norm(m.position)) for m in markers), default=0.0)

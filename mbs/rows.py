@@ -35,7 +35,7 @@ class Row:
     @property
     def carries_moment(self) -> bool:
         """Whether the force along the row is a moment."""
-        return self.kind == _core.RowKind.angle
+        return bool(self.kind == _core.RowKind.angle)
 
 
 def joint_rows(scene: Scene, joint: Joint) -> tuple[Row, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..errors import SolveError
@@ -27,7 +29,7 @@ def static_equilibrium(assembly: Assembly, start: State) -> tuple[State, Array]:
         size = max(1e-9, float(np.abs(Q).max()), float(np.abs(constraint_forces).max(initial=0.0)))
         return np.concatenate([Q - constraint_forces, C]), size
 
-    C, _, C_q = system.constraints(0.0, start.q, rest)
+    _, _, C_q = system.constraints(0.0, start.q, rest)
     multipliers = np.linalg.lstsq(C_q.T, system.force_at_rest(0.0, start.q), rcond=None)[0]
     x = np.concatenate([start.q, multipliers])
     for _ in range(MOST_ITERATIONS):
@@ -57,7 +59,7 @@ def _with_rates(assembly: Assembly, q: Array, v: Array) -> State:
     return State(q, v)
 
 
-def _jacobian(function, x: Array) -> Array:  # type: ignore[no-untyped-def]
+def _jacobian(function: Callable[[Array], Array], x: Array) -> Array:
     """Central differences, column by column."""
     steps = 1e-6 * np.maximum(1.0, np.abs(x))
     columns = []

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolveError
 
-# Before dolfinx does it: PETSc's own signal handlers would answer Ctrl-C or a closed pipe with a page on debuggers.
+# Before dolfinx does it: PETSc's own signal handlers would answer a closed pipe or a kill with a page on debuggers.
 petsc4py.init(["ffrobot", "-no_signal_handler"])
 
 import basix  # noqa: E402

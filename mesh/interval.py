@@ -1,4 +1,4 @@
-"""The interval mesh of a beam link: where its nodes lie, and the dolfinx mesh on them."""
+"""The interval mesh of a beam link: where its nodes lie, and the dolfinx mesh on them. Importing this loads dolfinx."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .compat import Floats, cell_vertices, create_interval_mesh
+
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
-
-    from .compat import Floats
 
 # Points closer than this, relative to the length, are one point.
 COINCIDENT = 1e-9
 
 
-def graded_nodes(breakpoints: Sequence[float], elements: int) -> NDArray[np.float64]:
+def graded_nodes(breakpoints: Sequence[float], elements: int) -> Floats:
     """Nodes of `elements` elements between the first and the last of `breakpoints`, with a node at each of them.
 
     Within a segment the elements are equal; they are shared out so that the longest is as short as possible. A uniform
@@ -46,7 +46,7 @@ def graded_nodes(breakpoints: Sequence[float], elements: int) -> NDArray[np.floa
     return np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)])
 
 
-def with_points(nodes: NDArray[np.float64], points: Sequence[float]) -> NDArray[np.float64]:
+def with_points(nodes: Floats, points: Sequence[float]) -> Floats:
     """`nodes` (m,) and `points` in one ascending list (≥ m,); a point that coincides with a node adds nothing."""
     length = nodes[-1] - nodes[0]
     merged = list(nodes)
@@ -56,15 +56,13 @@ def with_points(nodes: NDArray[np.float64], points: Sequence[float]) -> NDArray[
     return np.sort(np.asarray(merged, dtype=np.float64))
 
 
-def interval_mesh(nodes: NDArray[np.float64], flipped: Sequence[int] = ()) -> Mesh:
+def interval_mesh(nodes: Floats, flipped: Sequence[int] = ()) -> Mesh:
     """Mesh of the intervals between neighbouring `nodes` (m,), ascending, in m.
 
     Args:
         nodes: coordinates along the link's axis.
         flipped: cells whose second vertex comes first, as mesh files may have them.
     """
-    from .compat import create_interval_mesh
-
     cells = np.stack([np.arange(nodes.size - 1), np.arange(1, nodes.size)], axis=1)
     cells[list(flipped)] = cells[list(flipped)][:, ::-1]
     return create_interval_mesh(nodes, cells)
@@ -75,8 +73,6 @@ def cells_containing(mesh: Mesh, points: Floats) -> tuple[NDArray[np.int64], Flo
 
     A point on a boundary belongs to either of its cells. Points must lie on the mesh.
     """
-    from .compat import cell_vertices
-
     vertices = cell_vertices(mesh)
     order = np.argsort(vertices.min(axis=1))
     starts = vertices.min(axis=1)[order]

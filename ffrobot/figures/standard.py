@@ -13,11 +13,12 @@ SNAPSHOTS = 5
 
 
 def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
-    """Configurations, paths, deflections, forces, moments and voltages; analyses are laid over each other."""
+    """Configurations, paths, angles, deflections, forces, moments and voltages; analyses are laid over each other."""
     return tuple(
         [
             *_configurations(results),
             *_paths(results),
+            *_angles(results),
             *_deflections(results),
             *_over_time(results, "trajectories", "force", "force (N), moment (N·m)", "force along trajectory"),
             *_over_time(results, "joints", "moment", "moment (N·m), force (N)", "motor of joint"),
@@ -60,6 +61,16 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
             curves=tuple(curves),
             y_label="y (m)" if in_plane or component == "[1]" else "x (m)",
         )
+
+
+def _angles(results: Results) -> Iterator[FigureRecord]:
+    for body in _members(results, "bodies"):
+        datasets = [f"{a}/bodies/{body}/angle" for a in results.analyses if results.has(f"{a}/bodies/{body}/angle")]
+        if any(np.ptp(results.data(name)) for name in datasets):
+            curves = tuple(Curve(data=name, label=name.split("/")[0]) for name in datasets)
+            yield FigureRecord(
+                name=_name("angle", body), title=f"angle of {body}", curves=curves, y_label="angle (rad)"
+            )
 
 
 def _deflections(results: Results) -> Iterator[FigureRecord]:

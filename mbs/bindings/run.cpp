@@ -1,5 +1,5 @@
-#include "core/replay.h"
 #include "core/run.h"
+#include "core/replay.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
@@ -36,8 +36,8 @@ void bind_run(nb::module_ &m) {
   nb::class_<ReplayedActuation, Steering>(m, "ReplayedActuation", "Actuation from the dense output of a recorded run.")
       .def(nb::init<const System &, const Recording &, ActuationResolver, std::vector<bool>, AppliedActuation,
                     std::vector<Eigen::MatrixXd>>(),
-           "inverse"_a, "recording"_a, "resolver"_a, "trajectory"_a, "applied"_a, "projector"_a,
-           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
+           "inverse"_a, "recording"_a, "resolver"_a, "trajectory"_a, "applied"_a, "projector"_a, nb::keep_alive<1, 2>(),
+           nb::keep_alive<1, 3>());
 
   nb::class_<Run>(m, "Run", "Outputs of an analysis, one row per output time reached, and how it went.")
       .def_prop_ro("status", [](const Run &r) { return r.report.status; })
@@ -48,25 +48,26 @@ void bind_run(nb::module_ &m) {
       .def_prop_ro("q", [](const Run &r) { return r.outputs.q; })
       .def_prop_ro("v", [](const Run &r) { return r.outputs.v; })
       .def_prop_ro("a", [](const Run &r) { return r.outputs.a; })
-      .def_prop_ro("lambda_", [](const Run &r) { return r.outputs.lambda; })
+      .def_prop_ro("multipliers", [](const Run &r) { return r.outputs.lambda; })
       .def_prop_ro("tau", [](const Run &r) { return r.outputs.tau; })
       .def_prop_ro("F_p", [](const Run &r) { return r.outputs.F_p; })
       .def_prop_ro("residual", [](const Run &r) { return r.outputs.residual; });
 
-  m.def("run",
-        [](const System &system, std::vector<int> group, std::vector<bool> moment, Steering *steering,
-           const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double tolerance,
-           unsigned long max_steps, ActuationResolver *resolver, const std::function<bool(double)> &carry_on,
-           Recording *recording) {
-          const nb::gil_scoped_release unlocked;
-          ConstrainedMotion motion(system, std::move(group), std::move(moment), steering);
-          const auto ask = [&](double t) {
-            const nb::gil_scoped_acquire locked;
-            return carry_on(t);
-          };
-          return run(motion, times, q, v, {tolerance, max_steps}, steering, resolver, ask, recording);
-        },
-        "system"_a, "group"_a, "moment"_a, "steering"_a.none(), "times"_a, "q"_a, "v"_a, "tolerance"_a, "max_steps"_a,
-        "resolver"_a.none(), "carry_on"_a, "recording"_a.none(),
-        "Integrates the motion from (q, v) and reports it at `times`.");
+  m.def(
+      "run",
+      [](const System &system, std::vector<int> group, std::vector<bool> moment, Steering *steering,
+         const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double tolerance,
+         unsigned long max_steps, ActuationResolver *resolver, const std::function<bool(double)> &carry_on,
+         Recording *recording) {
+        const nb::gil_scoped_release unlocked;
+        ConstrainedMotion motion(system, std::move(group), std::move(moment), steering);
+        const auto ask = [&](double t) {
+          const nb::gil_scoped_acquire locked;
+          return carry_on(t);
+        };
+        return run(motion, times, q, v, {tolerance, max_steps}, steering, resolver, ask, recording);
+      },
+      "system"_a, "group"_a, "moment"_a, "steering"_a.none(), "times"_a, "q"_a, "v"_a, "tolerance"_a, "max_steps"_a,
+      "resolver"_a.none(), "carry_on"_a, "recording"_a.none(),
+      "Integrates the motion from (q, v) and reports it at `times`.");
 }

@@ -19,9 +19,8 @@ namespace {
 
 void check_size(const char *name, Eigen::Index got, Eigen::Index expected) {
   if (got != expected)
-    throw nb::value_error((std::string(name) + ": expected size " + std::to_string(expected) + ", got " +
-                           std::to_string(got))
-                              .c_str());
+    throw nb::value_error(
+        (std::string(name) + ": expected size " + std::to_string(expected) + ", got " + std::to_string(got)).c_str());
 }
 
 PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
@@ -30,7 +29,8 @@ PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, 
   const auto n = stiffness.size();
   check_size("W rows", W.rows(), 3 + 3 * static_cast<Eigen::Index>(marker_positions.size()));
   check_size("W columns", W.cols(), n);
-  for (const auto &[name, size] : {std::pair("damping", damping.rows()), {"j", j.size()}, {"S_tilde", S_tilde.rows()}, {"m_xy", m_xy.rows()}})
+  for (const auto &[name, size] :
+       {std::pair("damping", damping.rows()), {"j", j.size()}, {"S_tilde", S_tilde.rows()}, {"m_xy", m_xy.rows()}})
     if (size)
       check_size(name, size, n);
   return {mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions, {}};
@@ -101,40 +101,47 @@ void bind_system(nb::module_ &m) {
       .def_ro("b", &Row::b);
 
   nb::class_<System>(m, "System", "Bodies, constraints and drives; call finish() once after adding them.")
-      .def("__init__", [](System *s, const Vector2d &gravity) { (new (s) System())->gravity = gravity; }, "gravity"_a)
-      .def("add_body",
-           [](System &s, double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
-              const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
-              const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions) {
-             s.bodies.push_back(
-                 make_body(mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions));
-           },
-           "mass"_a, "inertia"_a, "first_moment"_a, "stiffness"_a, "damping"_a, "W"_a, "j"_a, "S_tilde"_a, "m_xy"_a,
-           "marker_positions"_a)
-      .def("add_constraint", [](System &s, const Row &row, const TimeFunction &f) { s.constraints.push_back({row, f}); },
-           "row"_a, "target"_a)
-      .def("add_drive", [](System &s, const Row &row, const TimeFunction &f) { s.drives.push_back({row, f}); }, "row"_a,
-           "size"_a)
-      .def("add_modal_drive",
-           [](System &s, int body, const VectorXd &vector, const TimeFunction &f) {
-             s.modal_drives.push_back({body, vector, f});
-           },
-           "body"_a, "vector"_a, "size"_a)
+      .def(
+          "__init__", [](System *s, const Vector2d &gravity) { (new (s) System())->gravity = gravity; }, "gravity"_a)
+      .def(
+          "add_body",
+          [](System &s, double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
+             const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
+             const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions) {
+            s.bodies.push_back(
+                make_body(mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions));
+          },
+          "mass"_a, "inertia"_a, "first_moment"_a, "stiffness"_a, "damping"_a, "W"_a, "j"_a, "S_tilde"_a, "m_xy"_a,
+          "marker_positions"_a)
+      .def(
+          "add_constraint", [](System &s, const Row &row, const TimeFunction &f) { s.constraints.push_back({row, f}); },
+          "row"_a, "target"_a)
+      .def(
+          "add_drive", [](System &s, const Row &row, const TimeFunction &f) { s.drives.push_back({row, f}); }, "row"_a,
+          "size"_a)
+      .def(
+          "add_modal_drive",
+          [](System &s, int body, const VectorXd &vector, const TimeFunction &f) {
+            s.modal_drives.push_back({body, vector, f});
+          },
+          "body"_a, "vector"_a, "size"_a)
       .def("finish", &System::finish)
       .def_ro("coordinates", &System::coordinates)
       .def_ro("first_coordinate", &System::first_coordinate)
-      .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a, "Accelerations (coordinates,) and multipliers (constraints,).")
+      .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a,
+           "Accelerations (coordinates,) and multipliers (constraints,).")
       .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q.")
       .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces of gravity, elasticity and drives.")
       .def("energies", &energies, "q"_a, "v"_a, "Kinetic, strain, gravitational energy and dissipated power (T, 4).");
 
-  m.def("time_evaluations",
-        [](const System &system, double t, const VectorXd &q, const VectorXd &v, int repetitions) {
-          Workspace w(system);
-          VectorXd a(system.coordinates);
-          for (int i = 0; i < repetitions; ++i)
-            accelerations(system, t, q.data(), v.data(), w, a.data());
-          return a[0];
-        },
-        "system"_a, "t"_a, "q"_a, "v"_a, "repetitions"_a, "Evaluates the accelerations many times, for benchmarks.");
+  m.def(
+      "time_evaluations",
+      [](const System &system, double t, const VectorXd &q, const VectorXd &v, int repetitions) {
+        Workspace w(system);
+        VectorXd a(system.coordinates);
+        for (int i = 0; i < repetitions; ++i)
+          accelerations(system, t, q.data(), v.data(), w, a.data());
+        return a[0];
+      },
+      "system"_a, "t"_a, "q"_a, "v"_a, "repetitions"_a, "Evaluates the accelerations many times, for benchmarks.");
 }

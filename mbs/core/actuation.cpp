@@ -85,9 +85,4 @@ void ActuationResolver::resolve(const Workspace &w) {
   }
 }
 
-double ActuationResolver::condition() const {
-  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
-  return pivots.minCoeff() / pivots.maxCoeff();
-}
-
 } // namespace ffrobot

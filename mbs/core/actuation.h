@@ -24,9 +24,8 @@ public:
   // After accelerations(): uses the kinematics and multipliers in w.
   void resolve(const Workspace &w);
 
-  const Eigen::VectorXd &tau() const { return tau_; }                         // (motors)
-  const std::vector<Eigen::VectorXd> &modal_force() const { return F_p_; }    // of each body
-  double condition() const; // smallest over largest pivot of the joint system at the last resolve
+  const Eigen::VectorXd &tau() const { return tau_; }                      // (motors)
+  const std::vector<Eigen::VectorXd> &modal_force() const { return F_p_; } // of each body
 
 private:
   const System &system_;

@@ -1,4 +1,5 @@
-// One step of DOP853 (Hairer, Norsett, Wanner 1993): order 8, error estimate of orders 5 and 3, dense output of order 7.
+// One step of DOP853 (Hairer, Norsett, Wanner 1993): order 8, error estimate of orders 5 and 3, dense output of
+// order 7.
 #pragma once
 
 #include "core/dop853_tableau.h"

@@ -19,7 +19,7 @@ public:
     return rows_.data() + start_[static_cast<std::size_t>(row)] + column;
   }
 
-  void factorise(); // in place; unpivoted
+  void factorise();            // in place; unpivoted
   void solve(double *x) const; // after factorise; x: right-hand side in, solution out
 
 private:

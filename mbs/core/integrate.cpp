@@ -19,8 +19,9 @@ public:
     constexpr double b = 8, exponent = 1 / (b * order);
     error = std::max(error, 1e-12);
     double factor = std::pow(target / error, exponent);
-    factor *= previous_step_ > 0 ? std::pow(target / previous_error_, exponent) * std::pow(step / previous_step_, -1 / b)
-                                 : factor;
+    factor *= previous_step_ > 0
+                  ? std::pow(target / previous_error_, exponent) * std::pow(step / previous_step_, -1 / b)
+                  : factor;
     previous_step_ = step;
     previous_error_ = error;
     return step * (1 + std::atan(factor - 1));
@@ -86,7 +87,8 @@ IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times,
       // Errors of single steps add up like a random walk, so a step's share of the tolerance is sqrt(step / duration);
       // `accumulation` is how far the sum exceeds that (tests/benchmarks, error against tolerance).
       constexpr double accumulation = 8;
-      const double share = controls.tolerance / accumulation * std::sqrt(step / duration);
+      constexpr double rounding = 2e-14; // what the estimate sees of it: shorter steps would not help
+      const double share = std::max(controls.tolerance / accumulation * std::sqrt(step / duration), rounding);
       size = system.error_size(t_end, method.end(), error.data()) * damping / share;
     }
     if (!(size <= 1)) {

@@ -19,7 +19,7 @@ enum class IntegrationStatus {
   completed,
   step_underflow, // no step size meets the tolerance
   too_many_steps,
-  interrupted,    // by the caller
+  interrupted, // by the caller
 };
 
 struct IntegrationReport {

@@ -37,7 +37,7 @@ private:
   std::vector<int> group_;
   std::vector<bool> group_is_moment_;
   Steering *steering_;
-  double length_ = 0; // of the system: what positions are compared with
+  double length_ = 0;                      // of the system: what positions are compared with
   std::vector<Eigen::VectorXd> frequency_; // of each body's modes, rad/s
 
   // peaks so far

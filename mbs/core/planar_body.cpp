@@ -159,7 +159,8 @@ void add_mobility(const PlanarBody &body, Index k, Index l, PlanarBodyState &s) 
   E(1, 0) = c * g10 - sn * g11;
   E(0, 1) = sn * g00 + c * g01;
   E(1, 1) = sn * g10 + c * g11;
-  const int rows = body.marker_rows[static_cast<std::size_t>(k)], columns = body.marker_rows[static_cast<std::size_t>(l)];
+  const int rows = body.marker_rows[static_cast<std::size_t>(k)],
+            columns = body.marker_rows[static_cast<std::size_t>(l)];
   if (columns == 3) {
     E(0, 2) = c * g2[0] - sn * g2[1];
     E(1, 2) = sn * g2[0] + c * g2[1];

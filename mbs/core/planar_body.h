@@ -18,16 +18,16 @@ namespace ffrobot {
 // and its Gram matrix G = W W^T, both constant in the body frame (row h moves with p where S_tilde is not zero).
 struct PlanarBody {
   double mass = 0;
-  double inertia = 0;                              // J2_11 + J2_22, about the origin of the frame
-  Eigen::Vector2d first_moment;                    // s0
-  Eigen::VectorXd stiffness;                       // (n) diagonal of K_ff
-  Eigen::MatrixXd damping;                         // (n, 1) diagonal of D_ff, or (n, n)
-  Eigen::MatrixXd W;                               // (3 + 3 markers, n)
-  Eigen::VectorXd j;                               // (n) I_bar_11 + I_bar_22; empty where it vanishes
-  Eigen::MatrixXd S_tilde;                         // (n, n) S_bar_12 - S_bar_21, skew; empty where it vanishes
-  Eigen::MatrixXd m_xy;                            // (n, n) S_bar_11 + S_bar_22; empty where it is the identity
-  std::vector<Eigen::Vector2d> marker_positions;   // undeformed, body frame
-  std::vector<int> marker_rows;                    // 3, or 2 where no constraint asks for the marker's rotation
+  double inertia = 0;                            // J2_11 + J2_22, about the origin of the frame
+  Eigen::Vector2d first_moment;                  // s0
+  Eigen::VectorXd stiffness;                     // (n) diagonal of K_ff
+  Eigen::MatrixXd damping;                       // (n, 1) diagonal of D_ff, or (n, n)
+  Eigen::MatrixXd W;                             // (3 + 3 markers, n)
+  Eigen::VectorXd j;                             // (n) I_bar_11 + I_bar_22; empty where it vanishes
+  Eigen::MatrixXd S_tilde;                       // (n, n) S_bar_12 - S_bar_21, skew; empty where it vanishes
+  Eigen::MatrixXd m_xy;                          // (n, n) S_bar_11 + S_bar_22; empty where it is the identity
+  std::vector<Eigen::Vector2d> marker_positions; // undeformed, body frame
+  std::vector<int> marker_rows;                  // 3, or 2 where no constraint asks for the marker's rotation
 
   Eigen::Index modes() const { return W.cols(); }
   Eigen::Index markers() const { return static_cast<Eigen::Index>(marker_positions.size()); }
@@ -36,7 +36,7 @@ struct PlanarBody {
 
 // Motion of one marker in the global frame.
 struct MarkerMotion {
-  Eigen::Vector2d arm;      // from the frame's origin, deformed
+  Eigen::Vector2d arm; // from the frame's origin, deformed
   Eigen::Vector2d position;
   Eigen::Vector2d velocity;
   double angle;
@@ -52,7 +52,7 @@ struct PlanarBodyState {
   std::vector<MarkerMotion> markers;
 
   // applied loads, set between kinematics and free_motion
-  Eigen::Matrix3Xd wrench; // (force x, force y, moment) at each marker, global
+  Eigen::Matrix3Xd wrench;    // (force x, force y, moment) at each marker, global
   Eigen::VectorXd modal_load; // (n) generalized forces on p
   bool has_wrench = false, has_modal_load = false;
 
@@ -61,19 +61,19 @@ struct PlanarBodyState {
   Eigen::MatrixXd mobility;           // (3 markers, 3 markers), global
 
   // internals of the elimination
-  Eigen::Index padded_rows;         // rows of W, padded for vector registers
-  Eigen::MatrixXd W;                // (padded_rows, n)
-  Eigen::MatrixXd W_transposed;     // (n, padded_rows)
-  Eigen::MatrixXd G;                // (padded_rows, padded_rows)
-  Eigen::VectorXd Wp, Wp_dot, Wk;   // W p, W p_dot, W (K p + D p_dot)
-  Eigen::VectorXd extra, W_extra;   // modal forces outside the common fast path, and W times them
-  Eigen::VectorXd z;                // multipliers of the rows of W in p_ddot
+  Eigen::Index padded_rows;       // rows of W, padded for vector registers
+  Eigen::MatrixXd W;              // (padded_rows, n)
+  Eigen::MatrixXd W_transposed;   // (n, padded_rows)
+  Eigen::MatrixXd G;              // (padded_rows, padded_rows)
+  Eigen::VectorXd Wp, Wp_dot, Wk; // W p, W p_dot, W (K p + D p_dot)
+  Eigen::VectorXd extra, W_extra; // modal forces outside the common fast path, and W times them
+  Eigen::VectorXd z;              // multipliers of the rows of W in p_ddot
   Eigen::VectorXd z_response;
-  Eigen::Matrix3Xd Z_transposed;    // (3, 3 markers) L^-1 B^T: B marker acceleration per (a, alpha) with p eliminated,
-                                    // global rows; L D L^T the eliminated mass matrix
-  Eigen::Vector3d L;                // (L_10, L_20, L_21)
+  Eigen::Matrix3Xd Z_transposed; // (3, 3 markers) L^-1 B^T: B marker acceleration per (a, alpha) with p eliminated,
+                                 // global rows; L D L^T the eliminated mass matrix
+  Eigen::Vector3d L;             // (L_10, L_20, L_21)
   Eigen::Vector3d D_inverse;
-  Eigen::Vector3d free_frame;       // free (a, alpha) of the body frame, body axes
+  Eigen::Vector3d free_frame; // free (a, alpha) of the body frame, body axes
 };
 
 // Positions and velocities of the markers for q = (R, theta, p), v = its rates.

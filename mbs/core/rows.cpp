@@ -7,6 +7,7 @@ using Eigen::Vector3d;
 
 void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMotion &motion) {
   const MarkerMotion &a = row.a.motion(bodies), &b = row.b.motion(bodies);
+  motion.bias = 0; // what a slide evaluated before may have left
   switch (row.kind) {
   case RowKind::x:
   case RowKind::y: {

@@ -65,9 +65,9 @@ Outputs OutputEvaluator::take(std::size_t reached) {
   return std::move(outputs_);
 }
 
-Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q,
-        const Eigen::VectorXd &v, const IntegrationControls &controls, Steering *steering,
-        ActuationResolver *resolver, const std::function<bool(double)> &carry_on, Recording *recording) {
+Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
+        const IntegrationControls &controls, Steering *steering, ActuationResolver *resolver,
+        const std::function<bool(double)> &carry_on, Recording *recording) {
   OutputEvaluator evaluate(motion.system(), times.size(), steering, resolver);
   Eigen::VectorXd y(2 * q.size());
   y << q, v;

@@ -14,9 +14,9 @@ using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eig
 
 // One row per output time that was reached.
 struct Outputs {
-  RowMajorMatrix q, v, a, lambda;        // (T, coordinates) and (T, constraints)
-  RowMajorMatrix tau, F_p;               // (T, motors) and (T, modes of all bodies); empty without a resolver
-  RowMajorMatrix residual;               // (T, 3) of C, C_dot, C_ddot: relative to the size of their terms
+  RowMajorMatrix q, v, a, lambda; // (T, coordinates) and (T, constraints)
+  RowMajorMatrix tau, F_p;        // (T, motors) and (T, modes of all bodies); empty without a resolver
+  RowMajorMatrix residual;        // (T, 3) of C, C_dot, C_ddot: relative to the size of their terms
 };
 
 struct Run {
@@ -25,9 +25,9 @@ struct Run {
 };
 
 // Integrates `motion` from (q, v) over `times`. `resolver` and `recording` may be null.
-Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q,
-        const Eigen::VectorXd &v, const IntegrationControls &controls, Steering *steering,
-        ActuationResolver *resolver, const std::function<bool(double)> &carry_on, Recording *recording);
+Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
+        const IntegrationControls &controls, Steering *steering, ActuationResolver *resolver,
+        const std::function<bool(double)> &carry_on, Recording *recording);
 
 // Evaluates the reported quantities of one state into row i of `outputs` (already sized).
 class OutputEvaluator {

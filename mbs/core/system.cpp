@@ -46,7 +46,7 @@ Workspace::Workspace(const System &system)
     : rows(system.constraints.size()), drive_rows(system.drives.size()), targets(system.constraints.size()),
       external_drive(system.drives.size(), 0.0), schur(system.envelope),
       lambda(Eigen::VectorXd::Zero(static_cast<Index>(system.constraints.size()))),
-      correction(Eigen::VectorXd::Zero(system.coordinates)) {
+      correction(Eigen::VectorXd::Zero(system.coordinates)), value(lambda), rate(lambda) {
   for (const auto &body : system.bodies) {
     bodies.emplace_back(body);
     wrench.emplace_back(Eigen::Matrix3Xd::Zero(3, body.markers()));
@@ -116,10 +116,8 @@ void assemble_schur(const System &system, Workspace &w) {
   w.schur.factorise();
 }
 
-} // namespace
-
-void accelerations(const System &system, double t, const double *q, const double *v, Workspace &w, double *a) {
-  ++w.evaluations;
+// Everything of an evaluation that does not depend on what the constraints ask for: C M^-1 C^T is factorised after it.
+void eliminate(const System &system, double t, const double *q, const double *v, Workspace &w) {
   update_kinematics(system, q, v, w);
   apply_drives(system, t, w);
   for (std::size_t b = 0; b < system.bodies.size(); ++b) {
@@ -127,17 +125,26 @@ void accelerations(const System &system, double t, const double *q, const double
     free_motion(system.bodies[b], q + i, v + i, system.gravity, w.bodies[b]);
   }
   for (std::size_t r = 0; r < system.constraints.size(); ++r) {
-    const auto &[row, target] = system.constraints[r];
-    RowMotion &motion = w.rows[r];
-    evaluate(row, w.bodies, motion);
-    w.targets[r] = target(t);
+    evaluate(system.constraints[r].row, w.bodies, w.rows[r]);
+    w.targets[r] = system.constraints[r].target(t);
+  }
+  assemble_schur(system, w);
+}
+
+} // namespace
+
+void accelerations(const System &system, double t, const double *q, const double *v, Workspace &w, double *a) {
+  ++w.evaluations;
+  eliminate(system, t, q, v, w);
+  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+    const Row &row = system.constraints[r].row;
+    const RowMotion &motion = w.rows[r];
     double rhs = motion.bias - w.targets[r].acceleration;
     for (const auto &[m, c] : {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)})
       if (m->body >= 0)
         rhs += c->dot(w.bodies[static_cast<std::size_t>(m->body)].free_acceleration.col(m->marker));
     w.lambda[static_cast<Index>(r)] = rhs;
   }
-  assemble_schur(system, w);
   solve_multipliers(system, w);
   for (std::size_t b = 0; b < system.bodies.size(); ++b) {
     const Index i = system.first_coordinate[b];
@@ -170,8 +177,8 @@ double acceleration_residual(const System &system, const double *a, const Worksp
         continue;
       const auto b = static_cast<std::size_t>(m->body);
       double size = 0;
-      residual += c->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker,
-                                             a + system.first_coordinate[b], size));
+      residual +=
+          c->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker, a + system.first_coordinate[b], size));
       scale += c->lpNorm<Eigen::Infinity>() * size;
     }
     worst = std::max(worst, std::abs(residual) / scale);
@@ -190,15 +197,13 @@ void static_force(const System &system, double t, const double *q, Workspace &w,
 }
 
 double project(const System &system, double t, double *q, double *v, Workspace &w) {
-  constexpr double tolerance = 1e-14;
+  // Not tighter: rounding of positions, moved into modes with frequencies up to 1e5 rad/s, is noise in their forces.
+  constexpr double tolerance = 1e-12;
   constexpr int refresh_after = 3, most_iterations = 12;
-  const auto m = static_cast<Index>(system.constraints.size());
-  if (m == 0)
+  if (system.constraints.empty())
     return 0;
   Eigen::Map<Eigen::VectorXd> q_(q, system.coordinates), v_(v, system.coordinates);
-  thread_local Eigen::VectorXd value, rate;
-  value.resize(m);
-  rate.resize(m);
+  Eigen::VectorXd &value = w.value, &rate = w.rate;
   const auto correct = [&](const Eigen::VectorXd &residual, Eigen::Map<Eigen::VectorXd> &x) {
     w.lambda = residual;
     solve_multipliers(system, w);
@@ -212,13 +217,11 @@ double project(const System &system, double t, double *q, double *v, Workspace &
     const double position = value.lpNorm<Eigen::Infinity>(), velocity = rate.lpNorm<Eigen::Infinity>();
     const double scale_q = 1 + q_.lpNorm<Eigen::Infinity>(), scale_v = 1 + v_.lpNorm<Eigen::Infinity>();
     left = std::max(position / scale_q, velocity / scale_v);
-    if (!(left > tolerance) || (left < 1e-12 && left > 0.2 * previous)) // done, at the rounding floor, or NaN
+    if (!(left > tolerance) || (left < 1e-11 && left > 0.2 * previous)) // done, at the rounding floor, or NaN
       break;
     previous = left;
-    if (i >= refresh_after) {
-      accelerations(system, t, q, v, w, w.correction.data());
-      --w.evaluations;
-    }
+    if (i >= refresh_after)
+      eliminate(system, t, q, v, w);
     correct(rate, v_);
     if (position > tolerance * scale_q)
       correct(value, q_);

@@ -41,8 +41,8 @@ struct System {
   // Derived from the above by finish()
   std::vector<Eigen::Index> first_coordinate; // of each body in q
   Eigen::Index coordinates = 0;
-  std::vector<Eigen::Index> envelope;         // first column of each row of C M^-1 C^T
-  struct Coupling {                           // constraint rows r >= s meet on a body at markers k and l
+  std::vector<Eigen::Index> envelope; // first column of each row of C M^-1 C^T
+  struct Coupling {                   // constraint rows r >= s meet on a body at markers k and l
     int r, s, body, k, l;
     bool r_is_b, s_is_b;
   };
@@ -55,16 +55,16 @@ struct Workspace {
   explicit Workspace(const System &system);
 
   std::vector<PlanarBodyState> bodies;
-  std::vector<RowMotion> rows;                  // of the constraints, at the last evaluation
+  std::vector<RowMotion> rows; // of the constraints, at the last evaluation
   std::vector<RowMotion> drive_rows;
   std::vector<Jet> targets;
-  std::vector<double> external_drive;           // added to the drives' own sizes; set by whoever steers the system
-  std::vector<Eigen::VectorXd> external_modal;  // likewise, modal forces of each body
+  std::vector<double> external_drive;          // added to the drives' own sizes; set by whoever steers the system
+  std::vector<Eigen::VectorXd> external_modal; // likewise, modal forces of each body
   bool has_external_modal = false;
-  EnvelopeMatrix schur;                         // C M^-1 C^T, factorised
+  EnvelopeMatrix schur; // C M^-1 C^T, factorised
   Eigen::VectorXd lambda;
-  std::vector<Eigen::Matrix3Xd> wrench;         // of the constraints, on the markers of each body
-  Eigen::VectorXd correction;                   // of projections
+  std::vector<Eigen::Matrix3Xd> wrench;    // of the constraints, on the markers of each body
+  Eigen::VectorXd correction, value, rate; // of projections
   unsigned long evaluations = 0;
 };
 

@@ -99,7 +99,7 @@ MISTAKES = {
 def test_mistake_in_a_file(two_link_copy, refused, file, edits, named):
     folder = two_link_copy({file: edits})
     with h5py.File(folder / "scene.results.h5", "w") as earlier:  # must survive
-        earlier["kept"] = 1.0
+        earlier.attrs["format"] = "ffrobot-results"
     message = refused(folder, "solve", "scene.toml")
     for text in named:
         assert text in message

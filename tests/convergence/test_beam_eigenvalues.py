@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+
+from ffrobot.errors import SolveError
 from ffrobot.fe_models.beam import family_model
 from ffrobot.fe_models.eigen import lowest_modes
 from ffrobot.fe_models.link_file import FAMILIES, BeamLink
 from ffrobot.mesh.interval import interval_mesh
-from scipy.optimize import brentq
-
-from ffrobot.errors import SolveError
 from ffrobot.validation import validate
 
 E, NU, RHO, LENGTH = 2.068427e11, 0.3, 7850.0, 1.0

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from ffrobot.fe_models.link import make_link
 
 from ffrobot.errors import InputError, SolveError
+from ffrobot.fe_models.link import make_link
 
 STEPPED = """
 [[geometry.segment]]

@@ -1,15 +1,16 @@
 """Stage 1 as a command: computed once, not again; what is in the way is not lost."""
 
+import signal
 import subprocess
 import sys
 import time
 
 import h5py
 import pytest
-from ffrobot.fe_models.link import cached_modal_body, input_hash, make_link
-from ffrobot.fe_models.link_file import read_link
 
 from ffrobot.errors import InputError
+from ffrobot.fe_models.link import cached_modal_body, input_hash, make_link
+from ffrobot.fe_models.link_file import read_link
 
 
 def test_up_to_date_links_are_not_computed_again(link_file):
@@ -49,6 +50,24 @@ print([m for m in ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix",
     assert time.perf_counter() - start < 2.0  # 0.3 s where nothing else runs
 
 
+@pytest.mark.parametrize("missing", ["dolfinx", "petsc4py", "slepc4py"])
+def test_without_the_finite_element_libraries(link_file, missing):
+    path = link_file()
+    code = f"""
+import sys
+from pathlib import Path
+from ffrobot.errors import SolveError
+from ffrobot.fe_models.link import make_link
+sys.modules[{missing!r}] = None  # as if not installed
+try:
+    make_link(Path({str(path)!r}))
+except SolveError as error:
+    print(error)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert f"link1.toml: computing a link needs the finite element libraries, and {missing}" in result.stdout
+
+
 def test_a_run_prints_nothing_and_repeats_bit_for_bit(link_file, tmp_path):
     path = link_file(family="all", count=20)
     make_link(path)
@@ -62,6 +81,21 @@ make_link(Path({str(path)!r}), Path({str(tmp_path / "again.h5")!r}))
     assert (tmp_path / "again.h5").read_bytes() == path.with_suffix(".h5").read_bytes()
 
 
+def test_signals_end_the_process_as_ever(link_file):
+    """PETSc installs handlers that print pages and exit with its own code, unless told not to."""
+    path = link_file()
+    code = f"""
+import os, signal
+from pathlib import Path
+from ffrobot.fe_models.link import make_link
+make_link(Path({str(path)!r}), force=True)
+os.kill(os.getpid(), signal.SIGTERM)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert result.returncode == -signal.SIGTERM
+    assert result.stderr == ""
+
+
 def test_progress_is_told(link_file):
     lines = []
     make_link(link_file(), progress=lines.append)
@@ -73,7 +107,7 @@ def test_another_file_in_the_way_is_kept(link_file, tmp_path):
     path = link_file()
     thesis = tmp_path / "thesis.h5"
     thesis.write_text("three years of work")
-    with pytest.raises(InputError, match=r"thesis\.h5: output: a file that is not a modal body is there"):
+    with pytest.raises(InputError, match=r"thesis\.h5: output: .*another kind"):
         make_link(path, thesis)
     results = tmp_path / "results.h5"
     with h5py.File(results, "w") as file:
@@ -126,7 +160,7 @@ except FfrobotError as error:
     finally:
         tmp_path.chmod(0o755)
     assert result.stdout.startswith("2 ")
-    assert "link1.h5: output: expected a folder that can be written" in result.stdout
+    assert "link1.h5: output: expected a writable folder" in result.stdout
 
 
 def test_cache(link_file, cache):

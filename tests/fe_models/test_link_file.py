@@ -1,9 +1,9 @@
 """Wrong link files: one clear error that names file, key, what was expected and what was found."""
 
 import pytest
-from ffrobot.fe_models.link_file import read_link
 
 from ffrobot.errors import InputError
+from ffrobot.fe_models.link_file import read_link
 
 SEGMENTS = """
 [[geometry.segment]]

@@ -6,9 +6,9 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
-from ffrobot.fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
 
 from ffrobot.errors import InputError
+from ffrobot.fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
 
 
 def cubic(x, coefficients):

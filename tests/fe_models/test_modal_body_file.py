@@ -6,10 +6,10 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from ffrobot.fe_models.link import make_link
-from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
 
 from ffrobot.errors import InputError, SolveError
+from ffrobot.fe_models.link import make_link
+from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from math import pi
 
 import pytest
+
 from ffrobot.fe_models.section import rectangle, tube
 
 

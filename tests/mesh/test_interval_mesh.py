@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from ffrobot.mesh.compat import cell_vertices
 from ffrobot.mesh.interval import cells_containing, graded_nodes, interval_mesh, with_points
 

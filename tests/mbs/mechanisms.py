@@ -1,0 +1,72 @@
+"""Scenes written in Python, with bodies that are given as `PlanarBody`."""
+
+from pathlib import Path
+
+import numpy as np
+from oracle import Mechanism
+
+from ffrobot.mbs.model import Assembly, build_model
+from ffrobot.mbs.scene_records import Analysis, Scene
+
+PLACEHOLDER = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # the bodies themselves are passed beside the scene
+
+
+def make_model(bodies, modal_loads=(), **keys):
+    """A model of `bodies`; `keys` are those of a scene file."""
+    tables = {"gravity": (0.0, -9.81)} | keys
+    if "analysis" not in tables:
+        tables["analysis"] = (pcid(),)
+    for name in ("joint", "trajectory", "load"):
+        tables[name] = tuple(tables.get(name, ()))
+    scene = Scene(
+        name="test",
+        body=tuple({"name": body.name, "rigid": PLACEHOLDER} for body in bodies),
+        path=Path("scene.toml"),
+        text="",
+        **tables,
+    )
+    return build_model(scene, bodies, modal_loads)
+
+
+def pcid(name="inverse", end=1.0, output_step=0.01, **keys):
+    return Analysis(name=name, kind="pcid", end=end, output_step=output_step, **keys)
+
+
+def forward(name="forward", end=1.0, output_step=0.01, **keys):
+    return Analysis(name=name, kind="forward", end=end, output_step=output_step, **keys)
+
+
+def revolute(name, first, second, **keys):
+    return {"name": name, "type": "revolute", "between": (first, second), **keys}
+
+
+def assemble(model):
+    """All joints, trajectories, loads and motors of the model in one system."""
+    return Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+
+
+def random_state(rng, size, modal=0.1):
+    """Any q and v: positions and angles of order one, `modal` times as much in all of q."""
+    return modal * rng.standard_normal(size) + 0.5, rng.standard_normal(size)
+
+
+def always(_):
+    """The progress of runs that nobody watches."""
+    return True
+
+
+def relative(got, expected, scale=None):
+    """Largest difference relative to the largest expected value."""
+    return np.abs(got - expected).max() / (np.abs(expected).max() if scale is None else scale)
+
+
+def oracle_of(assembly):
+    """The oracle's mechanism with the same bodies and rows, in the same order."""
+    model = assembly.model
+    return Mechanism(
+        model.bodies,
+        model.scene.gravity,
+        [(constraint.row, constraint.target) for constraint in assembly.constraints],
+        model.loads,
+        [(load.body, load.vector, load.size) for load in model.modal_loads],
+    )

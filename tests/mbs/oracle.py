@@ -1,0 +1,186 @@
+"""The planar equations as formulation.md, section 4, states them: dense matrices, written to be read, not to be fast.
+
+Shares nothing with the compiled core but its input: `PlanarBody`, rows (`ffrobot.mbs.rows.Row`) and functions of time.
+Coordinates q = (R, θ, p) of one body after the other; symbols as in Shabana, Dynamics of Multibody Systems, ch. 5.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+def rotation(theta):
+    return np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
+
+
+def rotation_derivative(theta):
+    return np.array([[-np.sin(theta), -np.cos(theta)], [np.cos(theta), -np.sin(theta)]])
+
+
+def mass_matrix(body, q):
+    """M (3 + n, 3 + n) of one body."""
+    theta, p = q[2], q[3:]
+    A, A_theta = rotation(theta), rotation_derivative(theta)
+    s = body.first_moment + body.S_bar @ p
+    M = np.zeros((len(q), len(q)))
+    M[:2, :2] = body.mass * np.eye(2)
+    M[:2, 2] = M[2, :2] = A_theta @ s
+    M[:2, 3:] = A @ body.S_bar
+    M[3:, :2] = M[:2, 3:].T
+    M[2, 2] = body.inertia + 2 * body.j @ p + p @ body.m_xy @ p
+    M[2, 3:] = M[3:, 2] = body.h + p @ body.S_tilde
+    M[3:, 3:] = np.eye(len(p))
+    return M
+
+
+def quadratic_velocity_forces(body, q, v):
+    """Q_v: the Coriolis and centrifugal forces."""
+    theta, p, theta_dot, p_dot = q[2], q[3:], v[2], v[3:]
+    A, A_theta = rotation(theta), rotation_derivative(theta)
+    s = body.first_moment + body.S_bar @ p
+    Q_R = theta_dot**2 * A @ s - 2 * theta_dot * A_theta @ body.S_bar @ p_dot
+    Q_theta = -2 * theta_dot * (body.j + p @ body.m_xy) @ p_dot
+    Q_f = theta_dot**2 * (body.j + body.m_xy @ p) + 2 * theta_dot * body.S_tilde @ p_dot
+    return np.concatenate([Q_R, [Q_theta], Q_f])
+
+
+def gravity_forces(body, q, g):
+    theta, p = q[2], q[3:]
+    s = body.first_moment + body.S_bar @ p
+    Q_theta = rotation_derivative(theta) @ s @ g
+    return np.concatenate([body.mass * g, [Q_theta], body.S_bar.T @ rotation(theta).T @ g])
+
+
+def elastic_forces(body, q, v):
+    return np.concatenate([np.zeros(3), -body.stiffness * q[3:] - body.damping @ v[3:]])
+
+
+@dataclass
+class Marker:
+    """Motion (x, y, angle) of one end of a row, its Jacobian L (3, N) and acceleration where q̈ = 0."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    L: np.ndarray
+    convective: np.ndarray
+
+
+@dataclass
+class RowState:
+    """value, rate and second derivative = gradient · q̈ + bias of a row."""
+
+    value: float
+    rate: float
+    gradient: np.ndarray
+    bias: float
+
+
+class Mechanism:
+    """Bodies with constraints (row, target), loads (row, size) and modal loads (body name, vector, size)."""
+
+    def __init__(self, bodies, gravity, constraints=(), loads=(), modal_loads=()):
+        self.bodies = list(bodies)
+        self.gravity = np.array(gravity)
+        self.constraints, self.loads, self.modal_loads = list(constraints), list(loads), list(modal_loads)
+        sizes = [3 + body.n_modes for body in self.bodies]
+        ends = np.cumsum(sizes)
+        self.size = int(ends[-1])
+        self.columns = {
+            body.name: slice(end - size, end) for body, size, end in zip(self.bodies, sizes, ends, strict=True)
+        }
+
+    def body(self, name):
+        return next(body for body in self.bodies if body.name == name)
+
+    def mass_matrix(self, q):
+        M = np.zeros((self.size, self.size))
+        for body in self.bodies:
+            i = self.columns[body.name]
+            M[i, i] = mass_matrix(body, q[i])
+        return M
+
+    def forces(self, t, q, v):
+        """Q: quadratic velocity, elastic, damping, gravity and applied forces."""
+        Q = np.zeros(self.size)
+        for body in self.bodies:
+            i = self.columns[body.name]
+            Q[i] += quadratic_velocity_forces(body, q[i], v[i])
+            Q[i] += elastic_forces(body, q[i], v[i]) + gravity_forces(body, q[i], self.gravity)
+        for row, size in self.loads:
+            Q += self.row(row, q, v).gradient * size(t)[0]
+        for name, vector, size in self.modal_loads:
+            Q[self.columns[name]][3:] += vector * size(t)[0]
+        return Q
+
+    def marker(self, end, q, v):
+        L = np.zeros((3, self.size))
+        if end.body is None:
+            return Marker(np.array([*end.position, 0.0]), np.zeros(3), L, np.zeros(3))
+        body, i = self.body(end.body), self.columns[end.body]
+        (R, theta, p), (theta_dot, p_dot) = (q[i][:2], q[i][2], q[i][3:]), (v[i][2], v[i][3:])
+        if end.point:
+            point = body.points[end.point]
+            x, Phi, phi = point.position, point.translation, point.rotation
+        else:
+            x, Phi, phi = np.zeros(2), np.zeros((2, body.n_modes)), np.zeros(body.n_modes)
+        A, A_theta = rotation(theta), rotation_derivative(theta)
+        u = x + Phi @ p
+        L[:2, i] = np.column_stack([np.eye(2), A_theta @ u, A @ Phi])
+        L[2, i] = np.concatenate([[0, 0, 1], phi])
+        convective = -(theta_dot**2) * A @ u + 2 * theta_dot * A_theta @ Phi @ p_dot
+        return Marker(np.array([*(R + A @ u), theta + phi @ p]), L @ v, L, np.array([*convective, 0.0]))
+
+    def row(self, row, q, v):
+        a, b = self.marker(row.a, q, v), self.marker(row.b, q, v)
+        if row.kind.name in ("x", "y", "angle"):
+            k = ("x", "y", "angle").index(row.kind.name)
+            value = b.position[k] - a.position[k] - row.offset
+            return RowState(value, b.velocity[k] - a.velocity[k], b.L[k] - a.L[k], b.convective[k] - a.convective[k])
+        alpha, alpha_dot = a.position[2], a.velocity[2]
+        n, n_alpha = rotation(alpha) @ row.direction, rotation_derivative(alpha) @ row.direction
+        d, d_dot = b.position[:2] - a.position[:2], b.velocity[:2] - a.velocity[:2]
+        gradient = n @ (b.L[:2] - a.L[:2]) + (n_alpha @ d) * a.L[2]
+        bias = n @ (b.convective[:2] - a.convective[:2]) + 2 * alpha_dot * n_alpha @ d_dot - alpha_dot**2 * n @ d
+        return RowState(n @ d - row.offset, n @ d_dot + alpha_dot * n_alpha @ d, gradient, bias)
+
+    def rows(self, q, v):
+        return [self.row(row, q, v) for row, _ in self.constraints]
+
+    def constraint_values(self, t, q, v):
+        """C, Ċ and C_q."""
+        states, targets = self.rows(q, v), [target(t) for _, target in self.constraints]
+        C = [state.value - target[0] for state, target in zip(states, targets, strict=True)]
+        C_dot = [state.rate - target[1] for state, target in zip(states, targets, strict=True)]
+        return np.array(C), np.array(C_dot), np.array([state.gradient for state in states]).reshape(-1, self.size)
+
+    def solve(self, t, q, v):
+        """q̈ and λ of the augmented system M q̈ + C_qᵀ λ = Q, C_q q̈ = γ (Eq. 13)."""
+        states = self.rows(q, v)
+        C_q = np.array([state.gradient for state in states]).reshape(-1, self.size)
+        gamma = [target(t)[2] - state.bias for state, (_, target) in zip(states, self.constraints, strict=True)]
+        m = len(gamma)
+        augmented = np.block([[self.mass_matrix(q), C_q.T], [C_q, np.zeros((m, m))]])
+        solution = np.linalg.solve(augmented, np.concatenate([self.forces(t, q, v), gamma]))
+        return solution[: self.size], solution[self.size :]
+
+    def energies(self, q, v):
+        """Kinetic, strain and gravitational energy, dissipated power."""
+        kinetic = 0.5 * v @ self.mass_matrix(q) @ v
+        strain = gravitational = dissipated = 0.0
+        for body in self.bodies:
+            (R, theta, p), p_dot = np.split(q[self.columns[body.name]], [2, 3]), v[self.columns[body.name]][3:]
+            strain += 0.5 * p @ (body.stiffness * p)
+            dissipated += p_dot @ body.damping @ p_dot
+            s = body.first_moment + body.S_bar @ p
+            gravitational -= (body.mass * R + rotation(theta[0]) @ s) @ self.gravity
+        return np.array([kinetic, strain, gravitational, dissipated])
+
+    def momentum(self, q, v):
+        """Linear momentum (2) and angular momentum about the origin, of all bodies together."""
+        momentum = np.zeros(3)
+        for body in self.bodies:
+            i = self.columns[body.name]
+            P = mass_matrix(body, q[i]) @ v[i]
+            momentum[:2] += P[:2]
+            momentum[2] += P[2] + q[i][0] * P[1] - q[i][1] * P[0]
+        return momentum

@@ -1,0 +1,100 @@
+"""C++ = the readable NumPy version, to 1e-12 of the largest value, at random states of every mechanism of the zoo."""
+
+import numpy as np
+import pytest
+import zoo
+from mechanisms import assemble, oracle_of, random_state, relative
+
+from ffrobot.mbs.model import ModalLoad
+from ffrobot.mbs.time_functions import parse_expression
+
+T = 0.37
+
+
+@pytest.fixture(params=zoo.ALL)
+def case(request):
+    assembly = assemble(zoo.build(request.param))
+    rng = np.random.default_rng(1)
+    q, v = random_state(rng, assembly.system.coordinates)
+    return assembly.system, oracle_of(assembly), q, v
+
+
+def test_accelerations_and_multipliers(case):
+    system, oracle, q, v = case
+    a, lambda_ = system.evaluate(T, q, v)
+    expected_a, expected_lambda = oracle.solve(T, q, v)
+    assert relative(a, expected_a) < 1e-12
+    assert relative(lambda_, expected_lambda) < 1e-12
+
+
+def test_constraints_rates_and_jacobian(case):
+    system, oracle, q, v = case
+    for got, expected in zip(system.constraints(T, q, v), oracle.constraint_values(T, q, v), strict=True):
+        assert relative(got, expected) < 1e-14
+
+
+def test_forces_at_rest(case):
+    system, oracle, q, _ = case
+    assert relative(system.force_at_rest(T, q), oracle.forces(T, q, np.zeros_like(q))) < 1e-13
+
+
+def test_energies(case):
+    system, oracle, q, v = case
+    assert relative(system.energies(q[None], v[None])[0], oracle.energies(q, v)) < 1e-13
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_many_states_of_a_general_pair(seed):
+    """Several random pairs at large deformation (p of order one) and speed."""
+    rng = np.random.default_rng(seed)
+    assembly = assemble(zoo.chain(rng, 2))
+    q, v = random_state(rng, assembly.system.coordinates, modal=1.0)
+    a, lambda_ = assembly.system.evaluate(T, q, 5 * v)
+    expected_a, expected_lambda = oracle_of(assembly).solve(T, q, 5 * v)
+    assert relative(a, expected_a) < 1e-12
+    assert relative(lambda_, expected_lambda) < 1e-12
+
+
+@pytest.mark.parametrize("modes", [1, 2, 9, 30])
+@pytest.mark.parametrize("dense_damping", [False, True])
+def test_mode_counts_and_damping(modes, dense_damping):
+    rng = np.random.default_rng(modes)
+    bodies = zoo.clouds(rng, 2, n=modes, points=40, dense_damping=dense_damping)
+    vector = rng.standard_normal(modes)
+    load = ModalLoad("b2", vector, parse_expression("3+t"))
+    model = zoo.make_model(bodies, [load], joint=zoo.serial_joints(2), trajectory=[zoo.tip_path("b2")], load=zoo.LOADS)
+    assembly = assemble(model)
+    q, v = random_state(rng, assembly.system.coordinates)
+    a, lambda_ = assembly.system.evaluate(T, q, v)
+    expected_a, expected_lambda = oracle_of(assembly).solve(T, q, v)
+    assert relative(a, expected_a) < 1e-12
+    assert relative(lambda_, expected_lambda) < 1e-12
+
+
+def test_gradients_are_the_derivatives_of_the_constraints():
+    """C_q against central differences of C, and Ċ = C_q q̇ − ∂target/∂t: not only the oracle's word for it."""
+    assembly = assemble(zoo.build("mixed"))
+    system = assembly.system
+    q, v = random_state(np.random.default_rng(2), system.coordinates)
+    _, rate, C_q = system.constraints(T, q, v)
+    h = 1e-6
+    columns = [
+        (system.constraints(T, q + h * e, v)[0] - system.constraints(T, q - h * e, v)[0]) / (2 * h)
+        for e in np.eye(len(q))
+    ]
+    assert relative(C_q, np.array(columns).T) < 1e-9
+    target_rates = np.array([c.target(T)[1] for c in assembly.constraints])
+    assert relative(rate, C_q @ v - target_rates) < 1e-14
+
+
+def test_accelerations_meet_the_second_derivative_of_the_constraints():
+    """C̈ = 0 by differences of Ċ along the motion."""
+    system = assemble(zoo.build("mixed backwards")).system
+    q, v = random_state(np.random.default_rng(3), system.coordinates)
+    a, _ = system.evaluate(T, q, v)
+    h = 1e-5
+
+    def rate(s):
+        return system.constraints(T + s, q + s * v + s**2 / 2 * a, v + s * a)[1]
+
+    assert np.abs(rate(h) - rate(-h)).max() / (2 * h) < 1e-8 * np.abs(a).max()

@@ -1,0 +1,145 @@
+"""Mechanisms of random bodies with every kind of joint, trajectory and load, on the ground's either side."""
+
+import numpy as np
+from material_points import random_cloud
+from mechanisms import make_model, revolute
+
+from ffrobot.mbs.model import ModalLoad
+from ffrobot.mbs.planar_body import with_payload
+from ffrobot.mbs.time_functions import parse_expression
+
+LOADS = (
+    {"point": "b1.side", "x": "3*sin(t)+1", "y": "-2*cos(t)", "moment": "0.7"},
+    {"joint": "j1", "moment": "1.1*t+0.4"},
+)
+
+
+def clouds(rng, count, **keys):
+    return [random_cloud(rng, f"b{k}", **keys).planar_body() for k in range(1, count + 1)]
+
+
+def serial_joints(count):
+    joints = [revolute("j1", "ground", "b1.root", at=(0.2, -0.1))]
+    return joints + [revolute(f"j{k}", f"b{k - 1}.tip", f"b{k}.root") for k in range(2, count + 1)]
+
+
+def tip_path(body, c=(1.0, 0.5)):
+    return {"name": "tip", "point": f"{body}.tip", "x": f"{c[0]}+0.3*t-0.2*t**2", "y": f"{c[1]}-0.4*t+0.5*t**2"}
+
+
+def chain(rng, count, **keys):
+    """Revolute joints only, the tip of the last link on a path."""
+    angles = {f"b{k}": 1.2 * (-0.6) ** (k - 1) for k in range(1, count + 1)}
+    tables = {"joint": serial_joints(count), "trajectory": [tip_path(f"b{count}")], "initial": {"angles": angles}}
+    return make_model(clouds(rng, count), **(tables | keys))
+
+
+def backwards(rng, **keys):
+    """Joints named from the outside in: ground second, each new link first."""
+    joints = [
+        revolute("j1", "b1.root", "ground", at=(0.2, -0.1)),
+        revolute("j2", "b2.root", "b1.tip"),
+    ]
+    tables = {"joint": joints, "trajectory": [tip_path("b2")], "initial": {"angles": {"b1": 1.2, "b2": -0.7}}}
+    return make_model(clouds(rng, 2), **(tables | keys))
+
+
+def mixed(rng, **keys):
+    """Prismatic to the ground, weld, revolute, prismatic between bodies; a path, a section angle, a way."""
+    joints = [
+        {"name": "j1", "type": "prismatic", "between": ("ground", "b1.root"), "at": (0.1, 0.0), "axis": (2.0, 1.0)},
+        {"name": "w", "type": "weld", "between": ("b1.tip", "b2.root")},
+        revolute("j2", "b2.tip", "b3.root"),
+        {"name": "j3", "type": "prismatic", "between": ("b3.tip", "b4.root"), "axis": (-1.0, 0.4)},
+    ]
+    trajectories = [
+        {"name": "way", "joint": "j3", "value": "0.3*sin(2*t)"},
+        {"name": "turn", "angle": "b3.side", "value": "0.1+0.2*t"},
+        {"name": "lift", "point": "b4.side", "y": "0.6*cos(t)"},
+    ]
+    angles = {"b1": 0.3, "b2": 0.9, "b3": -0.4, "b4": 0.2}
+    tables = {"joint": joints, "trajectory": trajectories, "initial": {"angles": angles}} | keys
+    return make_model(clouds(rng, 4), **tables)
+
+
+def mixed_backwards(rng, **keys):
+    """The same joints with their sides exchanged: prismatic axes ride on the outer bodies, the ground comes second."""
+    joints = [
+        {"name": "j1", "type": "prismatic", "between": ("b1.root", "ground"), "at": (0.1, 0.0), "axis": (2.0, 1.0)},
+        {"name": "w", "type": "weld", "between": ("b2.root", "b1.tip")},
+        revolute("j2", "b3.root", "b2.tip"),
+        {"name": "j3", "type": "prismatic", "between": ("b4.root", "b3.tip"), "axis": (-1.0, 0.4)},
+    ]
+    trajectories = [
+        {"name": "way", "joint": "j1", "value": "0.3*sin(2*t)"},
+        {"name": "frame", "angle": "b3", "value": "0.1+0.2*t"},
+        {"name": "turn", "point": "b4.tip", "x": "0.4*t"},
+    ]
+    angles = {"b1": 0.3, "b2": 0.9, "b3": -0.4, "b4": 0.2}
+    tables = {"joint": joints, "trajectory": trajectories, "initial": {"angles": angles}} | keys
+    return make_model(clouds(rng, 4), **tables)
+
+
+def four_bar(rng, **keys):
+    """A closed loop of revolute joints that follows an angle of its rocker; the motor sits at the crank."""
+    joints = [
+        *serial_joints(3),
+        revolute("j4", "b3.tip", "ground", at=(1.2, 0.1)),
+    ]
+    joints[0]["motor"] = True
+    trajectory = [{"name": "rocker", "angle": "b3.side", "value": "-1.4+0.5*t+t**2"}]
+    initial = {"angles": {"b1": 1.3, "b2": 0.1, "b3": -1.4}}
+    return make_model(clouds(rng, 3), **({"joint": joints, "trajectory": trajectory, "initial": initial} | keys))
+
+
+def slider_crank(rng, **keys):
+    """A closed loop with a slide, driven at the slider; the motor sits at the crank."""
+    joints = [
+        *serial_joints(2),
+        revolute("j3", "b2.tip", "b3.root"),
+        {"name": "rail", "type": "prismatic", "between": ("ground", "b3.root"), "axis": (1.0, 0.0)},
+    ]
+    joints[0]["motor"] = True
+    trajectory = [{"name": "slider", "point": "b3.root", "x": "1.6-0.2*sin(3*t)"}]
+    initial = {"angles": {"b1": 0.7, "b2": -0.7}}
+    return make_model(clouds(rng, 3), **({"joint": joints, "trajectory": trajectory, "initial": initial} | keys))
+
+
+def tree(rng, **keys):
+    """Two arms on one trunk, both followed."""
+    joints = [*serial_joints(2), revolute("j3", "b1.side", "b3.root")]
+    trajectories = [tip_path("b2"), {"name": "other", "angle": "b3.tip", "value": "t**2"}]
+    tables = {"joint": joints, "trajectory": trajectories, "initial": {"angles": {"b1": 1.2, "b2": -0.7}}}
+    return make_model(clouds(rng, 3), **(tables | keys))
+
+
+def loaded(rng, **keys):
+    """Forces and moments on a point, a joint moment, modal loads as patches make them, and a payload."""
+    bodies = clouds(rng, 2)
+    bodies[1] = with_payload(bodies[1], "tip", mass=0.6, inertia=0.02)
+    patches = [ModalLoad("b1", rng.standard_normal(bodies[0].n_modes), parse_expression(f"2-{k}*t")) for k in range(2)]
+    tables = {"trajectory": [tip_path("b2")], "load": LOADS, "initial": {"angles": {"b1": 1.2, "b2": -0.7}}}
+    return make_model(bodies, patches, joint=serial_joints(2), **(tables | keys))
+
+
+def free_flying(rng, **keys):
+    """Two bodies that nothing holds, one joint between them."""
+    return make_model(clouds(rng, 2), joint=[revolute("j1", "b1.tip", "b2.root")], **keys)
+
+
+ALL = {
+    **{f"chain of {count}": lambda rng, count=count, **keys: chain(rng, count, **keys) for count in range(1, 7)},
+    "backwards": backwards,
+    "mixed": mixed,
+    "mixed backwards": mixed_backwards,
+    "four-bar": four_bar,
+    "slider-crank": slider_crank,
+    "tree": tree,
+    "loaded": loaded,
+    "loaded, frame motors": lambda rng, **keys: loaded(rng, motors="frame", **keys),
+    "free-flying": free_flying,
+}
+
+
+def build(name, **keys):
+    return ALL[name](np.random.default_rng(sum(name.encode())), **keys)
