@@ -46,7 +46,7 @@ def check_output(path: Path, file_format: str, *, force: bool = False) -> None:
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
-    if path.exists() and not force and not _is_of_format(path, file_format):
+    if path.exists() and not (path.is_file() and (force or _is_of_format(path, file_format))):  # no device, ever
         raise InputError(
             f'{path}: output: expected a new name or an earlier file of format "{file_format}", found a file of another'
             " kind"
@@ -59,8 +59,6 @@ def check_output(path: Path, file_format: str, *, force: bool = False) -> None:
 
 
 def _is_of_format(path: Path, file_format: str) -> bool:
-    if not path.is_file():  # a device, say
-        return False
     with suppress(OSError), path.open("rb") as stream:
         signature = stream.read(len(HDF5_SIGNATURE))
         if signature != HDF5_SIGNATURE:
