@@ -47,7 +47,8 @@ def test_disk_full_while_writing_a_modal_body(two_link_copy, ffrobot, two_link):
     before = sorted(folder.iterdir())
     done = ffrobot("link", "link1.toml", cwd=folder, preexec_fn=_limit_files)
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].startswith("ffrobot: link1.h5: cannot write the modal body file:")
+    # MPI may complain of its own files, too
+    assert "ffrobot: link1.h5: cannot write the modal body file: File too large" in done.stderr.splitlines()
     assert "Traceback" not in done.stderr
     assert sorted(folder.iterdir()) == before
 
