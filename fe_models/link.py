@@ -14,11 +14,11 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from ..errors import FfrobotError, InputError, SolveError
-from ..files import check_writable
+from ..errors import FfrobotError, SolveError
+from ..files import check_output
 from .link_file import BeamLink, read_link
 from .modal_body import ModalBody
-from .modal_body_file import FORMAT_VERSION, is_modal_body_file, read_modal_body, write_modal_body
+from .modal_body_file import FORMAT, FORMAT_VERSION, read_modal_body, write_modal_body
 
 Progress = Callable[[str], None]
 
@@ -73,7 +73,7 @@ def make_link(
     digest = input_hash(link)
     if not force and (body := _up_to_date(path, digest)) is not None:
         return LinkOutcome(path, body, False, time.perf_counter() - start)
-    _check_target(path, force)
+    check_output(path, FORMAT, force=force)
     return _compute(link, link_path, path, digest, start, progress)
 
 
@@ -126,13 +126,6 @@ def _up_to_date(path: Path, digest: str) -> ModalBody | None:
     except FfrobotError:
         return None
     return body if body.input_hash == digest else None
-
-
-def _check_target(path: Path, force: bool) -> None:
-    """Refuse, before any work, an output that cannot be written or that would overwrite some other file."""
-    check_writable(path)
-    if path.exists() and not force and not is_modal_body_file(path):
-        raise InputError(f"{path}: output: a file that is not a modal body is there; use another name or --force")
 
 
 def _silent(_: str) -> None:

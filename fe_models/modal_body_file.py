@@ -69,18 +69,6 @@ def read_modal_body(path: Path) -> ModalBody:
         raise InputError(f"{path}: not a modal body file, or a damaged one: {error}") from None
 
 
-def is_modal_body_file(path: Path) -> bool:
-    """Whether `path` holds a modal body, or an HDF5 file too damaged to tell: what may be overwritten unasked."""
-    try:
-        with path.open("rb") as stream:
-            if stream.read(8) != b"\x89HDF\r\n\x1a\n":
-                return False
-        with h5py.File(path, "r") as file:
-            return bool(file.attrs.get("format") == FORMAT)
-    except OSError:
-        return True
-
-
 def _check_format(path: Path, attributes: h5py.AttributeManager) -> None:
     if attributes.get("format") != FORMAT:
         raise InputError(f'{path}: expected format "{FORMAT}", found {attributes.get("format", "no such attribute")!r}')

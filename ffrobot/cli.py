@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
 from pathlib import Path
+from types import FrameType
 
 import click
 
@@ -19,17 +21,15 @@ def cli() -> None:
     r"""What motors and piezoelectric patches must do so that a flexible robot follows its path.
 
     \b
-    Stage 1:  ffrobot link  LINK.toml     finite elements → modes → modal body file
-    Stage 2:  ffrobot solve SCENE.toml    modal bodies → dynamics → moments and voltages
+    Stage 1:  ffrobot link  LINK.toml   finite elements → modal body file
+    Stage 2:  ffrobot solve SCENE.toml  modal bodies → moments and voltages
     Then:     ffrobot info, ffrobot plot
     """
 
 
 @cli.command()
 @click.argument("link_file", metavar="LINK.toml", type=FILE)
-@click.option(
-    "-o", "--output", metavar="BODY.h5", type=FILE, help="Where to write; LINK.h5 beside the input if absent."
-)
+@click.option("-o", "--output", metavar="BODY.h5", type=FILE, help="Where to write [LINK.h5 beside the input].")
 @click.option("--force", is_flag=True, help="Compute even if the file is up to date.")
 def link(link_file: Path, output: Path | None, force: bool) -> None:
     """Compute the modal body file of one link (stage 1).
@@ -56,7 +56,7 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     "--output",
     metavar="RESULTS.h5",
     type=FILE,
-    help="Where to write; SCENE.results.h5 beside the input if absent.",
+    help="Where to write [SCENE.results.h5 beside the input].",
 )
 def solve(scene_file: Path, output: Path | None) -> None:
     """Run the analyses of a scene (stage 2).
@@ -64,22 +64,20 @@ def solve(scene_file: Path, output: Path | None) -> None:
     Links given as .toml are taken through stage 1 first where they are not up to date. Prints a summary: time per
     stage, steps, constraint violation, and the largest voltage against its limit.
     """
-    from rich.console import Console
-
-    from .files import check_writable
+    from .files import check_output
     from .progress import Display
-    from .results import write_results
+    from .results import FORMAT, write_results
     from .solve import solve as solve_scene
-    from .summary import print_summary
+    from .summary import print_summary, summary_console
 
     path = output or scene_file.with_suffix(".results.h5")
-    check_writable(path)
+    check_output(path, FORMAT)
     with Display() as display:
         solution = solve_scene(scene_file, display)
     began = time.perf_counter()
     write_results(solution, path)
     seconds = {**solution.seconds, "writing": time.perf_counter() - began}
-    print_summary(solution, path, seconds, Console())
+    print_summary(solution, path, seconds, summary_console())
     for outcome in solution.outcomes.values():
         outcome.check_completed()
 
@@ -106,15 +104,25 @@ def plot(results_file: Path, output: Path | None) -> None:
 
 
 def main() -> None:
-    """Run the command line: exit code 0, 1 where a solve failed, 2 for wrong input."""
+    """Run the command line: exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C."""
+    stopped = False
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal stopped
+        stopped = True
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, stop)
     try:
         cli(standalone_mode=False)
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
-    except click.exceptions.Abort:
-        click.echo("stopped", err=True)
-        sys.exit(130)
-    except FfrobotError as error:
+    except Exception as error:
+        if stopped:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
+            click.echo("ffrobot: stopped", err=True)
+            sys.exit(130)
+        if not isinstance(error, FfrobotError):
+            raise
         click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)

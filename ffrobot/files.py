@@ -36,17 +36,21 @@ def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool
             temporary.unlink(missing_ok=True)
 
 
-def check_writable(path: Path) -> None:
+def check_output(path: Path, file_format: str, *, force: bool = False) -> None:
     """Refuse, before any work is done, an output that could not be written or would cost a file of another kind.
 
-    Raises `InputError`.
+    An existing file is replaced only where it is empty, an HDF5 file whose attribute `format` is `file_format`, or one
+    too damaged to tell; or any file if `force`. Raises `InputError`.
     """
     if path.is_dir():
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
-    if path.exists() and not _is_hdf5(path):
-        raise InputError(f"{path}: output: expected a new name or an earlier HDF5 file, found a file of another kind")
+    if path.exists() and not (path.is_file() and (force or _is_of_format(path, file_format))):  # no device, ever
+        raise InputError(
+            f'{path}: output: expected a new name or an earlier file of format "{file_format}", found a file of another'
+            " kind"
+        )
     try:
         with tempfile.TemporaryFile(dir=path.resolve().parent):
             pass
@@ -54,10 +58,15 @@ def check_writable(path: Path) -> None:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
 
 
-def _is_hdf5(path: Path) -> bool:
-    """Whether `path` is an HDF5 file, or an empty one."""
-    if not path.is_file():  # a device, say
-        return False
+def _is_of_format(path: Path, file_format: str) -> bool:
     with suppress(OSError), path.open("rb") as stream:
-        return stream.read(len(HDF5_SIGNATURE)) in (b"", HDF5_SIGNATURE)
-    return False
+        signature = stream.read(len(HDF5_SIGNATURE))
+        if signature != HDF5_SIGNATURE:
+            return signature == b""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return bool(file.attrs.get("format") == file_format)
+    except OSError:
+        return True

@@ -25,7 +25,9 @@ def describe(path: Path) -> str:
             if kind == RESULTS_FORMAT:
                 return _results(file)
     except OSError as error:
-        reason = "no such file" if not path.exists() else f"not a readable HDF5 file ({error})"
+        reason = f"not a readable HDF5 file ({error})"
+        if not path.is_file():
+            reason = "a folder" if path.is_dir() else "no such file"
         raise InputError(f"{path}: expected a modal body file or a results file, found {reason}") from None
     if kind == MODAL_FORMAT:
         return _modal_body(read_modal_body(path))

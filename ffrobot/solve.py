@@ -78,6 +78,26 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
     watcher = watcher or Watcher()
+    solution = prepare(scene_path, watcher)
+    with Interruption() as interruption:
+        for analysis in solution.scene.analysis:
+            started = time.perf_counter()
+            outcome = _run(solution, analysis, watcher, interruption)
+            solution.outcomes[analysis.name] = outcome
+            if outcome.F_p is not None:
+                solution.voltages[analysis.name] = {
+                    body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
+                    for body, array in solution.patches.items()
+                }
+            solution.seconds[analysis.name] = time.perf_counter() - started
+            if outcome.status != "completed":
+                break
+    return solution
+
+
+def prepare(scene_path: Path, watcher: Watcher | None = None) -> Solution:
+    """Everything of a scene but its analyses: bodies, patches, model. Raises `InputError` as `solve` does."""
+    watcher = watcher or Watcher()
     began = time.perf_counter()
     scene = load_scene(scene_path)
     bodies = {body.name: loaded for body, loaded in zip(scene.body, _load_bodies(scene, watcher), strict=True)}
@@ -90,19 +110,6 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     model = build_model(scene, [body.planar for body in bodies.values()], _voltage_loads(scene, patches))
     solution = Solution(scene, model, bodies, patches, skipped=tuple(_skipped(scene, bodies)))
     solution.seconds["links and files"] = loaded - began
-    with Interruption() as interruption:
-        for analysis in scene.analysis:
-            started = time.perf_counter()
-            outcome = _run(solution, analysis, watcher, interruption)
-            solution.outcomes[analysis.name] = outcome
-            if outcome.F_p is not None:
-                solution.voltages[analysis.name] = {
-                    body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
-                    for body, array in patches.items()
-                }
-            solution.seconds[analysis.name] = time.perf_counter() - started
-            if outcome.status != "completed":
-                break
     return solution
 
 

@@ -1,7 +1,8 @@
-"""What a solve prints at its end, and what `ffrobot info` says of a file."""
+"""What a solve prints at its end."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,51 +12,76 @@ from rich.table import Table
 from .mbs.analyses import Outcome
 from .solve import Solution
 
+PLAIN_WIDTH = 120  # columns where the output is no terminal
+
+
+def summary_console() -> Console:
+    """The standard output; names in a scene are no markup, and what goes to a file is not squeezed into 80 columns."""
+    width = None if sys.stdout.isatty() else PLAIN_WIDTH
+    return Console(width=width, markup=False, highlight=False, emoji=False)
+
 
 def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], console: Console) -> None:
     """Tables of the analyses and voltages, wall time per stage, what was skipped, and where the results are."""
-    analyses = Table("analysis", "kind", "t (s)", "steps", "evaluations", "constraint violation", "status", "wall (s)")
+    console.print(_analyses(solution))
+    console.print("error aim: relative to the peak of each quantity; constraints: largest violation")
+    if any(solution.voltages.values()):
+        console.print()
+        console.print(_voltages(solution))
+    notes = Table.grid(padding=(0, 2))
+    notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
+    if solution.skipped:
+        notes.add_row("skipped", "; ".join(solution.skipped))
+    console.print()
+    console.print(notes)
+    console.print(f"results    {path}", soft_wrap=True)
+
+
+def _analyses(solution: Solution) -> Table:
+    table = _table("analysis", "kind", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
-        analyses.add_row(
+        analysis, reached = outcome.analysis, outcome.time[-1]
+        integrated = analysis.kind != "static"
+        table.add_row(
             name,
-            outcome.analysis.kind,
-            f"{outcome.time[-1]:g}",
-            f"{outcome.steps}",
-            f"{outcome.evaluations}",
+            analysis.kind,
+            f"{reached:g}" if outcome.status == "completed" else f"{reached:g} of {analysis.end:g}",
+            f"{outcome.steps}" if integrated else "",
+            f"{analysis.tolerance:.0e}" if integrated else "",
             _violation(outcome),
-            outcome.status,
             f"{outcome.wall_seconds:.3f}",
         )
-    console.print(analyses)
-    voltages = Table("analysis", "patches on", "required at most (V)", "limit (V)", "times the limit", "cond Φ_V")
+    return table
+
+
+def _voltages(solution: Solution) -> Table:
+    table = _table("voltages of", "on", "largest (V)", "limit (V)", "times limit", "cond Φ_V")
     for name, by_body in solution.voltages.items():
         for body, values in by_body.items():
             patches = solution.patches[body]
             limit = patches.limit
-            voltages.add_row(
+            table.add_row(
                 name,
                 body,
-                f"{values.largest:.4g}",
+                f"{values.largest:.0f}" if values.largest >= 1e3 else f"{values.largest:.3g}",
                 "none" if limit is None else f"{limit:g}",
                 "" if limit is None else f"{values.largest / limit:.3g}",
                 f"{patches.condition_number:.3g}",
             )
-    if voltages.row_count:
-        console.print(voltages)
-    tolerance = ", ".join(
-        f"{name} {outcome.analysis.tolerance:g}"
-        for name, outcome in solution.outcomes.items()
-        if outcome.analysis.kind != "static"
-    )
-    if tolerance:
-        console.print(f"error aimed at, relative to the peak of each reported quantity: {tolerance}", highlight=False)
-    console.print("wall time: " + ", ".join(f"{k} {v:.2f} s" for k, v in seconds.items()), highlight=False)
-    if solution.skipped:
-        console.print("skipped: " + "; ".join(solution.skipped), highlight=False)
-    console.print(f"results: {path}", highlight=False, soft_wrap=True)
+    return table
+
+
+def _table(*headers: str) -> Table:
+    """Columns of text without lines: the first ones left, numbers right; names fold where they must."""
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
+    for k, header in enumerate(headers):
+        if k < 2:
+            table.add_column(header, overflow="fold")
+        else:
+            table.add_column(header, justify="right", no_wrap=True)
+    return table
 
 
 def _violation(outcome: Outcome) -> str:
-    if outcome.residual.size == 0:
-        return "–"
-    return " / ".join(f"{value:.0e}" for value in outcome.residual.max(axis=0))
+    """The largest of position, velocity and acceleration level."""
+    return f"{outcome.residual.max():.0e}" if outcome.residual.size else ""

@@ -48,7 +48,9 @@ def load_toml(path: Path, kind: str) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"{path}: {kind} not found") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise InputError(f"{path}: cannot read the {kind}: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
         raise InputError(f"{path}: cannot read the {kind}: {error}") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not a valid TOML {kind}: {error}") from None

@@ -178,7 +178,7 @@ def _integrate(
     began = time.perf_counter()
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, steering, analysis.times.tolist(), start.q, start.v,
-        analysis.tolerance, analysis.max_steps or 0, resolver, progress, recording,
+        analysis.tolerance, analysis.max_steps, resolver, progress, recording,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     reached = len(run.q)

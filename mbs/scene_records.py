@@ -15,6 +15,7 @@ from .time_functions import Waypoints, load_waypoints, parse_expression
 
 GROUND = "ground"
 MAX_OUTPUTS = 10_000_000
+TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
 
 T = TypeVar("T")
 
@@ -288,12 +289,12 @@ class Analysis(Record):
     kind: Literal["pcid", "fcid", "forward", "static"]
     end: Positive = 0.0
     output_step: Positive = 0.0
-    tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 1e-6
+    tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
     actuation: str | None = None
     apply: Literal["joints", "joints+pzt", "trajectory"] | None = None
     shape: Literal["zero", "static", "given"] | None = None
     integrator: Literal["dop853"] = "dop853"
-    max_steps: Annotated[int, Field(gt=0)] | None = None
+    max_steps: Annotated[int, Field(gt=0)] = 5_000_000
 
     @model_validator(mode="after")
     def _consistent(self) -> Analysis:

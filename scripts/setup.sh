@@ -98,20 +98,25 @@ make_venv() {
   "$DEBIAN_PYTHON" -I -m venv --system-site-packages .venv && .venv/bin/python -m pip --version
 }
 
-# Everything that pyproject.toml asks for, held to Debian's own numpy, scipy and h5py: dolfinx is compiled against them.
+# Everything that pyproject.toml asks for, but numpy, scipy and h5py: those have to be Debian's, which dolfinx and its
+# HDF5 go with. pip is told of them as constraints only, since it does not recognise Debian's h5py.
 install_dependencies() {
   .venv/bin/python -I - <<'PYTHON' || return
+import re
 import tomllib
 from importlib.metadata import distributions
 from pathlib import Path
 
+from_debian = {"numpy", "scipy", "h5py"}
 project = tomllib.loads(Path("pyproject.toml").read_text())
 extras = project["project"]["optional-dependencies"]
 wanted = project["build-system"]["requires"] + project["project"]["dependencies"] + extras["plot"] + extras["test"]
+wanted = [line for line in wanted if re.match(r"[\w.-]+", line)[0] not in from_debian]
 Path(".venv/requirements.txt").write_text("\n".join(wanted) + "\n")
 
-debian = distributions(path=["/usr/lib/python3/dist-packages"])
-held = sorted({f"{d.name}=={d.version}" for d in debian if d.name in {"numpy", "scipy", "h5py"}})
+# Debian's h5py calls itself h5py._debian_h5py_serial.
+debian = {d.name.split(".")[0]: d.version for d in distributions(path=["/usr/lib/python3/dist-packages"])}
+held = [f"{name}=={debian[name]}" for name in sorted(from_debian)]
 Path(".venv/constraints.txt").write_text("\n".join(held) + "\n")
 PYTHON
   .venv/bin/python -m pip install -r .venv/requirements.txt -c .venv/constraints.txt
@@ -126,22 +131,20 @@ build_package() {
 check_environment() {
   env -u PYTHONNOUSERSITE .venv/bin/python - <<'PYTHON'
 import sys
-from pathlib import Path
+from importlib.util import find_spec
 
-import numpy
+for name in ("numpy", "scipy", "h5py"):
+    origin = find_spec(name).origin
+    if not origin.startswith("/usr/lib/python3/dist-packages/"):
+        sys.exit(f"{origin} hides Debian's {name}, which dolfinx goes with: uninstall it")
 
-held = Path(".venv/constraints.txt").read_text()
-if f"numpy=={numpy.__version__}\n" not in held:
-    sys.exit(f"numpy {numpy.__version__} in {numpy.__file__} hides Debian's numpy, against which dolfinx is compiled: uninstall it")
-
-import dolfinx  # noqa: F401
+import dolfinx, gmsh, h5py, meshio, numpy, scipy
 from petsc4py import PETSc
 
 if numpy.issubdtype(PETSc.ScalarType, numpy.complexfloating):
-    sys.exit("PETSc with complex numbers is selected: 'update-alternatives --config petsc' (and slepc) and choose the real one")
+    sys.exit("PETSc with complex numbers is selected: choose the real one in 'update-alternatives --config petsc'")
 
-import ffrobot  # noqa: F401
-import ffrobot.mbs._core  # noqa: F401
+import ffrobot.mbs._core
 PYTHON
 }
 
@@ -161,13 +164,13 @@ setup() {
   debian_step
 
   local venv_key dependencies_key
-  venv_key="$PWD $(readlink -f "$DEBIAN_PYTHON")"
+  venv_key="$PWD $(readlink -f "$DEBIAN_PYTHON") $(digest <scripts/setup.sh)"
   if [[ ! -f .venv/venv.stamp || $(<.venv/venv.stamp) != "$venv_key" ]] || ! .venv/bin/python -c '' 2>/dev/null; then
     rm -rf .venv
   fi
   once venv "$venv_key" "making the virtual environment .venv" make_venv
 
-  dependencies_key=$({ installed_packages && cat pyproject.toml scripts/setup.sh; } | digest)
+  dependencies_key=$({ installed_packages && cat pyproject.toml; } | digest)
   once dependencies "$dependencies_key" "installing Python packages" install_dependencies
   once build "$(build_key) $dependencies_key" "building ffrobot" build_package
   once check "$(<.venv/build.stamp)" "checking the environment" check_environment

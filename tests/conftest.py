@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 CASES = Path(__file__).parent.parent / "cases"
-COMMAND = Path(sys.executable).with_name("ffrobot")
 
 
 @dataclass(frozen=True)
@@ -20,6 +19,7 @@ class Command:
     """Runs `ffrobot` as a process; links are cached in a folder of the test session, empty at its start."""
 
     cache: Path
+    path: Path
 
     @property
     def environment(self):
@@ -27,7 +27,7 @@ class Command:
 
     def __call__(self, *arguments, timeout=120, **options):
         return subprocess.run(
-            [COMMAND, *map(str, arguments)],
+            [self.path, *map(str, arguments)],
             env=self.environment,
             timeout=timeout,
             capture_output=True,
@@ -55,7 +55,7 @@ class SolvedCase:
 
 @pytest.fixture(scope="session")
 def ffrobot(tmp_path_factory):
-    return Command(tmp_path_factory.mktemp("cache"))
+    return Command(tmp_path_factory.mktemp("cache"), Path(sys.executable).with_name("ffrobot"))
 
 
 @pytest.fixture(scope="session")

@@ -87,7 +87,8 @@ IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times,
       // Errors of single steps add up like a random walk, so a step's share of the tolerance is sqrt(step / duration);
       // `accumulation` is how far the sum exceeds that (tests/benchmarks, error against tolerance).
       constexpr double accumulation = 8;
-      const double share = controls.tolerance / accumulation * std::sqrt(step / duration);
+      constexpr double rounding = 2e-14; // what the estimate sees of it: shorter steps would not help
+      const double share = std::max(controls.tolerance / accumulation * std::sqrt(step / duration), rounding);
       size = system.error_size(t_end, method.end(), error.data()) * damping / share;
     }
     if (!(size <= 1)) {

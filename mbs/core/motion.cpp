@@ -37,7 +37,7 @@ void ConstrainedMotion::slope(double t, const double *y, double *dy) {
 }
 
 bool ConstrainedMotion::correct(double t, double *y) {
-  return project(system_, t, y, y + system_.coordinates, workspace_) < 1e-12;
+  return project(system_, t, y, y + system_.coordinates, workspace_) < 1e-11;
 }
 
 double ConstrainedMotion::error_size(double t, const double *y, const double *e) {

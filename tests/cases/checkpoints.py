@@ -9,7 +9,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-
 CASES = Path(__file__).parents[2] / "cases"
 
 

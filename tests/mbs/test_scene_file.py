@@ -217,7 +217,7 @@ MISTAKES = [
     ("end = 1.0", "end = 1e9", 'analysis "inverse": expected at most 10000000 outputs, found', ""),
     ("end = 1.0", "", 'analysis "inverse": expected the key "end" in kind = "pcid", found none', ""),
     ("end = 1.0", "end = -1.0", 'analysis "inverse": end: expected a number greater than 0, found -1.0', ""),
-    ("end = 1.0", "end = 1.0\ntolerance = 0", 'analysis "inverse": tolerance: expected a number greater than 0', "found 0"),
+    ("end = 1.0", "end = 1.0\ntolerance = 0", 'analysis "inverse": tolerance: expected a number of at least 1e-10', "found 0"),
     ("end = 1.0", 'end = 1.0\nintegrator = "dop"', 'analysis "inverse": integrator: expected "dop853", found "dop"', ""),
     ("end = 1.0", 'end = 1.0\nshape = "zero"', 'analysis "inverse": expected the key "shape" only in kind = "fcid"', "found"),
     ('kind = "pcid"', 'kind = "fcid"', 'analysis "inverse": kind: expected "pcid", "forward" or', "not available yet"),

@@ -1,0 +1,72 @@
+"""How fast it is, on one core. Not a test of correctness: nothing is asserted about seconds.
+
+Run and compare on a quiet machine:
+
+    .venv/bin/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only
+    … --benchmark-autosave, later --benchmark-compare
+
+In the ordinary test run (--benchmark-disable, see pyproject.toml) each runs once, so that they stay alive.
+
+* right-hand side: accelerations and multipliers of the two-link model, 26 coordinates and 6 constraints; the time shown
+  is that of 1000 evaluations (milliseconds there are microseconds each). Aim: 1 µs each.
+* pcid: one second of the two-link model at tolerance 1e-6. Aim: under 0.5 s.
+* process: `ffrobot solve` with the inverse analysis only and modal files up to date, from start to exit; extra_info has
+  what is left after taking off the solver's own wall_seconds. Aim: 0.5 s left.
+* link: stage 1 of a link in a process of its own, forms compiled before.
+"""
+
+from pathlib import Path
+
+import h5py
+import pytest
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.analyses import initial_state, run_pcid
+from ffrobot.mbs.model import Assembly
+from ffrobot.solve import prepare
+
+INVERSE = '\n[[analysis]]\nname = "inverse"\nkind = "pcid"\nend = 1.0\noutput_step = 0.001\ntolerance = 1e-6\n'
+EVALUATIONS = 1000
+
+
+@pytest.fixture
+def scene(case_copy, ffrobot, monkeypatch):
+    """The two-link case with the inverse analysis only; modal files and compiled forms come from the cache."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
+    path = case_copy("two_link")
+    head = path.read_text(encoding="utf-8").split("[[analysis]]")[0]
+    path.write_text(head + INVERSE, encoding="utf-8")
+    return path
+
+
+def test_right_hand_side(benchmark, scene):
+    model = prepare(scene).model
+    assembly = Assembly(model, [*model.joints, *model.trajectories])
+    start = initial_state(assembly)
+    assert (assembly.system.coordinates, len(assembly.constraints)) == (26, 6)
+    benchmark(_core.time_evaluations, assembly.system, 0.0, start.q, start.v, EVALUATIONS)
+
+
+def test_pcid_of_one_second(benchmark, scene):
+    model = prepare(scene).model
+    outcome = benchmark(run_pcid, model, model.scene.analysis[0], False, lambda t: True)
+    benchmark.extra_info |= {"steps": outcome.steps, "evaluations": outcome.evaluations}
+    assert outcome.status == "completed"
+
+
+def test_whole_process(benchmark, scene, ffrobot):
+    def run():
+        assert ffrobot("solve", scene).returncode == 0
+
+    run()  # stage 1, if nothing has cached it
+    benchmark.pedantic(run, rounds=5)
+    with h5py.File(scene.with_suffix(".results.h5")) as file:
+        seconds = float(file["inverse"].attrs["wall_seconds"])
+    if benchmark.stats:
+        benchmark.extra_info |= {"solver": seconds, "overhead": benchmark.stats.stats.min - seconds}
+
+
+def test_stage_1_of_a_link(benchmark, scene, ffrobot):
+    link = scene.with_name("link1.toml")
+    benchmark.pedantic(lambda: ffrobot("link", link, "--force"), rounds=3, warmup_rounds=1)
+    assert Path(link.with_suffix(".h5")).stat().st_size > 0

@@ -1,0 +1,149 @@
+"""Wrong input: one message that names file, key, expected and found; exit code 2; nothing written, nothing lost."""
+
+import h5py
+import pytest
+
+TIP_X, TIP_Y = 'x = "1.5*cos(pi*t/4)"', 'y = "sqrt(3)/2*cos(pi*t/4)"'
+BETWEEN_A = 'between = ["link1.tip", "link2.root"]'
+FIRST_PZT = 'body = "link1"\ncount = 10'
+
+# what is wrong: (file, {old: new}, what the message names)
+MISTAKES = {
+    "unknown key": ("scene.toml", {"motors =": "moters ="}, ["scene.toml: moters", 'did you mean "motors"?']),
+    "unknown key in a table": (
+        "scene.toml",
+        {"[initial]\n": "[initial]\nangels = 1\n"},
+        ["initial.angels", 'did you mean "angles"?'],
+    ),
+    "unknown key in a link": ("link2.toml", {"density": "densty"}, ["link2.toml: material.densty", '"density"']),
+    "wrong type": (
+        "scene.toml",
+        {"end = 1.0": 'end = "1.0"'},
+        ['analysis "inverse": end: expected a number, found "1.0"'],
+    ),
+    "missing link file": (
+        "scene.toml",
+        {'link = "link1.toml"': 'link = "link11.toml"'},
+        ['body "link1": link', '"link11.toml"', 'did you mean "link1.toml"?'],
+    ),
+    "negative density": (
+        "link1.toml",
+        {"density = 7850.0": "density = -7850.0"},
+        ["link1.toml: material.density: expected a number greater than 0, found -7850.0"],
+    ),
+    "zero-length link": ("link1.toml", {"length = 1.0": "length = 0.0"}, ["link1.toml: geometry.length", "found 0.0"]),
+    "singular start": (
+        "scene.toml",
+        {TIP_X: 'x = "2 - t"', TIP_Y: 'y = "0"', "link2 = 1.0471975511965976": "link2 = 0.0"},
+        ["initial", 'trajectory "tip"', "singular", "stretched"],
+    ),
+    "target out of reach": (
+        "scene.toml",
+        {TIP_X: 'x = "1.5 + t"'},
+        ['trajectory "tip"', "within reach", "at t = 0.3"],  # 1.5 + t, 0.866 is 2 m away at 0.3027 s
+    ),
+    "target out of reach at once": ("scene.toml", {TIP_X: 'x = "2.5"'}, ['trajectory "tip"', "t = 0 s"]),
+    "unknown interface": (
+        "scene.toml",
+        {BETWEEN_A: 'between = ["link1.tpi", "link2.root"]'},
+        ['joint "A": between', '"link1.tpi"', 'did you mean "tip"?'],
+    ),
+    "unknown body": ("scene.toml", {BETWEEN_A: 'between = ["link3.tip", "link2.root"]'}, ['joint "A"', '"link3.tip"']),
+    "patch beyond the end": (
+        "scene.toml",
+        {FIRST_PZT: 'body = "link1"\ncenters = [0.1, 0.99]'},
+        ['pzt "link1"', "patch 2 from 0.965 to 1.015 m"],
+    ),
+    "too many modes": ("link1.toml", {"count = 10": "count = 500"}, ["link1.toml: modes.count", "found 500"]),
+    "TOML syntax": (
+        "scene.toml",
+        {'name = "two_link"': "name = "},
+        ["scene.toml: not a valid TOML scene file", "line"],
+    ),
+    "TOML syntax in a link": ("link1.toml", {"[mesh]": "[mesh"}, ["link1.toml: not a valid TOML link file", "line"]),
+    "domain error": (
+        "scene.toml",
+        {TIP_X: 'x = "1.5 + 0.1*sqrt(0.5 - t)"'},
+        ['trajectory "tip": x', "t = 0.5 s", "domain"],
+    ),
+    "no expression": ("scene.toml", {TIP_X: 'x = "open(t)"'}, ['trajectory "tip": x', "unknown function 'open'"]),
+    "motors that do not fit": (
+        "scene.toml",
+        {BETWEEN_A: f"{BETWEEN_A}\nmotor = false", "at = [0.0, 0.0]": "at = [0.0, 0.0]\nmotor = true"},
+        ["joint", "as many motors as", "(2)", 'found 1 ("O")'],
+    ),
+    "repeated constraints": (
+        "scene.toml",
+        {"[initial]\n": '[[trajectory]]\nname = "again"\npoint = "link2.tip"\nx = "1.5"\n\n[initial]\n'},
+        ['trajectory "again", x', 'trajectory "tip", x', "repeat or contradict"],
+    ),
+    "output step that does not divide": (
+        "scene.toml",
+        {"output_step = 0.001": "output_step = 0.0007"},
+        ['analysis "inverse"', "output_step", "0.0007"],
+    ),
+    "tolerance below rounding": (
+        "scene.toml",
+        {"tolerance = 1e-7": "tolerance = 1e-18"},
+        ['analysis "inverse": tolerance', "1e-18"],
+    ),
+    "actuation that comes later": (
+        "scene.toml",
+        {'actuation = "inverse"': 'actuation = "joints_only"'},
+        ['analysis "forward": actuation', '"joints_only"'],
+    ),
+}
+
+
+@pytest.mark.parametrize(("file", "edits", "named"), MISTAKES.values(), ids=MISTAKES)
+def test_mistake_in_a_file(two_link_copy, refused, file, edits, named):
+    folder = two_link_copy({file: edits})
+    with h5py.File(folder / "scene.results.h5", "w") as earlier:  # must survive
+        earlier.attrs["format"] = "ffrobot-results"
+        earlier["kept"] = 1.0
+    message = refused(folder, "solve", "scene.toml")
+    for text in named:
+        assert text in message
+
+
+@pytest.mark.parametrize("link", ["link1.toml", "link2.toml"])
+def test_mistake_in_a_link_of_its_own(two_link_copy, refused, link):
+    folder = two_link_copy({link: {"youngs_modulus = 2.068427e11": 'youngs_modulus = "steel"'}})
+    assert f'{link}: material.youngs_modulus: expected a number, found "steel"' in refused(folder, "link", link)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("solve", "nowhere.toml"), "nowhere.toml: scene file not found"),
+        (("solve", "folder"), "folder: cannot read the scene file: Is a directory"),
+        (("solve", "latin1.toml"), "latin1.toml: cannot read the scene file: 'utf-8' codec"),
+        (("link", "nowhere.toml"), "nowhere.toml: link file not found"),
+        (("info", "nowhere.h5"), "nowhere.h5: expected a modal body file or a results file, found no such file"),
+        (("info", "folder"), "folder: expected a modal body file or a results file, found a folder"),
+        (("info", "scene.toml"), "scene.toml: expected a modal body file or a results file, found not"),
+        (("info", "other.h5"), "other.h5: expected a modal body file or a results file, found format None"),
+        (("plot", "nowhere.h5"), "nowhere.h5: expected a results file, found no such file"),
+        (("plot", "scene.toml"), "scene.toml: expected a results file, found not"),
+        (("plot", "other.h5"), "other.h5: expected a results file"),
+    ],
+)
+def test_files_that_are_not_what_they_should_be(two_link_copy, refused, arguments, named):
+    folder = two_link_copy()
+    (folder / "folder").mkdir()
+    (folder / "latin1.toml").write_bytes('name = "Gelenk für zwei"'.encode("latin-1"))
+    with h5py.File(folder / "other.h5", "w") as file:
+        file["temperature"] = [1.0, 2.0]
+    message = refused(folder, *arguments)
+    assert named in message
+    assert len(message.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "arguments", [("solve",), ("sovle", "scene.toml"), ("solve", "scene.toml", "--no-such-option")]
+)
+def test_wrong_command_line(ffrobot, tmp_path, arguments):
+    done = ffrobot(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "Usage: ffrobot" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,154 @@
+"""Runs that fail on the way: exit code 1, a message, what was computed kept, no half-written file."""
+
+import os
+import pty
+import resource
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+SHORT = {"end = 1.0": "end = 0.02"}
+ENDLESS = {
+    "end = 1.0": "end = 1000.0",
+    "output_step = 0.001": "output_step = 0.1",
+    'x = "1.5*cos(pi*t/4)"': 'x = "1.5 - 0.1*sin(t)"',
+    'y = "sqrt(3)/2*cos(pi*t/4)"': 'y = "sqrt(3)/2"',
+}
+
+
+def _limit_files():
+    """As on a full disk: nothing larger than 20 kB can be written (the results take about 100 kB)."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+
+@pytest.mark.parametrize("earlier", [True, False])
+def test_disk_full_while_writing_results(two_link_copy, ffrobot, earlier):
+    folder = two_link_copy({"scene.toml": SHORT})
+    results = folder / "scene.results.h5"
+    assert ffrobot("solve", "scene.toml", cwd=folder).returncode == 0
+    content = results.read_bytes()
+    assert len(content) > 20_000
+    if not earlier:
+        results.unlink()
+    before = sorted(folder.iterdir())
+    done = ffrobot("solve", "scene.toml", cwd=folder, preexec_fn=_limit_files)
+    assert done.returncode == 1
+    assert done.stderr.splitlines() == ["ffrobot: scene.results.h5: cannot write the results file: File too large"]
+    assert sorted(folder.iterdir()) == before
+    assert not earlier or results.read_bytes() == content
+
+
+def test_disk_full_while_writing_a_modal_body(two_link_copy, ffrobot, two_link):
+    folder = two_link_copy()  # the forms were compiled for `two_link`
+    before = sorted(folder.iterdir())
+    done = ffrobot("link", "link1.toml", cwd=folder, preexec_fn=_limit_files)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("ffrobot: link1.h5: cannot write the modal body file:")
+    assert "Traceback" not in done.stderr
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("output", "named"),
+    [
+        ("nowhere/r.h5", "found no folder nowhere"),
+        (".", "found a folder"),
+        ("/proc/r.h5", "expected a writable folder"),  # not even for root
+        ("/dev/null", "found a file of another kind"),  # a rename would replace the device
+        ("link1.toml", "found a file of another kind"),
+    ],
+)
+def test_output_that_cannot_be_written(two_link_copy, refused, output, named):
+    assert named in refused(two_link_copy(), "solve", "scene.toml", "-o", output)
+
+
+def test_too_many_steps(two_link_copy, ffrobot):
+    folder = two_link_copy({"scene.toml": SHORT | {"tolerance = 1e-7": "tolerance = 1e-7\nmax_steps = 500"}})
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    assert done.returncode == 1
+    assert 'analysis "inverse" ended at t = 0.00' in done.stderr
+    assert "raise max_steps" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    with h5py.File(folder / "scene.results.h5") as file:
+        assert set(file) == {"inverse"}
+        assert file["inverse"].attrs["status"] == "too many steps"
+        assert 1 < len(file["inverse/time"]) < 21
+
+
+def test_ctrl_c_keeps_what_was_computed(two_link_copy, ffrobot):
+    """On a terminal, where the progress says when the analysis runs."""
+    folder = two_link_copy({"scene.toml": ENDLESS})
+    terminal, end = pty.openpty()
+    process = subprocess.Popen(
+        [ffrobot.path, "solve", "scene.toml"], cwd=folder, env=ffrobot.environment | {"TERM": "xterm"}, stderr=end,
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    os.close(end)
+    shown = _read_until(terminal, b"inverse")
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    began = time.monotonic()
+    shown += _read_until(terminal, b"on request")
+    summary, _ = process.communicate(timeout=30)
+    assert time.monotonic() - began < 5.0
+    assert process.returncode == 1
+    assert b"Traceback" not in shown
+    assert b"(interrupted): stopped on request" in shown
+    assert " of 1000 " in summary
+    with h5py.File(folder / "scene.results.h5") as file:
+        group = file["inverse"]
+        assert group.attrs["status"] == "interrupted"
+        assert np.all(np.isfinite(group["joints/O/moment"]))
+        assert len(group["joints/O/moment"]) == len(group["time"]) >= 1
+
+
+def _read_until(terminal, text):
+    """What the terminal shows, up to and with `text`; a process that ends closes it."""
+    shown = b""
+    while text not in shown:
+        try:
+            shown += os.read(terminal, 4096)
+        except OSError:
+            break
+    assert text in shown, shown
+    return shown
+
+
+def test_ctrl_c_before_any_analysis_writes_nothing(two_link_copy, ffrobot, tmp_path):
+    """Stage 1 takes seconds; nothing is worth keeping then."""
+    folder = two_link_copy()
+    before = sorted(folder.iterdir())
+    process = subprocess.Popen(
+        [ffrobot.path, "solve", "scene.toml"], cwd=folder, env=ffrobot.environment | {"XDG_CACHE_HOME": str(tmp_path)},
+        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while "libdolfinx" not in _mapped(process.pid):  # stage 1 has begun
+        assert process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    summary, message = process.communicate(timeout=60)
+    assert process.returncode == 130, message
+    assert "Traceback" not in message
+    assert summary == ""
+    assert sorted(folder.iterdir()) == before
+
+
+def _mapped(pid):
+    with open(f"/proc/{pid}/maps") as maps:
+        return maps.read()
+
+
+def test_reader_that_goes_away_is_no_error(ffrobot, two_link):
+    """`ffrobot info … | head -1`."""
+    read, write = os.pipe()
+    os.close(read)
+    process = subprocess.run(
+        [ffrobot.path, "info", "scene.results.h5"], cwd=two_link.folder, env=ffrobot.environment, stdout=write,
+        stderr=subprocess.PIPE, text=True, timeout=60,
+    )  # fmt: skip
+    os.close(write)
+    assert process.stderr == ""

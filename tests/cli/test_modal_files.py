@@ -1,0 +1,109 @@
+"""Modal body files on the way to a solve: given by name, made when needed, damaged."""
+
+import h5py
+import numpy as np
+import pytest
+
+SHORT = {"end = 1.0": "end = 0.01"}
+GIVEN = {'link = "link1.toml"': 'modal = "link1.h5"'}
+
+
+@pytest.fixture
+def given(two_link_copy, ffrobot):
+    """A folder whose scene takes link1 from a modal body file, which is there."""
+    folder = two_link_copy({"scene.toml": SHORT | GIVEN})
+    assert ffrobot("link", "link1.toml", cwd=folder).returncode == 0
+    return folder
+
+
+def test_link_is_computed_once(two_link_copy, ffrobot):
+    folder = two_link_copy()
+    first = ffrobot("link", "link1.toml", cwd=folder)
+    content = (folder / "link1.h5").read_bytes()
+    assert first.stdout.startswith("link1.h5: computed in ")
+    link = folder / "link1.toml"
+    link.write_text("# a comment changes nothing\n" + link.read_text(encoding="utf-8"), encoding="utf-8")
+    again = ffrobot("link", "link1.toml", cwd=folder)
+    assert again.stdout.startswith("link1.h5: up to date")
+    assert "10 modes" in again.stdout
+    assert "computed" in ffrobot("link", "link1.toml", "--force", cwd=folder).stdout
+    assert (folder / "link1.h5").read_bytes() == content
+    elsewhere = ffrobot("link", "link1.toml", "-o", "body.h5", cwd=folder)
+    assert elsewhere.returncode == 0
+    assert (folder / "body.h5").read_bytes() == content
+
+
+def test_solve_uses_the_cache(two_link_copy, ffrobot, two_link):
+    """The links were computed for the session's `two_link`; nothing is written beside the scene but the results."""
+    folder = two_link_copy({"scene.toml": SHORT})
+    before = {path.name for path in folder.iterdir()}
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "link1: stage 1, up to date" in done.stdout
+    assert "link2: stage 1, up to date" in done.stdout
+    assert {path.name for path in folder.iterdir()} - before == {"scene.results.h5"}
+
+
+def test_damaged_cache_entry_is_made_again(two_link_copy, ffrobot):
+    folder = two_link_copy({"scene.toml": SHORT})
+    assert ffrobot("solve", "scene.toml", cwd=folder).returncode == 0
+    entries = list((ffrobot.cache / "ffrobot" / "links").glob("*.h5"))
+    assert entries
+    sizes = {entry: entry.stat().st_size for entry in entries}
+    for entry in entries:
+        entry.write_bytes(entry.read_bytes()[:1000])
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert sum(entry.stat().st_size == sizes[entry] for entry in entries) >= 2
+
+
+def test_scene_with_a_modal_file_gives_the_same(given, two_link_copy, ffrobot, two_link):
+    done = ffrobot("solve", "scene.toml", "-o", "mine.h5", cwd=given)
+    assert done.returncode == 0, done.stderr
+    assert not (given / "scene.results.h5").exists()
+    with h5py.File(given / "mine.h5") as file:
+        name = "inverse/points/link2.tip/deflection"
+        expected = two_link.file[name][:11]
+        np.testing.assert_allclose(file[name], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def _truncate(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def _garbage(path):
+    path.write_bytes(bytes(range(256)) * 40)
+
+
+def _nan(path):
+    with h5py.File(path, "r+") as file:
+        file["invariants/S_bar"][0, 0] = np.nan
+
+
+def _newer(path):
+    with h5py.File(path, "r+") as file:
+        file.attrs["format_version"] = 99
+
+
+def _asymmetric(path):
+    with h5py.File(path, "r+") as file:
+        file["modes/stiffness"][0, 1] = 1e6
+
+
+@pytest.mark.parametrize(
+    ("damage", "named"),
+    [
+        (_truncate, "damaged"),
+        (_garbage, "not a modal body file"),
+        (_nan, "S_bar"),
+        (_newer, "newer"),
+        (_asymmetric, "stiffness"),
+        (lambda path: path.unlink(), 'expected an existing file, found "link1.h5"'),
+    ],
+    ids=["truncated", "garbage", "nan", "newer", "asymmetric", "missing"],
+)
+def test_bad_modal_file(given, refused, damage, named):
+    damage(given / "link1.h5")
+    message = refused(given, "solve", "scene.toml")
+    assert "link1.h5" in message
+    assert named in message

@@ -1,0 +1,106 @@
+"""Help texts, summaries, what `info` tells, and what is loaded to say it."""
+
+import subprocess
+import sys
+
+import pytest
+
+FORBIDDEN = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "matplotlib")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--help"], ["link", "solve", "info", "plot", "Stage 1", "Stage 2"]),
+        (["link", "--help"], ["LINK.toml", "-o, --output BODY.h5", "--force", "up to date"]),
+        (["solve", "--help"], ["SCENE.toml", "-o, --output RESULTS.h5", "SCENE.results.h5", "stage 1"]),
+        (["info", "-h"], ["FILE.h5", "modal body", "results"]),
+        (["plot", "-h"], ["RESULTS.h5", "-o, --output DIR", "PNG and PDF"]),
+    ],
+)
+def test_help(ffrobot, arguments, told):
+    done = ffrobot(*arguments)
+    assert done.returncode == 0
+    for text in told:
+        assert text in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+def test_summary(two_link):
+    """Every number a reader asks for first, in whole words."""
+    out = two_link.stdout
+    lines = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
+    for name, kind in (("forward", "forward"), ("joints_only", "forward")):
+        assert lines[name][1:3] == [kind, "1"]
+    assert "…" not in out
+    assert "\x1b" not in out
+    for text in ("steps", "error aim", "constraints", "wall (s)", "largest (V)", "times limit", "cond Φ_V"):
+        assert text in out
+    for text in ("wall time", "writing", "skipped", "damping, which is zero"):
+        assert text in out
+    required = abs(two_link.file["inverse/pzt/link1/required_voltage"][()]).max()
+    assert f"{required:.0f}" in out
+    assert f"{required / 200:.3g}" in out
+    assert out.rstrip().endswith("scene.results.h5")
+    assert two_link.stderr == ""
+
+
+def test_info_of_results(two_link, ffrobot):
+    done = ffrobot("info", "scene.results.h5", cwd=two_link.folder)
+    assert done.returncode == 0
+    for text in ("results of scene 'two_link'", "body link1", "sha256", "joints_only", "completed",
+                 "/inverse/pzt/link1/required_voltage", "(1001, 10)"):  # fmt: skip
+        assert text in done.stdout
+
+
+def test_info_of_a_modal_body(two_link, ffrobot):
+    body = next((ffrobot.cache / "ffrobot" / "links").glob("*.h5"))
+    done = ffrobot("info", body)
+    assert done.returncode == 0
+    for text in ("modal body", "reference condition", "mass", "in-plane-bending", "root", "tip"):
+        assert text in done.stdout
+
+
+@pytest.fixture
+def short_scene(two_link_copy, two_link):
+    """The folder of a short two-link scene; its modal bodies are in the cache since `two_link`."""
+    return two_link_copy({"scene.toml": {"end = 1.0": "end = 0.01"}})
+
+
+def _loaded(program, cwd, environment):
+    """Which of the forbidden packages a Python program loads."""
+    program += f"\nimport sys; print(*sorted(set(sys.modules) & {set(FORBIDDEN)!r}), file=sys.stderr)"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=cwd, env=environment, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stderr.split()
+
+
+def test_stage_2_loads_no_finite_elements(short_scene, ffrobot, tmp_path):
+    assert _loaded("import ffrobot.mbs, ffrobot.mbs.analyses", tmp_path, ffrobot.environment) == []
+    solve = f"""
+import sys
+sys.argv = ["ffrobot", "solve", "scene.toml", "-o", {str(tmp_path / "r.h5")!r}]
+from ffrobot.cli import main
+main()
+"""
+    assert _loaded(solve, short_scene, ffrobot.environment) == []
+
+
+def test_stage_2_works_where_stage_1_is_not_installed(short_scene, ffrobot, tmp_path):
+    """The finite element libraries cannot be imported: the command line, and a solve from modal files, do not mind."""
+    program = f"""
+import sys
+for name in {FORBIDDEN!r}:
+    sys.modules[name] = None  # import raises ModuleNotFoundError
+sys.argv = ["ffrobot", "solve", "scene.toml", "-o", {str(tmp_path / "r.h5")!r}]
+from ffrobot.cli import main
+main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=short_scene, env=ffrobot.environment, capture_output=True, text=True,
+        timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "r.h5").exists()
