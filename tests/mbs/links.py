@@ -1,4 +1,4 @@
-"""Flexible links from polynomials (Ritz), without stage 1: bending in the plane, with frequencies as low as one likes."""
+"""Flexible links from polynomials (Ritz), without stage 1: bending in the plane, as soft as one likes."""
 
 from types import MappingProxyType
 

@@ -8,6 +8,7 @@ from mechanisms import always, assemble, pcid, relative
 from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import run_pcid
 from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.scene_records import TIGHTEST_TOLERANCE
 
 REPORTED = ("q", "v", "lambda_", "tau", "F_p")
 
@@ -41,12 +42,12 @@ def test_order_of_steps_and_of_dense_output_is_eight():
 
 @pytest.fixture(scope="module")
 def tight():
-    return inverse(arm(), tolerance=1e-12)
+    return inverse(arm(), tolerance=TIGHTEST_TOLERANCE)
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
 def test_errors_of_all_reported_quantities_are_within_the_tolerance(tight, tolerance):
-    """Relative to each quantity's peak; measured: λ 0.03 … 0.08 of the tolerance, q below 1e-4 of it."""
+    """Relative to each quantity's peak; measured: λ 0.05 … 0.08 of the tolerance, q below 1e-4 of it."""
     outcome = inverse(arm(), tolerance=tolerance)
     ratios = {name: relative(getattr(outcome, name), getattr(tight, name)) / tolerance for name in REPORTED}
     assert max(ratios.values()) <= 1.0, ratios
@@ -55,7 +56,7 @@ def test_errors_of_all_reported_quantities_are_within_the_tolerance(tight, toler
 
 def test_steps_grow_as_the_eighth_root_of_the_accuracy(tight):
     """The controller keeps the error proportional to the tolerance: steps ∝ error^(−1/8)."""
-    outcomes = [inverse(arm(), tolerance=tolerance) for tolerance in (1e-4, 1e-6, 1e-8, 1e-10)]
+    outcomes = [inverse(arm(), tolerance=tolerance) for tolerance in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)]
     errors = [relative(outcome.lambda_, tight.lambda_) for outcome in outcomes]
     slope = np.polyfit(np.log([outcome.steps for outcome in outcomes]), np.log(errors), 1)[0]
     assert slope == pytest.approx(-8.0, abs=0.5)
@@ -83,7 +84,7 @@ def test_output_times_do_not_steer_the_steps():
 def test_constraints_hold_at_every_output():
     """Position, velocity and acceleration level, relative to their terms, however coarse the steps."""
     for tolerance in (1e-3, 1e-6):
-        assert inverse(arm(), output_step=0.001, tolerance=tolerance).residual.max() < 1e-12
+        assert inverse(arm(), output_step=0.001, tolerance=tolerance).residual.max() < 1e-11
 
 
 def test_a_run_ends_at_max_steps_and_says_so():
@@ -95,13 +96,13 @@ def test_a_run_ends_at_max_steps_and_says_so():
 
 def test_a_run_stops_when_asked_to():
     asked = []
-    outcome = run_pcid(arm(), pcid(tolerance=1e-9), False, lambda t: asked.append(t) or t < 0.2)
+    outcome = run_pcid(arm(), pcid(tolerance=1e-10), False, lambda t: asked.append(t) or t < 0.2)
     assert outcome.status == "interrupted"
     assert 0.2 <= asked[-1] < 1
     assert outcome.time[-1] <= asked[-1]
 
 
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, TIGHTEST_TOLERANCE])
 def test_a_start_at_rest_costs_no_more_steps_than_the_motion(tolerance):
     """Vibration starts from nothing there: its rounding once drove the step below any size."""
     initial = {"angles": ANGLES, "state": "static"}
