@@ -124,7 +124,8 @@ def _unreachable(assembly: Assembly, t: float, q: Array) -> str:
             f" t = {t:g} s that the undeformed links cannot reach (or only stretched)"
         )
     return (
-        f"{assembly.model.scene.path}: expected joints that can be closed, found that {_names(assembly.constraints)}"
+        f"{assembly.model.scene.path}: expected joints that can be closed, found that"
+        f" {_names([c for c in assembly.constraints if not c.is_trajectory])}"
         f" cannot be met at t = {t:g} s from the initial angles"
     )
 

@@ -6,11 +6,42 @@
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
+
 #include "bindings/bindings.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace ffrobot;
+
+namespace {
+
+// States (2 steps + 1, 2 coordinates) of equal steps: where they end and, by dense output, in their middle.
+RowMajorMatrix fixed_steps(const System &system, double end, int steps, const Eigen::VectorXd &q,
+                           const Eigen::VectorXd &v) {
+  ConstrainedMotion motion(system, {}, {}, nullptr);
+  Dop853 method(motion.size());
+  Eigen::VectorXd y(motion.size()), middle(motion.size());
+  y << q, v;
+  RowMajorMatrix states(2 * steps + 1, y.size());
+  states.row(0) = y;
+  const double h = end / steps;
+  motion.slope(0, y.data(), method.first_slope());
+  for (int i = 0; i < steps; ++i) {
+    method.step(motion, i * h, y.data(), h);
+    motion.correct((i + 1) * h, method.end());
+    motion.slope((i + 1) * h, method.end(), method.last_slope());
+    method.prepare_dense(motion, i * h, y.data(), h);
+    method.interpolate((i + 0.5) * h, middle.data());
+    y = Eigen::Map<const Eigen::VectorXd>(method.end(), y.size());
+    std::copy_n(method.last_slope(), y.size(), method.first_slope());
+    states.row(2 * i + 1) = middle;
+    states.row(2 * i + 2) = y;
+  }
+  return states;
+}
+
+} // namespace
 
 void bind_run(nb::module_ &m) {
   nb::enum_<IntegrationStatus>(m, "IntegrationStatus", "How an integration ended.")
@@ -70,4 +101,7 @@ void bind_run(nb::module_ &m) {
       "system"_a, "group"_a, "moment"_a, "steering"_a.none(), "times"_a, "q"_a, "v"_a, "tolerance"_a, "max_steps"_a,
       "resolver"_a.none(), "carry_on"_a, "recording"_a.none(),
       "Integrates the motion from (q, v) and reports it at `times`.");
+
+  m.def("fixed_steps", &fixed_steps, "system"_a, "end"_a, "steps"_a, "q"_a, "v"_a,
+        "States after equal steps and in their middle (2 steps + 1, 2 coordinates), for convergence studies.");
 }

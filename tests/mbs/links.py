@@ -1,0 +1,79 @@
+"""Flexible links from polynomials (Ritz), without stage 1: bending in the plane, as soft as one likes."""
+
+from types import MappingProxyType
+
+import numpy as np
+from mechanisms import make_model, revolute
+from numpy.polynomial import Legendre, Polynomial
+
+from ffrobot.mbs.planar_body import PlanarBody, PlanarPoint
+
+CLAMPED = Polynomial([0, 0, 1])  # ξ²: deflection and slope vanish at the root
+SUPPORTED = Polynomial([0, 1, -1])  # ξ (1 − ξ): deflection vanishes at both ends
+
+
+def ritz_link(name, condition, length=1.0, mass=1.0, EI=30.0, modes=3, damping_ratio=0.0, extra=3):
+    """An Euler–Bernoulli beam in `modes` + `extra` polynomials; bending rigidity EI in N·m²."""
+    factor = {"cantilever": CLAMPED, "simply-supported": SUPPORTED}[condition]
+    basis = [factor * Legendre.basis(k, [0, 1]).convert(kind=Polynomial) for k in range(modes + extra)]
+    xi, weight = np.polynomial.legendre.leggauss(modes + extra + 4)
+    xi, weight = (xi + 1) / 2, weight / 2 * mass
+    w = np.array([f(xi) for f in basis])
+    w_2 = np.array([f.deriv(2)(xi) for f in basis]) / length**2
+    M = (w * weight) @ w.T
+    K = (w_2 * weight) @ w_2.T * EI * length / mass
+    L_inverse = np.linalg.inv(np.linalg.cholesky(M))
+    stiffness, vectors = np.linalg.eigh(L_inverse @ K @ L_inverse.T)
+    T = (L_inverse.T @ vectors)[:, :modes]
+    stiffness, n = stiffness[:modes], modes
+
+    def point(at):
+        bend = np.array([f(at) for f in basis]) @ T
+        slope = np.array([f.deriv()(at) for f in basis]) @ T / length
+        return PlanarPoint(np.array([at * length, 0.0]), np.array([np.zeros(n), bend]), slope)
+
+    zero = np.zeros((n, n))
+    return PlanarBody(
+        name=name,
+        mass=mass,
+        inertia=mass * length**2 / 3,
+        first_moment=np.array([mass * length / 2, 0.0]),
+        stiffness=stiffness,
+        damping=np.diag(2 * damping_ratio * np.sqrt(stiffness)),
+        S_bar=np.array([np.zeros(n), (w * weight).sum(axis=1) @ T]),
+        h=(w * weight * xi).sum(axis=1) @ T * length,
+        j=np.zeros(n),
+        S_tilde=zero,
+        m_xy=np.eye(n),
+        points=MappingProxyType({"root": point(0.0), "mid": point(0.5), "tip": point(1.0)}),
+        modal_transform=np.eye(n),
+        length=length,
+    )
+
+
+ANGLES = {"link1": 0.4, "link2": 1.3}
+TIP = np.cos(list(ANGLES.values())).sum(), np.sin(list(ANGLES.values())).sum()
+
+
+def quintic(start, end, duration=1.0):
+    """From rest to rest with zero acceleration at both ends, as an expression in t."""
+    s = f"(t/{duration})"
+    return f"{start!r}+{end - start!r}*(10*{s}**3-15*{s}**4+6*{s}**5)"
+
+
+def arm_links(EI=30.0, **keys):
+    return [
+        ritz_link("link1", "simply-supported", EI=4 * EI, **keys),
+        ritz_link("link2", "cantilever", EI=EI, **keys),
+    ]
+
+
+def arm(links=None, **keys):
+    """Two links, revolute joints O and A, the tip moving from rest to rest in a second."""
+    path = {"name": "tip", "point": "link2.tip", "x": quintic(TIP[0], 0.4), "y": quintic(TIP[1], 1.5)}
+    tables = {
+        "joint": [revolute("O", "ground", "link1.root"), revolute("A", "link1.tip", "link2.root")],
+        "trajectory": [path],
+        "initial": {"angles": ANGLES},
+    }
+    return make_model(links or arm_links(), **(tables | keys))

@@ -1,0 +1,99 @@
+"""Energy and momentum: what drives put in is found again, and what nothing touches stays."""
+
+import numpy as np
+import pytest
+import zoo
+from links import arm, arm_links
+from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
+from scipy.integrate import simpson
+
+from ffrobot.mbs.analyses import run_forward, run_pcid
+from ffrobot.mbs.observation import energies
+
+OUTPUT_STEP = 2.5e-4  # fine enough that Simpson's rule errs by less than 1e-10 here
+
+
+def energy_and_losses(outcome):
+    """Total energy (T,) and what damping has taken by the end."""
+    parts = energies(outcome)
+    total = parts["kinetic"] + parts["strain"] + parts["gravitational"]
+    return total, simpson(parts["dissipated_power"], x=outcome.time)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+def test_work_of_the_trajectory_forces_is_energy_gained_and_dissipated(tolerance):
+    outcome = run_pcid(
+        arm(arm_links(damping_ratio=0.02)), pcid(output_step=OUTPUT_STEP, tolerance=tolerance), False, always
+    )
+    power = sum(
+        -outcome.lambda_[:, i] * constraint.target.sample(outcome.time)[1]
+        for i, constraint in enumerate(outcome.assembly.constraints)
+        if constraint.is_trajectory
+    )
+    work, (total, losses) = simpson(power, x=outcome.time), energy_and_losses(outcome)
+    assert losses > 1e-3
+    assert abs(work - losses - (total[-1] - total[0])) < tolerance * np.abs(power).max()
+
+
+def test_work_of_given_loads_is_energy_gained_and_dissipated():
+    """Forward: a joint moment, and force and moment on a point that moves and turns."""
+    tolerance = 1e-8
+    loads = [
+        {"joint": "A", "moment": "4*sin(5*t)"},
+        {"point": "link2.tip", "x": "3*cos(4*t)", "y": "2", "moment": "0.3*t"},
+    ]
+    model = arm(arm_links(damping_ratio=0.02), trajectory=[], load=loads)
+    outcome = run_forward(model, forward(output_step=OUTPUT_STEP, tolerance=tolerance), None, {}, always)
+    mechanism = oracle_of(outcome.assembly)
+    power = [
+        sum(mechanism.row(row, q, v).rate * size(t)[0] for row, size in model.loads)
+        for t, q, v in zip(outcome.time, outcome.q, outcome.v, strict=True)
+    ]
+    work, (total, losses) = simpson(power, x=outcome.time), energy_and_losses(outcome)
+    assert losses > 1e-3
+    assert abs(work - losses - (total[-1] - total[0])) < 10 * tolerance * np.ptp(total)
+
+
+def test_energy_of_an_undamped_pendulum_stays():
+    tolerance = 1e-8
+    model = arm(trajectory=[], initial={"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 2.0}})
+    outcome = run_forward(model, forward(end=2.0, tolerance=tolerance), None, {}, always)
+    total, losses = energy_and_losses(outcome)
+    assert losses == 0
+    assert np.ptp(energies(outcome)["kinetic"]) > 1
+    assert np.ptp(total) < tolerance * np.ptp(energies(outcome)["kinetic"])
+
+
+@pytest.mark.parametrize("kind", ["links", "clouds"])
+def test_momentum_of_a_free_chain_stays(kind):
+    """Nothing holds it and nothing pulls: linear and angular momentum stay while it turns, folds and vibrates."""
+    tolerance = 1e-8
+    bodies = arm_links() if kind == "links" else zoo.clouds(np.random.default_rng(5), 2, dense_damping=False)
+    first, second = (body.name for body in bodies)
+    model = make_model(
+        bodies,
+        gravity=(0.0, 0.0),
+        joint=[revolute("A", f"{first}.tip", f"{second}.root")],
+        load=[{"joint": "A", "moment": "3*sin(8*t)"}],  # from within: no momentum
+        initial={"angles": {first: 0.3, second: 1.0}, "rates": {first: 3.0, second: -1.0}},
+    )
+    outcome = run_forward(model, forward(end=2.0, tolerance=tolerance), None, {}, always)
+    assert outcome.status == "completed"
+    mechanism = oracle_of(outcome.assembly)
+    momentum = np.array([mechanism.momentum(q, v) for q, v in zip(outcome.q, outcome.v, strict=True)])
+    assert np.ptp(outcome.q[:, outcome.coordinates(second)][:, 3]) > 1e-3
+    assert np.abs(momentum[0]).min() > 1e-3
+    assert np.abs(momentum - momentum[0]).max() < 10 * tolerance * np.abs(momentum).max()
+
+
+def test_center_of_mass_of_a_free_chain_falls_as_a_stone():
+    model = make_model(
+        arm_links(),
+        joint=[revolute("A", "link1.tip", "link2.root")],
+        initial={"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 3.0}},
+    )
+    outcome = run_forward(model, forward(tolerance=1e-9), None, {}, always)
+    mechanism = oracle_of(outcome.assembly)
+    momentum = np.array([mechanism.momentum(q, v)[:2] for q, v in zip(outcome.q, outcome.v, strict=True)])
+    fall = momentum[0] + np.outer(outcome.time, 2.0 * np.array([0.0, -9.81]))
+    np.testing.assert_allclose(momentum, fall, atol=1e-8)

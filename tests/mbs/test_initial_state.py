@@ -1,0 +1,154 @@
+"""Where runs start, and what is said when they cannot."""
+
+import numpy as np
+import pytest
+from links import ANGLES, TIP, arm, arm_links, ritz_link
+from mechanisms import always, assemble, make_model, pcid, revolute
+from test_rigid_limit import slider_crank
+
+from ffrobot.errors import InputError, SolveError
+from ffrobot.mbs.analyses import initial_state, run_pcid, run_static
+from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.model import build_model
+from ffrobot.mbs.observation import point_motion
+from ffrobot.mbs.scene_records import Analysis
+
+HOLD = {"name": "tip", "point": "link2.tip", "x": repr(float(TIP[0])), "y": repr(float(TIP[1]))}
+
+
+def refused(model, match):
+    with pytest.raises(InputError, match=match):
+        run_pcid(model, pcid(), False, always)
+
+
+def to(x, y, name="tip"):
+    return {"name": name, "point": "link2.tip", "x": x, "y": y}
+
+
+def test_start_meets_constraints_and_rates_undeformed():
+    model = arm(trajectory=[to("1.2-0.3*t", "0.9+0.5*t")])
+    assembly = assemble(model)
+    state = undeformed_state(assembly)
+    C, rate, _ = assembly.system.constraints(0.0, state.q, state.v)
+    assert np.abs(C).max() < 1e-13
+    assert np.abs(rate).max() < 1e-13
+    for body in model.bodies:
+        first = assembly.first[assembly.index[body.name]] + 3
+        assert not np.any(state.q[first : first + 3])
+        assert not np.any(state.v[first : first + 3])
+
+
+@pytest.mark.parametrize(("angles", "elbow"), [({"link1": -0.2, "link2": 1.4}, 1), ({"link1": 1.4, "link2": -0.2}, -1)])
+def test_the_guess_picks_the_elbow(angles, elbow):
+    assembly = assemble(arm(trajectory=[to("1.2", "0.9")], initial={"angles": angles}))
+    q = undeformed_state(assembly).q
+    turn = q[assembly.first[1] + 2] - q[assembly.first[0] + 2]
+    assert turn == pytest.approx(elbow * 2 * np.arccos(0.75), abs=1e-12)  # law of cosines: 1.5 = 2 cos(turn/2)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_closed_loop_takes_the_branch_of_the_guess(side):
+    """The crank above or below the axis, same slider position."""
+    path = {"name": "slider", "point": "slider.pin", "x": "0.6"}
+    model = slider_crank(path)
+    scene = model.scene.model_copy(
+        update={"initial": model.scene.initial.model_copy(update={"angles": {"crank": 0.9 * side, "rod": -0.3 * side}})}
+    )
+    assembly = assemble(build_model(scene, model.bodies))
+    crank = undeformed_state(assembly).q[assembly.first[assembly.index["crank"]] + 2]
+    # 0.5² = 0.2² + 0.6² − 2 · 0.2 · 0.6 cos φ
+    assert crank == pytest.approx(side * np.arccos((0.04 + 0.36 - 0.25) / 0.24), abs=1e-12)
+
+
+def test_stretched_arm_is_refused():
+    model = arm(trajectory=[to("2", "0")], initial={"angles": {"link1": 0.0, "link2": 0.0}})
+    refused(model, r'trajectory "tip".*singular.*stretched')
+
+
+def test_target_out_of_reach_at_the_start_is_named():
+    refused(arm(trajectory=[to("2.5", "0.3", "hand")]), r'trajectory "hand": expected a target within reach.*t = 0 s')
+
+
+def test_target_that_moves_out_of_reach_is_named_with_its_time():
+    """1.5 + t leaves the circle of radius 2 at t = 0.5 s."""
+    model = arm(trajectory=[to("1.5+t", "0", "hand")], initial={"angles": {"link1": -0.7, "link2": 0.7}})
+    with pytest.raises(InputError, match=r'trajectory "hand": expected a target within reach') as raised:
+        run_pcid(model, pcid(), False, always)
+    time = float(str(raised.value).split("t = ")[1].split(" s")[0])
+    assert time == pytest.approx(0.5, abs=0.02)
+
+
+def test_loop_that_cannot_be_closed_is_named():
+    joints = [
+        revolute("O", "ground", "link1.root"),
+        revolute("A", "link1.tip", "link2.root"),
+        revolute("far", "link2.tip", "ground", at=(2.5, 0.0)),
+    ]
+    refused(
+        make_model(arm_links(), joint=joints, trajectory=[{"name": "a", "angle": "link1", "value": "0.3"}]),
+        r'joint "far"',
+    )
+
+
+def test_repeated_trajectories_are_named():
+    again = {"name": "again", "point": "link2.tip", "x": repr(float(TIP[0]))}
+    refused(arm(trajectory=[HOLD, again]), r'1 too many among .*trajectory "again".*repeat or contradict')
+
+
+def test_contradicting_trajectories_are_named():
+    other = {"name": "other", "point": "link2.tip", "y": "0.1"}
+    refused(arm(trajectory=[HOLD, other]), r'1 too many among .*trajectory "other".*repeat or contradict')
+
+
+def test_redundant_joints_are_named():
+    joints = [
+        revolute("O", "ground", "link1.root"),
+        revolute("A", "link1.tip", "link2.root"),
+        revolute("twice", "link1.tip", "link2.root"),
+    ]
+    with pytest.raises(InputError, match=r'2 too many among .*joint "A", x.*joint "twice", x') as raised:
+        undeformed_state(assemble(make_model(arm_links(), joint=joints)))
+    assert '"O"' not in str(raised.value)
+
+
+def test_static_start_is_at_rest():
+    """A robot held still under gravity: no accelerations, no ringing later on."""
+    model = arm(trajectory=[HOLD], initial={"angles": ANGLES, "state": "static"})
+    outcome = run_pcid(model, pcid(tolerance=1e-8), False, always)
+    assert np.abs(outcome.q[0][3:6]).max() > 1e-4  # it sags
+    assert np.abs(outcome.a[0]).max() < 1e-8
+    assert np.abs(outcome.q - outcome.q[0]).max() < 1e-10
+    assert np.abs(outcome.lambda_ - outcome.lambda_[0]).max() < 1e-8 * np.abs(outcome.lambda_).max()
+
+
+def test_undeformed_start_rings():
+    """What the static start avoids."""
+    outcome = run_pcid(arm(trajectory=[HOLD]), pcid(), False, always)
+    assert np.abs(outcome.lambda_ - outcome.lambda_[0]).max() > np.abs(outcome.lambda_[0]).max()
+
+
+def test_static_start_of_a_moving_robot_meets_its_rates():
+    model = arm(trajectory=[to("1.2-0.3*t", "0.9+0.5*t")], initial={"angles": ANGLES, "state": "static"})
+    assembly = assemble(model)
+    state = initial_state(assembly)
+    C, rate, _ = assembly.system.constraints(0.0, state.q, state.v)
+    assert max(np.abs(C).max(), np.abs(rate).max()) < 1e-12
+
+
+def test_static_shape_of_a_horizontal_cantilever():
+    """Welded to the ground, sagging under its weight: w(L) = m g L³/(8 EI), and F L³/(3 EI) from a force at the tip."""
+    weld = {"name": "wall", "type": "weld", "between": ("ground", "beam.root")}
+    static = Analysis(name="rest", kind="static")
+    beam = ritz_link("beam", "cantilever", mass=2.0, EI=50.0)
+    load = [{"point": "beam.tip", "y": "-3"}]
+    outcome = run_static(make_model([beam], joint=[weld], load=load, analysis=(static,)), static)
+    expected = -(2.0 * 9.81 / 8 + 3.0 / 3) / 50.0
+    assert point_motion(outcome, "beam.tip").deflection[0, 1] == pytest.approx(expected, rel=1e-3)  # three modes
+
+
+def test_robot_without_equilibrium_is_refused():
+    """A link that slides freely down a rail has none."""
+    rail = {"name": "rail", "type": "prismatic", "between": ("ground", "link1.root"), "axis": (0.0, 1.0)}
+    model = make_model(arm_links()[:1], joint=[rail], initial={"state": "static"})
+    with pytest.raises(SolveError, match="no static equilibrium"):
+        initial_state(assemble(model))
