@@ -51,8 +51,8 @@ double ConstrainedMotion::error_size(double t, const double *y, const double *e)
                      std::hypot(d_dot[0], d_dot[1]) / peak.velocity, std::abs(d_dot[2]) / peak.angular_velocity});
     if (modes > 0) {
       // A robot at rest under gravity: p_dot starts from nothing, with the rounding of K p integrated over a period.
-      const double rounding = 32 * std::numeric_limits<double>::epsilon() *
-                              frequency_[b].cwiseProduct(VectorMap(y + i + 3, modes)).norm();
+      const double rounding =
+          32 * std::numeric_limits<double>::epsilon() * frequency_[b].cwiseProduct(VectorMap(y + i + 3, modes)).norm();
       size = std::max({size, VectorMap(d + 3, modes).norm() / peak.modal,
                        (VectorMap(d_dot + 3, modes).norm() - rounding) / peak.modal_velocity});
     }

@@ -110,17 +110,18 @@ bool collect_extra(const PlanarBody &body, const double *p, const double *p_dot,
   return any;
 }
 
-struct Factor { // L D L^T of the 3 x 3 mass matrix of the frame, p eliminated
-  Vector3d L, D_inverse;
-};
+// L D L^T of the 3 x 3 mass matrix of the frame, p eliminated. Its translational block m I - S_bar S_bar^T is constant.
+void factorise_translation(double mass, PlanarBodyState &s) {
+  s.D_inverse[0] = 1 / (mass - s.G(0, 0));
+  s.L[0] = -s.G(1, 0) * s.D_inverse[0];
+  s.D_inverse[1] = 1 / (mass - s.G(1, 1) + s.L[0] * s.G(1, 0));
+}
 
-Factor factorise(const Matrix3d &M) {
-  const double d0 = 1 / M(0, 0);
-  const double l10 = M(1, 0) * d0, l20 = M(2, 0) * d0;
-  const double d1 = 1 / (M(1, 1) - l10 * M(1, 0));
-  const double l21 = (M(2, 1) - l20 * M(1, 0)) * d1;
-  const double d2 = 1 / (M(2, 2) - l20 * M(2, 0) - l21 * l21 / d1);
-  return {{l10, l20, l21}, {d0, d1, d2}};
+void factorise_rotation(const Vector2d &coupling, double inertia, PlanarBodyState &s) {
+  const double y = coupling.y() - s.L[0] * coupling.x();
+  s.L[1] = coupling.x() * s.D_inverse[0];
+  s.L[2] = y * s.D_inverse[1];
+  s.D_inverse[2] = 1 / (inertia - s.L[1] * coupling.x() - s.L[2] * y);
 }
 
 Vector3d forward(const Vector3d &L, Vector3d b) {
@@ -206,6 +207,7 @@ PlanarBodyState::PlanarBodyState(const PlanarBody &body) : markers(static_cast<s
   wrench = free_acceleration = Eigen::Matrix3Xd::Zero(3, body.markers());
   Z_transposed = Eigen::Matrix3Xd::Zero(3, 3 * body.markers());
   mobility = Eigen::MatrixXd::Zero(3 * body.markers(), 3 * body.markers());
+  factorise_translation(body.mass, *this);
 }
 
 void kinematics(const PlanarBody &body, const double *q, const double *v, PlanarBodyState &s) {
@@ -262,16 +264,11 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
     s.extra.setZero();
 
   // Mass matrix and force of the frame after elimination
-  const Vector2d lever = perpendicular(moment);
-  double inertia = body.inertia + weighted(body, p, p);
+  const Vector2d coupling = perpendicular(moment) - s.G.col(2).head<2>();
+  double inertia = body.inertia + weighted(body, p, p) - s.G(2, 2);
   if (body.j.size())
     inertia += 2 * body.j.dot(VectorMap(p, body.modes()));
-  Matrix3d M;
-  M << body.mass, 0, lever.x(), 0, body.mass, lever.y(), lever.x(), lever.y(), inertia;
-  M -= s.G.topLeftCorner<3, 3>();
-  const Factor factor = factorise(M);
-  s.L = factor.L;
-  s.D_inverse = factor.D_inverse;
+  factorise_rotation(coupling, inertia, s);
   s.free_frame = backward(s.L, forward(s.L, Q - WQ.head<3>()).cwiseProduct(s.D_inverse));
 
   // Markers: acceleration = B (a, alpha) + Phi p_ddot + velocity terms, with p_ddot from the eliminated rows

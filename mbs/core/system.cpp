@@ -63,6 +63,15 @@ void update_kinematics(const System &system, const double *q, const double *v, W
   }
 }
 
+// The stages of a step and its projection meet the same time again and again.
+void update_targets(const System &system, double t, Workspace &w) {
+  if (t == w.target_time)
+    return;
+  for (std::size_t r = 0; r < system.constraints.size(); ++r)
+    w.targets[r] = system.constraints[r].target(t);
+  w.target_time = t;
+}
+
 void apply_drives(const System &system, double t, Workspace &w) {
   if (!system.drives.empty()) {
     for (std::size_t b = 0; b < system.bodies.size(); ++b) {
@@ -126,8 +135,8 @@ void eliminate(const System &system, double t, const double *q, const double *v,
   }
   for (std::size_t r = 0; r < system.constraints.size(); ++r) {
     evaluate(system.constraints[r].row, w.bodies, w.rows[r]);
-    w.targets[r] = system.constraints[r].target(t);
   }
+  update_targets(system, t, w);
   assemble_schur(system, w);
 }
 
@@ -155,13 +164,12 @@ void accelerations(const System &system, double t, const double *q, const double
 void constraint_residuals(const System &system, double t, const double *q, const double *v, Workspace &w, double *value,
                           double *rate) {
   update_kinematics(system, q, v, w);
+  update_targets(system, t, w);
   RowMotion motion;
   for (std::size_t r = 0; r < system.constraints.size(); ++r) {
-    const auto &[row, target] = system.constraints[r];
-    evaluate(row, w.bodies, motion);
-    const Jet f = target(t);
-    value[r] = motion.value - f.value;
-    rate[r] = motion.rate - f.rate;
+    evaluate(system.constraints[r].row, w.bodies, motion);
+    value[r] = motion.value - w.targets[r].value;
+    rate[r] = motion.rate - w.targets[r].rate;
   }
 }
 

@@ -8,6 +8,7 @@
 #include "core/rows.h"
 #include "core/time_function.h"
 
+#include <limits>
 #include <vector>
 
 namespace ffrobot {
@@ -57,7 +58,8 @@ struct Workspace {
   std::vector<PlanarBodyState> bodies;
   std::vector<RowMotion> rows; // of the constraints, at the last evaluation
   std::vector<RowMotion> drive_rows;
-  std::vector<Jet> targets;
+  std::vector<Jet> targets; // of the constraints at target_time
+  double target_time = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> external_drive;          // added to the drives' own sizes; set by whoever steers the system
   std::vector<Eigen::VectorXd> external_modal; // likewise, modal forces of each body
   bool has_external_modal = false;

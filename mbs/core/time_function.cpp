@@ -183,12 +183,16 @@ Jet Expression::operator()(double t) const {
     case Op::negate:
       a = -a;
       break;
-    case Op::sin:
-      a = chain(a, std::sin(a.value), std::cos(a.value), -std::sin(a.value));
+    case Op::sin: {
+      const double x = a.value, s = std::sin(x), c = std::cos(x); // one call of sincos
+      a = chain(a, s, c, -s);
       break;
-    case Op::cos:
-      a = chain(a, std::cos(a.value), -std::sin(a.value), -std::cos(a.value));
+    }
+    case Op::cos: {
+      const double x = a.value, s = std::sin(x), c = std::cos(x);
+      a = chain(a, c, -s, -c);
       break;
+    }
     case Op::tan:
       a = tan(a);
       break;
