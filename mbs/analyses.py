@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -83,11 +83,8 @@ def run_pcid(model: Model, analysis: Analysis, keep_recording: bool, progress: P
     assembly = Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
     start = initial_state(assembly)
     check_reach(assembly, undeformed_state(assembly), analysis.times)
-    resolver = None
-    if model.trajectories and len(model.motors) == model.rigid_freedom:
-        resolver = _core.ActuationResolver(assembly.system, assembly.is_trajectory, assembly.motor_rows)
     recording = _core.Recording() if keep_recording else None
-    return _integrate(assembly, analysis, start, None, resolver, recording, progress)
+    return _integrate(assembly, analysis, start, None, _resolver(assembly), recording, progress)
 
 
 def run_forward(
@@ -124,19 +121,15 @@ def run_forward(
 
 
 def run_static(model: Model, analysis: Analysis) -> Outcome:
-    """Equilibrium under gravity, loads and the trajectory constraints at t = 0."""
-    assembly = Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
-    began = time.perf_counter()
-    state, lambda_ = static_equilibrium(assembly, undeformed_state(assembly))
-    C, _, _ = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))
-    residual = np.array([[np.abs(C).max(initial=0.0), 0.0, 0.0]])
-    row = state.q[None]
-    seconds = time.perf_counter() - began
-    still = np.zeros_like(row)
-    return Outcome(
-        analysis, assembly, np.zeros(1), row, still, still, lambda_[None], None, None, residual,
-        "completed", 0, 0, 0, seconds,
-    )  # fmt: skip
+    """Equilibrium under gravity, loads and the trajectory constraints at t = 0, with the moments that hold it.
+
+    The targets are frozen, so that the multipliers of the state at rest are those of the equilibrium.
+    """
+    held = [replace(c, target=_core.TimeFunction.constant(c.target(0.0)[0])) for c in model.trajectories]
+    assembly = Assembly(model, [*model.joints, *held], model.loads, list(model.motors.values()))
+    state, _ = static_equilibrium(assembly, undeformed_state(assembly))
+    at_rest = State(state.q, np.zeros_like(state.q))
+    return _integrate(assembly, analysis, at_rest, None, _resolver(assembly), None, lambda _: True)
 
 
 def initial_state(assembly: Assembly) -> State:
@@ -145,6 +138,14 @@ def initial_state(assembly: Assembly) -> State:
     if assembly.model.scene.initial.state == "static":
         start, _ = static_equilibrium(assembly, start)
     return start
+
+
+def _resolver(assembly: Assembly) -> _core.ActuationResolver | None:
+    """What turns trajectory forces into motor and modal forces; None where the motors do not fit the mechanism."""
+    model = assembly.model
+    if not model.trajectories or len(model.motors) != model.rigid_freedom:
+        return None
+    return _core.ActuationResolver(assembly.system, assembly.is_trajectory, assembly.motor_rows)
 
 
 def _steered_rows(model: Model, analysis: Analysis, source: Outcome | None) -> tuple[list[Row], _core.AppliedActuation]:

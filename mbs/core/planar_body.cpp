@@ -346,7 +346,8 @@ void accelerations(const PlanarBody &body, const double *q, const double *v, con
   accumulate_rows(s, s.z_response, rows, n, p_ddot);
 }
 
-Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, Index k, const double *a, double &size) {
+Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, Index k, const double *q,
+                             const double *a, double &size) {
   const Index row = 3 + 3 * k;
   const Vector3d Phi_p_ddot = body.W.middleRows<3>(row) * VectorMap(a + 3, body.modes());
   const Vector2d &arm = s.markers[static_cast<std::size_t>(k)].arm;
@@ -354,8 +355,10 @@ Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, I
   const Vector2d coriolis = rotate(s, 2 * s.theta_dot * perpendicular(s.Wp_dot.segment<2>(row)));
   const Vector2d frame = Vector2d(a[0], a[1]), turn = a[2] * perpendicular(arm);
   const Vector2d centripetal = -s.theta_dot * s.theta_dot * arm;
-  size = frame.norm() + turn.norm() + centripetal.norm() + coriolis.norm() + elastic.norm() + std::abs(a[2]) +
-         std::abs(Phi_p_ddot[2]);
+  const Vector3d elastic_force =
+      body.W.middleRows<3>(row) * body.stiffness.cwiseProduct(VectorMap(q + 3, body.modes()));
+  size = elastic_force.norm() + frame.norm() + turn.norm() + centripetal.norm() + coriolis.norm() + elastic.norm() +
+         std::abs(a[2]) + std::abs(Phi_p_ddot[2]);
   Vector3d acceleration;
   acceleration << frame + turn + centripetal + coriolis + elastic, a[2] + Phi_p_ddot[2];
   return acceleration;

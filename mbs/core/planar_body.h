@@ -87,9 +87,10 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
 void accelerations(const PlanarBody &body, const double *q, const double *v, const Eigen::Matrix3Xd &constraint_wrench,
                    PlanarBodyState &state, double *a);
 
-// Acceleration (x, y, angular) of marker k for accelerations a of the coordinates, and the sum of its terms' sizes.
+// Acceleration (x, y, angular) of marker k for accelerations a of the coordinates, and the sum of its terms' sizes:
+// those of the elastic forces in p_ddot too, which cancel against others when a stiff link hardly vibrates.
 Eigen::Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &state, Eigen::Index k,
-                                    const double *a, double &size);
+                                    const double *q, const double *a, double &size);
 
 // M^-1 times the generalized force of wrenches on the markers (mass metric of the last free_motion).
 void respond(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, PlanarBodyState &state, double *dq);

@@ -37,7 +37,7 @@ void OutputEvaluator::operator()(std::size_t output, double t, const double *y) 
     outputs_.residual(i, 0) = value_.lpNorm<Eigen::Infinity>() / (1 + y_.head(n).lpNorm<Eigen::Infinity>());
     outputs_.residual(i, 1) = rate_.lpNorm<Eigen::Infinity>() / (1 + y_.tail(n).lpNorm<Eigen::Infinity>());
     accelerations(system_, t, q, v, workspace_, a_.data());
-    outputs_.residual(i, 2) = acceleration_residual(system_, a_.data(), workspace_);
+    outputs_.residual(i, 2) = acceleration_residual(system_, q, a_.data(), workspace_);
   } else
     outputs_.residual.row(i).setZero();
   outputs_.q.row(i) = y_.head(n).transpose();

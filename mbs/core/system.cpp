@@ -165,7 +165,7 @@ void constraint_residuals(const System &system, double t, const double *q, const
   }
 }
 
-double acceleration_residual(const System &system, const double *a, const Workspace &w) {
+double acceleration_residual(const System &system, const double *q, const double *a, const Workspace &w) {
   double worst = 0;
   RowMotion motion;
   for (std::size_t r = 0; r < system.constraints.size(); ++r) {
@@ -177,8 +177,8 @@ double acceleration_residual(const System &system, const double *a, const Worksp
         continue;
       const auto b = static_cast<std::size_t>(m->body);
       double size = 0;
-      residual +=
-          c->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker, a + system.first_coordinate[b], size));
+      residual += c->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker, q + system.first_coordinate[b],
+                                             a + system.first_coordinate[b], size));
       scale += c->lpNorm<Eigen::Infinity>() * size;
     }
     worst = std::max(worst, std::abs(residual) / scale);

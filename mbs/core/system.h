@@ -77,7 +77,7 @@ void constraint_residuals(const System &system, double t, const double *q, const
 
 // Largest violation of C_ddot = 0 by the accelerations a, relative to the terms that cancel in it. Computed from a
 // alone, not from the elimination that made it. At the coordinates of the last evaluation.
-double acceleration_residual(const System &system, const double *a, const Workspace &w);
+double acceleration_residual(const System &system, const double *q, const double *a, const Workspace &w);
 
 // Moves q and v onto C = 0 and C_dot = 0 in the mass metric, by Newton steps on the last factorisation where it
 // is good enough and a fresh one otherwise. Returns the largest residual left, relative to 1 m, 1 rad, 1 m/s.

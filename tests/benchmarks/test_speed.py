@@ -31,7 +31,7 @@ EVALUATIONS = 1000
 
 @pytest.fixture
 def scene(case_copy, ffrobot, monkeypatch):
-    """The two-link case with the inverse analysis only; modal files and compiled forms come from the cache."""
+    """The two-link case with the inverse analysis only; modal files and forms come from the session's cache."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
     path = case_copy("two_link")
     head = path.read_text(encoding="utf-8").split("[[analysis]]")[0]

@@ -42,14 +42,27 @@ def test_disk_full_while_writing_results(two_link_copy, ffrobot, earlier):
     assert not earlier or results.read_bytes() == content
 
 
-def test_disk_full_while_writing_a_modal_body(two_link_copy, ffrobot, two_link):
-    folder = two_link_copy()  # the forms were compiled for `two_link`
-    before = sorted(folder.iterdir())
-    done = ffrobot("link", "link1.toml", cwd=folder, preexec_fn=_limit_files)
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 16 kB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=16k", "tmpfs", folder]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
+        pytest.skip("mounting a small file system needs root")
+    yield folder
+    subprocess.run(["umount", folder], check=True)
+
+
+@pytest.mark.parametrize("command", [("link", "link1.toml"), ("solve", "scene.toml")])
+def test_full_disk(two_link_copy, ffrobot, small_disk, command):
+    folder = two_link_copy({"scene.toml": SHORT})
+    done = ffrobot(*command, "-o", small_disk / "out.h5", cwd=folder)
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].startswith("ffrobot: link1.h5: cannot write the modal body file:")
-    assert "Traceback" not in done.stderr
-    assert sorted(folder.iterdir()) == before
+    (message,) = done.stderr.splitlines()
+    assert message.startswith(f"ffrobot: {small_disk / 'out.h5'}: cannot write the ")
+    assert message.endswith(": No space left on device")
+    assert list(small_disk.iterdir()) == []
 
 
 @pytest.mark.parametrize(
