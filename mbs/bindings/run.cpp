@@ -76,13 +76,14 @@ void bind_run(nb::module_ &m) {
       .def_prop_ro("steps", [](const Run &r) { return r.report.steps; })
       .def_prop_ro("rejected", [](const Run &r) { return r.report.rejected; })
       .def_prop_ro("evaluations", [](const Run &r) { return r.report.evaluations; })
-      .def_prop_ro("q", [](const Run &r) { return r.outputs.q; })
-      .def_prop_ro("v", [](const Run &r) { return r.outputs.v; })
-      .def_prop_ro("a", [](const Run &r) { return r.outputs.a; })
-      .def_prop_ro("multipliers", [](const Run &r) { return r.outputs.lambda; })
-      .def_prop_ro("tau", [](const Run &r) { return r.outputs.tau; })
-      .def_prop_ro("F_p", [](const Run &r) { return r.outputs.F_p; })
-      .def_prop_ro("residual", [](const Run &r) { return r.outputs.residual; });
+      // references: the arrays are views that keep their Run alive
+      .def_prop_ro("q", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.q; })
+      .def_prop_ro("v", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.v; })
+      .def_prop_ro("a", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.a; })
+      .def_prop_ro("multipliers", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.lambda; })
+      .def_prop_ro("tau", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.tau; })
+      .def_prop_ro("F_p", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.F_p; })
+      .def_prop_ro("residual", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.residual; });
 
   m.def(
       "run",
