@@ -58,7 +58,7 @@ TIP = np.cos(list(ANGLES.values())).sum(), np.sin(list(ANGLES.values())).sum()
 def quintic(start, end, duration=1.0):
     """From rest to rest with zero acceleration at both ends, as an expression in t."""
     s = f"(t/{duration})"
-    return f"{start!r}+{end - start!r}*(10*{s}**3-15*{s}**4+6*{s}**5)"
+    return f"{float(start)!r}+{float(end - start)!r}*(10*{s}**3-15*{s}**4+6*{s}**5)"
 
 
 def arm_links(EI=30.0, **keys):

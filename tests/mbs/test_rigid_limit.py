@@ -96,7 +96,7 @@ FACTORS = np.array([1.0, 4.0, 16.0])
 
 def septic(start, end):
     """As `quintic`, with the jerk zero at both ends, too."""
-    return f"{start!r}+{end - start!r}*(35*t**4-84*t**5+70*t**6-20*t**7)"
+    return f"{float(start)!r}+{float(end - start)!r}*(35*t**4-84*t**5+70*t**6-20*t**7)"
 
 
 def deviations(law):
