@@ -21,6 +21,7 @@ from .mbs.model import ModalLoad, Model, build_model
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.scene_file import load_scene
 from .mbs.scene_records import Analysis, Scene, split_point
+from .validation import did_you_mean, quoted
 
 
 class Watcher:
@@ -162,7 +163,8 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
             continue
         if point not in planar.points:
             raise InputError(
-                f'{scene.path}: payload: point: expected one of {", ".join(planar.points)}, found "{payload.point}"'
+                f'{scene.path}: payload: point: expected a point of "{name}" ({quoted(planar.points)}), found'
+                f' "{payload.point}"{did_you_mean(point, planar.points)}'
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
     return LoadedBody(planar, body.modal, body.path, body.computed)
