@@ -15,6 +15,8 @@ from ..mbs.scene_records import PztLayout
 
 Array = NDArray[np.float64]
 
+SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
+
 
 @dataclass(frozen=True)
 class PatchArray:
@@ -52,7 +54,8 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     """Place the patches of `layout` on a link.
 
     c = E_p d31 w_p (t_p + t_b)/2 with the link's height t_b in the plane; a patch works on the difference of the
-    section rotations at its ends. Raises `InputError` for a patch beyond the link or across a step of its section.
+    section rotations at its ends. Raises `InputError` for a patch beyond the link or across a step of its section, and for as many patches as modes
+    that do not reach them all.
     """
     key = f'{scene_path}: pzt "{layout.body}"'
     if layout.centers is not None:
@@ -71,7 +74,13 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     moment_per_volt = layout.modulus * layout.d31 * layout.width * (layout.thickness + heights) / 2
     rotation = np.array([[body.interpolate(x).rotation[2] for x in pair] for pair in edges.clip(0.0, body.length)])
     Phi_V = moment_per_volt[:, None] * (rotation[:, 1] - rotation[:, 0]) @ planar.modal_transform
-    return PatchArray(layout.body, edges, moment_per_volt, Phi_V.T, layout.limit)
+    array = PatchArray(layout.body, edges, moment_per_volt, Phi_V.T, layout.limit)
+    if len(edges) == planar.n_modes and not array.condition_number < SINGULAR:
+        raise InputError(
+            f"{key}: expected patches that reach every mode, found a singular Φ_V (condition number"
+            f" {array.condition_number:.1g}): move them, or use more of them"
+        )
+    return array
 
 
 def _height(key: str, body: ModalBody, number: int, start: float, end: float) -> float:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolveError
 from .patches import PatchArray
 
 Array = NDArray[np.float64]
@@ -34,16 +33,10 @@ class Voltages:
 
 
 def solve_voltages(patches: PatchArray, F_p: Array) -> Voltages:
-    """Voltages that produce the modal forces F_p (T, n). Raises `SolveError` when Φ_V is square and singular."""
+    """Voltages that produce the modal forces F_p (T, n)."""
     n, k = patches.Phi_V.shape
     if n == k:
-        try:
-            required = np.linalg.solve(patches.Phi_V, F_p.T).T
-        except np.linalg.LinAlgError:
-            raise SolveError(
-                f'pzt "{patches.body}": the patches cannot reach every mode (Φ_V is singular): move them, or use more'
-                " of them"
-            ) from None
+        required = np.linalg.solve(patches.Phi_V, F_p.T).T
     else:
         required = F_p @ np.linalg.pinv(patches.Phi_V).T
     limit = np.inf if patches.limit is None else patches.limit

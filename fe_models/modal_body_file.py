@@ -129,11 +129,10 @@ def _image(body: ModalBody) -> bytes:
         file.attrs["format_version"] = FORMAT_VERSION
         for name in _ATTRIBUTES:
             file.attrs[name] = getattr(body, name)
-        for name, dataset in _DATASETS.items():
-            file[dataset] = getattr(body, name)
+        _write_arrays(file, {dataset: getattr(body, name) for name, dataset in _DATASETS.items()})
         for dataset, unit in _UNITS.items():
             file[dataset].attrs["unit"] = unit
-        file["modes"].create_dataset("family", data=list(body.family), dtype=h5py.string_dtype())
+        file["modes"].create_dataset("family", data=list(body.family), dtype=h5py.string_dtype(), track_times=False)
         _write_arrays(file.create_group("geometric_stiffness"), body.geometric_stiffness)
         for name, interface in body.interfaces.items():
             _write_arrays(file.create_group(f"interfaces/{name}"), vars(interface))
@@ -147,4 +146,4 @@ def _image(body: ModalBody) -> bytes:
 def _write_arrays(group: h5py.Group, arrays: Mapping[str, NDArray[np.generic] | None]) -> None:
     for name, array in arrays.items():
         if array is not None:
-            group[name] = array
+            group.create_dataset(name, data=array, track_times=False)
