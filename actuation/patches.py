@@ -54,8 +54,8 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     """Place the patches of `layout` on a link.
 
     c = E_p d31 w_p (t_p + t_b)/2 with the link's height t_b in the plane; a patch works on the difference of the
-    section rotations at its ends. Raises `InputError` for a patch beyond the link or across a step of its section, and for as many patches as modes
-    that do not reach them all.
+    section rotations at its ends. Raises `InputError` for a patch beyond the link or across a step of its section, and
+    for as many patches as modes that do not reach them all.
     """
     key = f'{scene_path}: pzt "{layout.body}"'
     if layout.centers is not None:

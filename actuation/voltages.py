@@ -35,10 +35,7 @@ class Voltages:
 def solve_voltages(patches: PatchArray, F_p: Array) -> Voltages:
     """Voltages that produce the modal forces F_p (T, n)."""
     n, k = patches.Phi_V.shape
-    if n == k:
-        required = np.linalg.solve(patches.Phi_V, F_p.T).T
-    else:
-        required = F_p @ np.linalg.pinv(patches.Phi_V).T
+    required = np.linalg.solve(patches.Phi_V, F_p.T).T if n == k else F_p @ np.linalg.pinv(patches.Phi_V).T
     limit = np.inf if patches.limit is None else patches.limit
     within_limit = np.clip(required, -limit, limit)
     residual = np.linalg.norm(F_p - within_limit @ patches.Phi_V.T, axis=1)
