@@ -230,40 +230,78 @@ void kinematics(const PlanarBody &body, const double *q, const double *v, Planar
   }
 }
 
+namespace {
+
+// Forces on the frame: (Q_R in body axes, Q_theta) of inertia and gravity.
+Vector3d frame_force(const PlanarBody &body, const double *p, const double *p_dot, const Vector2d &g,
+                     const Vector2d &moment, const PlanarBodyState &s) {
+  const double theta_dot = s.theta_dot;
+  Vector3d Q;
+  Q.head<2>() = body.mass * g + theta_dot * theta_dot * moment - 2 * theta_dot * perpendicular(s.Wp_dot.head<2>());
+  Q[2] = -2 * theta_dot * weighted(body, p, p_dot) + perpendicular(moment).dot(g);
+  if (body.j.size())
+    Q[2] -= 2 * theta_dot * body.j.dot(VectorMap(p_dot, body.modes()));
+  return Q;
+}
+
+// Adds the applied wrenches to the force on the frame, and to z in body axes.
+void add_wrenches(const PlanarBody &body, Vector3d &Q, PlanarBodyState &s) {
+  for (Index k = 0; k < body.markers(); ++k) {
+    const Vector2d f = s.wrench.col(k).head<2>();
+    s.z.segment<2>(3 + 3 * k) = rotate_back(s, f);
+    s.z[5 + 3 * k] = s.wrench(2, k);
+    Q.head<2>() += s.z.segment<2>(3 + 3 * k);
+    Q[2] += perpendicular(s.markers[static_cast<std::size_t>(k)].arm).dot(f) + s.wrench(2, k);
+  }
+}
+
+// Acceleration of marker k = B (a, alpha) + Phi_k p_ddot + velocity terms, with p_ddot from its eliminated rows.
+void eliminate_marker(const PlanarBody &body, Index k, const Eigen::VectorXd &WQ, PlanarBodyState &s) {
+  const Index row = 3 + 3 * k;
+  const Vector2d arm = rotate_back(s, s.markers[static_cast<std::size_t>(k)].arm);
+  Matrix3d B = -s.G.block<3, 3>(row, 0);
+  B(0, 0) += 1;
+  B(1, 1) += 1;
+  B(0, 2) -= arm.y();
+  B(1, 2) += arm.x();
+  B(2, 2) += 1;
+  Vector3d a = B * s.free_frame + WQ.segment<3>(row);
+  a.head<2>() += -s.theta_dot * s.theta_dot * arm + 2 * s.theta_dot * perpendicular(s.Wp_dot.segment<2>(row));
+  const Vector2d a_global = rotate(s, a.head<2>());
+  s.free_acceleration.col(k) << a_global, a[2];
+  for (int c = 0; c < 3; ++c) {
+    const double x = B(0, c), y = B(1, c);
+    B(0, c) = s.cosine * x - s.sine * y;
+    B(1, c) = s.sine * x + s.cosine * y;
+  }
+  for (int r = 0; r < body.marker_rows[static_cast<std::size_t>(k)]; ++r)
+    s.Z_transposed.col(3 * k + r) = forward(s.L, B.row(r).transpose());
+}
+
+} // namespace
+
 void free_motion(const PlanarBody &body, const double *q, const double *v, const Vector2d &gravity,
                  PlanarBodyState &s) {
   const double *p = q + 3, *p_dot = v + 3;
-  const double theta_dot = s.theta_dot, theta_dot_squared = theta_dot * theta_dot;
-  const Index K = body.markers();
   const Vector2d g = rotate_back(s, gravity);
   const Vector2d moment = body.first_moment + s.Wp.head<2>(); // s = s0 + S_bar p
+  Vector3d Q = frame_force(body, p, p_dot, g, moment, s);
 
   // Known part of the modal forces: Q_f = theta_dot^2 p - K p - D p_dot + W^T z + extra
   s.z.setZero();
   s.z.head<2>() = g;
-  Vector3d Q; // (Q_R in body axes, Q_theta)
-  Q.head<2>() = body.mass * g + theta_dot_squared * moment - 2 * theta_dot * perpendicular(s.Wp_dot.head<2>());
-  Q[2] = -2 * theta_dot * weighted(body, p, p_dot) + perpendicular(moment).dot(g);
-  if (body.j.size())
-    Q[2] -= 2 * theta_dot * body.j.dot(VectorMap(p_dot, body.modes()));
-  if (s.has_wrench)
-    for (Index k = 0; k < K; ++k) {
-      const Vector2d f = s.wrench.col(k).head<2>();
-      s.z.segment<2>(3 + 3 * k) = rotate_back(s, f);
-      s.z[5 + 3 * k] = s.wrench(2, k);
-      Q.head<2>() += s.z.segment<2>(3 + 3 * k);
-      Q[2] += perpendicular(s.markers[static_cast<std::size_t>(k)].arm).dot(f) + s.wrench(2, k);
-    }
   auto &WQ = s.Wk; // W Q_f, in place of W (K p + D p_dot)
-  WQ = theta_dot_squared * s.Wp - s.Wk + s.G.col(0) * g.x() + s.G.col(1) * g.y();
-  if (s.has_wrench)
+  WQ = s.theta_dot * s.theta_dot * s.Wp - s.Wk + s.G.col(0) * g.x() + s.G.col(1) * g.y();
+  if (s.has_wrench) {
+    add_wrenches(body, Q, s);
     WQ.noalias() += s.G.rightCols(s.padded_rows - 3) * s.z.tail(s.padded_rows - 3);
+  }
   if (collect_extra(body, p, p_dot, s))
     WQ += s.W_extra;
   else
     s.extra.setZero();
 
-  // Mass matrix and force of the frame after elimination
+  // The frame after elimination of p
   const Vector2d coupling = perpendicular(moment) - s.G.col(2).head<2>();
   double inertia = body.inertia + weighted(body, p, p) - s.G(2, 2);
   if (body.j.size())
@@ -271,32 +309,9 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
   factorise_rotation(coupling, inertia, s);
   s.free_frame = backward(s.L, forward(s.L, Q - WQ.head<3>()).cwiseProduct(s.D_inverse));
 
-  // Markers: acceleration = B (a, alpha) + Phi p_ddot + velocity terms, with p_ddot from the eliminated rows
-  for (Index k = 0; k < K; ++k) {
-    const auto &m = s.markers[static_cast<std::size_t>(k)];
-    const Index row = 3 + 3 * k;
-    const Matrix3d G = s.G.block<3, 3>(row, 0);
-    const Vector2d arm = rotate_back(s, m.arm);
-    Matrix3d B = -G;
-    B(0, 0) += 1;
-    B(1, 1) += 1;
-    B(0, 2) -= arm.y();
-    B(1, 2) += arm.x();
-    B(2, 2) += 1;
-    Vector3d a = B * s.free_frame + WQ.segment<3>(row);
-    a.head<2>() += -theta_dot_squared * arm + 2 * theta_dot * perpendicular(s.Wp_dot.segment<2>(row));
-    const Vector2d a_global = rotate(s, a.head<2>());
-    s.free_acceleration.col(k) << a_global, a[2];
-    for (int c = 0; c < 3; ++c) {
-      const double x = B(0, c), y = B(1, c);
-      B(0, c) = s.cosine * x - s.sine * y;
-      B(1, c) = s.sine * x + s.cosine * y;
-    }
-    for (int r = 0; r < body.marker_rows[static_cast<std::size_t>(k)]; ++r)
-      s.Z_transposed.col(3 * k + r) = forward(s.L, B.row(r).transpose());
-  }
-
-  for (Index k = 0; k < K; ++k)
+  for (Index k = 0; k < body.markers(); ++k)
+    eliminate_marker(body, k, WQ, s);
+  for (Index k = 0; k < body.markers(); ++k)
     for (Index l = 0; l <= k; ++l)
       add_mobility(body, k, l, s);
 }
@@ -326,8 +341,7 @@ void accelerations(const PlanarBody &body, const double *q, const double *v, con
   const Index n = body.modes(), rows = body.W.rows();
   const Vector3d x = s.free_frame + frame_response(body, constraint_wrench, s, s.z_response);
   s.z_response += s.z;
-  s.z_response.head<2>() -= s.free_frame.head<2>();
-  s.z_response[2] -= s.free_frame[2];
+  s.z_response.head<3>() -= s.free_frame;
   const Vector2d R_ddot = rotate(s, x.head<2>());
   a[0] = R_ddot.x();
   a[1] = R_ddot.y();
