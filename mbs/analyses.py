@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import SolveError
 from . import _core
 from .initial_state import State, check_reach, undeformed_state
-from .model import Array, Assembly, Model
+from .model import ZERO, Array, Assembly, Model
 from .rows import Row
 from .scene_records import Analysis
 from .statics import static_equilibrium
@@ -99,8 +99,7 @@ def run_forward(
     `projector[body]` (n, n) is what the patches of a body make of the modal forces asked of them.
     """
     steered, applied = _steered_rows(model, analysis, source)
-    zero = _core.TimeFunction.constant(0.0)
-    assembly = Assembly(model, model.joints, [*((row, zero) for row in steered), *model.loads])
+    assembly = Assembly(model, model.joints, [*((row, ZERO) for row in steered), *model.loads])
     steering = None
     if source is not None:
         assert source.recording is not None
@@ -127,7 +126,7 @@ def run_static(model: Model, analysis: Analysis) -> Outcome:
     """
     held = [replace(c, target=_core.TimeFunction.constant(c.target(0.0)[0])) for c in model.trajectories]
     assembly = Assembly(model, [*model.joints, *held], model.loads, list(model.motors.values()))
-    state, _ = static_equilibrium(assembly, undeformed_state(assembly))
+    state = static_equilibrium(assembly, undeformed_state(assembly))
     at_rest = State(state.q, np.zeros_like(state.q))
     return _integrate(assembly, analysis, at_rest, None, _resolver(assembly), None, lambda _: True)
 
@@ -136,7 +135,7 @@ def initial_state(assembly: Assembly) -> State:
     """The initial state the scene asks for."""
     start = undeformed_state(assembly)
     if assembly.model.scene.initial.state == "static":
-        start, _ = static_equilibrium(assembly, start)
+        start = static_equilibrium(assembly, start)
     return start
 
 

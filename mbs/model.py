@@ -22,7 +22,7 @@ ZERO = _core.TimeFunction.constant(0.0)
 
 @dataclass(frozen=True)
 class Constraint:
-    """A row that is held at `target`(t); `group` numbers the force or moment of one joint or trajectory."""
+    """A row that is held at `target`(t): `component` of the joint or trajectory `owner`."""
 
     row: Row
     target: TimeFunction

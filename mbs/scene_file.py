@@ -9,38 +9,8 @@ from typing import Any
 
 from ..errors import InputError
 from ..validation import did_you_mean, load_toml, quoted, validate
-from .scene_records import (
-    GROUND,
-    Analysis,
-    Body,
-    Initial,
-    Joint,
-    Load,
-    Payload,
-    PztLayout,
-    RigidBody,
-    Scene,
-    SceneKeys,
-    Trajectory,
-    split_point,
-)
+from .scene_records import GROUND, Analysis, Load, Scene, SceneKeys, Trajectory
 from .time_functions import check_domain
-
-__all__ = [
-    "GROUND",
-    "Analysis",
-    "Body",
-    "Initial",
-    "Joint",
-    "Load",
-    "Payload",
-    "PztLayout",
-    "RigidBody",
-    "Scene",
-    "Trajectory",
-    "load_scene",
-    "split_point",
-]
 
 
 def load_scene(path: Path) -> Scene:

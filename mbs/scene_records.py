@@ -363,21 +363,3 @@ class Scene(SceneKeys):
 
     path: Path
     text: str
-
-
-__all__ = [
-    "GROUND",
-    "Analysis",
-    "Body",
-    "Initial",
-    "Joint",
-    "Load",
-    "Payload",
-    "PztLayout",
-    "RigidBody",
-    "Scene",
-    "SceneKeys",
-    "Trajectory",
-    "Waypoints",
-    "split_point",
-]

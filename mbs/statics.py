@@ -14,8 +14,8 @@ MOST_ITERATIONS = 60
 TOLERANCE = 1e-12  # residual forces relative to the largest of their terms
 
 
-def static_equilibrium(assembly: Assembly, start: State) -> tuple[State, Array]:
-    """Solve Q(q) − C_qᵀλ = 0, C(q, 0) = 0 by Newton from `start`; returns the state (v kept on Ċ = 0) and λ.
+def static_equilibrium(assembly: Assembly, start: State) -> State:
+    """Solve Q(q) − C_qᵀλ = 0, C(q, 0) = 0 by Newton from `start`; returns the state (v kept on Ċ = 0).
 
     The Jacobian is taken by central differences: convergence is to the exact residual, the slope only sets the pace.
     Raises `SolveError` where the robot has no equilibrium near the start.
@@ -35,7 +35,7 @@ def static_equilibrium(assembly: Assembly, start: State) -> tuple[State, Array]:
     for _ in range(MOST_ITERATIONS):
         r, size = residual(x)
         if np.abs(r[:n]).max() <= TOLERANCE * size and np.abs(r[n:]).max(initial=0.0) <= TOLERANCE:
-            return _with_rates(assembly, x[:n], start.v), x[n:]
+            return _with_rates(assembly, x[:n], start.v)
         try:
             step = np.linalg.solve(_jacobian(lambda y: residual(y)[0], x), r)
         except np.linalg.LinAlgError:

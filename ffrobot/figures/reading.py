@@ -49,10 +49,6 @@ class Results:
         """Names of the analyses that the file holds, in the order of the scene."""
         return [entry["name"] for entry in self.scene["analysis"] if entry["name"] in self._file]
 
-    def attribute(self, analysis: str, name: str) -> str:
-        """An attribute of an analysis, such as its `kind`; empty where the file has none."""
-        return str(self._file[analysis].attrs.get(name, ""))
-
     def names(self, group: str) -> list[str]:
         """Names inside a group such as `inverse/points`; none when the file does not have it."""
         return list(self._file[group]) if group in self._file else []
