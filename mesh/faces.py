@@ -31,6 +31,8 @@ IN_PLANE = 1e-5
 # Neighbouring facets belong to one smooth face when their normals are closer than this; a circle may have 8 edges.
 _SMOOTH = np.cos(np.radians(50))
 _ALONG = np.cos(np.radians(30))
+# How far from a face, relative to its size, the point may lie that is to pick it.
+_NEAR = 0.02
 _LISTED = 12
 
 
@@ -85,9 +87,9 @@ class SmoothFace:
         weights = boundary.area[facets] / boundary.area[facets].sum()
         normals = boundary.normal[facets]
         normal = weights @ normals
-        # Directions of the normals: a cylinder's lie in one plane, and all round in it.
+        # Directions of the normals: a cylinder's lie in one plane (coarse triangles on it: nearly), all round in it.
         spread, directions = np.linalg.eigh(normals.T @ (weights[:, None] * normals))
-        around = spread[0] < 0.02 and spread[1] > 0.15 and np.linalg.norm(normal) < 0.3
+        around = spread[0] < 0.06 and spread[1] > 0.15 and np.linalg.norm(normal) < 0.3
         axis = directions[:, 0] if around else None
         center = weights @ boundary.centroid[facets]
         return cls(facets, center, float(boundary.area[facets].sum()), normal, axis)
@@ -113,7 +115,7 @@ class SmoothFace:
     def __str__(self) -> str:
         facing = "axis" if self.axis is not None else "normal"
         direction = self.axis if self.axis is not None else self.normal
-        return f"center {_show(self.center)} m, {facing} {_show(direction)}, {self.area:.4g} m²"
+        return f"center {_show(self.center)} m, {facing} {_show(np.round(direction, 2))}, {self.area:.4g} m²"
 
 
 def named_faces(
@@ -187,19 +189,22 @@ def _nearest(boundary: Boundary, table: InterfaceRecord, path: Path) -> Choice:
     """The smooth face nearest to the table's position among those that face along its normal."""
     position, normal = np.array(table.position, dtype=np.float64), np.array(table.normal, dtype=np.float64)
     where = f"{path}: interface.position of {table.name}"
-    size = np.linalg.norm(normal)
-    if size == 0:
+    magnitude = np.linalg.norm(normal)
+    if magnitude == 0:
         raise InputError(f"{path}: interface.normal of {table.name}: expected a direction, found {table.normal}")
-    facing = [face for face in boundary.smooth_faces if face.faces_along(normal / size)]
+    facing = [face for face in boundary.smooth_faces if face.faces_along(normal / magnitude)]
     distances = np.array([face.distance(boundary, position) for face in facing])
-    wanted = f"a face near {_show(position)} m with the outward normal (of a bore: the axis) {_show(normal / size)}"
+    wanted = (
+        f"a face near {_show(position)} m with the outward normal (of a bore: the axis) {_show(normal / magnitude)}"
+    )
     if not facing:
         _reject(where, wanted, "none", boundary)
     best = int(np.argmin(distances))
-    reach = np.sqrt(facing[best].area)
-    if distances[best] > 0.5 * reach:
+    size = np.sqrt(facing[best].area)
+    # A point given for a face lies on it; for a bore, somewhere inside.
+    if distances[best] > (0.25 if facing[best].axis is not None else _NEAR) * size:
         _reject(where, wanted, f"none nearer than {distances[best]:.4g} m", boundary)
-    rivals = np.flatnonzero(distances <= distances[best] + 1e-3 * reach)
+    rivals = np.flatnonzero(distances <= distances[best] + 1e-3 * size)
     if rivals.size > 1:
         _reject(where, wanted, f"{rivals.size} that are equally near", boundary)
     return facing[best].facets
@@ -271,4 +276,5 @@ def _reject(where: str, expected: str, found: str, boundary: Boundary) -> NoRetu
 
 
 def _show(vector: Floats) -> str:
-    return f"({', '.join(f'{value:.4g}' for value in np.round(vector, 12) + 0.0)})"
+    # Below a micrometre, or in a unit vector, there is nothing to tell; adding zero turns −0 into 0.
+    return f"({', '.join(f'{value:.4g}' for value in np.round(vector, 6) + 0.0)})"

@@ -37,7 +37,11 @@ def part_mesh(
     """Make or read the part, put it into the link's frame, check it, name its faces.
 
     Args:
-        geometry, record, interfaces, patches: tables of the link file at `path`.
+        geometry: of the link file.
+        record: its table `mesh`.
+        interfaces: its tables `interface`.
+        patches: its table `surface_patch`.
+        path: the link file, named in errors.
         progress: is told what is being done.
 
     Raises:

@@ -53,13 +53,13 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
 def _declared_unit(file: Path) -> str:
     """The unit of length that the file declares, by OpenCASCADE's name; millimetres if none."""
     text = re.sub(r"\s+", "", file.read_text(encoding="latin-1")).upper()
-    other = re.search(
-        r"CONVERSION_BASED_UNIT\('(\w+)'[^)]*\)LENGTH_UNIT\(\)|LENGTH_UNIT\(\)[^;]*CONVERSION_BASED_UNIT\('(\w+)'", text
-    )  # noqa: E501
-    if other and (name := other[1] or other[2]) in _OTHER_UNITS:
-        return _OTHER_UNITS[name]
-    si = re.search(r"LENGTH_UNIT\(\)[^;]*?SI_UNIT\((\$|\.\w+\.),\.METRE\.\)", text)
-    return _SI_PREFIXES.get(si[1], "MM") if si else "MM"
+    units = [entity for entity in text.split(";") if "LENGTH_UNIT()" in entity]
+    # An inch is declared as so many millimetres: the conversion comes first.
+    for entity in units:
+        if (other := re.search(r"CONVERSION_BASED_UNIT\('(\w+)'", entity)) and other[1] in _OTHER_UNITS:
+            return _OTHER_UNITS[other[1]]
+    prefixes = [found[1] for entity in units if (found := re.search(r"SI_UNIT\((\$|\.\w+\.),\.METRE\.\)", entity))]
+    return _SI_PREFIXES.get(prefixes[0], "MM") if prefixes else "MM"
 
 
 def _check_volumes(where: str) -> None:
@@ -93,7 +93,8 @@ def _name_groups() -> None:
         groups: dict[str, list[int]] = {}
         for entity in gmsh.model.getEntities(dim):
             label = gmsh.model.getEntityName(*entity).split("/")[-1].strip()
-            if label:
+            # OpenCASCADE's own writer calls nameless shapes after itself.
+            if label and not label.startswith("Open CASCADE"):
                 groups.setdefault(label, []).append(entity[1])
         for label, tags in groups.items():
             gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, tags), label)
