@@ -125,7 +125,8 @@ def straightened(part: PartMesh) -> PartMesh:
 def _determinants(part: PartMesh) -> Floats:
     """(c, s) determinants of the Jacobian at the corners, and in curved cells at the other nodes of degree 2 too."""
     at = reference_nodes(part.cell, part.degree)
-    return np.linalg.det(jacobians(part.points[part.cells], part.cell, part.degree, at))
+    determinants: Floats = np.linalg.det(jacobians(part.points[part.cells], part.cell, part.degree, at))
+    return determinants
 
 
 def _quality(part: PartMesh) -> Floats:

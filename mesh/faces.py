@@ -99,7 +99,7 @@ class SmoothFace:
         if self.axis is not None:
             return abs(float(self.axis @ direction)) > _ALONG
         size = float(np.linalg.norm(self.normal))
-        return size > 0.5 and float(self.normal @ direction) > _ALONG * size
+        return size > 0.5 and bool(self.normal @ direction > _ALONG * size)
 
     def distance(self, boundary: Boundary, position: Floats) -> float:
         """From `position` (3,) to the nearest of its facets, roughly; of a bore, to its center."""
