@@ -20,7 +20,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..mesh.compat import compile_form, constant_space, geometry_nodes, lagrange_space, space_nodes
+from ..mesh.compat import compiled_form, constant_space, geometry_degree, lagrange_space, node_map
 from .constitutive import stiffness
 from .link_records import Material, OrthotropicMaterial
 
@@ -50,23 +50,26 @@ class ScalarMass:
 
     Attributes:
         csr: (owned, owned + foreign).
-        scatter: fetches the foreign nodes' displacements of a vector; None where there are none.
+        scatter: fetches the foreign nodes' displacements of a vector into `foreign`; None on one process.
+        comm: of the processes.
     """
 
     csr: sp.csr_matrix
     scatter: PETSc.Scatter | None
     foreign: PETSc.Vec
+    comm: Any
 
     def __matmul__(self, U: Floats) -> Floats:
-        """M U of U (owned, k) with k a multiple of 3; collective."""
+        """M U of displacements U (3 owned, n), the same matrix for each component; collective."""
+        n = U.shape[1]
         if self.scatter is None:
-            return np.asarray(self.csr @ U)
-        columns = []
-        vector = self._vector(U.shape[0])
-        for part in np.split(U, U.shape[1] // 3, axis=1):
-            vector.array[:] = part.ravel()
-            columns.append(self.apply(vector))
-        return np.concatenate(columns, axis=1)
+            return np.asarray(self.csr @ U.reshape(-1, 3 * n)).reshape(-1, n)
+        result = np.empty_like(U)
+        vector = PETSc.Vec().createMPI((U.shape[0], None), bsize=3, comm=self.comm)
+        for k in range(n):
+            vector.array[:] = U[:, k]
+            result[:, k] = self.apply(vector).ravel()
+        return result
 
     def apply(self, vector: PETSc.Vec) -> Floats:
         """(owned, 3) M u of the displacements in `vector`; collective."""
@@ -75,15 +78,6 @@ class ScalarMass:
             return np.asarray(self.csr @ own)
         self.scatter.scatter(vector, self.foreign)
         return np.asarray(self.csr @ np.concatenate([own, self.foreign.array_r.reshape(-1, 3)]))
-
-    def _vector(self, nodes: int) -> PETSc.Vec:
-        return PETSc.Vec().createMPI((3 * nodes, None), bsize=3, comm=self.scatter_comm)
-
-    @property
-    def scatter_comm(self) -> Any:
-        """Communicator of the vectors."""
-        assert self.scatter is not None
-        return self.scatter.comm
 
 
 @dataclass(frozen=True)
@@ -98,7 +92,9 @@ class SolidModel:
         nodes: (c, d) nodes of each cell, numbered as this rank sees them: its own first, ghosts behind.
         materials: of the cells.
         mass: scalar mass matrix.
-        pattern: blocks of the stiffness matrix in the rows of this rank: above the diagonal within, and beyond.
+        pattern: number of blocks in each row of the stiffness matrix: in this rank's columns and in later ranks'.
+        local_to_global: numbers of the nodes that this rank sees.
+        stiffness_form: compiled.
     """
 
     mesh: Mesh
@@ -136,13 +132,15 @@ class SolidModel:
         return result
 
     def with_ghosts(self, U: Floats) -> Floats:
-        """(owned + ghosts, 3, k) of U (owned, 3, k): ghosts fetched from their owners; collective."""
+        """(3 (owned + ghosts), n) degrees of freedom of U (3 owned, n): ghosts fetched from their owners; collective."""
+        if self.comm.size == 1:
+            return U
         function = fem.Function(self.V)
-        result = np.empty((function.x.array.size // 3, 3, U.shape[2]))
-        for k in range(U.shape[2]):
-            function.x.array[: 3 * self.owned] = U[:, :, k].ravel()
+        result = np.empty((function.x.array.size, U.shape[1]))
+        for k, u in enumerate(U.T):
+            function.x.array[: u.size] = u
             function.x.scatter_forward()
-            result[:, :, k] = function.x.array.reshape(-1, 3)
+            result[:, k] = function.x.array
         return result
 
 
@@ -162,13 +160,13 @@ def material_map(
 def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
     """Spaces, mass matrix and stiffness form of a solid; `stiffness_matrix` then assembles."""
     V, S = lagrange_space(mesh, order, vector=True), lagrange_space(mesh, order, vector=False)
-    nodes = space_nodes(V)
-    assert np.array_equal(nodes, space_nodes(S)), "scalar and vector space number their nodes alike"
+    nodes = node_map(V)
+    assert np.array_equal(nodes, node_map(S)), "scalar and vector space number their nodes alike"
     owned = V.dofmap.index_map.size_local
     a, b = ufl.TrialFunction(S), ufl.TestFunction(S)
     rho = _cellwise(mesh, materials.density, materials.of_cell)
     dx = ufl.dx(metadata={"quadrature_degree": mass_degree(mesh, order)})
-    M = fem.petsc.assemble_matrix(compile_form(rho * a * b * dx))
+    M = fem.petsc.assemble_matrix(compiled_form(rho * a * b * dx))
     M.assemble()
     mass, pattern = _scalar_mass(M)
     return SolidModel(
@@ -181,7 +179,7 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
         mass=mass,
         pattern=pattern,
         local_to_global=M.getLGMap()[0],
-        stiffness_form=compile_form(_stiffness_form(V, materials, strain_degree(mesh, order))),
+        stiffness_form=compiled_form(_stiffness_form(V, materials, strain_degree(mesh, order))),
     )
 
 
@@ -203,14 +201,14 @@ def stiffness_matrix(model: SolidModel, held: Sequence[Any] = ()) -> PETSc.Mat:
 
 def strain_degree(mesh: Mesh, order: int) -> int:
     """Degree of quadrature for products of two strains: exact on straight-sided cells."""
-    _, geometry = geometry_nodes(mesh)
+    geometry = geometry_degree(mesh)
     highest = order - 1 if _is_simplex(mesh) else order
     return 2 * highest + 2 * (geometry - 1)
 
 
 def mass_degree(mesh: Mesh, order: int) -> int:
     """Degree of quadrature for products of two displacements: exact, but for curved order beyond the second."""
-    _, geometry = geometry_nodes(mesh)
+    geometry = geometry_degree(mesh)
     return 2 * order + (3 * (geometry - 1) if _is_simplex(mesh) else 3 * geometry - 1)
 
 
@@ -241,13 +239,13 @@ def _stiffness_form(V: fem.FunctionSpace, materials: MaterialMap, degree: int) -
 def _cellwise(mesh: Mesh, values: Floats, of_cell: Integers) -> fem.Function:
     """The function that is values[of_cell[c]] in cell c."""
     function = fem.Function(constant_space(mesh, values.shape[1:]))
-    cells = space_nodes(function.function_space)[:, 0]
+    cells = node_map(function.function_space)[:, 0]
     function.x.array.reshape(-1, *values.shape[1:])[cells] = values[of_cell]
     return function
 
 
 def _is_simplex(mesh: Mesh) -> bool:
-    return str(mesh.ufl_cell()) == "tetrahedron"
+    return mesh.ufl_domain().ufl_cell().cellname() == "tetrahedron"
 
 
 def _scalar_mass(M: PETSc.Mat) -> tuple[ScalarMass, tuple[Integers, Integers]]:
@@ -268,4 +266,4 @@ def _scalar_mass(M: PETSc.Mat) -> tuple[ScalarMass, tuple[Integers, Integers]]:
         there = PETSc.IS().createStride(3 * foreign.size, comm=PETSc.COMM_SELF)
         scatter = PETSc.Scatter().create(source, here, target, there)
     counts = (within.astype(PETSc.IntType), beyond.astype(PETSc.IntType))
-    return ScalarMass(csr, scatter, target), counts
+    return ScalarMass(csr, scatter, target, M.comm), counts

@@ -159,7 +159,8 @@ def compiled_form(form: ufl.Form) -> fem.Form:
 
 def lagrange_element(space: FunctionSpace) -> basix.finite_element.FiniteElement:
     """Basix element of one component of a vector Lagrange space."""
-    return space.sub(0).element.basix_element
+    scalar = space.sub(0) if space.num_sub_spaces else space
+    return scalar.element.basix_element
 
 
 def node_map(space: FunctionSpace) -> Integers:
@@ -200,13 +201,6 @@ def _compiling() -> Iterator[None]:
         logging.disable(before)
 
 
-def lagrange_element(cell: str, degree: int) -> basix.finite_element.FiniteElement:
-    """Basix Lagrange element on a reference `cell` ("tetrahedron", "hexahedron"), as `lagrange_space` uses it."""
-    return basix.create_element(
-        _FAMILIES["P"], getattr(basix.CellType, cell), degree, basix.LagrangeVariant.gll_warped
-    )
-
-
 def lagrange_space(mesh: Mesh, degree: int, *, vector: bool) -> FunctionSpace:
     """Continuous Lagrange functions on a mesh of solids: scalar ones, or one for each direction of space."""
     return _space(mesh, degree, (3,) if vector else ())
@@ -221,7 +215,7 @@ def _space(mesh: Mesh, degree: int, shape: tuple[int, ...]) -> FunctionSpace:
     options: dict[str, Any] = {"discontinuous": degree == 0}
     if degree:
         options["lagrange_variant"] = basix.LagrangeVariant.gll_warped
-    cell = getattr(basix.CellType, mesh.topology.cell_name() if not _OLD else str(mesh.ufl_cell()))
+    cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
     with _compiling():
         if _OLD:
             element = basix_ufl.create_element(_FAMILIES["P"], cell, degree, **options)
@@ -229,26 +223,3 @@ def _space(mesh: Mesh, degree: int, shape: tuple[int, ...]) -> FunctionSpace:
             return fem.FunctionSpace(mesh, wrap(element, *([shape] if len(shape) == 2 else shape)))
         element = basix_ufl.element(_FAMILIES["P"], cell, degree, shape=shape or None, **options)
         return fem.functionspace(mesh, element)
-
-
-def space_nodes(space: FunctionSpace) -> Integers:
-    """(c, d) nodes of each cell (this rank's own cells first, then its ghosts), in the order of `lagrange_element`."""
-    dofs = space.dofmap.list
-    cells = space.mesh.topology.index_map(3)
-    array = np.asarray(dofs.array if _OLD else dofs, dtype=np.int64)
-    return array.reshape(cells.size_local + cells.num_ghosts, -1)
-
-
-def geometry_nodes(mesh: Mesh) -> tuple[Integers, int]:
-    """(c, v) points of each cell in the order of its coordinate element, and the degree of that element."""
-    dofs = mesh.geometry.dofmap
-    cells = mesh.topology.index_map(3)
-    array = np.asarray(dofs.array if _OLD else dofs, dtype=np.int64)
-    cmap = mesh.geometry.cmap if _OLD or not hasattr(mesh.geometry, "cmaps") else mesh.geometry.cmaps[0]
-    return array.reshape(cells.size_local + cells.num_ghosts, -1), int(cmap.degree)
-
-
-def compile_form(form: ufl.Form) -> Any:
-    """A form ready for assembly."""
-    with _compiling():
-        return fem.form(form)
