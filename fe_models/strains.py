@@ -10,7 +10,7 @@ from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..mesh.compat import geometry_element, geometry_map, lagrange_element, node_map
+from ..mesh.compat import coordinate_element, geometry_nodes, lagrange_element, node_map
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -47,8 +47,8 @@ def modal_strains(space: FunctionSpace, cells: Integers, X: Floats, modes: Float
 
 def jacobians(mesh: Mesh, cells: Integers, X: Floats) -> Floats:
     """(q, 3, 3) J = ∂x/∂X at reference coordinates X (q, 3) in each of `cells` (q,)."""
-    shapes = geometry_element(mesh).tabulate(1, X)[1:, :, :, 0]
-    corners = mesh.geometry.x[geometry_map(mesh)[cells]]
+    shapes = coordinate_element(mesh).tabulate(1, X)[1:, :, :, 0]
+    corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     return np.asarray(np.einsum("kqv,qvi->qik", shapes, corners))
 
 
@@ -64,7 +64,7 @@ def locate(mesh: Mesh, points: Floats, slack: float) -> tuple[Integers, Integers
         For each hit the point (h,), the cell (h,) and the reference coordinates (h, 3).
     """
     owned = mesh.topology.index_map(3).size_local
-    corners = mesh.geometry.x[geometry_map(mesh)[:owned]]
+    corners = mesh.geometry.x[geometry_nodes(mesh)]
     if not owned or not len(points):
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3))
     centers = corners.mean(axis=1)
@@ -88,8 +88,8 @@ def locate(mesh: Mesh, points: Floats, slack: float) -> tuple[Integers, Integers
 
 def pulled_back(mesh: Mesh, cells: Integers, points: Floats) -> Floats:
     """(q, 3) reference coordinates of `points` (q, 3) in `cells` (q,); far outside a curved cell anything."""
-    element = geometry_element(mesh)
-    corners = mesh.geometry.x[geometry_map(mesh)[cells]]
+    element = coordinate_element(mesh)
+    corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     X = np.full_like(points, 0.25)
     for _ in range(NEWTON_STEPS if len(points) else 0):
         x = np.einsum("qv,qvi->qi", element.tabulate(0, X)[0, :, :, 0], corners)

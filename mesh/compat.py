@@ -169,18 +169,6 @@ def node_map(space: FunctionSpace) -> Integers:
     return np.asarray(nodes.array if _OLD else nodes, dtype=np.int64).reshape(-1, lagrange_element(space).dim)
 
 
-def geometry_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
-    """Basix element of the map from the reference cell to a cell, of degree 1 or 2."""
-    cell = getattr(basix.CellType, mesh.topology.cell_type.name)
-    return basix.create_element(_FAMILIES["P"], cell, mesh.geometry.cmap.degree, basix.LagrangeVariant.equispaced)
-
-
-def geometry_map(mesh: Mesh) -> Integers:
-    """(c, v) points of `mesh.geometry.x` that shape each cell of this process, ghosts too."""
-    points = mesh.geometry.dofmap
-    return np.asarray(points.array if _OLD else points, dtype=np.int64).reshape(-1, geometry_element(mesh).dim)
-
-
 @contextmanager
 def _compiling() -> Iterator[None]:
     """FFCx compiles what it does not find in its cache (`fenics` in the XDG cache folder): mute its and gcc's log.
