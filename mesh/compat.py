@@ -151,6 +151,24 @@ def assemble_matrix(form: ufl.Form) -> sp.csr_matrix:
     return sp.csr_matrix((matrix.data.copy(), matrix.indices.copy(), matrix.indptr.copy()), shape=(test, trial))
 
 
+def compiled_form(form: ufl.Form) -> fem.Form:
+    """`form` ready to be assembled."""
+    with _compiling():
+        return fem.form(form)
+
+
+def lagrange_element(space: FunctionSpace) -> basix.finite_element.FiniteElement:
+    """Basix element of one component of a vector Lagrange space."""
+    scalar = space.sub(0) if space.num_sub_spaces else space
+    return scalar.element.basix_element
+
+
+def node_map(space: FunctionSpace) -> Integers:
+    """(c, d) nodes of each cell of this process, ghosts too; component i of node k is degree of freedom 3k + i."""
+    nodes = space.dofmap.list
+    return np.asarray(nodes.array if _OLD else nodes, dtype=np.int64).reshape(-1, lagrange_element(space).dim)
+
+
 @contextmanager
 def _compiling() -> Iterator[None]:
     """FFCx compiles what it does not find in its cache (`fenics` in the XDG cache folder): mute its and gcc's log.
@@ -169,3 +187,27 @@ def _compiling() -> Iterator[None]:
         ) from None
     finally:
         logging.disable(before)
+
+
+def lagrange_space(mesh: Mesh, degree: int, *, vector: bool) -> FunctionSpace:
+    """Continuous Lagrange functions on a mesh of solids: scalar ones, or one for each direction of space."""
+    return _space(mesh, degree, (3,) if vector else ())
+
+
+def constant_space(mesh: Mesh, shape: tuple[int, ...]) -> FunctionSpace:
+    """Functions that are constant in each cell, with values of `shape`."""
+    return _space(mesh, 0, shape)
+
+
+def _space(mesh: Mesh, degree: int, shape: tuple[int, ...]) -> FunctionSpace:
+    options: dict[str, Any] = {"discontinuous": degree == 0}
+    if degree:
+        options["lagrange_variant"] = basix.LagrangeVariant.gll_warped
+    cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
+    with _compiling():
+        if _OLD:
+            element = basix_ufl.create_element(_FAMILIES["P"], cell, degree, **options)
+            wrap = {0: lambda e: e, 1: basix_ufl.VectorElement, 2: basix_ufl.TensorElement}[len(shape)]
+            return fem.FunctionSpace(mesh, wrap(element, *([shape] if len(shape) == 2 else shape)))
+        element = basix_ufl.element(_FAMILIES["P"], cell, degree, shape=shape or None, **options)
+        return fem.functionspace(mesh, element)
