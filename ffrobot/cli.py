@@ -92,14 +92,13 @@ def info(file: Path) -> None:
 
 
 @cli.command()
-@click.argument("results_file", metavar="RESULTS.h5", type=FILE)
-@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; RESULTS.figures if absent.")
-def plot(results_file: Path, output: Path | None) -> None:
-    """Draw the standard figures of a results file, as PNG and PDF."""
-    from .figures import plot_results
+@click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
+def plot(file: Path, output: Path | None) -> None:
+    """Draw the figures of a results file, or mesh and modes of a modal body file, as PNG and PDF."""
+    from .figures import plot_file
 
-    folder = output or results_file.with_suffix(".figures")
-    for path in plot_results(results_file, folder):
+    for path in plot_file(file, output or file.with_suffix(".figures")):
         click.echo(path)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 
@@ -44,6 +45,7 @@ def _modal_body(body: ModalBody) -> str:
         + ", ".join(f"{name} at ({', '.join(f'{c:g}' for c in i.position)}) m" for name, i in body.interfaces.items()),
         f"stations: {len(body.stations.position)} along the axis",
         f"geometric stiffness: {', '.join(body.geometric_stiffness) or 'none'}",
+        *_optional(body),
     ]
     modes = Table("mode", "family", "frequency (Hz)", "ω (rad/s)", "damping ratio")
     for k, family in enumerate(body.family):
@@ -52,6 +54,18 @@ def _modal_body(body: ModalBody) -> str:
             f"{k + 1}", family, f"{frequency:.6f}", f"{6.283185307179586 * frequency:.5f}", f"{body.damping_ratio[k]:g}"
         )
     return "\n".join(lines) + "\n" + _rendered(modes)
+
+
+def _optional(body: ModalBody) -> Iterator[str]:
+    """Lines on what only some modal bodies have."""
+    for name, point in body.stress.items():
+        yield f"modal stresses at {name}, ({', '.join(f'{c:g}' for c in point.position)}) m"
+    if body.surface_stress is not None:
+        yield f"modal stresses on the surface, at {len(body.surface_stress)} points"
+    if (patches := body.surface_patches) is not None:
+        faces = " and ".join(face for face in ("top", "bottom") if getattr(patches, face) is not None)
+        places = ", ".join(f"{start:g} … {end:g}" for start, end in patches.edges)
+        yield f"patches outlined in the mesh, {faces}, {patches.width:g} m wide: {places} m"
 
 
 def _results(file: h5py.File) -> str:

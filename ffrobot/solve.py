@@ -21,6 +21,7 @@ from .mbs.model import ModalLoad, Model, build_model
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.scene_file import load_scene
 from .mbs.scene_records import Analysis, Scene, split_point
+from .mbs.stress import BodyStress, body_stress
 from .validation import did_you_mean, quoted
 
 
@@ -57,6 +58,7 @@ class Solution:
     Attributes:
         outcomes: by analysis, in the order of the scene.
         voltages: by analysis and body.
+        stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
         skipped: what the scene did not need, one line each.
     """
@@ -67,6 +69,7 @@ class Solution:
     patches: Mapping[str, PatchArray]
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
+    stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
 
@@ -90,6 +93,11 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
                     body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
                     for body, array in solution.patches.items()
                 }
+            solution.stresses[analysis.name] = {
+                name: stress
+                for name, body in solution.bodies.items()
+                if body.modal is not None and (stress := body_stress(outcome, body.planar, body.modal)) is not None
+            }
             solution.seconds[analysis.name] = time.perf_counter() - started
             if outcome.status != "completed":
                 break
