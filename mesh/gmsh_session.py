@@ -151,9 +151,7 @@ def _growing_field(begin: float, end: float, faces: list[int]) -> int:
 def extract_mesh() -> RawMesh:
     """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
     number, points = _points()
-    groups = {
-        dim: {tag: _group_name(dim, tag) for _, tag in gmsh.model.getPhysicalGroups(dim)} for dim in (2, 3)
-    }
+    groups = {dim: {tag: _group_name(dim, tag) for _, tag in gmsh.model.getPhysicalGroups(dim)} for dim in (2, 3)}
     region_of = {
         int(entity): name
         for tag, name in groups[3].items()

@@ -25,9 +25,7 @@ _VOLUME, _FACE = 3, 2
 DimTags = list[tuple[int, int]]
 
 
-def mesh_shape(
-    geometry: SolidGeometry, record: SolidMeshRecord, patches: SurfacePatches | None, path: Path
-) -> Source:
+def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, patches: SurfacePatches | None, path: Path) -> Source:
     """Tetrahedra in the shape that `geometry` describes, the outlines of the `patches` along edges of elements.
 
     Raises:
