@@ -2,8 +2,8 @@
 
 Every cell is cut in its reference coordinates, where it is a few tetrahedra, by marching through these: a tetrahedron
 that the plane cuts contributes one triangle or two. Where the map of the cell bends, the corners and the mid-sides of
-each triangle are moved onto the plane along the faces of the tetrahedra, so that the pieces still meet, and the triangle
-becomes one with six nodes: what remains is of third order in its size.
+each triangle are moved onto the plane along the faces of the tetrahedra, so that the pieces still meet, and the
+triangle becomes one with six nodes: what remains is of third order in its size.
 
 Importing this loads dolfinx.
 """
@@ -109,8 +109,13 @@ class _Cells:
 
 @dataclass(frozen=True)
 class _Triangles:
-    """Pieces of the section: `cell` (t,) among those cut; `ends` (t, 3, 2, 3) the reference coordinates, above and
-    below the plane, of the edges that their corners lie on; `corners` (t, 3, 3)."""
+    """Pieces of the section, in reference coordinates.
+
+    Attributes:
+        cell: (t,) which of the cut cells each lies in.
+        ends: (t, 3, 2, 3) ends, above and below the plane, of the edges that the corners lie on.
+        corners: (t, 3, 3).
+    """
 
     cell: Integers
     ends: Floats

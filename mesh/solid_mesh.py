@@ -11,15 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from dolfinx.mesh import exterior_facet_indices, meshtags
+from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 from ..errors import FfrobotError
-from .cells import CellName, Floats, Integers
+from .cells import CellName, Integers
 from .compat import create_solid_mesh, geometry_nodes
 from .part import part_mesh
 from .part_mesh import PartMesh, facet_keys
 from .records import InterfaceRecord, SolidGeometry, SolidMeshRecord, SurfacePatches
+from .surface import Surface, boundary, reference_facets, surface_of
 
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
@@ -41,6 +42,7 @@ class SolidMesh:
         faces: "root", "tip", the interfaces that are faces, "patch/K/top", "patch/K/bottom" → tag in `facet_tags`; two
             names may have one tag.
         size: mean extent of the cells along x, in m.
+        surface: what a picture shows.
     """
 
     mesh: Mesh
@@ -50,6 +52,7 @@ class SolidMesh:
     regions: Mapping[str, int]
     faces: Mapping[str, int]
     size: float
+    surface: Surface
 
 
 def solid_mesh(
@@ -64,8 +67,11 @@ def solid_mesh(
     """Mesh of a solid link, distributed over `comm`.
 
     Args:
-        geometry, record, interfaces, patches: the tables of the link file at `path`.
-        path: named in errors.
+        geometry: of the link file.
+        record: its table `mesh`.
+        interfaces: its tables `interface`.
+        patches: its table `surface_patch`.
+        path: the link file, named in errors.
         comm: all its processes call.
         progress: is told what is being done.
 
@@ -85,7 +91,7 @@ def solid_mesh(
 
 
 def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> SolidMesh:
-    """dolfinx's mesh of `part`, which rank 0 gives."""
+    """The distributed mesh of `part`, which rank 0 gives and all others pass as None."""
     described = comm.bcast(_description(part) if part is not None else None)
     cell, degree, nodes = described["cell"], described["degree"], described["nodes"]
     cells = part.cells if part is not None else np.empty((0, nodes), dtype=np.int64)
@@ -102,6 +108,7 @@ def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> Solid
         described["regions"],
         described["faces"],
         described["size"],
+        surface_of(mesh),
     )
 
 
@@ -122,35 +129,10 @@ def _description(part: PartMesh) -> dict[str, Any]:
     }
 
 
-def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
-    """The boundary facets of this process.
-
-    Returns:
-        (b,) facets ascending, (b,) the cell and (b, 3 or 4) the nodes (rows of `mesh.geometry.x`) of each, in dolfinx's
-        order of the facet's corners.
-    """
-    mesh.topology.create_connectivity(2, 3)
-    mesh.topology.create_connectivity(3, 2)
-    facets = np.sort(np.asarray(exterior_facet_indices(mesh.topology), dtype=np.int64))
-    to_cells, to_facets = mesh.topology.connectivity(2, 3), mesh.topology.connectivity(3, 2)
-    cells = np.asarray(to_cells.array, dtype=np.int64)[np.asarray(to_cells.offsets)[facets]]
-    corners = facet_corners(mesh)
-    of_cell = np.asarray(to_facets.array).reshape(-1, len(corners))[cells]
-    which = np.argmax(of_cell == facets[:, None], axis=1)
-    nodes = np.take_along_axis(geometry_nodes(mesh)[cells], corners[which], axis=1)
-    return facets, cells, nodes
-
-
-def facet_corners(mesh: Mesh) -> Integers:
-    """(facets of a cell, 3 or 4) corners of each facet of the reference cell, in dolfinx's order."""
-    import basix
-
-    return np.array(basix.topology(getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname()))[2])
-
-
 def _tagged_facets(mesh: Mesh, described: Mapping[str, Any]) -> tuple[Integers, Integers]:
     """Local facets that belong to a face, ascending, and their tags."""
-    facets, _, nodes = boundary(mesh)
+    facets, cells, which = boundary(mesh)
+    nodes = np.take_along_axis(geometry_nodes(mesh)[cells], reference_facets(mesh)[which], axis=1)
     keys = facet_keys(np.asarray(mesh.geometry.input_global_indices)[nodes], described["points"])
     order = np.argsort(described["keys"])
     sorted_keys = described["keys"][order]
