@@ -19,7 +19,7 @@ from .beam import R_X, U_X, FamilyModel, family_model
 from .beam_stress import beam_stresses
 from .eigen import lowest_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
-from .link_records import FAMILIES, BeamLink, Family
+from .link_records import FAMILIES, BeamLink, Family, Link
 from .lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
 
@@ -76,7 +76,7 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         frequency=omega / (2 * np.pi),
         stiffness=np.diag(omega**2),
         modal_mass=modal_mass(models, modes),
-        damping_ratio=_damping_ratio(link, omega),
+        damping_ratio=damping_ratio(link, omega),
         family=tuple(mode.family for mode in modes),
         geometric_stiffness=with_lumped_loads(geometric_stiffness(link, stations, fields, named), attached),
         interfaces=interfaces,
@@ -139,6 +139,11 @@ def canonical(fields: Floats) -> Floats:
     The dominant translation is positive at the station nearest the root where it exceeds half its largest value; of a
     mode without translation, the twist.
     """
+    return fields * canonical_signs(fields)
+
+
+def canonical_signs(fields: Floats) -> Floats:
+    """(n,) 1 or −1: what `canonical` multiplies each mode by."""
     signs = np.ones(fields.shape[2])
     for k in range(signs.size):
         rows = fields[U_X:R_X, :, k]
@@ -146,7 +151,7 @@ def canonical(fields: Floats) -> Floats:
             rows = fields[R_X:, :, k]
         dominant = rows[np.argmax(np.abs(rows).max(axis=1))]
         signs[k] = np.sign(dominant[np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max())])
-    return fields * signs
+    return signs
 
 
 def _element_boundaries(link: BeamLink) -> Floats:
@@ -194,7 +199,7 @@ def _heights(link: BeamLink, x: Floats) -> Floats:
     return heights[np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")]
 
 
-def _damping_ratio(link: BeamLink, omega: Floats) -> Floats:
+def damping_ratio(link: Link, omega: Floats) -> Floats:
     """(n,) ζ as given, or of Rayleigh damping D = aM + bK: ζ = a/(2ω) + bω/2."""
     if link.damping.rayleigh is not None:
         a, b = link.damping.rayleigh

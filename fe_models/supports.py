@@ -109,6 +109,12 @@ class Flexibility:
         """F f of loads (3 owned, k); collective."""
         return self._projected(self._condensed_solve(self._projected_load(loads)))
 
+    @property
+    def rank(self) -> int:
+        """Number of independent displacements that the supports leave."""
+        total = 3 * self.model.V.dofmap.index_map.size_global - self.model.comm.allreduce(int(self.clamped.sum()))
+        return int(total + self.W.shape[1] - (0 if self.B is None else len(self.B)))
+
     def apply(self, load: PETSc.Vec, result: PETSc.Vec) -> None:
         """As above, of one PETSc vector."""
         result.array[:] = (self @ load.array_r[:, None])[:, 0]
