@@ -40,7 +40,7 @@ def draw_mesh(body: ModalBody) -> Figure:
     kind = {2: "elements", 3: "triangles", 4: "quadrilaterals"}[cells.shape[1]]
     views = [(cells, f"{body.name}: mesh of {len(cells)} {kind}")]
     near = cells[np.all(points[cells, 0] <= CLOSE_UP * body.stations.height.max(), axis=1)]
-    if cells.shape[1] > 2 and 0 < len(near) < len(cells):
+    if cells.shape[1] > 2 and 0 < len(near) < len(cells) and np.ptp(points[near, 0]) > 0.0:
         views.append((near, f"{body.name} at the root"))
     figure = Figure(figsize=(WIDTH, 3.0 * len(views)), layout="constrained")
     for k, (shown, title) in enumerate(views):
