@@ -29,8 +29,8 @@ Choice = NDArray[np.int64]
 # as few as five digits.
 IN_PLANE = 1e-5
 # Neighbouring facets belong to one smooth face when their normals are closer than this; a circle may have 8 edges.
-_SMOOTH = np.cos(np.radians(50))
-_ALONG = np.cos(np.radians(30))
+_SMOOTH = float(np.cos(np.radians(50)))
+_ALONG = float(np.cos(np.radians(30)))
 # How far from a face, relative to its size, the point may lie that is to pick it.
 _NEAR = 0.02
 _LISTED = 12
