@@ -7,7 +7,7 @@ blocks), which takes half the memory and, measured, a third of the time of the g
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -215,9 +215,7 @@ def mass_degree(mesh: Mesh, order: int) -> int:
 def voigt(gradient: Any) -> Any:
     """ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of ∂u_i/∂x_j at [i, j]."""
     g = gradient
-    return ufl.as_vector(
-        [g[0, 0], g[1, 1], g[2, 2], g[1, 2] + g[2, 1], g[0, 2] + g[2, 0], g[0, 1] + g[1, 0]]
-    )
+    return ufl.as_vector([g[0, 0], g[1, 1], g[2, 2], g[1, 2] + g[2, 1], g[0, 2] + g[2, 0], g[0, 1] + g[1, 0]])
 
 
 def _stiffness_form(V: fem.FunctionSpace, materials: MaterialMap, degree: int) -> ufl.Form:

@@ -1,4 +1,4 @@
-"""NAFEMS benchmarks (formulation.md, section 11) with solids, refined; and the paper's links against Timoshenko's beam."""
+"""NAFEMS benchmarks (formulation.md, section 11) with solids, refined; the paper's links against Timoshenko's beam."""
 
 import sys
 from pathlib import Path
@@ -23,7 +23,9 @@ def frequencies(body, family):
     return np.array([f for f, name in zip(body.frequency, body.family, strict=True) if name == family])
 
 
-@pytest.mark.parametrize(("cell", "order", "meshes"), [("hexahedron", 2, [(5, 2), (10, 4)]), ("tetrahedron", 3, [(4, 1), (8, 2)])])
+@pytest.mark.parametrize(
+    ("cell", "order", "meshes"), [("hexahedron", 2, [(5, 2), (10, 4)]), ("tetrahedron", 3, [(4, 1), (8, 2)])]
+)
 def test_nafems_fv5(tmp_path, cell, order, meshes):
     bodies = [
         body_of(write_solid(tmp_path, **FV5, cell=cell, order=order, divisions=(n, across, across)))
@@ -123,9 +125,9 @@ def test_bending_of_the_paper_s_links_is_timoshenko_s(tmp_path, condition, coupl
     beam = beam_modal_body(read_link(beam_file), beam_file, "", lambda _: None)
     np.testing.assert_allclose(solid.frequency[:5], beam.frequency[:5], rtol=difference)
     np.testing.assert_allclose(solid.S_bar[1], beam.S_bar[1], rtol=0, atol=0.002 * np.abs(beam.S_bar).max())
-    np.testing.assert_allclose(
-        solid.interpolate(0.3).translation[1, :5], beam.interpolate(0.3).translation[1, :5], rtol=0, atol=0.005
-    )
+    shapes = [body.interpolate(0.3).translation[1, :5] for body in (solid, beam)]
+    # Some 0.2 % in frequency of a clamp are a shift of the nodes of as much of the wave length.
+    np.testing.assert_allclose(*shapes, rtol=0, atol=0.002 if coupling == "mean" else 0.01)
     for load in ("t_x", "omega_zz", "force/tip/x"):
         one, other = solid.geometric_stiffness[load][:3, :3], beam.geometric_stiffness[load][:3, :3]
         np.testing.assert_allclose(one, other, rtol=0, atol=0.01 * np.abs(other).max())
