@@ -7,7 +7,7 @@ blocks), which takes half the memory and, measured, a third of the time of the g
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 

@@ -66,9 +66,7 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Floats]) -> dict[str,
     return loads
 
 
-def prestressed(
-    flexibility: Flexibility, modes: Floats, interfaces: Mapping[str, Floats]
-) -> dict[str, Floats]:
+def prestressed(flexibility: Flexibility, modes: Floats, interfaces: Mapping[str, Floats]) -> dict[str, Floats]:
     """(n, n) geometric stiffness by unit load, the body held by its reference condition; collective.
 
     Args:

@@ -84,7 +84,9 @@ def solid_modal_body(
         link,
         flexibility,
         mass,
-        lambda X: section_motion(sections, x, element, *sections.of(model, model.with_ghosts(X))),
+        lambda X: section_motion(
+            sections, x, element, *sections.of(model, model.with_ghosts(X)), mass.motion_of_attached(X)
+        ),
         str(path),
     )
     progress(f"{link.name}: integrating the inertia")
@@ -134,7 +136,9 @@ def _materials(link: SolidLink, solid: SolidMesh, path: Path) -> MaterialMap:
     for region in link.region:
         if region.group not in solid.regions:
             found = ", ".join(solid.regions) or "none"
-            raise InputError(f"{path}: region.group: expected a volume group of the mesh ({found}), found {region.group}")
+            raise InputError(
+                f"{path}: region.group: expected a volume group of the mesh ({found}), found {region.group}"
+            )
         regions.append((solid.cell_tags.find(solid.regions[region.group]), region.material))
     return material_map(solid.mesh, link.material, regions)
 

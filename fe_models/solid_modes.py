@@ -52,7 +52,7 @@ def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Re
     batch = needed if family == "all" else 2 * needed + 2
     X = np.empty((3 * model.owned, 0))
     while True:
-        if family == "all" and needed > available or X.shape[1] == available:
+        if (family == "all" and needed > available) or X.shape[1] == available:
             key = "count" if link.modes.indices is None else "indices"
             raise InputError(
                 f"{where}: modes.{key}: expected at most the number of modes available in family "
