@@ -134,7 +134,9 @@ def _materials(link: SolidLink, solid: SolidMesh, path: Path) -> MaterialMap:
     for region in link.region:
         if region.group not in solid.regions:
             found = ", ".join(solid.regions) or "none"
-            raise InputError(f"{path}: region.group: expected a volume group of the mesh ({found}), found {region.group}")
+            raise InputError(
+                f"{path}: region.group: expected a volume group of the mesh ({found}), found {region.group}"
+            )
         regions.append((solid.cell_tags.find(solid.regions[region.group]), region.material))
     return material_map(solid.mesh, link.material, regions)
 
@@ -198,4 +200,4 @@ def _picture(solid: SolidMesh, model: SolidModel, modes: Floats) -> PictureMesh:
     local = modes.reshape(-1, 3, n)[node_map(model.V)[surface.cells]]
     displacement = np.zeros((len(surface.points), 3, n))
     displacement[surface.rows] = np.einsum("pd,pdin->pin", shapes, local, optimize=True)
-    return PictureMesh(surface.points, surface.triangles, model.total(displacement))
+    return PictureMesh(surface.points, surface.triangles, model.total(displacement), surface.edges)
