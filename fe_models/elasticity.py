@@ -261,7 +261,7 @@ def _scalar_mass(M: PETSc.Mat) -> tuple[ScalarMass, tuple[Integers, Integers]]:
     if M.comm.size > 1:
         source = PETSc.Vec().createMPI((3 * (end - first), None), bsize=3, comm=M.comm)
         here = PETSc.IS().createBlock(3, foreign.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        there = PETSc.IS().createStride(3 * foreign.size, comm=PETSc.COMM_SELF)
+        there = PETSc.IS().createStride(3 * foreign.size, step=1, comm=PETSc.COMM_SELF)
         scatter = PETSc.Scatter().create(source, here, target, there)
     counts = (within.astype(PETSc.IntType), beyond.astype(PETSc.IntType))
     return ScalarMass(csr, scatter, target, M.comm), counts

@@ -16,6 +16,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import meshtags
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
 from ..mesh.compat import compiled_form, geometry_degree, lagrange_element, lagrange_space, node_map
 from ..mesh.slices import section_quadrature
@@ -140,12 +141,13 @@ def _to_owners(model: SolidModel, weights: sp.csr_matrix) -> Floats:
     dense = weights.toarray()
     if model.comm.size == 1:
         return dense
-    vector = fem.Function(lagrange_space(model.mesh, model.order, vector=False)).vector
+    seen = np.arange(dense.shape[1], dtype=PETSc.IntType)
     result = np.empty((dense.shape[0], model.owned))
     for target, row in zip(result, dense, strict=True):
-        with vector.localForm() as local:
-            local.array[:] = row
-        vector.ghostUpdate(addv=True, mode="reverse")
+        vector = PETSc.Vec().createMPI((model.owned, None), comm=model.comm)
+        vector.setLGMap(model.local_to_global)
+        vector.setValuesLocal(seen, row, addv=True)
+        vector.assemble()
         target[:] = vector.array_r
     return result
 

@@ -11,6 +11,7 @@ from types import FrameType
 import click
 
 from .errors import FfrobotError
+from .parallel import is_first
 
 FILE = click.Path(path_type=Path)
 
@@ -42,6 +43,8 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
 
     with Display() as display:
         outcome = make_link(link_file, output, force, display.stage)
+    if not is_first():
+        return
     body = outcome.body
     verb = f"computed in {outcome.seconds:.2f} s" if outcome.computed else "up to date"
     click.echo(
@@ -123,5 +126,6 @@ def main() -> None:
             sys.exit(130)
         if not isinstance(error, FfrobotError):
             raise
-        click.echo(f"ffrobot: {error}", err=True)
+        if is_first():
+            click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)
