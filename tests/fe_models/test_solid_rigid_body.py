@@ -5,7 +5,12 @@ import pytest
 from solids import body_of, dense, elastic_frequencies, frame_and_modes, model_of, write_solid
 
 COARSE = {"cell": "hexahedron", "order": 2, "divisions": (4, 1, 1)}
-CONDITIONS = [("cantilever", "mean"), ("cantilever", "rigid"), ("simply-supported", "mean"), ("simply-supported", "rigid")]
+CONDITIONS = [
+    ("cantilever", "mean"),
+    ("cantilever", "rigid"),
+    ("simply-supported", "mean"),
+    ("simply-supported", "rigid"),
+]
 
 
 def free_frequencies(path, plates=()):
@@ -39,9 +44,7 @@ def test_all_modes_give_the_free_frequencies(tmp_path, condition, coupling):
     plates = {"mean": (), "rigid": ("root",) if condition == "cantilever" else ("root", "tip")}[coupling]
     path = write_solid(tmp_path, **COARSE, condition=condition, coupling=coupling, family="all", count=1)
     expected = free_frequencies(path, plates)
-    path = write_solid(
-        tmp_path, **COARSE, condition=condition, coupling=coupling, family="all", count=expected.size
-    )
+    path = write_solid(tmp_path, **COARSE, condition=condition, coupling=coupling, family="all", count=expected.size)
     found = elastic_frequencies(*frame_and_modes(body_of(path)))
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 
