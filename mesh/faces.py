@@ -90,7 +90,7 @@ class SmoothFace:
         # Directions of the normals: a cylinder's lie in one plane (coarse triangles on it: nearly), all round in it.
         spread, directions = np.linalg.eigh(normals.T @ (weights[:, None] * normals))
         around = spread[0] < 0.06 and spread[1] > 0.15 and np.linalg.norm(normal) < 0.3
-        axis = directions[:, 0] if around else None
+        axis = directions[:, 0] * np.sign(directions[np.argmax(np.abs(directions[:, 0])), 0]) if around else None
         center = weights @ boundary.centroid[facets]
         return cls(facets, center, float(boundary.area[facets].sum()), normal, axis)
 

@@ -4,16 +4,17 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
 from solid_parts import rectangle
 
 from ffrobot.errors import InputError
+from ffrobot.mesh.compat import coordinate_element, geometry_nodes
 from ffrobot.mesh.records import CircleSection, InterfaceRecord, SolidMeshRecord, SurfacePatches
 from ffrobot.mesh.solid_mesh import distributed, solid_mesh
 from ffrobot.mesh.structured import structured_box
@@ -46,8 +47,6 @@ def test_patches_by_dolfinx(solid):
 
 
 def test_regions_by_dolfinx():
-    from dataclasses import replace
-
     box = structured_box(1.0, (0.1, 0.1), (0.1, 0.1), (10, 2, 2), "tetrahedron")
     tags = np.where(box.points[box.corners, 0].mean(axis=1) > 0.7, 3, 0).astype(np.int32)
     body = distributed(replace(box, cell_tag=tags, regions={"hub": 3}))
@@ -77,8 +76,6 @@ def test_the_surface_is_closed_and_faces_outward(solid, mesh):
 
 
 def test_surface_points_are_where_their_cells_say(solid):
-    from ffrobot.mesh.compat import coordinate_element, geometry_nodes
-
     body = solid_mesh(solid(section=CircleSection(shape="circle", diameter=0.1)), SolidMeshRecord(), (), None, LINK)
     surface = body.surface
     np.testing.assert_array_equal(np.sort(surface.rows), np.arange(len(surface.points)))
@@ -89,8 +86,8 @@ def test_surface_points_are_where_their_cells_say(solid):
 
 
 def test_errors_reach_the_caller(solid):
+    lost = InterfaceRecord(name="a", position=(0.5, 1.0, 0.0), normal=(0.0, 1.0, 0.0))
     with pytest.raises(InputError, match=r"link.toml: interface.position of a"):
-        lost = InterfaceRecord(name="a", position=(0.5, 1.0, 0.0), normal=(0.0, 1.0, 0.0))
         solid_mesh(solid(section=rectangle()), SolidMeshRecord(), (lost,), None, LINK)
 
 
@@ -100,6 +97,7 @@ from pathlib import Path
 from dolfinx import fem
 from mpi4py import MPI
 from ffrobot.errors import InputError
+from ffrobot.mesh.compat import coordinate_element, geometry_nodes
 from ffrobot.mesh.records import *
 from ffrobot.mesh.slices import section_quadrature
 from ffrobot.mesh.solid_mesh import solid_mesh
@@ -147,7 +145,3 @@ def test_two_processes_see_what_one_sees(tmp_path):
         assert done.returncode == 0, done.stderr
         results.append(np.loadtxt(tmp_path / f"{count}.txt"))
     np.testing.assert_allclose(results[1], results[0], rtol=1e-10, atol=1e-14)
-
-
-def test_the_world_is_one_process_here():
-    assert MPI.COMM_WORLD.size == 1
