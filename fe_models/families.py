@@ -49,15 +49,28 @@ class SectionMotion:
 
 
 def section_motion(
-    averages: Averages, x: Floats, element: NDArray[np.int64], translation: Floats, rotation: Floats
+    averages: Averages,
+    x: Floats,
+    element: NDArray[np.int64],
+    translation: Floats,
+    rotation: Floats,
+    attached: Sequence[tuple[Floats, Floats]] = (),
 ) -> SectionMotion:
-    """Motion of the sections at x (k,), stations of `element` (e, 4); translation and rotation (k, 3, n)."""
+    """Motion of the sections at x (k,), stations of `element` (e, 4); translation and rotation (k, 3, n).
+
+    `attached`: of each mass on an interface, the motion there (6, n) and its weights (6,).
+    """
     line = np.zeros(x.size)
     np.add.at(line, element, (x[element[:, 3]] - x[element[:, 0]])[:, None] * SIMPSON)
     mass = np.sqrt(line * averages.density * averages.area)[:, None]
     turn = np.sqrt(line * averages.density)[:, None] * np.sqrt(np.einsum("kii->ki", averages.inertia))
     moved = [mass * translation[:, axis] for axis in range(3)]
     turned = [turn[:, axis, None] * rotation[:, axis] for axis in range(3)]
+    for motion, weights in attached:
+        rows = np.sqrt(weights)[:, None] * motion
+        for axis in range(3):
+            moved[axis] = np.concatenate([moved[axis], rows[[axis]]])
+            turned[axis] = np.concatenate([turned[axis], rows[[3 + axis]]])
     bending = np.concatenate([moved[1], turned[2]]), np.concatenate([moved[2], turned[1]])
     return SectionMotion((*bending, moved[0], turned[0]))
 

@@ -38,6 +38,10 @@ class Mass:
         """M U of U (3 owned, n); collective."""
         return self._with_attached(self.model.mass @ U, U)
 
+    def motion_of_attached(self, U: Floats) -> list[tuple[Floats, Floats]]:
+        """For each attached mass its motion (6, n) and weights (6,); collective."""
+        return [(self.model.total(B @ U), weights) for B, weights in self.attached]
+
     def mult(self, _: PETSc.Mat, u: PETSc.Vec, result: PETSc.Vec) -> None:
         """As above, of one PETSc vector."""
         product = self.model.mass.apply(u).reshape(-1, 1)

@@ -84,7 +84,9 @@ def solid_modal_body(
         link,
         flexibility,
         mass,
-        lambda X: section_motion(sections, x, element, *sections.of(model, model.with_ghosts(X))),
+        lambda X: section_motion(
+            sections, x, element, *sections.of(model, model.with_ghosts(X)), mass.motion_of_attached(X)
+        ),
         str(path),
     )
     progress(f"{link.name}: integrating the inertia")

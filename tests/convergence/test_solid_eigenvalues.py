@@ -23,19 +23,19 @@ def frequencies(body, family):
     return np.array([f for f, name in zip(body.frequency, body.family, strict=True) if name == family])
 
 
-@pytest.mark.parametrize(("cell", "order", "meshes"), [("hexahedron", 2, [5, 10]), ("tetrahedron", 3, [3, 6])])
+@pytest.mark.parametrize(("cell", "order", "meshes"), [("hexahedron", 2, [(5, 2), (10, 4)]), ("tetrahedron", 3, [(4, 1), (8, 2)])])
 def test_nafems_fv5(tmp_path, cell, order, meshes):
     bodies = [
-        body_of(write_solid(tmp_path, **FV5, cell=cell, order=order, divisions=(n, max(1, n // 5), max(1, n // 5))))
-        for n in meshes
+        body_of(write_solid(tmp_path, **FV5, cell=cell, order=order, divisions=(n, across, across)))
+        for n, across in meshes
     ]
     fine = bodies[-1]
     bending = frequencies(fine, "in-plane-bending")
-    # Timoshenko's beam; a solid knows no shear factor, and its sections warp.
-    np.testing.assert_allclose(bending[:2], [42.65, 148.2], rtol=0.005)
-    np.testing.assert_allclose(bending[2], 283.5, rtol=0.015)
-    np.testing.assert_allclose(frequencies(fine, "torsion")[0], 71.20, rtol=0.002)
-    np.testing.assert_allclose(frequencies(fine, "axial")[0], 125.00, rtol=0.002)
+    # Timoshenko's beam with its shear factor for the first three. Torsion is Saint-Venant's, without the inertia of
+    # warping, which a solid has: its frequency converges to 0.4 % less; axial likewise, by lateral inertia, 0.07 %.
+    np.testing.assert_allclose(bending[:3], [42.65, 148.2, 283.5], rtol=0.005)
+    np.testing.assert_allclose(frequencies(fine, "torsion")[0], 71.20, rtol=0.005)
+    np.testing.assert_allclose(frequencies(fine, "axial")[0], 125.00, rtol=0.001)
     # A square section bends the same way in both planes.
     np.testing.assert_allclose(bending, frequencies(fine, "out-of-plane-bending"), rtol=2e-3)
     assert np.all(bodies[0].frequency >= fine.frequency * (1 - 1e-9))
@@ -46,7 +46,7 @@ def test_nafems_fv32(tmp_path):
     expected = {"in-plane-bending": [44.623, 130.03, 246.05, 379.90], "axial": [162.70, 391.44]}
     for family, target in expected.items():
         errors = []
-        for n in (4, 8):
+        for n in (8, 16):
             path = write_solid(
                 tmp_path,
                 E=200e9,
@@ -72,8 +72,8 @@ def test_nafems_fv32(tmp_path):
 def test_nafems_fv52(tmp_path):
     """Simply supported square plate, 10 m × 10 m × 1 m, its lower edges held across."""
     expected = [45.897, 109.44, 109.44, 167.89, 193.59, 206.19, 206.19]
-    errors = []
-    for n in (2, 4):
+    found = []
+    for n in (4, 8):
         path = write_solid(
             tmp_path,
             E=200e9,
@@ -82,7 +82,7 @@ def test_nafems_fv52(tmp_path):
             height=1.0,
             width=10.0,
             cell="hexahedron",
-            order=3,
+            order=2,
             divisions=(n, 1, n),
         )
         model, _ = model_of(path)
@@ -92,10 +92,12 @@ def test_nafems_fv52(tmp_path):
         K = symmetric(stiffness_matrix(model))[free][:, free]
         M = sp.kron(model.mass.csr, sp.eye(3), format="csr")[free][:, free]
         omega2 = eigsh(K, 10, M, sigma=-1e3, return_eigenvectors=False)
-        errors.append(np.abs(np.sqrt(np.sort(omega2)[3:]) / (2 * np.pi) / expected - 1))
-    # NAFEMS' targets are plate theory's beyond the first; solid elements come out lower by up to 3 %.
-    assert errors[-1][0] < 0.03
-    assert errors[-1].max() < 0.05, errors
+        found.append(np.sqrt(np.sort(omega2)[3:]) / (2 * np.pi))
+    coarse, fine = found
+    np.testing.assert_allclose(coarse, expected, rtol=0.03)  # a mesh as coarse as the benchmark's
+    # In-plane mode, which the supports do not touch. The others go on falling with finer meshes: a line holds no solid.
+    np.testing.assert_allclose(fine[4], expected[4], rtol=2e-4)
+    assert np.all(fine < coarse)
 
 
 def symmetric(K):
@@ -105,20 +107,24 @@ def symmetric(K):
     return (upper + sp.triu(upper, 1).T).tocsc()
 
 
-@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
-def test_bending_of_the_paper_s_links_is_timoshenko_s(tmp_path, condition):
-    """The default element on the coarsest mesh, within 0.2 %; 0.015 m thick, 1 m long."""
-    solid = body_of(write_solid(tmp_path, condition=condition))
+@pytest.mark.parametrize(
+    ("condition", "coupling", "difference"),
+    # A rigid root is clamped across too: stiffer, by 0.15 % in mode 1 once converged, and by the coarse mesh there.
+    [("cantilever", "mean", 5e-4), ("simply-supported", "mean", 5e-4), ("cantilever", "rigid", 2.5e-3)],
+)
+def test_bending_of_the_paper_s_links_is_timoshenko_s(tmp_path, condition, coupling, difference):
+    """The default element, 5 232 unknowns, 1 m × 0.015 m × 0.025 m."""
+    solid = body_of(write_solid(tmp_path, condition=condition, coupling=coupling))
     text = (tmp_path / "link1.toml").read_text()
     text = text.replace('kind = "solid"', 'kind = "beam"').replace("divisions = [36, 1, 1]", "elements = 40")
     text = text.replace('cell = "tetrahedron"\norder = 3\n', "") + '\n[model]\ntheory = "timoshenko"\n'
     beam_file = tmp_path / "beam.toml"
     beam_file.write_text(text)
     beam = beam_modal_body(read_link(beam_file), beam_file, "", lambda _: None)
-    np.testing.assert_allclose(solid.frequency[:5], beam.frequency[:5], rtol=0.002)
+    np.testing.assert_allclose(solid.frequency[:5], beam.frequency[:5], rtol=difference)
     np.testing.assert_allclose(solid.S_bar[1], beam.S_bar[1], rtol=0, atol=0.002 * np.abs(beam.S_bar).max())
     np.testing.assert_allclose(
-        solid.interpolate(0.3).translation[1], beam.interpolate(0.3).translation[1], rtol=0, atol=0.01
+        solid.interpolate(0.3).translation[1, :5], beam.interpolate(0.3).translation[1, :5], rtol=0, atol=0.005
     )
     for load in ("t_x", "omega_zz", "force/tip/x"):
         one, other = solid.geometric_stiffness[load][:3, :3], beam.geometric_stiffness[load][:3, :3]
