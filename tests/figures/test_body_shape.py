@@ -85,10 +85,21 @@ def test_modes_of_a_solid_are_drawn_over_its_outline(solid):
 def test_mesh_shows_cells_and_interfaces(solid, beam):
     axes = draw_mesh(solid).axes
     assert len(axes) == 1  # no cell but the end face is whole within a close-up
-    assert f"{len(solid.mesh.cells)} " in axes[0].get_title(loc="left")
-    assert len(axes[0].collections[0].get_paths()) == len(solid.mesh.cells)
+    quadrilaterals = solid.mesh.cells.shape[1] == 4
+    sides = 12 if quadrilaterals else 18  # the diagonals, too, are sides of triangles
+    lines = [path for path in axes[0].collections[0].get_paths() if len(np.unique(path.vertices, axis=0)) == 2]
+    assert len(axes[0].collections[0].get_paths()) - len(lines) == len(solid.mesh.cells)
+    assert len({tuple(path.vertices.mean(axis=0).round(9)) for path in lines}) == sides
     assert {"root", "tip"} <= {line.get_label() for line in axes[0].lines}
     assert len(draw_mesh(beam).axes[0].collections[0].get_segments()) == 10
+
+
+def test_mesh_with_edges_of_its_own_shows_no_others(solid):
+    """Two edges of elements, of which the other lines only divide the faces; one that is no side of a cell is left."""
+    edges = np.array([[0, 1], [4, 0], [0, 7]])
+    figure = draw_mesh(replace(solid, mesh=replace(solid.mesh, edges=edges)))
+    paths = figure.axes[0].collections[0].get_paths()
+    assert sum(len(np.unique(path.vertices, axis=0)) == 2 for path in paths) == 2
 
 
 def test_fold_of_a_roof_and_border_of_an_open_surface():
