@@ -11,14 +11,11 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
-from .cells import CELLS, Floats
-from .jacobian import jacobians, reference_nodes
+from .cells import Floats
+from .jacobian import SLIVER, cell_quality, jacobians, reference_nodes
 from .part_mesh import PartMesh, facet_keys
 from .records import SolidGeometry
 
-# Volume of a tetrahedron relative to that of the regular one with the same mean square edge, and smallest determinant
-# of a hexahedron's Jacobian relative to the product of its edges: below, a cell is flat.
-SLIVER = 1e-3
 # Smallest determinant of a curved cell's Jacobian relative to its largest.
 _CURVED = 0.005
 METRES = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
@@ -93,7 +90,7 @@ def check_quality(part: PartMesh, where: str) -> None:
     largest = np.abs(determinants).max(axis=1)
     inverted = determinants.min(axis=1) <= 1e-6 * largest
     # A flat cell's determinant has no sign to speak of.
-    flat = _quality(part) < SLIVER
+    flat = cell_quality(part.points[part.corners], part.cell) < SLIVER
     if np.any(inverted & ~flat):
         _reject_cells(part, inverted & ~flat, "inverted elements", "elements with their nodes in order", where)
     if np.any(flat):
@@ -127,21 +124,6 @@ def _determinants(part: PartMesh) -> Floats:
     at = reference_nodes(part.cell, part.degree)
     determinants: Floats = np.linalg.det(jacobians(part.points[part.cells], part.cell, part.degree, at))
     return determinants
-
-
-def _quality(part: PartMesh) -> Floats:
-    """(c,) 1 for regular tetrahedra and cubes, 0 for flat cells; of the corners alone."""
-    corners = part.points[part.corners]
-    edges = corners[:, CELLS[part.cell].edges]
-    lengths = np.linalg.norm(edges[:, :, 1] - edges[:, :, 0], axis=2)
-    J = jacobians(corners, part.cell, 1, CELLS[part.cell].corners)
-    volume = np.abs(np.linalg.det(J)).min(axis=1)
-    if part.cell == "tetrahedron":
-        quality: Floats = np.sqrt(2) * volume / np.maximum(np.mean(lengths**2, axis=1), 1e-300) ** 1.5
-        return quality
-    sides = np.linalg.norm(J, axis=2)
-    scaled: Floats = np.min(np.abs(np.linalg.det(J)) / np.maximum(np.prod(sides, axis=2), 1e-300), axis=1)
-    return scaled
 
 
 def _reject_cells(part: PartMesh, bad: NDArray[np.bool_], what: str, expected: str, where: str) -> NoReturn:

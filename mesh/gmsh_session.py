@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import InputError
 from .cells import Floats, Integers
 from .defaults import CIRCLE, GROWTH
+from .jacobian import SLIVER, cell_quality
 from .source import RawMesh
 
 # gmsh's numbers of volume elements, under the names that meshio uses.
@@ -37,8 +38,9 @@ VOLUME_ELEMENTS = {
 }
 # gmsh's newer algorithm, HXT, makes better meshes faster, but other ones in every run.
 _DELAUNAY = 1
-# A mesh too coarse for the shape crosses itself: then finer ones along curved faces are tried.
-_FINER = (1, 2, 4)
+# A mesh too coarse for the shape crosses itself: then finer ones along curved faces are tried. Now and then one has a
+# flat cell: a slightly smaller size gives another mesh. Factors of the elements around a circle, and of the size:
+_ATTEMPTS = ((1, 1.0), (1, 0.94), (1, 0.88), (2, 0.5), (4, 0.25))
 
 
 @contextmanager
@@ -94,21 +96,31 @@ def mesh_model(size: float, where: str, around: int = CIRCLE) -> None:
     Raises:
         InputError: gmsh cannot mesh the shape.
     """
-    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-    problem: Exception | None = None
-    for finer in _FINER:
-        curved = _refine_curved_faces(size, around * finer)
+    problem: object = None
+    for finer, smaller in _ATTEMPTS:
+        gmsh.option.setNumber("Mesh.MeshSizeMax", smaller * size)
+        curved = _refine_curved_faces(smaller * size, around * finer)
         try:
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises nothing more special
             problem = error
-            gmsh.model.mesh.clear()
-            gmsh.option.setNumber("Mesh.MeshSizeMax", size / (2 * finer))
-            continue
-        if curved:
-            gmsh.model.mesh.setOrder(2)
-        return
+        else:
+            if not _has_slivers():
+                if curved:
+                    gmsh.model.mesh.setOrder(2)
+                return
+            problem = "some are flat"
+        gmsh.model.mesh.clear()
     raise InputError(f"{where}: expected a shape that elements of {size:g} can fill, found that they cannot: {problem}")
+
+
+def _has_slivers() -> bool:
+    tags, points, _ = gmsh.model.mesh.getNodes()
+    place = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    place[tags.astype(np.int64)] = np.arange(len(tags))
+    _, _, nodes = gmsh.model.mesh.getElements(3)
+    corners = points.reshape(-1, 3)[place[np.concatenate(nodes).astype(np.int64)].reshape(-1, 4)]
+    return bool(np.min(cell_quality(corners, "tetrahedron")) < SLIVER)
 
 
 def _refine_curved_faces(size: float, around: int) -> bool:

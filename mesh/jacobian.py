@@ -9,6 +9,9 @@ import numpy as np
 
 from .cells import CELLS, CellName, Floats
 
+# Quality below which a cell is flat.
+SLIVER = 1e-3
+
 
 @lru_cache
 def reference_nodes(cell: CellName, degree: int) -> Floats:
@@ -39,6 +42,28 @@ def jacobians(nodes: Floats, cell: CellName, degree: int, X: Floats) -> Floats:
     slopes = _monomial_slopes(cell, degree, X) @ _coefficients(cell, degree)  # (3, q, v)
     J: Floats = np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
     return J
+
+
+def cell_quality(corners: Floats, cell: CellName) -> Floats:
+    """(c,) 1 for regular tetrahedra and cubes, 0 for flat cells.
+
+    Volume of a tetrahedron relative to that of the regular one with the same mean square edge; smallest determinant of
+    a hexahedron's Jacobian relative to the product of its edges.
+
+    Args:
+        corners: (c, v, 3) of each cell.
+        cell: their shape.
+    """
+    J = jacobians(corners, cell, 1, CELLS[cell].corners)
+    determinants = np.abs(np.linalg.det(J))
+    if cell == "tetrahedron":
+        edges = corners[:, CELLS[cell].edges]
+        squares = np.sum((edges[:, :, 1] - edges[:, :, 0]) ** 2, axis=2)
+        quality: Floats = np.sqrt(2) * determinants.min(axis=1) / np.maximum(squares.mean(axis=1), 1e-200) ** 1.5
+        return quality
+    sides = np.prod(np.linalg.norm(J, axis=2), axis=2)
+    scaled: Floats = np.min(determinants / np.maximum(sides, 1e-300), axis=1)
+    return scaled
 
 
 def _coefficients(cell: CellName, degree: int) -> Floats:
