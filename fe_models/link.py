@@ -50,9 +50,10 @@ def input_hash(link: Link) -> str:
 
     A part's file counts by its content. Comments, the order of keys, 1 for 1.0, dates of files change nothing.
     """
-    content = {"format": FORMAT_VERSION, "algorithm": ALGORITHM_VERSION, "link": link.model_dump(mode="json")}
+    record = link.model_dump(mode="json")
     if isinstance(link, SolidLink) and link.geometry.file is not None:
-        content["link"]["geometry"]["file"] = hashlib.sha256(link.geometry.file.read_bytes()).hexdigest()
+        record["geometry"]["file"] = hashlib.sha256(link.geometry.file.read_bytes()).hexdigest()
+    content = {"format": FORMAT_VERSION, "algorithm": ALGORITHM_VERSION, "link": record}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
