@@ -71,11 +71,13 @@ class PictureMesh:
         points: (p, 3) in m.
         cells: (c, v) points of each cell.
         mode_shapes: (p, 3, n) displacement per unit of modal coordinate.
+        edges: (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture.
     """
 
     points: Floats
     cells: Integers
     mode_shapes: Floats
+    edges: Integers | None = None
 
     def __post_init__(self) -> None:
         _freeze(self)
@@ -339,6 +341,8 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         shapes.append((f"stress/points/{name}/position", point.position, (3,)))
         shapes.append((f"stress/points/{name}/stress", point.stress, (6, n)))
         shapes.append((f"stress/points/{name}/strain", point.strain, (6, n)))
+    if body.mesh.edges is not None:
+        shapes.append(("mesh.edges", body.mesh.edges, (len(body.mesh.edges), 2)))
     if body.surface_stress is not None:
         shapes.append(("stress/surface", body.surface_stress, (p, 6, n)))
     if body.surface_patches is not None:

@@ -202,4 +202,4 @@ def _picture(solid: SolidMesh, model: SolidModel, modes: Floats) -> PictureMesh:
     local = modes.reshape(-1, 3, n)[node_map(model.V)[surface.cells]]
     displacement = np.zeros((len(surface.points), 3, n))
     displacement[surface.rows] = np.einsum("pd,pdin->pin", shapes, local, optimize=True)
-    return PictureMesh(surface.points, surface.triangles, model.total(displacement))
+    return PictureMesh(surface.points, surface.triangles, model.total(displacement), surface.edges)

@@ -8,6 +8,8 @@ from io import StringIO
 from pathlib import Path
 
 import h5py
+import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
@@ -36,13 +38,12 @@ def describe(path: Path) -> str:
 
 
 def _modal_body(body: ModalBody) -> str:
-    x, y, z = body.first_moment / body.mass
+    center = _place(body, body.first_moment / body.mass)
     lines = [
         f"modal body {body.name!r}: {body.kind}, {body.reference_condition} reference condition, {body.length:g} m",
         f"made by ffrobot {body.ffrobot_version} from input {body.input_hash[:12]}",
-        f"mass {body.mass:.6g} kg, center of mass ({x:.6g}, {y:.6g}, {z:.6g}) m",
-        "interfaces: "
-        + ", ".join(f"{name} at ({', '.join(f'{c:g}' for c in i.position)}) m" for name, i in body.interfaces.items()),
+        f"mass {body.mass:.6g} kg, center of mass {center}",
+        "interfaces: " + ", ".join(f"{name} at {_place(body, i.position)}" for name, i in body.interfaces.items()),
         f"stations: {len(body.stations.position)} along the axis",
         f"geometric stiffness: {', '.join(body.geometric_stiffness) or 'none'}",
         *_optional(body),
@@ -56,10 +57,16 @@ def _modal_body(body: ModalBody) -> str:
     return "\n".join(lines) + "\n" + _rendered(modes)
 
 
+def _place(body: ModalBody, position: NDArray[np.float64]) -> str:
+    """Coordinates (3,) as text, rounding errors of solids as what they are: 0."""
+    x, y, z = np.where(np.abs(position) < 1e-12 * body.length, 0.0, position)
+    return f"({x:.6g}, {y:.6g}, {z:.6g}) m"
+
+
 def _optional(body: ModalBody) -> Iterator[str]:
     """Lines on what only some modal bodies have."""
     for name, point in body.stress.items():
-        yield f"modal stresses at {name}, ({', '.join(f'{c:g}' for c in point.position)}) m"
+        yield f"modal stresses at {name}, {_place(body, point.position)}"
     if body.surface_stress is not None:
         yield f"modal stresses on the surface, at {len(body.surface_stress)} points"
     if (patches := body.surface_patches) is not None:

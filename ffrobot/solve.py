@@ -18,6 +18,7 @@ from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.model import ModalLoad, Model, build_model
+from .mbs.observation import body_motion
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.scene_file import load_scene
 from .mbs.scene_records import Analysis, Scene, split_point
@@ -93,11 +94,7 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
                     body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
                     for body, array in solution.patches.items()
                 }
-            solution.stresses[analysis.name] = {
-                name: stress
-                for name, body in solution.bodies.items()
-                if body.modal is not None and (stress := body_stress(outcome, body.planar, body.modal)) is not None
-            }
+            solution.stresses[analysis.name] = _stresses(solution, outcome)
             solution.seconds[analysis.name] = time.perf_counter() - started
             if outcome.status != "completed":
                 break
@@ -176,6 +173,16 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
     return LoadedBody(planar, body.modal, body.path, body.computed)
+
+
+def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
+    """Of the bodies whose files hold modal stresses."""
+    found = {
+        name: body_stress(body.modal, body_motion(outcome, body.planar).modal)
+        for name, body in solution.bodies.items()
+        if body.modal is not None
+    }
+    return {name: stress for name, stress in found.items() if stress is not None}
 
 
 def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> list[ModalLoad]:

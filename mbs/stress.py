@@ -9,9 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fe_models.modal_body import ModalBody
-from .analyses import Outcome
-from .observation import body_motion
-from .planar_body import PlanarBody
 
 Array = NDArray[np.float64]
 
@@ -54,11 +51,10 @@ class BodyStress:
         return max(found, key=lambda entry: entry[0])
 
 
-def body_stress(outcome: Outcome, planar: PlanarBody, body: ModalBody) -> BodyStress | None:
-    """Stresses of `body` in an analysis; None where its file holds no modal stresses."""
+def body_stress(body: ModalBody, p: Array) -> BodyStress | None:
+    """Stresses under modal coordinates p (T, n) of the file; None where it holds no modal stresses."""
     if not body.stress and body.surface_stress is None:
         return None
-    p = body_motion(outcome, planar).modal
     points = {}
     for name, point in body.stress.items():
         stress = p @ point.stress.T

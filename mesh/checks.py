@@ -20,7 +20,7 @@ from .records import SolidGeometry
 # of a hexahedron's Jacobian relative to the product of its edges: below, a cell is flat.
 SLIVER = 1e-3
 # Smallest determinant of a curved cell's Jacobian relative to its largest.
-_CURVED = 0.02
+_CURVED = 0.005
 METRES = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
 _NAMES = {"m": "metres", "mm": "millimetres", "in": "inches"}
 # A part may reach beyond its interfaces (bosses around joints); farther out than this it is taken for a slip.

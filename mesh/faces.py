@@ -29,8 +29,8 @@ Choice = NDArray[np.int64]
 # as few as five digits.
 IN_PLANE = 1e-5
 # Neighbouring facets belong to one smooth face when their normals are closer than this; a circle may have 8 edges.
-_SMOOTH = np.cos(np.radians(50))
-_ALONG = np.cos(np.radians(30))
+_SMOOTH = float(np.cos(np.radians(50)))
+_ALONG = float(np.cos(np.radians(30)))
 # How far from a face, relative to its size, the point may lie that is to pick it.
 _NEAR = 0.02
 _LISTED = 12
@@ -90,7 +90,7 @@ class SmoothFace:
         # Directions of the normals: a cylinder's lie in one plane (coarse triangles on it: nearly), all round in it.
         spread, directions = np.linalg.eigh(normals.T @ (weights[:, None] * normals))
         around = spread[0] < 0.06 and spread[1] > 0.15 and np.linalg.norm(normal) < 0.3
-        axis = directions[:, 0] if around else None
+        axis = directions[:, 0] * np.sign(directions[np.argmax(np.abs(directions[:, 0])), 0]) if around else None
         center = weights @ boundary.centroid[facets]
         return cls(facets, center, float(boundary.area[facets].sum()), normal, axis)
 

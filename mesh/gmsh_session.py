@@ -83,12 +83,13 @@ def volume_and_surface() -> tuple[float, float]:
     return sum(occ.getMass(*e) for e in gmsh.model.getEntities(3)), sum(occ.getMass(*e) for e in faces)
 
 
-def mesh_model(size: float, where: str) -> None:
+def mesh_model(size: float, where: str, around: int = CIRCLE) -> None:
     """Fill the model with tetrahedra of edge length `size`, finer along curved faces, and bend them to these.
 
     Args:
         size: in the model's unit.
         where: beginning of the error's message: file and key.
+        around: elements on a full circle of a curved face.
 
     Raises:
         InputError: gmsh cannot mesh the shape.
@@ -96,7 +97,7 @@ def mesh_model(size: float, where: str) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     problem: Exception | None = None
     for finer in _FINER:
-        curved = _refine_curved_faces(size, CIRCLE * finer)
+        curved = _refine_curved_faces(size, around * finer)
         try:
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises nothing more special
@@ -107,7 +108,7 @@ def mesh_model(size: float, where: str) -> None:
         if curved:
             gmsh.model.mesh.setOrder(2)
         return
-    raise InputError(f"{where}: expected a shape that can be meshed with elements of {size:g}, found: {problem}")
+    raise InputError(f"{where}: expected a shape that elements of {size:g} can fill, found that they cannot: {problem}")
 
 
 def _refine_curved_faces(size: float, around: int) -> bool:
@@ -200,4 +201,6 @@ def read_msh(path: Path, where: str) -> RawMesh:
             gmsh.open(str(path))
             return extract_mesh()
         except Exception as error:  # gmsh raises nothing more special
-            raise InputError(f"{where}: expected a mesh that gmsh can read, found: {error}") from None
+            raise InputError(
+                f"{where}: expected a mesh that gmsh can read, found one that it cannot: {error}"
+            ) from None

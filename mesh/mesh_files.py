@@ -44,11 +44,12 @@ def read_foreign(path: Path, where: str) -> RawMesh:
         with redirect_stdout(said), redirect_stderr(said):
             mesh = meshio.read(path)
             names = _names_of_cells(mesh, path)
+            points = np.zeros((len(mesh.points), 3))
+            points[:, : mesh.points.shape[1]] = mesh.points
     except (Exception, SystemExit) as error:  # whatever a reader meets in a corrupt file, it raises as it comes
-        reason = " ".join(f"{said.getvalue()} {error or type(error).__name__}".split())
-        raise InputError(f"{where}: expected a mesh that meshio can read, found: {reason}") from None
-    points = np.zeros((len(mesh.points), 3))
-    points[:, : mesh.points.shape[1]] = mesh.points
+        reason = said.getvalue() if isinstance(error, SystemExit) else f"{said.getvalue()} {error!r}"
+        reason = " ".join(reason.replace(str(path), path.name).split())
+        raise InputError(f"{where}: expected a mesh that meshio can read, found one that it cannot: {reason}") from None
     blocks: list[tuple[str, Integers, str | None]] = []
     faces: dict[str, list[Integers]] = {}
     surfaces = 0

@@ -8,7 +8,7 @@ from typing import NoReturn
 import gmsh
 
 from ..errors import InputError
-from .defaults import default_order, default_size
+from .defaults import BAR, CIRCLE, default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
 from .records import (
     CircleSection,
@@ -40,7 +40,8 @@ def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, patches: Surfac
             _outline(body, geometry, patches)
         gmsh.model.occ.synchronize()
         size = record.size or default_size(*volume_and_surface(), record.order or default_order("tetrahedron"))
-        mesh_model(size, f"{path}: geometry")
+        around = BAR if isinstance(geometry.section, CircleSection) else CIRCLE
+        mesh_model(size, f"{path}: geometry", around)
         return source_from(extract_mesh(), f"{path}: geometry")
 
 

@@ -141,8 +141,8 @@ def _march(cells: _Cells, at_end: bool, tolerance: float) -> _Triangles:
     for number, cuts in _CUTS.items():
         cell, which = np.nonzero(count == number)
         order = np.argsort(~inside[cell, which], axis=1, kind="stable")
-        corners = np.take_along_axis(tetrahedra[which], order, axis=1)
-        pieces.extend((cell, corners[:, np.array(cut)]) for cut in cuts)
+        sorted_corners = np.take_along_axis(tetrahedra[which], order, axis=1)
+        pieces.extend((cell, sorted_corners[:, np.array(cut)]) for cut in cuts)
     cell = np.concatenate([piece[0] for piece in pieces])
     edges = np.concatenate([piece[1] for piece in pieces])  # (t, 3, 2) points of the lattice
     f_ends = f[cell[:, None, None], edges]

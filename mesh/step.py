@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import gmsh
@@ -13,9 +14,9 @@ from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_sur
 from .records import SolidMeshRecord
 from .source import Source, source_from
 
-# What OpenCASCADE calls the units of length that a STEP file can declare.
-_SI_PREFIXES = {"$": "M", ".MILLI.": "MM", ".CENTI.": "CM", ".MICRO.": "UM", ".KILO.": "KM"}
-_OTHER_UNITS = {"INCH": "INCH", "FOOT": "FT", "MILE": "MI"}
+# Units of length that a STEP file can declare, in mm: OpenCASCADE turns all numbers into millimetres.
+_SI_PREFIXES = {"$": 1e3, ".MILLI.": 1.0, ".CENTI.": 10.0, ".DECI.": 100.0, ".MICRO.": 1e-3, ".KILO.": 1e6}
+_OTHER_UNITS = {"INCH": 25.4, "FOOT": 304.8, "MILE": 1609344.0}
 
 
 def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> Source:
@@ -32,26 +33,28 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
     Raises:
         InputError: the file is corrupt, holds no closed volume, or cannot be meshed.
     """
+    declared = _declared_unit(file)
     with gmsh_session():
-        # Otherwise OpenCASCADE turns the numbers into millimetres.
-        gmsh.option.setString("Geometry.OCCTargetUnit", _declared_unit(file))
         gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
         try:
             gmsh.model.occ.importShapes(str(file), highestDimOnly=False)
             gmsh.model.occ.synchronize()
         except Exception as error:  # gmsh raises nothing more special
-            raise InputError(f"{where}: expected a STEP file, found one that cannot be read: {error}") from None
+            raise InputError(
+                f"{where}: expected a STEP file, found one that OpenCASCADE cannot read: {error}"
+            ) from None
         _check_volumes(where)
         _join()
         _name_groups()
         order = record.order or default_order("tetrahedron")
-        size = record.size / scale if record.size else default_size(*volume_and_surface(), order)
+        size = record.size / scale * declared if record.size else default_size(*volume_and_surface(), order)
         mesh_model(size, where)
-        return source_from(extract_mesh(), where)
+        source = source_from(extract_mesh(), where)
+    return replace(source, part=source.part.moved(source.part.points / declared))
 
 
-def _declared_unit(file: Path) -> str:
-    """The unit of length that the file declares, by OpenCASCADE's name; millimetres if none."""
+def _declared_unit(file: Path) -> float:
+    """The unit of length that the file declares, in mm; millimetres if none."""
     text = re.sub(r"\s+", "", file.read_text(encoding="latin-1")).upper()
     units = [entity for entity in text.split(";") if "LENGTH_UNIT()" in entity]
     # An inch is declared as so many millimetres: the conversion comes first.
@@ -59,7 +62,7 @@ def _declared_unit(file: Path) -> str:
         if (other := re.search(r"CONVERSION_BASED_UNIT\('(\w+)'", entity)) and other[1] in _OTHER_UNITS:
             return _OTHER_UNITS[other[1]]
     prefixes = [found[1] for entity in units if (found := re.search(r"SI_UNIT\((\$|\.\w+\.),\.METRE\.\)", entity))]
-    return _SI_PREFIXES.get(prefixes[0], "MM") if prefixes else "MM"
+    return _SI_PREFIXES.get(prefixes[0], 1.0) if prefixes else 1.0
 
 
 def _check_volumes(where: str) -> None:

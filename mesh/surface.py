@@ -33,6 +33,7 @@ class Surface:
     Attributes:
         points: (p, 3) in m; the order does not depend on the number of processes.
         triangles: (t, 3) rows of `points`, counter-clockwise seen from outside.
+        edges: (e, 2) rows of `points`: the borders of the facets, of which triangles may be a finer division.
         rows: (k,) the points that this process evaluates fields at: each belongs to one process.
         cells: (k,) local cell of each of these.
         X: (k, 3) reference coordinates there.
@@ -40,6 +41,7 @@ class Surface:
 
     points: Floats
     triangles: Integers
+    edges: Integers
     rows: Integers
     cells: Integers
     X: Floats
@@ -72,15 +74,17 @@ def surface_of(mesh: Mesh) -> Surface:
     n = int(np.clip(np.sqrt(TRIANGLES / max(count, 1)), 1, _FINEST))
     element = coordinate_element(mesh)
     corners = np.asarray(basix.geometry(element.cell_type))[reference_facets(mesh)][which]
-    weights, pattern = _lattice(corners.shape[1], n)
+    weights, pattern, border = _lattice(corners.shape[1], n)
     X = np.einsum("la,bai->bli", weights, corners)
     points, inward = _positions(mesh, element, cells, X)
-    triangles = pattern[None] + (len(weights) * np.arange(len(cells)))[:, None, None]
+    first_point = (len(weights) * np.arange(len(cells)))[:, None, None]
+    triangles, edges = pattern[None] + first_point, border[None] + first_point
     # Corners of the reference facets run either way round.
     first, second, third = (points.reshape(-1, 3)[triangles[:, 0, k]] for k in range(3))
     turned = np.einsum("bi,bi->b", np.cross(second - first, third - first), inward) > 0
     triangles[turned] = triangles[turned][..., ::-1]
-    return _gathered(mesh, points.reshape(-1, 3), triangles.reshape(-1, 3), np.repeat(cells, len(weights)), X)
+    owners = np.repeat(cells, len(weights))
+    return _gathered(mesh, points.reshape(-1, 3), triangles.reshape(-1, 3), edges.reshape(-1, 2), owners, X)
 
 
 def _positions(
@@ -96,8 +100,12 @@ def _positions(
 
 
 @lru_cache
-def _lattice(corners: int, n: int) -> tuple[Floats, Integers]:
-    """A facet divided into n × n triangles (or twice that): weights (l, corners) of its corners, triangles (m, 3)."""
+def _lattice(corners: int, n: int) -> tuple[Floats, Integers, Integers]:
+    """A facet divided into n × n triangles (or twice that).
+
+    Returns:
+        (l, corners) weights of its corners at the points, (m, 3) triangles, (b, 2) their sides on the facet's border.
+    """
     square = corners == 4
     places = [(i, j) for j in range(n + 1) for i in range(n + 1) if square or i + j <= n]
     number = {place: k for k, place in enumerate(places)}
@@ -108,16 +116,20 @@ def _lattice(corners: int, n: int) -> tuple[Floats, Integers]:
         weights = np.stack([1 - s - t, s, t], axis=1)
     low = [[(i, j), (i + 1, j), (i, j + 1)] for i, j in places if (i + 1, j) in number and (i, j + 1) in number]
     high = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in places if (i + 1, j + 1) in number]
-    return weights, np.array([[number[place] for place in triangle] for triangle in low + high])
+    triangles = np.array([[number[place] for place in triangle] for triangle in low + high])
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    sides, count = np.unique(sides, axis=0, return_counts=True)
+    return weights, triangles, sides[count == 1]
 
 
-def _gathered(mesh: Mesh, points: Floats, triangles: Integers, cells: Integers, X: Floats) -> Surface:
+def _gathered(mesh: Mesh, points: Floats, triangles: Integers, edges: Integers, cells: Integers, X: Floats) -> Surface:
     """One numbering for the points of all processes; a point that several have belongs to the first of them."""
     comm = mesh.comm
     counts = comm.allgather(len(points))
     begin = sum(counts[: comm.rank])
     everything = np.concatenate(comm.allgather(points))
     all_triangles = np.concatenate(comm.allgather(triangles + begin))
+    all_edges = np.concatenate(comm.allgather(edges + begin))
     grid = np.rint(everything / (_COINCIDENT * np.ptp(everything, axis=0).max())).astype(np.int64)
     _, first, number = np.unique(grid, axis=0, return_index=True, return_inverse=True)
     number = number.reshape(-1)
@@ -128,4 +140,5 @@ def _gathered(mesh: Mesh, points: Floats, triangles: Integers, cells: Integers, 
     shift = (np.argmin(renumbered, axis=1)[:, None] + np.arange(3)) % 3
     renumbered = np.take_along_axis(renumbered, shift, axis=1)
     renumbered = renumbered[np.lexsort(renumbered.T[::-1])]
-    return Surface(everything[first], renumbered, mine, cells[local], X.reshape(-1, 3)[local])
+    borders = np.unique(np.sort(number[all_edges], axis=1), axis=0)
+    return Surface(everything[first], renumbered, borders, mine, cells[local], X.reshape(-1, 3)[local])

@@ -37,16 +37,17 @@ LIGHT = (VIEWER + UP) / np.linalg.norm(VIEWER + UP)
 def draw_mesh(body: ModalBody) -> Figure:
     """The mesh with its interfaces, and of a solid a close-up of the end at the root."""
     points, cells = body.mesh.points, body.mesh.cells
-    kind = {2: "elements", 3: "triangles", 4: "quadrilaterals"}[cells.shape[1]]
-    views = [(cells, f"{body.name}: mesh of {len(cells)} {kind}")]
+    edges = body.mesh.edges if body.mesh.edges is not None else _sides(cells)
+    views = [(cells, f"{body.name}: mesh")]
     near = cells[np.all(points[cells, 0] <= CLOSE_UP * body.stations.height.max(), axis=1)]
-    if cells.shape[1] > 2 and 0 < len(near) < len(cells):
+    if cells.shape[1] > 2 and 0 < len(near) < len(cells) and np.ptp(points[near, 0]) > 0.0:
         views.append((near, f"{body.name} at the root"))
     figure = Figure(figsize=(WIDTH, 3.0 * len(views)), layout="constrained")
     for k, (shown, title) in enumerate(views):
         axes = _view(figure, (len(views), 1, k + 1), title)
-        _draw_cells(axes, points, shown, np.tile(matplotlib.colors.to_rgb(FACE), (len(shown), 1)), edges=True)
         last = points[shown, 0].max()
+        colors = np.tile(matplotlib.colors.to_rgb(FACE), (len(shown), 1))
+        _draw_cells(axes, points, shown, colors, edges[np.all(points[edges, 0] <= last, axis=1)])
         for j, (name, interface) in enumerate(body.interfaces.items()):
             if interface.position[0] <= last:
                 at = _projected(interface.position)
@@ -72,7 +73,7 @@ def draw_modes(body: ModalBody) -> Figure:
         size = np.linalg.norm(shape, axis=1)
         if np.any(size):
             colors = matplotlib.colormaps[ORDERED](size[cells].mean(axis=1) / size.max())[:, :3]
-            _draw_cells(axes, points + AMPLITUDE * body.length / size.max() * shape, cells, colors, edges=False)
+            _draw_cells(axes, points + AMPLITUDE * body.length / size.max() * shape, cells, colors)
         else:
             axes.text(0.5, 0.1, "the axis does not move", transform=axes.transAxes, ha="center")
         axes.update_datalim(frame)
@@ -94,29 +95,35 @@ def _projected(points: Array) -> Array:
     return np.stack([points @ RIGHT, points @ UP], axis=-1)
 
 
-def _draw_cells(axes: Axes, points: Array, cells: Integers, colors: Array, edges: bool) -> None:
-    """Cells of two points as lines, larger ones as polygons, the far ones first; colours (c, 3)."""
-    depth = points[cells].mean(axis=1) @ VIEWER
-    order = np.argsort(depth)
-    corners = _projected(points[cells[order]])
+def _draw_cells(axes: Axes, points: Array, cells: Integers, colors: Array, edges: Integers | None = None) -> None:
+    """Cells of two points as lines, larger ones as polygons; colours (c, 3). Far ones first: near ones hide them."""
     if cells.shape[1] == 2:
-        axes.add_collection(LineCollection(list(corners), colors=COLORS[0] if edges else colors[order], linewidths=2.0))
-        if edges:
-            nodes = _projected(points[np.unique(cells)])
-            axes.plot(*nodes.T, "|", color=EDGE, markersize=6, markeredgewidth=0.8)
+        lines = list(_projected(points[cells]))
+        axes.add_collection(LineCollection(lines, colors=colors if edges is None else COLORS[0], linewidths=2.0))
+        if edges is not None:
+            axes.plot(*_projected(points[np.unique(cells)]).T, "|", color=EDGE, markersize=6, markeredgewidth=0.8)
     else:
         # Which way the normals of the cells point is unknown, and hidden cells are painted over.
-        shade = 0.6 + 0.4 * np.abs(_normals(points, cells[order]) @ LIGHT)
-        shaded = colors[order] * shade[:, None]
-        axes.add_collection(
-            PolyCollection(
-                list(corners),
-                facecolors=shaded,
-                edgecolors=EDGE if edges else shaded,
-                linewidths=0.25,
-            )
-        )
+        faces = colors * (0.6 + 0.4 * np.abs(_normals(points, cells) @ LIGHT))[:, None]
+        polygons, depth = list(_projected(points[cells])), points[cells].mean(axis=1) @ VIEWER
+        if edges is not None:  # lines are polygons of two corners, sorted in just before their cells
+            edges, nearest = _edge_depth(cells, depth, edges)
+            polygons, depth = polygons + list(_projected(points[edges])), np.append(depth, nearest)
+            faces = np.concatenate([faces, np.tile(matplotlib.colors.to_rgb(EDGE), (len(edges), 1))])
+        order = np.argsort(depth, kind="stable")
+        polygons, faces = [polygons[k] for k in order], faces[order]
+        axes.add_collection(PolyCollection(polygons, facecolors=faces, edgecolors=faces, linewidths=0.3))
     axes.autoscale_view()
+
+
+def _edge_depth(cells: Integers, depth: Array, edges: Integers) -> tuple[Integers, Array]:
+    """Those of `edges` (e, 2) that are sides of cells, and the depth of the nearer of the cells with that side."""
+    size = cells.max() + 1
+    keys, place = np.unique(_sides(cells) @ [size, 1], return_inverse=True)
+    nearest = np.full(len(keys), -np.inf)
+    np.maximum.at(nearest, place, np.repeat(depth, cells.shape[1]))
+    inside = edges[np.isin(np.sort(edges, axis=1) @ [size, 1], keys)]
+    return inside, nearest[np.searchsorted(keys, np.sort(inside, axis=1) @ [size, 1])]
 
 
 def _directions(axes: Axes, size: float) -> None:
@@ -139,13 +146,19 @@ def _normals(points: Array, cells: Integers) -> Array:
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
 
 
+def _sides(cells: Integers) -> Integers:
+    """(c v, 2) the sides of all cells, ascending in each: those that two cells share are listed twice."""
+    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2)
+    return np.asarray(np.sort(sides, axis=1), dtype=np.int64)
+
+
 def _outline(points: Array, cells: Integers) -> Integers:
     """(e, 2) the edges along which a surface folds or ends; of a line, all of it."""
     corners = cells.shape[1]
     if corners == 2:
         return cells
     normals = _normals(points, cells)
-    edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges = _sides(cells)
     owner = np.repeat(np.arange(len(cells)), corners)
     order = np.lexsort(edges.T)
     edges, owner = edges[order], owner[order]
