@@ -111,7 +111,8 @@ class SolidModel:
     @property
     def comm(self) -> MPI.Comm:
         """Communicator of the mesh."""
-        return self.mesh.comm
+        comm: MPI.Comm = self.mesh.comm
+        return comm
 
     @property
     def owned(self) -> int:
@@ -257,7 +258,7 @@ def _cellwise(mesh: Mesh, values: Floats, of_cell: Integers) -> fem.Function:
 
 
 def _is_simplex(mesh: Mesh) -> bool:
-    return mesh.ufl_domain().ufl_cell().cellname() == "tetrahedron"
+    return bool(mesh.ufl_domain().ufl_cell().cellname() == "tetrahedron")
 
 
 def _scalar_mass(M: PETSc.Mat) -> tuple[ScalarMass, tuple[Integers, Integers]]:

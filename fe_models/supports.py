@@ -107,7 +107,8 @@ class Flexibility:
 
     def __matmul__(self, loads: Floats) -> Floats:
         """F f of loads (3 owned, k); collective."""
-        return self._projected(self._condensed_solve(self._projected_load(loads)))
+        result: Floats = self._projected(self._condensed_solve(self._projected_load(loads)))
+        return result
 
     @property
     def rank(self) -> int:
@@ -144,7 +145,7 @@ class Flexibility:
         if columns == 1:
             self._load.array[:] = loads[:, 0]
             self._factor.solve(self._load, self._result)
-            return self._result.array_r[:, None].copy()
+            return np.array(self._result.array_r[:, None])
         total = self.model.V.dofmap.index_map.size_global * 3
         F, U = (PETSc.Mat().createDense(((rows, total), (None, columns)), comm=self.model.comm) for _ in range(2))
         for matrix in (F, U):
