@@ -111,7 +111,8 @@ class SolidModel:
     @property
     def comm(self) -> MPI.Comm:
         """Communicator of the mesh."""
-        return self.mesh.comm
+        comm: MPI.Comm = self.mesh.comm
+        return comm
 
     @property
     def owned(self) -> int:
@@ -131,8 +132,22 @@ class SolidModel:
         self.comm.Allreduce(part, result)
         return result
 
+    def to_owners(self, parts: Floats) -> Floats:
+        """(r, owned) of (r, owned + ghosts): what several processes have for a node is added; collective."""
+        if self.comm.size == 1:
+            return parts
+        seen = np.arange(parts.shape[1], dtype=PETSc.IntType)
+        result = np.empty((parts.shape[0], self.owned))
+        for target, row in zip(result, parts, strict=True):
+            vector = PETSc.Vec().createMPI((self.owned, None), comm=self.comm)
+            vector.setLGMap(self.local_to_global)
+            vector.setValuesLocal(seen, row, addv=True)
+            vector.assemble()
+            target[:] = vector.array_r
+        return result
+
     def with_ghosts(self, U: Floats) -> Floats:
-        """(3 (owned + ghosts), n) degrees of freedom of U (3 owned, n): ghosts fetched from their owners; collective."""
+        """(3 (owned + ghosts), n) degrees of freedom of U (3 owned, n), ghosts from their owners; collective."""
         if self.comm.size == 1:
             return U
         function = fem.Function(self.V)
@@ -212,7 +227,7 @@ def mass_degree(mesh: Mesh, order: int) -> int:
     return 2 * order + (3 * (geometry - 1) if _is_simplex(mesh) else 3 * geometry - 1)
 
 
-def voigt(gradient: Any) -> Any:
+def voigt(gradient: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
     """ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of ∂u_i/∂x_j at [i, j]."""
     g = gradient
     return ufl.as_vector([g[0, 0], g[1, 1], g[2, 2], g[1, 2] + g[2, 1], g[0, 2] + g[2, 0], g[0, 1] + g[1, 0]])
@@ -243,7 +258,7 @@ def _cellwise(mesh: Mesh, values: Floats, of_cell: Integers) -> fem.Function:
 
 
 def _is_simplex(mesh: Mesh) -> bool:
-    return mesh.ufl_domain().ufl_cell().cellname() == "tetrahedron"
+    return bool(mesh.ufl_domain().ufl_cell().cellname() == "tetrahedron")
 
 
 def _scalar_mass(M: PETSc.Mat) -> tuple[ScalarMass, tuple[Integers, Integers]]:

@@ -1,4 +1,4 @@
-"""Families of the modes of a solid: told by how much of the kinetic energy the mean motion of its cross sections carries.
+"""Families of the modes of a solid: told by the kinetic energy in the mean motion of its cross sections.
 
 Of a mode with unit modal mass, the sections' mean translation (u, v, w) and rotation (φ_x, φ_y, φ_z) carry the shares
 
@@ -107,5 +107,4 @@ def _turn(families: Sequence[Floats], wanted: str) -> Floats:
     """(m, m): principal axes of the families' energies, each weighted by its number so that none are equal."""
     weights = [4.0, 3.0, 2.0, 1.0] if wanted == "all" else [float(name == wanted) for name in FAMILIES]
     energy = sum(weight * rows.T @ rows for weight, rows in zip(weights, families, strict=True))
-    values, vectors = np.linalg.eigh(energy)
-    return np.asarray(vectors[:, ::-1])
+    return np.asarray(np.linalg.eigh(energy)[1][:, ::-1])

@@ -1,8 +1,8 @@
 """Mean motion of faces and cross sections of a solid: six linear functionals of its displacements.
 
 Area-weighted averages about the centroid c of the face (the RBE3 convention): translation ∫u ds / A, and rotation
-θ = J⁻¹ ∫ r × u ds with r = x − c and J = ∫ (r·r I − r rᵀ) ds: the rigid motion nearest to u in the mean square. Both need no
-more than ∫N_a ds and ∫x N_a ds of each shape function N_a.
+θ = J⁻¹ ∫ r × u ds with r = x − c and J = ∫ (r·r I − r rᵀ) ds: the rigid motion nearest to u in the mean square. Both
+need no more than ∫N_a ds and ∫x N_a ds of each shape function N_a.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import meshtags
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from ..mesh.compat import compiled_form, geometry_degree, lagrange_element, lagrange_space, node_map
 from ..mesh.slices import section_quadrature
@@ -59,7 +58,7 @@ class Averages:
 
     def rows(self, model: SolidModel) -> Floats:
         """B (k, 6, 3 owned): translation and rotation as rows over this rank's own degrees of freedom; collective."""
-        weights = _to_owners(model, self.weights).reshape(-1, 4, model.owned)
+        weights = model.to_owners(self.weights.toarray()).reshape(-1, 4, model.owned)
         result = np.zeros((weights.shape[0], 6, model.owned, 3))
         for axis in range(3):
             result[:, axis, :, axis] = weights[:, 0] / self.area[:, None]
@@ -113,7 +112,7 @@ def _averages(model: SolidModel, weights: sp.csr_matrix, moments: Floats, height
 
 
 def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Floats, Floats]:
-    """This rank's part of ∫N, ∫xN, ∫yN, ∫zN over a face, (4, owned + ghosts), and of ∫ (1, x)ᵀ(1, x) ds."""
+    """Of this rank, ∫N, ∫xN, ∫yN, ∫zN over a face, (4, owned + ghosts), and of ∫ (1, x)ᵀ(1, x) ds."""
     mesh = model.mesh
     facets = facet_tags.find(tag)  # type: ignore[attr-defined]
     # Tag 1 of a set of its own, so that one form serves all faces: its numbers are compiled into it.
@@ -134,22 +133,6 @@ def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Floa
             other.value[:] = another
             moments[row, column] = fem.assemble_scalar(moment)
     return np.array(weights), moments
-
-
-def _to_owners(model: SolidModel, weights: sp.csr_matrix) -> Floats:
-    """(4k, owned) with what other ranks add; collective."""
-    dense = weights.toarray()
-    if model.comm.size == 1:
-        return dense
-    seen = np.arange(dense.shape[1], dtype=PETSc.IntType)
-    result = np.empty((dense.shape[0], model.owned))
-    for target, row in zip(result, dense, strict=True):
-        vector = PETSc.Vec().createMPI((model.owned, None), comm=model.comm)
-        vector.setLGMap(model.local_to_global)
-        vector.setValuesLocal(seen, row, addv=True)
-        vector.assemble()
-        target[:] = vector.array_r
-    return result
 
 
 def _extremes(model: SolidModel, ranges: Floats) -> tuple[Floats, Floats]:

@@ -113,29 +113,39 @@ def _compute(
     progress: Progress | None,
     make_folder: bool = False,
 ) -> LinkOutcome:
+    def write(body: ModalBody) -> ModalBody:
+        write_modal_body(path, body, make_folder=make_folder)
+        return body
+
+    def make() -> ModalBody:
+        return _modal_body(link, link_path, digest, progress or _silent)
+
+    if processes() == 1:
+        body = write(make())
+    elif isinstance(link, SolidLink):
+        body = make()
+        on_first(lambda: bool(write(body)))
+    else:  # too small to share out
+        on_first(lambda: bool(write(make())))
+        body = read_modal_body(path)
+    return LinkOutcome(path, body, True, time.perf_counter() - start)
+
+
+def _modal_body(link: Link, link_path: Path, digest: str, progress: Progress) -> ModalBody:
     try:
         if isinstance(link, SolidLink):
-            from .solid_link import solid_modal_body as modal_body
-        else:
-            from .beam_link import beam_modal_body as modal_body
+            from .solid_link import solid_modal_body
+
+            return solid_modal_body(link, link_path, digest, progress)
+        from .beam_link import beam_modal_body
+
+        return beam_modal_body(link, link_path, digest, progress)
     except ModuleNotFoundError as error:
         raise SolveError(
             f"{link_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "
             "install dolfinx and slepc4py (Debian: python3-dolfinx python3-slepc4py), or use a modal body file made "
             "elsewhere"
         ) from None
-    body: ModalBody
-    if processes() > 1 and not isinstance(link, SolidLink):  # too small to share out
-
-        def alone() -> None:
-            write_modal_body(path, modal_body(link, link_path, digest, progress or _silent), make_folder=make_folder)
-
-        on_first(alone)
-        body = read_modal_body(path)
-    else:
-        body = modal_body(link, link_path, digest, progress or _silent)
-        on_first(lambda: write_modal_body(path, body, make_folder=make_folder))
-    return LinkOutcome(path, body, True, time.perf_counter() - start)
 
 
 def _up_to_date(path: Path, digest: str) -> ModalBody | None:

@@ -8,10 +8,11 @@ entries are up to (length / element size)⁴ as large as the lowest ω².
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import basix
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..mesh.compat import coordinate_element, geometry_degree, geometry_nodes, lagrange_element, node_map
@@ -34,11 +35,32 @@ class Gradients:
         cells: which, of this rank's own.
         weights: (c, q) quadrature weight times volume in m³.
         values: (c, 3, q, 3, k): ∂u_i/∂x_j at [:, j, :, i].
+        inverse: (c, 1 or q, 3, 3) ∂X_a/∂x_j at [:, :, j, a].
+        shapes: (3, q, d) slopes of the shape functions on the reference cell.
     """
 
     cells: slice
     weights: Floats
     values: Floats
+    inverse: Floats
+    shapes: Floats
+
+    def only(self, fields: slice) -> Gradients:
+        """Of some of the fields."""
+        return replace(self, values=self.values[..., fields])
+
+    def forces(self, stress: Floats) -> Floats:
+        """(c, d, 3, k) ∫ σ : ∇N_a dV at the nodes of each cell, of stresses (c, 6, q, k) times weights."""
+        c, _, q, k = stress.shape
+        tensor = np.empty((c, 3, q, 3, k))
+        for row, (i, j) in enumerate(VOIGT):
+            tensor[:, j, :, i] = tensor[:, i, :, j] = stress[:, row]
+        if self.inverse.shape[1] == 1:
+            reference = np.swapaxes(self.inverse[:, 0], 1, 2) @ tensor.reshape(c, 3, -1)
+        else:
+            reference = np.einsum("cqja,cjqm->caqm", self.inverse, tensor.reshape(c, 3, q, -1), optimize=True)
+        slopes = self.shapes.reshape(-1, self.shapes.shape[2]).T
+        return np.asarray(slopes @ reference.reshape(c, 3 * q, -1)).reshape(c, -1, 3, k)
 
     def strains(self) -> Floats:
         """(c, 6, q, k) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy."""
@@ -71,7 +93,7 @@ def gradients(model: SolidModel, fields: Floats) -> Iterator[Gradients]:
         else:
             reference = reference.reshape(len(weights), 3, len(rule), -1)
             physical = np.einsum("cqja,caqk->cjqk", inverse, reference, optimize=True)
-        yield Gradients(part, weights, physical.reshape(len(weights), 3, len(rule), 3, k))
+        yield Gradients(part, weights, physical.reshape(len(weights), 3, len(rule), 3, k), inverse, shapes)
 
 
 def stresses(model: SolidModel, piece: Gradients, strains: Floats) -> Floats:
@@ -92,11 +114,24 @@ def strain_energy(model: SolidModel, modes: Floats) -> Floats:
     return 0.5 * (total + total.T)
 
 
+def internal_forces(model: SolidModel, fields: Floats) -> Floats:
+    """(3 owned, k) K u of displacements `fields` (3 (owned + ghosts), k), by their strains; collective."""
+    k = fields.shape[1]
+    nodes = node_map(model.V)
+    total = np.zeros((fields.shape[0] // 3, 3 * k))
+    for piece in gradients(model, fields):
+        stress = stresses(model, piece, piece.strains()) * piece.weights[:, None, :, None]
+        row = nodes[piece.cells].ravel()
+        collect = sp.csr_matrix((np.ones(row.size), (row, np.arange(row.size))), shape=(len(total), row.size))
+        total += collect @ piece.forces(stress).reshape(row.size, 3 * k)
+    return np.ascontiguousarray(model.to_owners(total.T).T).reshape(-1, k)
+
+
 def geometric_stiffness(model: SolidModel, modes: Floats, prestress: Floats) -> Floats:
     """(l, n, n) ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV for the stresses σ of each of l displacement fields; collective.
 
-    Second variation of the work of a stress σ on the quadratic part of Green's strain (Bathe, Finite Element Procedures,
-    §6.2.3): positive where tension stiffens.
+    Second variation of the work of a stress σ on the quadratic part of Green's strain (Bathe, Finite Element
+    Procedures, §6.2.3): positive where tension stiffens.
 
     Args:
         model: of the solid.
@@ -107,7 +142,7 @@ def geometric_stiffness(model: SolidModel, modes: Floats, prestress: Floats) -> 
     total = np.zeros((loads, n * n))
     for piece in gradients(model, np.concatenate([modes, prestress], axis=1)):
         Phi = piece.values[..., :n]
-        load = Gradients(piece.cells, piece.weights, piece.values[..., n:])
+        load = piece.only(slice(n, None))
         stress = stresses(model, load, load.strains()) * piece.weights[:, None, :, None]
         for row, (a, b) in enumerate(VOIGT):
             products = np.swapaxes(Phi[:, a], -1, -2) @ Phi[:, b]  # (c, q, n, n)

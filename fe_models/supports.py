@@ -1,12 +1,12 @@
 """How a solid is held, and its flexibility F: the displacements u = F f under loads f, with the supports in place.
 
-Rigid faces (RBE2) move by q (six numbers about their centroid). Their nodes are clamped in the factorised matrix K_0 and
-q comes back by static condensation (Craig and Bampton, 1968): with W the displacements under unit q and S = WᵀKW,
+Rigid faces (RBE2) move by q (six numbers about their centroid). Their nodes are clamped in the factorised matrix K_0
+and q comes back by static condensation (Craig and Bampton, 1968): with W the displacements under unit q and S = WᵀKW,
 
     G = K_0⁻¹ + W S⁻¹ Wᵀ
 
-Mean supports B u = 0 leave K singular: six springs, on degrees of freedom that hold the body isostatically, make it positive
-definite, and loads in equilibrium leave them unloaded. With R the rigid motions and P = I − R (B R)⁻¹ B,
+Mean supports B u = 0 leave K singular: six springs, on degrees of freedom that hold the body isostatically, make it
+positive definite, and loads in equilibrium leave them unloaded. With R the rigid motions and P = I − R (B R)⁻¹ B,
 
     F = P G Pᵀ
 
@@ -53,7 +53,7 @@ class Flexibility:
     Args:
         model: free in space.
         faces: rigid ones; may be none.
-        B: (6, 3 owned) rows of the mean supports, where the supports are such; None where the rigid faces hold the body.
+        B: (6, 3 owned) rows of the mean supports; None where the rigid faces hold the body.
 
     Raises:
         SolveError: the supported stiffness is not positive definite.
@@ -107,7 +107,8 @@ class Flexibility:
 
     def __matmul__(self, loads: Floats) -> Floats:
         """F f of loads (3 owned, k); collective."""
-        return self._projected(self._condensed_solve(self._projected_load(loads)))
+        result: Floats = self._projected(self._condensed_solve(self._projected_load(loads)))
+        return result
 
     @property
     def rank(self) -> int:
@@ -144,7 +145,7 @@ class Flexibility:
         if columns == 1:
             self._load.array[:] = loads[:, 0]
             self._factor.solve(self._load, self._result)
-            return self._result.array_r[:, None].copy()
+            return np.array(self._result.array_r[:, None])
         total = self.model.V.dofmap.index_map.size_global * 3
         F, U = (PETSc.Mat().createDense(((rows, total), (None, columns)), comm=self.model.comm) for _ in range(2))
         for matrix in (F, U):
@@ -209,8 +210,8 @@ def _factorised(K: PETSc.Mat) -> PETSc.KSP:
         solver.setUp()
     except PETSc.Error:
         raise SolveError(
-            f"stiffness matrix of size {K.getSize()[0]}: it is not positive definite in double precision, or memory does "
-            "not suffice for its factors; check material and mesh, or use larger elements"
+            f"stiffness matrix of size {K.getSize()[0]}: it is not positive definite in double precision, or memory "
+            "does not suffice for its factors; check material and mesh, or use larger elements"
         ) from None
     K.destroy()
     return solver

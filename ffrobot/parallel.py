@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from .errors import FfrobotError
 
@@ -41,7 +41,7 @@ def on_first(work: Callable[[], T]) -> T:
     result, error = MPI.COMM_WORLD.bcast((result, error))
     if error is not None:
         raise error
-    return result  # type: ignore[return-value]
+    return cast(T, result)
 
 
 def _environment(names: tuple[str, ...], default: int) -> int:
