@@ -80,18 +80,19 @@ def section_averages(model: SolidModel, x: Floats) -> Averages:
     """Mean motion of the cross sections at `x` (k,) in m; collective."""
     element, nodes = lagrange_element(model.V), node_map(model.V)
     degree = model.order + geometry_degree(model.mesh)
-    size = int(nodes.max(initial=-1)) + 1
+    size = model.V.dofmap.index_map.size_local + model.V.dofmap.index_map.num_ghosts
     rows, moments, ranges, masses = [], [], [], []
     for place in x:
         section = section_quadrature(model.mesh, float(place), degree)
         w = section.weights
         monomials = np.concatenate([np.ones((w.size, 1)), section.points], axis=1)
         shapes = element.tabulate(0, section.X)[0, :, :, 0] if w.size else np.empty((0, element.dim))
-        entries = (monomials.T * w)[:, :, None] * shapes  # (4, q, d)
-        columns = np.broadcast_to(nodes[section.cells], entries.shape)
-        row = np.broadcast_to(np.arange(4)[:, None, None], entries.shape)
-        shape = (4, max(size, model.V.dofmap.index_map.size_local + model.V.dofmap.index_map.num_ghosts))
-        rows.append(sp.csr_matrix((entries.ravel(), (row.ravel(), columns.ravel())), shape=shape))
+        cells, place_of = np.unique(section.cells, return_inverse=True)
+        gather = sp.csr_matrix((w, (place_of, np.arange(w.size))), shape=(cells.size, w.size))
+        entries = gather @ (monomials[:, :, None] * shapes[:, None, :]).reshape(w.size, -1)  # (cells, 4 d)
+        columns = np.broadcast_to(nodes[cells][:, None, :], (cells.size, 4, element.dim))
+        row = np.broadcast_to(np.arange(4)[:, None], columns.shape)
+        rows.append(sp.csr_matrix((entries.ravel(), (row.ravel(), columns.ravel())), shape=(4, size)))
         moments.append(monomials.T * w @ monomials)
         ranges.append(section.y_range)
         density = model.materials.density[model.materials.of_cell[section.cells]]

@@ -83,6 +83,7 @@ def lowest_modes(flexibility: Flexibility, mass: Mass, count: int, known: Floats
     # Measured: twice the wanted number of basis vectors, SLEPc's default, needs fewest solves.
     solver.setDimensions(count, min(size, max(2 * count, count + 15)))
     solver.setTolerances(TOLERANCE, 1000)
+    solver.setPurify(False)  # a solve for each mode; M is regular, and a Ritz step on the strain energies follows
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(0.0)
     if known.shape[1]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .elasticity import SolidModel
-from .families import SectionMotion, aligned, names
+from .families import NEARLY, SectionMotion, aligned, names
 from .link_records import SolidLink
 from .solid_eigen import Mass, lowest_modes
 from .strain_energy import strain_energy
@@ -49,7 +49,7 @@ def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Re
     family, model = link.modes.family, flexibility.model
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
     needed, available = int(numbers[-1]) + 1, flexibility.rank
-    batch = needed if family == "all" else 2 * needed + 2
+    batch = needed + 2 if family == "all" else 2 * needed + 2
     X = np.empty((3 * model.owned, 0))
     while True:
         if (family == "all" and needed > available) or X.shape[1] == available:
@@ -63,12 +63,19 @@ def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Re
         motion = read(X)
         Q = aligned(omega2, motion, family)
         kinds = names(motion.turned(Q))
-        hits = [k for k, kind in enumerate(kinds) if family in ("all", kind)]
+        settled = available if X.shape[1] == available else _settled(omega2)
+        hits = [k for k, kind in enumerate(kinds[:settled]) if family in ("all", kind)]
         if len(hits) >= needed:
             chosen = np.array(hits)[numbers]
             return _chosen(omega2, X, Q[:, chosen], [kinds[k] for k in chosen])
         share = max(len(hits), 1) / X.shape[1]
         batch = int(np.ceil((needed - len(hits)) / share)) + 2
+
+
+def _settled(omega2: Floats) -> int:
+    """How many of the modes found lie below the last gap: the others may belong with one that is yet to be found."""
+    gaps = np.flatnonzero(np.diff(omega2) > NEARLY * omega2[1:])
+    return int(gaps[-1]) + 1 if gaps.size else 0
 
 
 def _ritz(model: SolidModel, X: Floats) -> tuple[Floats, Floats]:

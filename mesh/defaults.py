@@ -6,7 +6,7 @@ from .cells import CellName
 
 # Elements along a full circle of a curved face, and along that of a solid bar: there, where a cell has two edges on the
 # circle, it cannot follow it between them. With these a bar lacks 0.03 % of its volume, a part with holes 0.002 %.
-CIRCLE = 8
+CIRCLE = 12
 BAR = 12
 # How much larger an element may be at unit distance from a curved face.
 GROWTH = 0.4
