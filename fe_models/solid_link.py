@@ -77,7 +77,7 @@ def solid_modal_body(
     x, element = _station_grid(link, solid)
     sections = section_averages(model, x)
     progress(f"{link.name}: factorising {3 * model.V.dofmap.index_map.size_global} unknowns")
-    flexibility = _held(link, model, solid, places)
+    flexibility = _held(link, model, solid, places, path)
     mass = _loaded(link, model, places)
     progress(f"{link.name}: solving for the modes")
     modes = wanted_modes(
@@ -152,18 +152,25 @@ def _places(link: SolidLink, model: SolidModel, solid: SolidMesh) -> Places:
     return Places(averages, {name: one.rows(model)[0] for name, one in averages.items()})
 
 
-def _held(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Places) -> Flexibility:
+def _held(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Places, path: Path) -> Flexibility:
     """The body held by its reference condition, faces with rigid coupling made plates."""
     held = HELD[link.reference.condition]
     plates = {record.name for record in link.interface if record.coupling == "rigid"}
     if link.coupling == "rigid":
         plates |= {name for name, components in held.items() if components}
-    faces = []
+    faces, taken = [], np.zeros(model.owned, dtype=bool)
     for name in sorted(plates):
         nodes = fem.locate_dofs_topological(model.V, 2, solid.facet_tags.find(solid.faces[name]))
+        own = nodes[nodes < model.owned]
+        if model.total(np.array([np.sum(taken[own])]))[0]:
+            raise InputError(
+                f"{path}: interface.coupling of {name}: expected rigid faces that do not touch each other "
+                f"({', '.join(sorted(plates))}), found nodes that two of them share"
+            )
+        taken[own] = True
         supported = held.get(name, ()) if link.coupling == "rigid" else ()
         free = [component for component in range(6) if component not in supported]
-        faces.append(RigidFace(nodes[nodes < model.owned], places.averages[name].centroid[0], free))
+        faces.append(RigidFace(own, places.averages[name].centroid[0], free))
     if link.coupling == "rigid":
         return Flexibility(model, faces, None)
     rows = [places.rows[name][list(components)] for name, components in held.items()]

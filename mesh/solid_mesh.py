@@ -14,7 +14,7 @@ import numpy as np
 from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
-from ..errors import FfrobotError
+from ..errors import FfrobotError, InputError
 from .cells import CellName, Integers
 from .compat import create_solid_mesh, geometry_nodes
 from .part import part_mesh
@@ -98,6 +98,9 @@ def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> Solid
     points = part.points if part is not None else np.empty((0, 3))
     mesh = create_solid_mesh(comm, cell, degree, cells, points)
     local = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
+    fewest = comm.allreduce(local.size, op=MPI.MIN)
+    if not fewest:
+        raise InputError(f"mpirun: expected fewer processes than {comm.size}: some got none of the mesh's elements")
     cell_tag = described["cell_tag"][np.asarray(mesh.topology.original_cell_index)[: local.size]]
     facets, facet_tag = _tagged_facets(mesh, described)
     return SolidMesh(

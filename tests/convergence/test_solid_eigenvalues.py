@@ -33,14 +33,31 @@ def test_nafems_fv5(tmp_path, cell, order, meshes):
     ]
     fine = bodies[-1]
     bending = frequencies(fine, "in-plane-bending")
-    # Timoshenko's beam with its shear factor for the first three. Torsion is Saint-Venant's, without the inertia of
-    # warping, which a solid has: its frequency converges to 0.4 % less; axial likewise, by lateral inertia, 0.07 %.
+    # Timoshenko's beam with its shear factor for the first three, Saint-Venant's torsion, the rod's axial mode.
     np.testing.assert_allclose(bending[:3], [42.65, 148.2, 283.5], rtol=0.005)
     np.testing.assert_allclose(frequencies(fine, "torsion")[0], 71.20, rtol=0.005)
     np.testing.assert_allclose(frequencies(fine, "axial")[0], 125.00, rtol=0.001)
     # A square section bends the same way in both planes.
     np.testing.assert_allclose(bending, frequencies(fine, "out-of-plane-bending"), rtol=2e-3)
     assert np.all(bodies[0].frequency >= fine.frequency * (1 - 1e-9))
+
+
+def test_nafems_fv5_lies_between_soft_and_rigid_ends(tmp_path):
+    """Saint-Venant's torsion is held by its own shear stresses.
+
+    A mean support holds the end softer, a rigid one, which keeps it from warping, harder; both shift all torsion modes
+    by the same factor, as a little more or less length would. Likewise the rod, whose end a rigid face keeps from
+    contracting.
+    """
+    mean, rigid = (
+        body_of(write_solid(tmp_path, **FV5, cell="hexahedron", order=2, divisions=(10, 4, 4), coupling=coupling))
+        for coupling in ("mean", "rigid")
+    )
+    for family, known in (("torsion", 71.20), ("axial", 125.00)):
+        soft, hard = frequencies(mean, family)[0], frequencies(rigid, family)[0]
+        assert 0.99 * known < soft < known < hard < 1.01 * known
+    shift = frequencies(mean, "torsion")[:2] / [71.20, 3 * 71.20]
+    assert shift[0] == pytest.approx(shift[1], abs=2e-4)
 
 
 def test_nafems_fv32(tmp_path):
