@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "fe_models"))
 
 from solids import write_solid
 
-TOGETHER = ["mpirun", "-n", "2", "--oversubscribe"]
+TOGETHER = ["mpirun", "-n", "2", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1"]
 AS_ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
@@ -26,7 +26,7 @@ def link_on_two(ffrobot, *arguments):
         env=os.environ | ffrobot.environment | AS_ROOT,
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=300,
     )
 
 
