@@ -89,7 +89,7 @@ def section_averages(model: SolidModel, x: Floats) -> Averages:
         shapes = element.tabulate(0, section.X)[0, :, :, 0] if w.size else np.empty((0, element.dim))
         cells, place_of = np.unique(section.cells, return_inverse=True)
         gather = sp.csr_matrix((w, (place_of, np.arange(w.size))), shape=(cells.size, w.size))
-        entries = gather @ (monomials[:, :, None] * shapes[:, None, :]).reshape(w.size, -1)  # (cells, 4 d)
+        entries = gather @ (monomials[:, :, None] * shapes[:, None, :]).reshape(w.size, 4 * element.dim)
         columns = np.broadcast_to(nodes[cells][:, None, :], (cells.size, 4, element.dim))
         row = np.broadcast_to(np.arange(4)[:, None], columns.shape)
         rows.append(sp.csr_matrix((entries.ravel(), (row.ravel(), columns.ravel())), shape=(4, size)))

@@ -18,7 +18,7 @@ from ..errors import FfrobotError, SolveError
 from ..files import check_output
 from ..parallel import on_first, processes
 from .link_file import read_link
-from .link_records import Link, SolidLink
+from .link_records import BeamLink, Link, SolidLink
 from .modal_body import ModalBody
 from .modal_body_file import FORMAT, FORMAT_VERSION, read_modal_body, write_modal_body
 
@@ -113,33 +113,32 @@ def _compute(
     progress: Progress | None,
     make_folder: bool = False,
 ) -> LinkOutcome:
-    def write(body: ModalBody) -> ModalBody:
-        write_modal_body(path, body, make_folder=make_folder)
-        return body
+    compute = _computation(link, link_path)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
-        return _modal_body(link, link_path, digest, progress or _silent)
+        return compute(link, link_path, digest, progress or _silent)
 
-    if processes() == 1:
-        body = write(make())
-    elif isinstance(link, SolidLink):
-        body = make()
-        on_first(lambda: bool(write(body)))
-    else:  # too small to share out
-        on_first(lambda: bool(write(make())))
+    def write(body: ModalBody) -> None:
+        write_modal_body(path, body, make_folder=make_folder)
+
+    if processes() > 1 and isinstance(link, BeamLink):  # too small to share out
+        on_first(lambda: write(make()))
         body = read_modal_body(path)
+    else:
+        body = make()
+        on_first(lambda: write(body))
     return LinkOutcome(path, body, True, time.perf_counter() - start)
 
 
-def _modal_body(link: Link, link_path: Path, digest: str, progress: Progress) -> ModalBody:
+def _computation(link: Link, link_path: Path) -> Callable[..., ModalBody]:
     try:
-        if isinstance(link, SolidLink):
-            from .solid_link import solid_modal_body
+        if isinstance(link, BeamLink):
+            from .beam_link import beam_modal_body
 
-            return solid_modal_body(link, link_path, digest, progress)
-        from .beam_link import beam_modal_body
+            return beam_modal_body
+        from .solid_link import solid_modal_body
 
-        return beam_modal_body(link, link_path, digest, progress)
+        return solid_modal_body
     except ModuleNotFoundError as error:
         raise SolveError(
             f"{link_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "

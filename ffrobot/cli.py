@@ -5,13 +5,14 @@ from __future__ import annotations
 import signal
 import sys
 import time
+import traceback
 from pathlib import Path
 from types import FrameType
 
 import click
 
 from .errors import FfrobotError
-from .parallel import is_first
+from .parallel import end_all, is_first
 
 FILE = click.Path(path_type=Path)
 
@@ -125,7 +126,9 @@ def main() -> None:
             click.echo("ffrobot: stopped", err=True)
             sys.exit(130)
         if not isinstance(error, FfrobotError):
-            raise
+            traceback.print_exc()
+            end_all()
+            sys.exit(1)
         if is_first():
             click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)

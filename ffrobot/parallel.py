@@ -44,5 +44,13 @@ def on_first(work: Callable[[], T]) -> T:
     return cast(T, result)
 
 
+def end_all() -> None:
+    """End every process of the run: after an error that only this one has seen the others would wait for ever."""
+    if processes() > 1:
+        from mpi4py import MPI
+
+        MPI.COMM_WORLD.Abort(1)
+
+
 def _environment(names: tuple[str, ...], default: int) -> int:
     return next((int(os.environ[name]) for name in names if name in os.environ), default)

@@ -24,7 +24,9 @@ class Command:
 
     @property
     def environment(self):
-        return os.environ | {"XDG_CACHE_HOME": str(self.cache), "TERM": "dumb"}
+        """Without what MPI leaves behind in a process that has loaded dolfinx: a nested mpirun trips over it."""
+        clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+        return clean | {"XDG_CACHE_HOME": str(self.cache), "TERM": "dumb"}
 
     def __call__(self, *arguments, timeout=120, **options):
         return subprocess.run(

@@ -1,6 +1,5 @@
 """`mpirun -n 2 ffrobot link` makes the file that one process makes."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -23,7 +22,7 @@ pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is
 def link_on_two(ffrobot, *arguments):
     return subprocess.run(
         [*TOGETHER, ffrobot.path, "link", *map(str, arguments)],
-        env=os.environ | ffrobot.environment | AS_ROOT,
+        env=ffrobot.environment | AS_ROOT,
         capture_output=True,
         text=True,
         timeout=300,

@@ -1,6 +1,5 @@
 """The distributed mesh: regions, faces and surface are the part's, whatever the number of processes."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -135,9 +134,9 @@ if comm.rank == 0:
 
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun here")
-def test_two_processes_see_what_one_sees(tmp_path):
+def test_two_processes_see_what_one_sees(ffrobot, tmp_path):
     (tmp_path / "run.py").write_text(PARALLEL)
-    environment = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    environment = ffrobot.environment | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     results = []
     for count in (1, 2):
         command = ["mpirun", "--oversubscribe", "-n", str(count), sys.executable, "run.py", f"{count}.txt"]
