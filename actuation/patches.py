@@ -23,18 +23,29 @@ class PatchArray:
     """The patches of one body.
 
     Attributes:
-        body: its name.
+        layout: the keys of the scene.
         edges: (k, 2) where each patch begins and ends along the link, m.
+        height: (k,) t_b, of the link in the plane under each patch, m.
         moment_per_volt: (k,) c in N·m/V.
         Phi_V: (n, k) modal forces per volt, in the coordinates of the `PlanarBody`: c [φ'(x2) − φ'(x1)].
-        limit: largest voltage, V; None where the scene gives none.
+        limit: (k,) largest voltages, V; infinite where the scene gives none.
+        sqrt_W: (rows, n) what of the modal forces left unmet counts: |sqrt_W r|² is made small.
+        frequency: (n,) of the modes, Hz.
     """
 
-    body: str
+    layout: PztLayout
     edges: Array
+    height: Array
     moment_per_volt: Array
     Phi_V: Array
-    limit: float | None
+    limit: Array
+    sqrt_W: Array
+    frequency: Array
+
+    @property
+    def body(self) -> str:
+        """Name of the body."""
+        return self.layout.body
 
     @property
     def condition_number(self) -> float:
@@ -42,45 +53,123 @@ class PatchArray:
         return float(np.linalg.cond(self.Phi_V))
 
     @property
-    def projector(self) -> Array:
-        """(n, n) what the best voltages make of wanted modal forces: the identity where the patches reach all modes."""
-        n, k = self.Phi_V.shape
-        if n == k:
-            return np.eye(n)
-        return self.Phi_V @ np.linalg.pinv(self.Phi_V)
+    def unreached_modes(self) -> Array:
+        """Numbers (from 0) of the modes that take part in what no voltages can produce."""
+        left, sizes, _ = np.linalg.svd(self.Phi_V)
+        rank = int(np.count_nonzero(sizes > sizes[0] / SINGULAR))
+        return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
+
+    @property
+    def surface_distance(self) -> Array:
+        """(k,) from the link's axis to the outer surface of each patch, m."""
+        return self.height / 2 + self.layout.layers * self.layout.thickness
+
+
+def moment_per_volt(layout: PztLayout, height: Array) -> Array:
+    """c = E_p d31 w_p Σ arm of each layer, t_b/2 + (i − ½) t_p: E_p d31 w_p N (t_b + N t_p)/2; twice that on both faces.
+
+    One layer on one face is Eq. 14 of Shaban 2022. The stiffness of the patches is left out, as there.
+    """
+    layers, faces = layout.layers, 2 if layout.face == "both" else 1
+    arms = layers * (height + layers * layout.thickness) / 2
+    return faces * layout.modulus * layout.d31 * layout.width * arms
 
 
 def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: PlanarBody) -> PatchArray:
     """Place the patches of `layout` on a link.
 
-    c = E_p d31 w_p (t_p + t_b)/2 with the link's height t_b in the plane; a patch works on the difference of the
-    section rotations at its ends. Raises `InputError` for a patch beyond the link or across a step of its section, and
-    for as many patches as modes that do not reach them all.
+    A patch works on the difference of the section rotations at its ends; on one named face also on its elongation,
+    since it pulls there. Raises `InputError` for patches beyond the link, on each other or across a step of its
+    section, and for weights that do not fit.
     """
     key = f'{scene_path}: pzt "{layout.body}"'
+    edges = patch_edges(layout, body.length)
+    _check_edges(key, edges, body.length)
+    heights = np.array([_height(key, body, k, start, end) for k, (start, end) in enumerate(edges, 1)])
+    c = moment_per_volt(layout, heights)
+    ends = [[body.interpolate(x) for x in pair] for pair in edges.clip(0.0, body.length)]
+    Phi_V = c[:, None] * np.array([end.rotation[2] - start.rotation[2] for start, end in ends])
+    if layout.face in ("+y", "-y"):  # bending forwards (M > 0) is a pull above the axis, a push below it
+        side = 1.0 if layout.face == "+y" else -1.0
+        force = -side * layout.modulus * layout.d31 * layout.width * layout.layers
+        Phi_V += force * np.array([end.translation[0] - start.translation[0] for start, end in ends])
+    limit = np.broadcast_to(np.inf if layout.limit is None else np.array(layout.limit), len(edges))
+    return PatchArray(
+        layout, edges, heights, c, (Phi_V @ planar.modal_transform).T, limit, _weights(key, layout, planar),
+        np.sqrt(planar.stiffness) / (2 * np.pi),
+    )  # fmt: skip
+
+
+def patch_edges(layout: PztLayout, length: float) -> Array:
+    """(k, 2) where the patches of `layout` begin and end on a link of that length, m."""
     if layout.centers is not None:
         centers = np.array(layout.centers)
     else:
-        centers = (np.arange(layout.patch_count) + 0.5) * body.length / layout.patch_count
-    edges = centers[:, None] + np.array([-0.5, 0.5]) * layout.length
-    slack = 1e-9 * body.length
-    for k, (start, end) in enumerate(edges, 1):
-        if start < -slack or end > body.length + slack:
-            raise InputError(
-                f"{key}: expected patches within the link, 0 … {body.length:g} m, found patch {k} from {start:g} to"
-                f" {end:g} m"
-            )
-    heights = np.array([_height(key, body, k, start, end) for k, (start, end) in enumerate(edges, 1)])
-    moment_per_volt = layout.modulus * layout.d31 * layout.width * (layout.thickness + heights) / 2
-    rotation = np.array([[body.interpolate(x).rotation[2] for x in pair] for pair in edges.clip(0.0, body.length)])
-    Phi_V = moment_per_volt[:, None] * (rotation[:, 1] - rotation[:, 0]) @ planar.modal_transform
-    array = PatchArray(layout.body, edges, moment_per_volt, Phi_V.T, layout.limit)
-    if len(edges) == planar.n_modes and not array.condition_number < SINGULAR:
+        centers = (np.arange(layout.patch_count) + 0.5) * length / layout.patch_count
+    edges: Array = centers[:, None] + np.array([-0.5, 0.5]) * layout.length
+    return edges
+
+
+def check_reach(scene_path: Path, patches: PatchArray) -> None:
+    """Raise `InputError` unless the patches reach every mode, or the scene is content with less."""
+    if patches.layout.allocation == "least-squares":
+        return
+    key = f'{scene_path}: pzt "{patches.body}"'
+    advice = 'or be content with the best they can do: allocation = "least-squares"'
+    n, k = patches.Phi_V.shape
+    if k < n:
+        raise InputError(f"{key}: expected as many patches as modes ({n}) or more, found {k}: add patches, {advice}")
+    unreached = patches.unreached_modes
+    if unreached.size:
+        modes = ", ".join(f"{j + 1} ({patches.frequency[j]:.4g} Hz)" for j in unreached)
         raise InputError(
             f"{key}: expected patches that reach every mode, found a singular Φ_V (condition number"
-            f" {array.condition_number:.1g}): move them, or use more of them"
+            f" {patches.condition_number:.1g}): no voltages serve mode {modes}; move patches, {advice}"
         )
-    return array
+
+
+def _check_edges(key: str, edges: Array, length: float) -> None:
+    slack = 1e-9 * length
+    for k, (start, end) in enumerate(edges, 1):
+        if start < -slack or end > length + slack:
+            raise InputError(
+                f"{key}: expected patches within the link, 0 … {length:g} m, found patch {k} from {start:g} to {end:g} m"
+            )
+    order = np.argsort(edges[:, 0])
+    for k, following in zip(order[:-1], order[1:], strict=True):
+        if edges[following, 0] < edges[k, 1] - slack:
+            first, second = sorted((k + 1, following + 1))
+            (a, b), (c, d) = edges[first - 1], edges[second - 1]
+            raise InputError(
+                f"{key}: expected patches beside each other, found patch {first} ({a:g} to {b:g} m) and patch {second}"
+                f" ({c:g} to {d:g} m) on the same place"
+            )
+
+
+def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
+    """sqrt_W: of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points."""
+    n = planar.n_modes
+    if layout.mode_weights is not None:
+        if len(layout.mode_weights) != n:
+            raise InputError(
+                f"{key}: mode_weights: expected {n} weights, one for each mode that moves in the plane, found"
+                f" {len(layout.mode_weights)}"
+            )
+        return np.diag(np.sqrt(layout.mode_weights))
+    if layout.point_weights is None:
+        return np.eye(n)
+    unknown = layout.point_weights.keys() - planar.points.keys()
+    if unknown:
+        raise InputError(
+            f"{key}: point_weights: expected points of the link, {', '.join(planar.points)}, found"
+            f" {', '.join(sorted(unknown))}"
+        )
+    return np.vstack(
+        [
+            np.sqrt(weight) * planar.points[name].translation / planar.stiffness
+            for name, weight in layout.point_weights.items()
+        ]
+    )
 
 
 def _height(key: str, body: ModalBody, number: int, start: float, end: float) -> float:

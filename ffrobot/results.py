@@ -10,6 +10,7 @@ import numpy as np
 
 from . import __version__
 from .actuation.patches import PatchArray
+from .actuation.points import PointForces, PointSet
 from .actuation.voltages import Voltages
 from .files import write_atomically
 from .mbs.analyses import Outcome
@@ -44,6 +45,10 @@ def write_results(solution: Solution, path: Path) -> None:
             _write_forces(group, outcome)
             for body_name, voltages in solution.voltages.get(name, {}).items():
                 _write_voltages(group.create_group(f"pzt/{body_name}"), solution.patches[body_name], voltages)
+            for body_name, forces in solution.point_forces.get(name, {}).items():
+                _write_point_forces(
+                    group.create_group(f"actuation_points/{body_name}"), solution.points[body_name], forces
+                )
         file.flush()
         image: bytes = file.id.get_file_image()
     write_atomically(path, image, "results file")
@@ -61,7 +66,7 @@ def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
     analysis = outcome.analysis
     group.attrs["kind"] = analysis.kind
-    group.attrs["integrator"] = "none" if analysis.kind == "static" else analysis.integrator
+    group.attrs["integrator"] = analysis.integrator if analysis.kind in ("pcid", "forward") else "none"
     group.attrs["tolerance"] = analysis.tolerance
     group.attrs["actuation"] = analysis.actuation or ""
     group.attrs["apply"] = analysis.apply or ""
@@ -110,4 +115,16 @@ def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) 
     group["edges"] = patches.edges
     group["moment_per_volt"] = patches.moment_per_volt
     group.attrs["condition_number"] = patches.condition_number
-    group.attrs["limit"] = np.inf if patches.limit is None else patches.limit
+    group["residual_force"] = voltages.unmet
+    group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
+
+
+def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces) -> None:
+    group["force"] = forces.force
+    group["residual"] = forces.residual
+    group["residual_force"] = forces.unmet
+    group["position"] = np.array([point.position for point in points.points])
+    group["direction"] = points.direction.T
+    group.attrs["components"] = list(points.axes)
+    group.attrs["rank"] = forces.rank
+    group.attrs["condition_number"] = forces.condition_number

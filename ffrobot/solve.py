@@ -5,22 +5,25 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from .actuation.patches import PatchArray, patch_array
-from .actuation.voltages import Voltages, solve_voltages
+from .actuation.patches import PatchArray, check_reach, patch_array
+from .actuation.points import PointForces, PointSet, point_set, solve_point_forces, with_points
+from .actuation.voltages import Voltages, allocation, solve_voltages
 from .errors import InputError
 from .fe_models.modal_body import ModalBody
 from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
+from .mbs.fcid import run_fcid
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.scene_file import load_scene
 from .mbs.scene_records import Analysis, Scene, split_point
+from .mbs.steering import Equipment
 from .validation import did_you_mean, quoted
 
 
@@ -57,6 +60,7 @@ class Solution:
     Attributes:
         outcomes: by analysis, in the order of the scene.
         voltages: by analysis and body.
+        point_forces: likewise.
         seconds: wall time by stage.
         skipped: what the scene did not need, one line each.
     """
@@ -65,8 +69,10 @@ class Solution:
     model: Model
     bodies: Mapping[str, LoadedBody]
     patches: Mapping[str, PatchArray]
+    points: Mapping[str, PointSet] = field(default_factory=dict)
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
+    point_forces: dict[str, dict[str, PointForces]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
 
@@ -85,11 +91,7 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
             started = time.perf_counter()
             outcome = _run(solution, analysis, watcher, interruption)
             solution.outcomes[analysis.name] = outcome
-            if outcome.F_p is not None:
-                solution.voltages[analysis.name] = {
-                    body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
-                    for body, array in solution.patches.items()
-                }
+            _allocate(solution, outcome)
             solution.seconds[analysis.name] = time.perf_counter() - started
             if outcome.status != "completed":
                 break
@@ -108,10 +110,33 @@ def prepare(scene_path: Path, watcher: Watcher | None = None) -> Solution:
         for layout in scene.pzt
         if (modal := bodies[layout.body].modal) is not None
     }
+    if any(analysis.kind != "forward" for analysis in scene.analysis) and scene.trajectory:
+        for array in patches.values():
+            check_reach(scene.path, array)
+    points = {
+        layout.body: point_set(scene.path, layout, bodies[layout.body].modal, bodies[layout.body].planar)
+        for layout in scene.actuation_points
+    }
+    for name, chosen in points.items():
+        bodies[name] = replace(bodies[name], planar=with_points(bodies[name].planar, chosen))
     model = build_model(scene, [body.planar for body in bodies.values()], _voltage_loads(scene, patches))
-    solution = Solution(scene, model, bodies, patches, skipped=tuple(_skipped(scene, bodies)))
+    solution = Solution(scene, model, bodies, patches, points, skipped=tuple(_skipped(scene, bodies)))
     solution.seconds["links and files"] = loaded - began
     return solution
+
+
+def _allocate(solution: Solution, outcome: Outcome) -> None:
+    """What patches and actuation points have to do for what an inverse analysis found."""
+    name = outcome.analysis.name
+    if outcome.F_p is not None:
+        solution.voltages[name] = {
+            body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
+            for body, array in solution.patches.items()
+        }
+    if outcome.analysis.kind != "forward" and any(outcome.assembly.is_trajectory):
+        solution.point_forces[name] = {
+            body: solve_point_forces(points, outcome) for body, points in solution.points.items()
+        }
 
 
 def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Outcome:
@@ -123,18 +148,22 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
 
     if analysis.kind == "static":
         return run_static(model, analysis)
+    if analysis.kind == "fcid":
+        return run_fcid(model, analysis)
     if analysis.kind == "pcid":
         replayed = any(later.actuation == analysis.name for later in solution.scene.analysis)
         return run_pcid(model, analysis, replayed, progress)
     source = solution.outcomes[analysis.actuation] if analysis.actuation else None
-    if source is not None and analysis.apply != "trajectory" and source.tau is None:
-        raise InputError(
-            f'{solution.scene.path}: analysis "{analysis.name}": apply: expected motors that fit the mechanism'
-            f" ({model.rigid_freedom} of them) for {analysis.apply!r}, found {len(model.motors)}; name them with"
-            ' motor = true, or use apply = "trajectory"'
-        )
-    projector = {name: array.projector for name, array in solution.patches.items()}
-    return run_forward(model, analysis, source, projector, progress)
+    return run_forward(model, analysis, source, _equipment(solution), progress)
+
+
+def _equipment(solution: Solution) -> Equipment:
+    """The actuators of the scene, fresh for one run."""
+    return Equipment(
+        {name: allocation(array, limited=False) for name, array in solution.patches.items()},
+        {name: allocation(array, limited=True) for name, array in solution.patches.items()},
+        {name: points.actuator() for name, points in solution.points.items()},
+    )
 
 
 def _load_bodies(scene: Scene, watcher: Watcher) -> list[LoadedBody]:

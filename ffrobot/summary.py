@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -41,7 +42,7 @@ def _analyses(solution: Solution) -> Table:
     table = _table("analysis", "kind", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
         analysis, reached = outcome.analysis, outcome.time[-1]
-        integrated = analysis.kind != "static"
+        integrated = analysis.kind in ("pcid", "forward")
         table.add_row(
             name,
             analysis.kind,
@@ -59,13 +60,13 @@ def _voltages(solution: Solution) -> Table:
     for name, by_body in solution.voltages.items():
         for body, values in by_body.items():
             patches = solution.patches[body]
-            limit = patches.limit
+            limit = patches.limit.min()
             table.add_row(
                 name,
                 body,
                 f"{values.largest:.0f}" if values.largest >= 1e3 else f"{values.largest:.3g}",
-                "none" if limit is None else f"{limit:g}",
-                "" if limit is None else f"{values.largest / limit:.3g}",
+                "none" if limit == np.inf else f"{limit:g}",
+                "" if limit == np.inf else f"{np.abs(values.required / patches.limit).max():.3g}",
                 f"{patches.condition_number:.3g}",
             )
     return table
