@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -27,9 +28,10 @@ class PatchArray:
         edges: (k, 2) where each patch begins and ends along the link, m.
         height: (k,) t_b, of the link in the plane under each patch, m.
         moment_per_volt: (k,) c in N·m/V.
-        Phi_V: (n, k) modal forces per volt, in the coordinates of the `PlanarBody`: c [φ'(x2) − φ'(x1)].
+        turn: (n, k) φ'(x2) − φ'(x1) of the modes of the `PlanarBody`, rad per unit of modal coordinate.
+        Phi_V: (n, k) modal forces per volt, in the same coordinates: c times `turn`, and more on one named face.
         limit: (k,) largest voltages, V; infinite where the scene gives none.
-        sqrt_W: (rows, n) what of the modal forces left unmet counts: |sqrt_W r|² is made small.
+        W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
         frequency: (n,) of the modes, Hz.
     """
 
@@ -37,9 +39,10 @@ class PatchArray:
     edges: Array
     height: Array
     moment_per_volt: Array
+    turn: Array
     Phi_V: Array
     limit: Array
-    sqrt_W: Array
+    W_sqrt: Array
     frequency: Array
 
     @property
@@ -66,9 +69,9 @@ class PatchArray:
 
 
 def moment_per_volt(layout: PztLayout, height: Array) -> Array:
-    """c = E_p d31 w_p Σ arm of each layer, t_b/2 + (i − ½) t_p: E_p d31 w_p N (t_b + N t_p)/2; twice that on both faces.
+    """Moment (k,) c = E_p d31 w_p N (t_b + N t_p)/2 of N layers on one face, N·m/V; twice that on both faces.
 
-    One layer on one face is Eq. 14 of Shaban 2022. The stiffness of the patches is left out, as there.
+    The layers' arms, t_b/2 + (i − ½) t_p, are summed. One layer on one face is Eq. 14 of Shaban 2022. The stiffness of the patches is left out, as there.
     """
     layers, faces = layout.layers, 2 if layout.face == "both" else 1
     arms = layers * (height + layers * layout.thickness) / 2
@@ -88,16 +91,16 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     heights = np.array([_height(key, body, k, start, end) for k, (start, end) in enumerate(edges, 1)])
     c = moment_per_volt(layout, heights)
     ends = [[body.interpolate(x) for x in pair] for pair in edges.clip(0.0, body.length)]
-    Phi_V = c[:, None] * np.array([end.rotation[2] - start.rotation[2] for start, end in ends])
+    T = planar.modal_transform
+    turn = (np.array([end.rotation[2] - start.rotation[2] for start, end in ends]) @ T).T
+    Phi_V = c * turn
     if layout.face in ("+y", "-y"):  # bending forwards (M > 0) is a pull above the axis, a push below it
         side = 1.0 if layout.face == "+y" else -1.0
         force = -side * layout.modulus * layout.d31 * layout.width * layout.layers
-        Phi_V += force * np.array([end.translation[0] - start.translation[0] for start, end in ends])
-    limit = np.broadcast_to(np.inf if layout.limit is None else np.array(layout.limit), len(edges))
-    return PatchArray(
-        layout, edges, heights, c, (Phi_V @ planar.modal_transform).T, limit, _weights(key, layout, planar),
-        np.sqrt(planar.stiffness) / (2 * np.pi),
-    )  # fmt: skip
+        Phi_V += force * (np.array([end.translation[0] - start.translation[0] for start, end in ends]) @ T).T
+    limit = np.full(len(edges), np.inf if layout.limit is None else layout.limit)
+    weights, frequency = _weights(key, layout, planar), np.sqrt(planar.stiffness) / (2 * np.pi)
+    return PatchArray(layout, edges, heights, c, turn, Phi_V, limit, weights, frequency)
 
 
 def patch_edges(layout: PztLayout, length: float) -> Array:
@@ -108,6 +111,20 @@ def patch_edges(layout: PztLayout, length: float) -> Array:
         centers = (np.arange(layout.patch_count) + 0.5) * length / layout.patch_count
     edges: Array = centers[:, None] + np.array([-0.5, 0.5]) * layout.length
     return edges
+
+
+def with_patch_count(
+    scene_path: Path, layout: PztLayout, body: ModalBody, planar: PlanarBody, count: int
+) -> PatchArray | None:
+    """As many of the same patches, evenly spread over the link, with one limit; None where they have no room."""
+    if count * layout.length > body.length * (1 + 1e-9):
+        return None
+    limit = min(layout.limit) if isinstance(layout.limit, tuple) else layout.limit
+    spread = layout.model_copy(update={"count": count, "centers": None, "limit": limit})
+    try:
+        return patch_array(scene_path, spread, body, planar)
+    except InputError:  # across a step of the section
+        return None
 
 
 def check_reach(scene_path: Path, patches: PatchArray) -> None:
@@ -133,10 +150,10 @@ def _check_edges(key: str, edges: Array, length: float) -> None:
     for k, (start, end) in enumerate(edges, 1):
         if start < -slack or end > length + slack:
             raise InputError(
-                f"{key}: expected patches within the link, 0 … {length:g} m, found patch {k} from {start:g} to {end:g} m"
+                f"{key}: expected patches within the link, 0 … {length:g} m, found patch {k} from {start:g} to"
+                f" {end:g} m"
             )
-    order = np.argsort(edges[:, 0])
-    for k, following in zip(order[:-1], order[1:], strict=True):
+    for k, following in pairwise(np.argsort(edges[:, 0])):
         if edges[following, 0] < edges[k, 1] - slack:
             first, second = sorted((k + 1, following + 1))
             (a, b), (c, d) = edges[first - 1], edges[second - 1]
@@ -147,7 +164,7 @@ def _check_edges(key: str, edges: Array, length: float) -> None:
 
 
 def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
-    """sqrt_W: of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points."""
+    """W_sqrt: of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points."""
     n = planar.n_modes
     if layout.mode_weights is not None:
         if len(layout.mode_weights) != n:

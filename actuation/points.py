@@ -90,7 +90,8 @@ def point_set(scene_path: Path, layout: ActuationPoints, body: ModalBody | None,
     coordinates = 3 + planar.n_modes
     if len(places) > coordinates:
         raise InputError(
-            f"{key}: expected at most as many components as the body has coordinates ({coordinates}), found {len(places)}"
+            f"{key}: expected at most as many components as the body has coordinates ({coordinates}), found"
+            f" {len(places)}"
         )
     points = [_point(key, place, body, planar) for _, place in places]
     axes = tuple(axis for axis, _ in places)
@@ -157,8 +158,8 @@ def _automatic(key: str, name: str, body: ModalBody | None, planar: PlanarBody) 
     rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))
     if rank < coordinates:
         raise InputError(
-            f"{key}: expected points that carry all {coordinates} generalized forces of the body, found {rank} independent"
-            " components among all its stations"
+            f"{key}: expected points that carry all {coordinates} generalized forces of the body, found {rank}"
+            " independent components among all its stations"
         )
     kept = sorted(order[:coordinates])
     return _named(name, tuple(candidates.axes[k] for k in kept), [candidates.points[k] for k in kept], planar)
@@ -199,7 +200,7 @@ def _check_rank(key: str, chosen: PointSet) -> None:
     rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))
     if rank < len(chosen.names):
         raise InputError(
-            f"{key}: expected components that differ in what they do to the body, found {len(chosen.names)} of which only"
-            f" {rank} are independent: axial ones coincide where no mode moves along the link, and it has"
+            f"{key}: expected components that differ in what they do to the body, found {len(chosen.names)} of which"
+            f" only {rank} are independent: axial ones coincide where no mode moves along the link, and it has"
             f" {len(chosen.scale)} coordinates"
         )

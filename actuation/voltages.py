@@ -39,19 +39,19 @@ class Voltages:
 
 
 def voltage_gain(patches: PatchArray) -> Array:
-    """(k, n) voltages per modal force without limits: Φ_V⁻¹, the smallest of many, or those of least weighted residual."""
-    Phi_V, sqrt_W = patches.Phi_V, patches.sqrt_W
+    """Voltages (k, n) per modal force without limits: Φ_V⁻¹, the smallest of many, or those of least residual."""
+    Phi_V, W_sqrt = patches.Phi_V, patches.W_sqrt
     n, k = Phi_V.shape
     if k >= n and not patches.unreached_modes.size:
         return np.linalg.inv(Phi_V) if n == k else np.linalg.pinv(Phi_V)
-    gain: Array = np.linalg.pinv(sqrt_W @ Phi_V) @ sqrt_W
+    gain: Array = np.linalg.pinv(W_sqrt @ Phi_V) @ W_sqrt
     return gain
 
 
 def allocation(patches: PatchArray, *, limited: bool) -> _core.Allocation:
     """What turns modal forces into voltages, with the limits of the patches or without."""
     limit = patches.limit if limited else np.full_like(patches.limit, np.inf)
-    return _core.Allocation(patches.Phi_V, patches.sqrt_W, voltage_gain(patches), limit)
+    return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), limit)
 
 
 def solve_voltages(patches: PatchArray, F_p: Array) -> Voltages:

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from . import __version__
+from .actuation.feasibility import MotorFeasibility, PatchFeasibility
 from .actuation.patches import PatchArray
 from .actuation.points import PointForces, PointSet
 from .actuation.voltages import Voltages
@@ -49,6 +50,10 @@ def write_results(solution: Solution, path: Path) -> None:
                 _write_point_forces(
                     group.create_group(f"actuation_points/{body_name}"), solution.points[body_name], forces
                 )
+            for trajectory, shift in solution.predicted_shift.get(name, {}).items():
+                group[f"trajectories/{trajectory}/predicted_shift"] = shift
+            for owner, judged in solution.feasibility.get(name, {}).items():
+                _write_feasibility(group.require_group("feasibility"), solution, owner, judged)
         file.flush()
         image: bytes = file.id.get_file_image()
     write_atomically(path, image, "results file")
@@ -117,6 +122,23 @@ def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) 
     group.attrs["condition_number"] = patches.condition_number
     group["residual_force"] = voltages.unmet
     group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
+
+
+def _write_feasibility(
+    group: h5py.Group, solution: Solution, owner: str, judged: PatchFeasibility | MotorFeasibility
+) -> None:
+    if isinstance(judged, MotorFeasibility):
+        entry = group.create_group(f"joints/{owner}")
+        entry.attrs.update(vars(judged) | {"factor": judged.factor})
+        return
+    entry = group.create_group(f"pzt/{owner}")
+    arrays = {key: value for key, value in vars(judged).items() if isinstance(value, np.ndarray)}
+    for key, values in (arrays | {"factor": judged.factor, "mode_factor": judged.mode_factor}).items():
+        entry[key] = values
+    layout = solution.patches[owner].layout
+    entry.attrs["depoling_field"] = layout.depoling_field or np.inf
+    entry.attrs["strain_limit"] = layout.strain_limit or np.inf
+    entry.create_group("remedies").attrs.update(vars(judged.remedies))
 
 
 def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces) -> None:

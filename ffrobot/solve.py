@@ -6,12 +6,16 @@ import hashlib
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .actuation.patches import PatchArray, check_reach, patch_array
+from .actuation.feasibility import MotorFeasibility, PatchFeasibility, judge_motors, judge_patches
+from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
 from .actuation.points import PointForces, PointSet, point_set, solve_point_forces, with_points
+from .actuation.prediction import predicted_shift, unmet_modal_forces
 from .actuation.voltages import Voltages, allocation, solve_voltages
 from .errors import InputError
 from .fe_models.modal_body import ModalBody
@@ -25,6 +29,8 @@ from .mbs.scene_file import load_scene
 from .mbs.scene_records import Analysis, Scene, split_point
 from .mbs.steering import Equipment
 from .validation import did_you_mean, quoted
+
+Array = NDArray[np.float64]
 
 
 class Watcher:
@@ -61,6 +67,8 @@ class Solution:
         outcomes: by analysis, in the order of the scene.
         voltages: by analysis and body.
         point_forces: likewise.
+        predicted_shift: by analysis and trajectory, (T, m): what voltages within their limits leave undone.
+        feasibility: by analysis, of patches by body and motors by joint.
         seconds: wall time by stage.
         skipped: what the scene did not need, one line each.
     """
@@ -73,6 +81,8 @@ class Solution:
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
     point_forces: dict[str, dict[str, PointForces]] = field(default_factory=dict)
+    predicted_shift: dict[str, dict[str, Array]] = field(default_factory=dict)
+    feasibility: dict[str, dict[str, PatchFeasibility | MotorFeasibility]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
 
@@ -133,10 +143,27 @@ def _allocate(solution: Solution, outcome: Outcome) -> None:
             body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
             for body, array in solution.patches.items()
         }
+        if solution.patches:
+            unmet = unmet_modal_forces(outcome, solution.voltages[name])
+            solution.predicted_shift[name] = predicted_shift(outcome, unmet)
+        solution.feasibility[name] = _judge(solution, outcome)
     if outcome.analysis.kind != "forward" and any(outcome.assembly.is_trajectory):
         solution.point_forces[name] = {
             body: solve_point_forces(points, outcome) for body, points in solution.points.items()
         }
+
+
+def _judge(solution: Solution, outcome: Outcome) -> dict[str, PatchFeasibility | MotorFeasibility]:
+    """Can patches and motors do what an inverse analysis found?"""
+    scene, name = solution.scene, outcome.analysis.name
+    judged: dict[str, PatchFeasibility | MotorFeasibility] = {}
+    judged.update(judge_motors(outcome, {joint.name: joint for joint in scene.joint}))
+    for body, array in solution.patches.items():
+        loaded = solution.bodies[body]
+        assert loaded.modal is not None
+        trial = partial(with_patch_count, scene.path, array.layout, loaded.modal, loaded.planar)
+        judged[body] = judge_patches(array, solution.voltages[name][body], outcome, trial)
+    return judged
 
 
 def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Outcome:

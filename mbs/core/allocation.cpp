@@ -18,16 +18,16 @@ constexpr int most_iterations = 200, most_halvings = 40;
 
 } // namespace
 
-Allocation::Allocation(MatrixXd Phi, const MatrixXd &sqrt_W, MatrixXd gain, VectorXd limit)
+Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, VectorXd limit)
     : Phi_(std::move(Phi)), gain_(std::move(gain)), limit_(std::move(limit)), scale_(limit_) {
   const Index k = Phi_.cols();
   for (Index i = 0; i < k; ++i)
     if (!std::isfinite(scale_[i]))
       scale_[i] = 1;
-  const MatrixXd A = sqrt_W * Phi_ * scale_.asDiagonal();
+  const MatrixXd A = W_sqrt * Phi_ * scale_.asDiagonal();
   H_ = A.transpose() * A;
   H_.diagonal().array() += ridge * std::max(H_.trace(), std::numeric_limits<double>::min());
-  back_ = A.transpose() * sqrt_W;
+  back_ = A.transpose() * W_sqrt;
   V_ = u_ = b_ = gradient_ = trial_ = free_step_ = VectorXd::Zero(k);
 }
 
