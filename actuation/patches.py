@@ -71,7 +71,8 @@ class PatchArray:
 def moment_per_volt(layout: PztLayout, height: Array) -> Array:
     """Moment (k,) c = E_p d31 w_p N (t_b + N t_p)/2 of N layers on one face, N·m/V; twice that on both faces.
 
-    The layers' arms, t_b/2 + (i − ½) t_p, are summed. One layer on one face is Eq. 14 of Shaban 2022. The stiffness of the patches is left out, as there.
+    The layers' arms, t_b/2 + (i − ½) t_p, are summed. One layer on one face is Eq. 14 of Shaban
+    2022. The stiffness of the patches is left out, as there.
     """
     layers, faces = layout.layers, 2 if layout.face == "both" else 1
     arms = layers * (height + layers * layout.thickness) / 2
@@ -191,13 +192,23 @@ def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
 
 def _height(key: str, body: ModalBody, number: int, start: float, end: float) -> float:
     """The height of the link along y under a patch."""
-    x = body.stations.position[:, 0]
-    slack = 1e-9 * body.length
-    covered = (x[1:] > start + slack) & (x[:-1] < end - slack)
-    heights = body.stations.height[:-1][covered]
+    heights = _covered_heights(body, start, end)
     if np.ptp(heights) > 1e-9 * heights.max():
         raise InputError(
             f"{key}: expected patches on one section each, found patch {number} ({start:g} to {end:g} m) across a step"
             f" of the height from {heights.min():g} to {heights.max():g} m"
         )
     return float(heights[0])
+
+
+def section_height(body: ModalBody, start: float, end: float) -> float:
+    """The height of the link along y between two places of one section, m."""
+    return float(_covered_heights(body, start, end)[0])
+
+
+def _covered_heights(body: ModalBody, start: float, end: float) -> Array:
+    x = body.stations.position[:, 0]
+    slack = 1e-9 * body.length
+    covered = (x[1:] > start + slack) & (x[:-1] < end - slack)
+    heights: Array = body.stations.height[:-1][covered]
+    return heights

@@ -1,4 +1,7 @@
-"""The command line: `ffrobot link | solve | feasibility | info | plot`. Heavy imports happen inside the commands that need them."""
+"""The command line: `ffrobot link | solve | feasibility | info | plot`.
+
+Heavy imports happen inside the commands that need them.
+"""
 
 from __future__ import annotations
 

@@ -12,10 +12,9 @@ from rich.console import Console, Group
 from rich.table import Table
 
 from .errors import InputError
+from .validation import quoted
 
 Array = NDArray[np.float64]
-
-STRONG, WEAK = "yes", "no"
 
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:
@@ -29,8 +28,8 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
             judged = [name for name, group in file.items() if "feasibility" in group]
             if analysis is not None and analysis not in judged:
                 raise InputError(
-                    f"{path}: --analysis: expected an analysis with motors or patches, {', '.join(judged) or 'none here'},"
-                    f" found {analysis!r}"
+                    f"{path}: --analysis: expected an analysis with motors or patches, {quoted(judged)}, found"
+                    f' "{analysis}"'
                 )
             wanted = judged if analysis is None else [analysis]
             return Group(*(table for name in wanted for table in _tables(name, file[name])))
@@ -52,72 +51,67 @@ def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
 
 def _motors(group: h5py.Group) -> Table:
     table = _table(
-        "motor of",
-        "moment",
-        "limit",
-        "speed (rad/s)",
-        "limit",
-        "power (W)",
-        "limit",
-        "missing",
-        "from t (s)",
-        "can it?",
+        "motor of", "moment", "limit", "speed", "limit", "power (W)", "limit", "factor", "from t (s)", "can it?"
     )
+    keys = ("moment", "moment_limit", "speed", "speed_limit", "power", "power_limit")
     for name, motor in group.items():
-        a = motor.attrs
-        table.add_row(
-            name, *(_number(a[key]) for key in ("moment", "moment_limit", "speed", "speed_limit", "power", "power_limit")),
-            *_verdict(a["factor"], a["saturation_time"]),
-        )  # fmt: skip
+        peaks = [_number(motor.attrs[key]) for key in keys]
+        table.add_row(name, *peaks, *_verdict(motor.attrs["factor"], motor.attrs["saturation_time"]))
     return table
 
 
 def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
     table = _table(
-        f"patch of {body}", "at (m)", "needs (V)", "limit (V)", "needs (N·m)", "has (N·m)", "missing", "from t (s)",
-        "field (kV/mm)", "of depoling", "strain (1e-6)", "can it?",
+        body, "at (m)", "needs (V)", "has (V)", "needs (N·m)", "has", "factor", "from (s)", "kV/mm", "depoling",
+        "strain (µ)", "can it?",
     )  # fmt: skip
     required, available = judged["required_moment"][()], judged["available_moment"][()]
     c, depoling = np.abs(pzt["moment_per_volt"][()]), judged.attrs["depoling_field"]
     for k in range(len(required)):
-        field = judged["field"][k]
-        missing, since, verdict = _verdict(judged["factor"][k], judged["saturation_time"][k])
+        moments = (required[k] / c[k], available[k] / c[k], required[k], available[k])
+        field, strain = judged["field"][k], judged["strain"][k]
+        factor, since, can = _verdict(judged["factor"][k], judged["saturation_time"][k])
+        beyond = [
+            name
+            for name, is_beyond in (
+                ("depoled", judged["limited_field"][k] > depoling),
+                ("strained", strain > judged.attrs["strain_limit"]),
+            )
+            if is_beyond
+        ]
         table.add_row(
-            f"{k + 1}", f"{pzt['edges'][k].mean():.4g}", _number(required[k] / c[k]), _number(available[k] / c[k]),
-            _number(required[k]), _number(available[k]), missing, since, _number(field / 1e6), _number(field / depoling),
-            _number(1e6 * judged["strain"][k]), verdict,
+            f"patch {k + 1}", f"{pzt['edges'][k].mean():.4g}", *map(_number, moments), factor, since,
+            _number(field / 1e6), "" if np.isinf(depoling) else _number(field / depoling), _number(1e6 * strain),
+            ", ".join([can, *beyond]),
         )  # fmt: skip
     return table
 
 
 def _modes(body: str, judged: h5py.Group) -> Table:
-    table = _table(f"mode of {body}", "needs (N/√kg)", "all patches have (N/√kg)", "missing")
+    table = _table(body, "needs (N/√kg)", "all patches have (N/√kg)", "factor")
     for k, (needed, had, factor) in enumerate(
         zip(judged["mode_required"][()], judged["mode_available"][()], judged["mode_factor"][()], strict=True), 1
     ):
-        table.add_row(f"{k}", _number(needed), _number(had), _number(factor))
+        table.add_row(f"mode {k}", _number(needed), _number(had), _number(factor))
     return table
 
 
 def _remedy_line(judged: h5py.Group) -> str:
-    return "what alone would do: " + remedy_text(dict(judged["remedies"].attrs))
-
-
-def remedy_text(remedies: dict[str, float]) -> str:
-    """What limit, number of layers, thickness or number of patches would do."""
-    count = (
-        f"{remedies['count']:.0f} patches"
-        if remedies["count"]
-        else f"no number of patches ({remedies['most_count']:.0f} have room, and lack a factor {_number(remedies['most_factor'])})"
-    )
+    if np.all(judged["factor"][()] <= 1.0):
+        return f"the patches can do it; a limit of {_number(judged['remedies'].attrs['limit'])} V would do"
+    remedies = judged["remedies"].attrs
+    count = f"{remedies['count']} patches"
+    if not remedies["count"]:
+        missing = _number(remedies["most_factor"])
+        count = f"no number of patches ({remedies['most_count']} have room, and lack a factor {missing})"
     return (
-        f"a limit of {_number(remedies['limit'])} V; {remedies['layers']:.0f} layers;"
-        f" {_number(1e3 * remedies['thickness'])} mm thick layers at the same field; {count}"
+        f"what alone would do: a limit of {_number(remedies['limit'])} V; {remedies['layers']} layers;"
+        f" layers of {_number(1e3 * remedies['thickness'])} mm at the same field; {count}"
     )
 
 
 def _verdict(factor: float, since: float) -> tuple[str, str, str]:
-    return _number(factor), "" if np.isnan(since) else f"{since:g}", STRONG if factor <= 1 else WEAK
+    return _number(factor), "" if np.isnan(since) else f"{since:g}", "yes" if factor <= 1 else "no"
 
 
 def _number(value: float) -> str:

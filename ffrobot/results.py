@@ -50,6 +50,9 @@ def write_results(solution: Solution, path: Path) -> None:
                 _write_point_forces(
                     group.create_group(f"actuation_points/{body_name}"), solution.points[body_name], forces
                 )
+            for body_name, effect in solution.structure.items():
+                for key, pair in vars(effect).items():
+                    group[f"patch_structure/{body_name}/{key}"] = pair
             for trajectory, shift in solution.predicted_shift.get(name, {}).items():
                 group[f"trajectories/{trajectory}/predicted_shift"] = shift
             for owner, judged in solution.feasibility.get(name, {}).items():

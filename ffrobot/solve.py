@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .actuation.feasibility import MotorFeasibility, PatchFeasibility, judge_motors, judge_patches
+from .actuation.patch_structure import StructureEffect, structure_effect, with_patches
 from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
 from .actuation.points import PointForces, PointSet, point_set, solve_point_forces, with_points
 from .actuation.prediction import predicted_shift, unmet_modal_forces
@@ -64,6 +65,7 @@ class Solution:
     """Everything a solve computed.
 
     Attributes:
+        structure: what patches that are part of their link change of it, by body.
         outcomes: by analysis, in the order of the scene.
         voltages: by analysis and body.
         point_forces: likewise.
@@ -78,6 +80,7 @@ class Solution:
     bodies: Mapping[str, LoadedBody]
     patches: Mapping[str, PatchArray]
     points: Mapping[str, PointSet] = field(default_factory=dict)
+    structure: Mapping[str, StructureEffect] = field(default_factory=dict)
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
     point_forces: dict[str, dict[str, PointForces]] = field(default_factory=dict)
@@ -115,6 +118,7 @@ def prepare(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     scene = load_scene(scene_path)
     bodies = {body.name: loaded for body, loaded in zip(scene.body, _load_bodies(scene, watcher), strict=True)}
     loaded = time.perf_counter()
+    structure = _add_patches(scene, bodies)
     patches = {
         layout.body: patch_array(scene.path, layout, modal, bodies[layout.body].planar)
         for layout in scene.pzt
@@ -130,7 +134,7 @@ def prepare(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     for name, chosen in points.items():
         bodies[name] = replace(bodies[name], planar=with_points(bodies[name].planar, chosen))
     model = build_model(scene, [body.planar for body in bodies.values()], _voltage_loads(scene, patches))
-    solution = Solution(scene, model, bodies, patches, points, skipped=tuple(_skipped(scene, bodies)))
+    solution = Solution(scene, model, bodies, patches, points, structure, skipped=tuple(_skipped(scene, bodies)))
     solution.seconds["links and files"] = loaded - began
     return solution
 
@@ -154,7 +158,7 @@ def _allocate(solution: Solution, outcome: Outcome) -> None:
 
 
 def _judge(solution: Solution, outcome: Outcome) -> dict[str, PatchFeasibility | MotorFeasibility]:
-    """Can patches and motors do what an inverse analysis found?"""
+    """Whether patches and motors can do what an inverse analysis found."""
     scene, name = solution.scene, outcome.analysis.name
     judged: dict[str, PatchFeasibility | MotorFeasibility] = {}
     judged.update(judge_motors(outcome, {joint.name: joint for joint in scene.joint}))
@@ -224,6 +228,18 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
     return LoadedBody(planar, body.modal, body.path, body.computed)
+
+
+def _add_patches(scene: Scene, bodies: dict[str, LoadedBody]) -> dict[str, StructureEffect]:
+    """Adds mass and stiffness of patches to their links where the scene asks for it."""
+    effects = {}
+    for layout in scene.pzt:
+        bare = bodies[layout.body]
+        if layout.structural and bare.modal is not None:
+            patch_array(scene.path, layout, bare.modal, bare.planar)  # refuses patches that do not fit
+            bodies[layout.body] = replace(bare, planar=with_patches(bare.planar, bare.modal, layout))
+            effects[layout.body] = structure_effect(bare.planar, bodies[layout.body].planar)
+    return effects
 
 
 def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> list[ModalLoad]:

@@ -29,6 +29,8 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     if any(solution.voltages.values()):
         console.print()
         console.print(_voltages(solution))
+    for name in solution.feasibility:
+        console.print(f"{name}: {_verdict(solution, name)}")
     notes = Table.grid(padding=(0, 2))
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
@@ -70,6 +72,21 @@ def _voltages(solution: Solution) -> Table:
                 f"{patches.condition_number:.3g}",
             )
     return table
+
+
+def _verdict(solution: Solution, analysis: str) -> str:
+    """Whether the actuators can do it, and which cannot."""
+    short = {name: judged for name, judged in solution.feasibility[analysis].items() if np.max(judged.factor) > 1}
+    if not short:
+        return "motors and patches can do it, as far as limits are given"
+    return (
+        "beyond their limits: "
+        + ", ".join(
+            f"{name} (factor {np.max(judged.factor):.3g}, from t = {np.nanmin(judged.saturation_time):g} s)"
+            for name, judged in short.items()
+        )
+        + "; details: ffrobot feasibility"
+    )
 
 
 def _table(*headers: str) -> Table:

@@ -332,8 +332,8 @@ class Analysis(Record):
     """One run, with outputs at 0, output_step, …, end (s).
 
     Both are 0 where the file does not give them: in static analyses (t = 0 only), and in forward analyses that take
-    over the times of their actuation, which `load_scene` fills in. `shape` of FCID says which p(t) is prescribed, `modal`
-    gives it: expressions for the first modes of a body, as its modal file numbers them; all others are 0.
+    over the times of their actuation, which `load_scene` fills in. `shape` of FCID says which p(t) is prescribed,
+    `modal` gives it: expressions for the first modes of a body, as its modal file numbers them; all others are 0.
     `limits` keeps the actuators of a forward run within their limits.
     """
 
