@@ -367,12 +367,14 @@ class Analysis(Record):
             )
         if self.actuation is not None and self.kind != "forward":
             raise ValueError(f'expected the key "actuation" only in kind = "forward", found kind = "{self.kind}"')
-        if (self.shape is not None) != (self.kind == "fcid"):
-            found = f'kind = "{self.kind}" ' + ("with it" if self.shape else "without it")
-            raise ValueError(f'expected the key "shape" in kind = "fcid" and nowhere else, found {found}')
-        if (self.modal is not None) != (self.shape == "given"):
-            found = f'shape = "{self.shape}" ' + ("with it" if self.modal is not None else "without it")
-            raise ValueError(f'expected the key "modal" in shape = "given" and nowhere else, found {found}')
+        if self.shape is not None and self.kind != "fcid":
+            raise ValueError(f'expected the key "shape" only in kind = "fcid", found kind = "{self.kind}"')
+        if self.shape is None and self.kind == "fcid":
+            raise ValueError('expected the key "shape" in kind = "fcid", found none')
+        if self.modal is not None and self.shape != "given":
+            raise ValueError(f'expected the key "modal" only in shape = "given", found shape = "{self.shape}"')
+        if self.modal is None and self.shape == "given":
+            raise ValueError('expected the key "modal" in shape = "given", found none')
         if self.limits and self.apply not in ("joints", "joints+pzt"):
             raise ValueError(
                 f'expected limits = true only beside apply = "joints" or "joints+pzt", found apply = "{self.apply}"'

@@ -151,7 +151,7 @@ def test_both_faces_bend_twice_as_much_and_layers_add_up(cantilever, layers):
 
 @pytest.mark.parametrize(("face", "sign"), [("+y", -1.0), ("-y", 1.0), ("both", 0.0)])
 def test_one_face_also_stretches_the_link(all_modes, face, sign):
-    """u(L) = ∓E_p d31 w_p V (x2 − x1)/EA of a bar: all axial modes would give it, here one gives 8/π² sin(πx/2L) of it."""
+    """u(L) = ∓E_p d31 w_p V x2/EA of a bar: of it one axial mode gives 8/π² sin(πx2/2L) L/x2."""
     planar = from_modal_body("link", all_modes)
     array = patches(all_modes, planar, centers=(0.025,), face=face)
     p = array.Phi_V[:, 0] * 100.0 / planar.stiffness

@@ -150,7 +150,7 @@ def test_zero_shape_is_the_rigid_arm_in_closed_form():
 
 
 def test_static_shape_sags_as_in_closed_form():
-    """A horizontal cantilever on a motor that stands still: w(L) = ρA g L⁴/8EI, τ = m g L/2, nothing left for patches."""
+    """A horizontal cantilever, its motor at rest: w(L) = ρA g L⁴/8EI, τ = m g L/2, nothing left for patches."""
     EI, mass = 5e3, 1.3
     link = ritz_link("link1", "cantilever", EI=EI, mass=mass, modes=8, extra=0)
     model = make_model(
