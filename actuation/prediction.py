@@ -34,7 +34,8 @@ def predicted_shift(outcome: Outcome, unmet: Array) -> dict[str, Array]:
     delta_q = np.einsum("tkn,tn->tk", held_joint_motion(outcome), -unmet / stiffness)
     C_q = outcome.assembly.system.constraint_jacobians(outcome.q)
     shift = np.einsum("trk,tk->tr", C_q, delta_q)
+    names = [(c.owner, c.component, c.is_trajectory) for c in outcome.assembly.constraints]
     columns: dict[str, list[int]] = {}
     for trajectory in model.trajectories:  # in the order of the scene, unlike the constraints of the assembly
-        columns.setdefault(trajectory.owner, []).append(outcome.assembly.constraints.index(trajectory))
+        columns.setdefault(trajectory.owner, []).append(names.index((trajectory.owner, trajectory.component, True)))
     return {owner: shift[:, of_owner] for owner, of_owner in columns.items()}
