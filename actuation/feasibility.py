@@ -137,7 +137,7 @@ def judge_motors(outcome: Outcome, joints: dict[str, Joint]) -> dict[str, MotorF
     return judged
 
 
-def _first_time(time: Array, beyond: Array) -> Array:
+def _first_time(time: Array, beyond: NDArray[np.bool_]) -> Array:
     """The first of the times (T,) at which each column of `beyond` (T, k) holds; NaN where it never does."""
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 

@@ -56,7 +56,7 @@ class PatchArray:
         return float(np.linalg.cond(self.Phi_V))
 
     @property
-    def unreached_modes(self) -> Array:
+    def unreached_modes(self) -> NDArray[np.intp]:
         """Numbers (from 0) of the modes that take part in what no voltages can produce."""
         left, sizes, _ = np.linalg.svd(self.Phi_V)
         rank = int(np.count_nonzero(sizes > sizes[0] / SINGULAR))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..mbs.analyses import Outcome
 from ..mbs.joint_space import held_joint_motion
+from ..mbs.observation import rotated
 from .voltages import Voltages
 
 Array = NDArray[np.float64]
@@ -24,18 +25,19 @@ def unmet_modal_forces(outcome: Outcome, voltages: Mapping[str, Voltages]) -> Ar
 
 
 def predicted_shift(outcome: Outcome, unmet: Array) -> dict[str, Array]:
-    """Shift (T, m) of each trajectory's components by unmet modal forces r, where the motors keep their angles.
+    """Shift (T, 2), m, global axes, of every point by unmet modal forces r, where motors keep their angles.
 
-    To first order, and slowly: δp = −K⁻¹ r, and δ(target) = C_sq ∂q/∂p δp. Vibration that a sudden lack of force starts
-    can be twice as large; motors that keep their moments instead of their angles let the arm drift away in time.
+    To first order, and slowly: δp = −K⁻¹ r, δq = ∂q/∂p δp, δr = δR + A_θ u δθ + A Φ δp. Vibration that a sudden lack of
+    force starts can be twice as large; motors that keep their moments instead of their angles let an arm drift away.
     """
     model = outcome.assembly.model
     stiffness = np.concatenate([body.stiffness for body in model.bodies])
     delta_q = np.einsum("tkn,tn->tk", held_joint_motion(outcome), -unmet / stiffness)
-    C_q = outcome.assembly.system.constraint_jacobians(outcome.q)
-    shift = np.einsum("trk,tk->tr", C_q, delta_q)
-    names = [(c.owner, c.component, c.is_trajectory) for c in outcome.assembly.constraints]
-    columns: dict[str, list[int]] = {}
-    for trajectory in model.trajectories:  # in the order of the scene, unlike the constraints of the assembly
-        columns.setdefault(trajectory.owner, []).append(names.index((trajectory.owner, trajectory.component, True)))
-    return {owner: shift[:, of_owner] for owner, of_owner in columns.items()}
+    shifts = {}
+    for body in model.bodies:
+        q, delta = (x[:, outcome.coordinates(body.name)] for x in (outcome.q, delta_q))
+        for name, point in body.points.items():
+            u = point.position + q[:, 3:] @ point.translation.T
+            in_body = delta[:, 3:] @ point.translation.T + delta[:, 2:3] * np.column_stack([-u[:, 1], u[:, 0]])
+            shifts[f"{body.name}.{name}"] = delta[:, :2] + rotated(q[:, 2], in_body)
+    return shifts

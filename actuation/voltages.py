@@ -30,7 +30,8 @@ class Voltages:
     @property
     def residual(self) -> Array:
         """(T,) norm of the modal force that `within_limit` leaves unmet."""
-        return np.linalg.norm(self.unmet, axis=1)
+        norms: Array = np.linalg.norm(self.unmet, axis=1)
+        return norms
 
     @property
     def largest(self) -> float:
@@ -38,20 +39,30 @@ class Voltages:
         return float(np.abs(self.required).max(initial=0.0))
 
 
+def voltage_scale(patches: PatchArray) -> Array:
+    """Ordinary voltages (k,) of the patches: their limits, the largest of these where a patch has none, else 1 V."""
+    known = np.isfinite(patches.limit)
+    return np.where(known, patches.limit, patches.limit[known].max() if known.any() else 1.0)
+
+
 def voltage_gain(patches: PatchArray) -> Array:
-    """Voltages (k, n) per modal force without limits: Φ_V⁻¹, the smallest of many, or those of least residual."""
-    Phi_V, W_sqrt = patches.Phi_V, patches.W_sqrt
-    n, k = Phi_V.shape
-    if k >= n and not patches.unreached_modes.size:
-        return np.linalg.inv(Phi_V) if n == k else np.linalg.pinv(Phi_V)
-    gain: Array = np.linalg.pinv(W_sqrt @ Phi_V) @ W_sqrt
+    """Voltages (k, n) per modal force without limits: Φ_V⁻¹, or those of least weighted residual.
+
+    Of many that do, the smallest relative to `voltage_scale`.
+    """
+    n, k = patches.Phi_V.shape
+    if k == n and not patches.unreached_modes.size:
+        return np.linalg.inv(patches.Phi_V)
+    W_sqrt = patches.W_sqrt if k < n or patches.unreached_modes.size else np.eye(n)
+    scale = voltage_scale(patches)
+    gain: Array = scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt
     return gain
 
 
 def allocation(patches: PatchArray, *, limited: bool) -> _core.Allocation:
     """What turns modal forces into voltages, with the limits of the patches or without."""
     limit = patches.limit if limited else np.full_like(patches.limit, np.inf)
-    return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), limit)
+    return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), limit, voltage_scale(patches))
 
 
 def solve_voltages(patches: PatchArray, F_p: Array) -> Voltages:

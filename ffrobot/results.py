@@ -53,8 +53,8 @@ def write_results(solution: Solution, path: Path) -> None:
             for body_name, effect in solution.structure.items():
                 for key, pair in vars(effect).items():
                     group[f"patch_structure/{body_name}/{key}"] = pair
-            for trajectory, shift in solution.predicted_shift.get(name, {}).items():
-                group[f"trajectories/{trajectory}/predicted_shift"] = shift
+            for point, shift in solution.predicted_shift.get(name, {}).items():
+                group[f"points/{point}/predicted_shift"] = shift
             for owner, judged in solution.feasibility.get(name, {}).items():
                 _write_feasibility(group.require_group("feasibility"), solution, owner, judged)
         file.flush()

@@ -69,7 +69,7 @@ class Solution:
         outcomes: by analysis, in the order of the scene.
         voltages: by analysis and body.
         point_forces: likewise.
-        predicted_shift: by analysis and trajectory, (T, m): what voltages within their limits leave undone.
+        predicted_shift: by analysis and point, (T, 2) m: what voltages within their limits leave undone.
         feasibility: by analysis, of patches by body and motors by joint.
         seconds: wall time by stage.
         skipped: what the scene did not need, one line each.

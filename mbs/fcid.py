@@ -28,8 +28,8 @@ Shape = list[list[TimeFunction]]
 def run_fcid(model: Model, analysis: Analysis) -> Outcome:
     """Motion and forces for the trajectories and the shape that the analysis prescribes.
 
-    Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed, `SolveError`
-    where no static shape is found.
+    Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
+    `SolveError` where no static shape is found.
     """
     assembly = Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
     frames = len(assembly.rigid_coordinates)

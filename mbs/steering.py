@@ -79,7 +79,7 @@ def _point_actuators(
             f' "{source.analysis.name}" drives ({quoted(driven)}), found none on {quoted(missing)}'
         )
     rows: list[Row] = []
-    actuators = []
+    actuators: list[_core.Actuator] = []
     for i, body in enumerate(model.bodies):
         if body.name not in equipment.points:
             continue

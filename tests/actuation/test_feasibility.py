@@ -177,20 +177,19 @@ def test_predicted_shift_of_the_tip_is_what_happens(arm):
         outcome = held.outcomes["motion"]
         tips.append(outcome.q[0, 3:] @ outcome.assembly.model.body("link").points["tip"].translation[1])
     assert abs(tips[0]) < 1e-12  # straight
-    body = straight.outcomes["motion"].assembly.model.body("link")
-    deflection = body.points["tip"].translation[1] @ (-voltages.unmet[0] / body.stiffness)
-    assert deflection == pytest.approx(tips[1], rel=1e-9)
+    np.testing.assert_allclose(straight.predicted_shift["motion"]["link.tip"][0], [0.0, tips[1]], rtol=1e-9, atol=1e-15)
 
 
-def test_predicted_shift_of_a_path(arm):
-    """The trajectory is the height of the tip: its shift is the deflection that unmet modal forces leave."""
+def test_predicted_shift_of_an_inclined_tip(arm):
+    """The shift across the link is the deflection that unmet modal forces leave."""
     solution = arm(trajectory='point = "link.tip"\ny = "0.1*sin(2*t)"')
     outcome = solution.outcomes["motion"]
     unmet = unmet_modal_forces(outcome, solution.voltages["motion"])
     np.testing.assert_array_equal(unmet, solution.voltages["motion"]["link"].unmet)
     body = outcome.assembly.model.body("link")
     deflection = -(unmet / body.stiffness) @ body.points["tip"].translation[1]
-    expected = np.cos(outcome.q[:, 2]) * deflection
-    shift = predicted_shift(outcome, unmet)["turn"]
-    np.testing.assert_allclose(shift[:, 0], expected, atol=1e-9 * np.abs(expected).max())
-    np.testing.assert_array_equal(shift, solution.predicted_shift["motion"]["turn"])
+    theta = outcome.q[:, 2]
+    expected = deflection[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
+    shift = predicted_shift(outcome, unmet)["link.tip"]
+    np.testing.assert_allclose(shift, expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_array_equal(shift, solution.predicted_shift["motion"]["link.tip"])

@@ -19,7 +19,9 @@ UNLIMITED = np.full(N, np.inf)
 
 def patches(Phi, limit=UNLIMITED):
     """The same patches on both links."""
-    return {name: _core.Allocation(Phi, np.eye(N), np.linalg.pinv(Phi), limit) for name in ("link1", "link2")}
+    return {
+        name: _core.Allocation(Phi, np.eye(N), np.linalg.pinv(Phi), limit, np.ones(N)) for name in ("link1", "link2")
+    }
 
 
 FULL = Equipment(patches(np.eye(N)))  # patches that reach every mode
