@@ -17,6 +17,7 @@ from ..mbs.scene_records import PztLayout
 Array = NDArray[np.float64]
 
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
+LEAST_WEIGHT = 1e-4  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
 
 
 @dataclass(frozen=True)
@@ -173,7 +174,8 @@ def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
                 f"{key}: mode_weights: expected {n} weights, one for each mode that moves in the plane, found"
                 f" {len(layout.mode_weights)}"
             )
-        return np.diag(np.sqrt(layout.mode_weights))
+        weights = np.array(layout.mode_weights) / max(layout.mode_weights)
+        return np.diag(np.sqrt(weights.clip(min=LEAST_WEIGHT)))
     if layout.point_weights is None:
         return np.eye(n)
     unknown = layout.point_weights.keys() - planar.points.keys()
@@ -182,12 +184,16 @@ def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
             f"{key}: point_weights: expected points of the link, {', '.join(planar.points)}, found"
             f" {', '.join(sorted(unknown))}"
         )
-    return np.vstack(
+    rows = np.vstack(
         [
             np.sqrt(weight) * planar.points[name].translation / planar.stiffness
             for name, weight in layout.point_weights.items()
         ]
     )
+    size = np.linalg.norm(rows, 2)
+    if not size > 0.0:
+        raise InputError(f"{key}: point_weights: expected points that move with the modes, found none that do")
+    return np.vstack([rows / size, np.sqrt(LEAST_WEIGHT) * np.eye(n)])
 
 
 def _height(key: str, body: ModalBody, number: int, start: float, end: float) -> float:

@@ -12,9 +12,11 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double ridge = 1e-8; // of the Hessian's largest eigenvalue, where others vanish: picks one of many solutions
-constexpr double vanishing = 1e-12;
-constexpr int most_iterations = 200, most_halvings = 40, refinements = 2;
+constexpr double vanishing = 1e-12;      // eigenvalues of the Hessian below this fraction of the largest are zeros
+constexpr double ridge = 1e-9;           // of the smallest other one is added then: picks one of many solutions
+constexpr double smallest_ridge = 1e-13; // of the largest
+constexpr double rounding = 1e-14;       // of the gradient, relative to its terms
+constexpr int most_changes = 500;
 
 } // namespace
 
@@ -24,102 +26,111 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
   const MatrixXd A = W_sqrt * Phi_ * scale_.asDiagonal();
   H_ = A.transpose() * A;
   const VectorXd sizes = Eigen::SelfAdjointEigenSolver<MatrixXd>(H_, Eigen::EigenvaluesOnly).eigenvalues();
-  if (sizes[0] < vanishing * sizes[k - 1] || sizes[k - 1] == 0)
-    ridge_ = sizes[k - 1] > 0 ? ridge * sizes[k - 1] : 1.0;
-  H_.diagonal().array() += ridge_;
+  const double largest = sizes[k - 1];
+  double added = 0;
+  if (largest == 0)
+    added = 1;
+  else if (sizes[0] < vanishing * largest)
+    added =
+        std::max(smallest_ridge * largest,
+                 ridge * *std::find_if(sizes.begin(), sizes.end(), [&](double x) { return x >= vanishing * largest; }));
+  H_.diagonal().array() += added;
   back_ = A.transpose() * W_sqrt;
   bound_ = limit_.cwiseQuotient(scale_);
-  V_ = u_ = b_ = gradient_ = trial_ = VectorXd::Zero(k);
+  V_ = u_ = b_ = gradient_ = VectorXd::Zero(k);
+  held_.assign(static_cast<std::size_t>(k), 0);
 }
 
 const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
   V_.noalias() = gain_ * F;
   if ((V_.array().abs() <= limit_.array()).all()) {
     u_ = V_.cwiseQuotient(scale_);
+    std::fill(held_.begin(), held_.end(), 0);
     return V_;
   }
   b_.noalias() = back_ * F;
-  bool exact = false; // the last step ended at the minimum of the free voltages
-  for (int i = 0; i < most_iterations; ++i) {
-    gradient_.noalias() = H_ * u_ - b_;
-    const bool same = hold();
-    if (free_.empty() || (exact && same))
-      break;
+  for (int i = 0; i < most_changes; ++i) {
     ++iterations_;
-    exact = step();
+    if (!move())
+      continue;
+    if (!release())
+      break;
   }
-  finish();
   V_ = u_.cwiseProduct(scale_).cwiseMax(-limit_).cwiseMin(limit_);
   return V_;
 }
 
-void Allocation::finish() {
-  if (free_.empty())
-    return;
-  for (const Index f : free_)
-    u_[f] = 0;
-  for (int i = 0; i <= (ridge_ > 0 ? refinements : 0); ++i) {
-    gradient_.noalias() = H_ * u_ - b_;
-    if (i > 0)
-      gradient_ -= ridge_ * u_;
-    solve_free();
-    for (std::size_t f = 0; f < free_.size(); ++f)
-      u_[free_[f]] += free_step_[static_cast<Index>(f)];
+// To the minimum of the free voltages, or as far as the first limit on the way: that voltage is held, and false
+// returned.
+bool Allocation::move() {
+  minimise();
+  double length = 1;
+  Index first = -1;
+  for (std::size_t f = 0; f < free_.size(); ++f) {
+    const Index j = free_[f];
+    const double target = target_[static_cast<Index>(f)], way = target - u_[j];
+    if (std::abs(target) <= bound_[j])
+      continue;
+    const double until = std::max(0.0, (std::copysign(bound_[j], target) - u_[j]) / way);
+    if (until < length) {
+      length = until;
+      first = j;
+    }
   }
-  u_ = u_.cwiseMax(-bound_).cwiseMin(bound_);
-}
-
-bool Allocation::hold() {
-  free_.clear();
-  for (Index i = 0; i < u_.size(); ++i) {
-    const bool held = (u_[i] >= bound_[i] && gradient_[i] < 0) || (u_[i] <= -bound_[i] && gradient_[i] > 0);
-    if (!held)
-      free_.push_back(i);
+  for (std::size_t f = 0; f < free_.size(); ++f) {
+    double &u = u_[free_[f]];
+    u = length == 1 ? target_[static_cast<Index>(f)] : u + length * (target_[static_cast<Index>(f)] - u);
   }
-  if (free_ == factorised_)
+  if (first < 0)
     return true;
-  factorised_ = free_;
-  if (free_.empty())
-    return false;
-  const auto count = static_cast<Index>(free_.size());
-  MatrixXd H_free(count, count);
-  for (Index c = 0; c < count; ++c)
-    for (Index r = 0; r < count; ++r)
-      H_free(r, c) = H_(free_[static_cast<std::size_t>(r)], free_[static_cast<std::size_t>(c)]);
-  llt_.compute(H_free);
+  held_[static_cast<std::size_t>(first)] = u_[first] > 0 ? 1 : -1;
+  u_[first] = std::copysign(bound_[first], u_[first]);
   return false;
 }
 
-void Allocation::solve_free() {
+// Target of the free voltages: from the held ones alone, whatever the iteration came from.
+void Allocation::minimise() {
+  free_.clear();
+  VectorXd held = VectorXd::Zero(u_.size());
+  for (Index j = 0; j < u_.size(); ++j)
+    if (held_[static_cast<std::size_t>(j)])
+      held[j] = u_[j];
+    else
+      free_.push_back(j);
   const auto count = static_cast<Index>(free_.size());
-  free_step_.resize(count);
+  if (free_ != factorised_) {
+    MatrixXd H_free(count, count);
+    for (Index c = 0; c < count; ++c)
+      for (Index r = 0; r < count; ++r)
+        H_free(r, c) = H_(free_[static_cast<std::size_t>(r)], free_[static_cast<std::size_t>(c)]);
+    llt_.compute(H_free);
+    factorised_ = free_;
+  }
+  gradient_.noalias() = b_ - H_ * held;
+  target_.resize(count);
   for (Index f = 0; f < count; ++f)
-    free_step_[f] = -gradient_[free_[static_cast<std::size_t>(f)]];
-  llt_.solveInPlace(free_step_);
+    target_[f] = gradient_[free_[static_cast<std::size_t>(f)]];
+  if (count)
+    llt_.solveInPlace(target_);
 }
 
-bool Allocation::step() {
-  solve_free();
-  const auto count = free_step_.size();
-  const double before = cost(u_);
-  double length = 1;
-  bool cut = false;
-  for (int i = 0; i < most_halvings; ++i, length /= 2) {
-    trial_ = u_;
-    cut = false;
-    for (Index f = 0; f < count; ++f) {
-      const Index j = free_[static_cast<std::size_t>(f)];
-      const double wanted = u_[j] + length * free_step_[f];
-      trial_[j] = std::clamp(wanted, -bound_[j], bound_[j]);
-      cut = cut || trial_[j] != wanted;
+// Frees the voltage that presses most against the inner side of its limit; false where none does: the solution.
+bool Allocation::release() {
+  gradient_.noalias() = H_ * u_ - b_;
+  const double size = b_.lpNorm<Eigen::Infinity>() + H_.lpNorm<Eigen::Infinity>() * u_.lpNorm<Eigen::Infinity>();
+  double largest = rounding * size;
+  Index most = -1;
+  for (Index j = 0; j < u_.size(); ++j) {
+    const double inward = held_[static_cast<std::size_t>(j)] * gradient_[j];
+    if (inward > largest) {
+      largest = inward;
+      most = j;
     }
-    // sufficient decrease, as far as rounding lets it be seen
-    const double promised = gradient_.dot(trial_ - u_);
-    if (cost(trial_) <= before + 1e-4 * promised + 1e-15 * std::abs(before))
-      break;
   }
-  u_ = trial_;
-  return length == 1 && !cut;
+  if (most < 0)
+    return false;
+  held_[static_cast<std::size_t>(most)] = 0;
+  return true;
 }
 
 } // namespace ffrobot

@@ -10,9 +10,9 @@ namespace ffrobot {
 // Minimises |W_sqrt (F - Phi V)|^2 over -limit <= V <= limit. Always has a solution; where it is not unique, the
 // smallest voltages relative to `scale` are picked.
 //
-// Projected Newton method (D. P. Bertsekas, SIAM J. Control Optim. 20, 1982): voltages at a limit that want to go
-// beyond it are held there, the others take the Newton step of the quadratic, cut at the limits. Near the solution
-// the held set no longer changes and one step is exact, so that a warm start costs one or two solves.
+// Active sets (P. B. Stark and R. L. Parker, Comput. Stat. 10, 1995: BVLS): voltages at a limit are held there, the
+// others go to their minimum or to the first limit on the way; then the one that presses most against the inner side of
+// its limit is let go. Ends after finitely many changes; from one time to the next there are few.
 class Allocation {
 public:
   // Phi: (n, k) modal forces per volt; W_sqrt: (rows, n); gain: (k, n) the best voltages without limits, V = gain F,
@@ -28,20 +28,16 @@ public:
   unsigned long iterations() const { return iterations_; }
 
 private:
-  bool hold(); // which voltages stay at their limit, and the others' Hessian; true where that is as before
-  bool step(); // Newton step of the free voltages, cut at the limits; true where it was taken in full
-  // The free voltages from the held ones alone, so that V does not depend on where the iteration began: noise would
-  // look like an error of the integrator that no step is short enough for. Takes back what the ridge has cost.
-  void finish();
-  void solve_free(); // free_step: the gradient through the Hessian of the free voltages
-  double cost(const Eigen::VectorXd &u) const { return u.dot(0.5 * (H_ * u) - b_); }
+  bool move();
+  void minimise();
+  bool release();
 
   Eigen::MatrixXd Phi_, gain_, H_, back_; // in u = V / scale: H = A^T A, b = back F with A = W_sqrt Phi scale
   Eigen::VectorXd limit_, scale_, bound_; // bound: limits of u
-  Eigen::VectorXd V_, u_, b_, gradient_, trial_, free_step_;
+  Eigen::VectorXd V_, u_, b_, gradient_, target_;
+  std::vector<int> held_; // sign of the limit at which a voltage is held, 0 where free
   std::vector<Eigen::Index> free_, factorised_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
-  double ridge_ = 0;
   unsigned long iterations_ = 0;
 };
 

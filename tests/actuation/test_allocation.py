@@ -6,7 +6,7 @@ from scipy.optimize import lsq_linear
 
 from ffrobot.mbs import _core
 
-RIDGE = 1e-10  # of the forces may be left where many voltages would do: picking the smallest costs so much at most
+RIDGE = 1e-8  # of the forces may be left where many voltages would do: picking the smallest costs so much at most
 
 
 def allocation(Phi, limit, W_sqrt=None):

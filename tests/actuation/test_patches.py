@@ -180,8 +180,8 @@ def test_weights_of_points_keep_the_tip_where_it_is_wanted(cantilever):
         solve_voltages(patches(body, centers=(0.1, 0.5), allocation="least-squares", **keys), F_p)
         for keys in ({}, {"point_weights": {"tip": 1.0}})
     )
-    assert abs(tip @ weighted.unmet[0]) < 1e-9 * abs(tip @ F_p[0])
-    assert abs(tip @ equal.unmet[0]) > 1e-3 * abs(tip @ F_p[0])
+    assert abs(tip @ weighted.unmet[0]) < 0.1 * abs(tip @ F_p[0])
+    assert abs(tip @ equal.unmet[0]) > 0.5 * abs(tip @ F_p[0])
 
 
 @pytest.mark.parametrize(
