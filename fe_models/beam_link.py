@@ -17,7 +17,7 @@ from ..mesh.interval import graded_nodes, interval_mesh, with_points
 from .beam import R_X, U_X, FamilyModel, family_model
 from .eigen import lowest_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
-from .link_file import FAMILIES, BeamLink, Family
+from .link_records import FAMILIES, BeamLink, Family
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         SolveError: the eigensolver did not converge.
     """
     length = link.geometry.length
-    named = {"root": 0.0, "tip": length, **{item.name: item.position for item in link.interface}}
+    named = link.places
     nodes = _element_boundaries(link)
     mesh = interval_mesh(nodes)
     # The fields are read on a mesh of their own: there also the middle and the interfaces are vertices.

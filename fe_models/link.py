@@ -16,7 +16,8 @@ from platformdirs import user_cache_path
 
 from ..errors import FfrobotError, SolveError
 from ..files import check_output
-from .link_file import BeamLink, read_link
+from .link_file import read_link
+from .link_records import Link, SolidLink
 from .modal_body import ModalBody
 from .modal_body_file import FORMAT, FORMAT_VERSION, read_modal_body, write_modal_body
 
@@ -43,12 +44,15 @@ class LinkOutcome:
     seconds: float
 
 
-def input_hash(link: BeamLink) -> str:
+def input_hash(link: Link) -> str:
     """SHA-256 of what a modal body depends on: the link as checked, defaults filled in, and the program's algorithm.
 
-    Comments, the order of keys, 1 for 1.0 and dates of files change nothing.
+    A part's file counts by its content. Comments, the order of keys, 1 for 1.0, dates of files change nothing.
     """
-    content = {"format": FORMAT_VERSION, "algorithm": ALGORITHM_VERSION, "link": link.model_dump(mode="json")}
+    record = link.model_dump(mode="json")
+    if isinstance(link, SolidLink) and link.geometry.file is not None:
+        record["geometry"]["file"] = hashlib.sha256(link.geometry.file.read_bytes()).hexdigest()
+    content = {"format": FORMAT_VERSION, "algorithm": ALGORITHM_VERSION, "link": record}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
@@ -98,7 +102,7 @@ def cached_modal_body(link_path: Path, progress: Progress | None = None) -> Link
 
 
 def _compute(
-    link: BeamLink,
+    link: Link,
     link_path: Path,
     path: Path,
     digest: str,
@@ -107,14 +111,17 @@ def _compute(
     make_folder: bool = False,
 ) -> LinkOutcome:
     try:
-        from .beam_link import beam_modal_body
+        if isinstance(link, SolidLink):
+            from .solid_link import solid_modal_body as modal_body
+        else:
+            from .beam_link import beam_modal_body as modal_body
     except ModuleNotFoundError as error:
         raise SolveError(
             f"{link_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "
             "install dolfinx and slepc4py (Debian: python3-dolfinx python3-slepc4py), or use a modal body file made "
             "elsewhere"
         ) from None
-    body = beam_modal_body(link, link_path, digest, progress or _silent)
+    body = modal_body(link, link_path, digest, progress or _silent)
     write_modal_body(path, body, make_folder=make_folder)
     return LinkOutcome(path, body, True, time.perf_counter() - start)
 
