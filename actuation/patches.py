@@ -17,7 +17,8 @@ from ..mbs.scene_records import PztLayout
 Array = NDArray[np.float64]
 
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
-LEAST_WEIGHT = 1e-4  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
+LEAST_WEIGHT = 1e-6  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
+ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
 
 
 @dataclass(frozen=True)
@@ -193,7 +194,8 @@ def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
     size = np.linalg.norm(rows, 2)
     if not size > 0.0:
         raise InputError(f"{key}: point_weights: expected points that move with the modes, found none that do")
-    return np.vstack([rows / size, np.sqrt(LEAST_WEIGHT) * np.eye(n)])
+    softest = np.sqrt(planar.stiffness.min() / planar.stiffness)
+    return np.vstack([rows / size, np.sqrt(ENERGY_WEIGHT) * np.diag(softest)])
 
 
 def _height(key: str, body: ModalBody, number: int, start: float, end: float) -> float:

@@ -12,7 +12,8 @@ In the ordinary test run (--benchmark-disable, see pyproject.toml) each runs onc
 * pcid: one second of the two-link model at tolerance 1e-6. Aim: under 0.5 s.
 * process: `ffrobot solve` with the inverse analysis only and modal files up to date, from start to exit; extra_info has
   what is left after taking off the solver's own wall_seconds. Aim: 0.5 s left.
-* fcid: 1000 outputs of the two-link model with straight links, and with sagging ones. Aim: 10 ms.
+* fcid: 1000 outputs of the two-link model with straight links, and with sagging ones; extra_info has the solver's
+  own time, without the check that the path is within reach. Aim: 10 ms.
 * allocation: voltages of 20 patches for 20 modes at 1000 times, most of which meet limits. Aim: 50 ms.
 * link: stage 1 of a link in a process of its own, forms compiled before.
 """
