@@ -93,6 +93,26 @@ class MotorFeasibility:
         return max(self.moment / self.moment_limit, self.speed / self.speed_limit, self.power / self.power_limit)
 
 
+@dataclass(frozen=True)
+class Feasibility:
+    """Everything that one analysis asks of the actuators: motors by joint, patches by body."""
+
+    motors: dict[str, MotorFeasibility]
+    patches: dict[str, PatchFeasibility]
+
+    @property
+    def short(self) -> dict[str, tuple[float, float]]:
+        """Actuators that cannot do it: the factor they lack, and from what time on (s)."""
+        judged: dict[str, MotorFeasibility | PatchFeasibility] = {}
+        judged.update({f"motor {name}": motor for name, motor in self.motors.items()})
+        judged.update({f"patches of {name}": patches for name, patches in self.patches.items()})
+        return {
+            name: (float(np.max(j.factor)), float(np.nanmin(j.saturation_time)))
+            for name, j in judged.items()
+            if np.max(j.factor) > 1.0
+        }
+
+
 def judge_patches(
     patches: PatchArray, voltages: Voltages, outcome: Outcome, with_count: Callable[[int], PatchArray | None]
 ) -> PatchFeasibility:

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from . import __version__
-from .actuation.feasibility import MotorFeasibility, PatchFeasibility
+from .actuation.feasibility import Feasibility
 from .actuation.patches import PatchArray
 from .actuation.points import PointForces, PointSet
 from .actuation.voltages import Voltages
@@ -55,8 +55,8 @@ def write_results(solution: Solution, path: Path) -> None:
                     group[f"patch_structure/{body_name}/{key}"] = pair
             for point, shift in solution.predicted_shift.get(name, {}).items():
                 group[f"points/{point}/predicted_shift"] = shift
-            for owner, judged in solution.feasibility.get(name, {}).items():
-                _write_feasibility(group.require_group("feasibility"), solution, owner, judged)
+            if name in solution.feasibility:
+                _write_feasibility(group.create_group("feasibility"), solution, solution.feasibility[name])
         file.flush()
         image: bytes = file.id.get_file_image()
     write_atomically(path, image, "results file")
@@ -127,21 +127,17 @@ def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) 
     group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
 
 
-def _write_feasibility(
-    group: h5py.Group, solution: Solution, owner: str, judged: PatchFeasibility | MotorFeasibility
-) -> None:
-    if isinstance(judged, MotorFeasibility):
-        entry = group.create_group(f"joints/{owner}")
-        entry.attrs.update(vars(judged) | {"factor": judged.factor})
-        return
-    entry = group.create_group(f"pzt/{owner}")
-    arrays = {key: value for key, value in vars(judged).items() if isinstance(value, np.ndarray)}
-    for key, values in (arrays | {"factor": judged.factor, "mode_factor": judged.mode_factor}).items():
-        entry[key] = values
-    layout = solution.patches[owner].layout
-    entry.attrs["depoling_field"] = layout.depoling_field or np.inf
-    entry.attrs["strain_limit"] = layout.strain_limit or np.inf
-    entry.create_group("remedies").attrs.update(vars(judged.remedies))
+def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
+    for joint, motor in judged.motors.items():
+        group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
+    for body, patches in judged.patches.items():
+        entry, layout = group.create_group(f"pzt/{body}"), solution.patches[body].layout
+        arrays = {key: value for key, value in vars(patches).items() if isinstance(value, np.ndarray)}
+        for key, values in (arrays | {"factor": patches.factor, "mode_factor": patches.mode_factor}).items():
+            entry[key] = values
+        entry.attrs["depoling_field"] = layout.depoling_field or np.inf
+        entry.attrs["strain_limit"] = layout.strain_limit or np.inf
+        entry.create_group("remedies").attrs.update(vars(patches.remedies))
 
 
 def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .actuation.feasibility import MotorFeasibility, PatchFeasibility, judge_motors, judge_patches
+from .actuation.feasibility import Feasibility, judge_motors, judge_patches
 from .actuation.patch_structure import StructureEffect, structure_effect, with_patches
 from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
 from .actuation.points import PointForces, PointSet, point_set, solve_point_forces, with_points
@@ -70,7 +70,7 @@ class Solution:
         voltages: by analysis and body.
         point_forces: likewise.
         predicted_shift: by analysis and point, (T, 2) m: what voltages within their limits leave undone.
-        feasibility: by analysis, of patches by body and motors by joint.
+        feasibility: by analysis.
         seconds: wall time by stage.
         skipped: what the scene did not need, one line each.
     """
@@ -85,7 +85,7 @@ class Solution:
     voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
     point_forces: dict[str, dict[str, PointForces]] = field(default_factory=dict)
     predicted_shift: dict[str, dict[str, Array]] = field(default_factory=dict)
-    feasibility: dict[str, dict[str, PatchFeasibility | MotorFeasibility]] = field(default_factory=dict)
+    feasibility: dict[str, Feasibility] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
 
@@ -157,17 +157,16 @@ def _allocate(solution: Solution, outcome: Outcome) -> None:
         }
 
 
-def _judge(solution: Solution, outcome: Outcome) -> dict[str, PatchFeasibility | MotorFeasibility]:
-    """Whether patches and motors can do what an inverse analysis found."""
+def _judge(solution: Solution, outcome: Outcome) -> Feasibility:
+    """Whether motors and patches can do what an inverse analysis found."""
     scene, name = solution.scene, outcome.analysis.name
-    judged: dict[str, PatchFeasibility | MotorFeasibility] = {}
-    judged.update(judge_motors(outcome, {joint.name: joint for joint in scene.joint}))
+    patches = {}
     for body, array in solution.patches.items():
         loaded = solution.bodies[body]
         assert loaded.modal is not None
         trial = partial(with_patch_count, scene.path, array.layout, loaded.modal, loaded.planar)
-        judged[body] = judge_patches(array, solution.voltages[name][body], outcome, trial)
-    return judged
+        patches[body] = judge_patches(array, solution.voltages[name][body], outcome, trial)
+    return Feasibility(judge_motors(outcome, {joint.name: joint for joint in scene.joint}), patches)
 
 
 def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Outcome:

@@ -76,17 +76,11 @@ def _voltages(solution: Solution) -> Table:
 
 def _verdict(solution: Solution, analysis: str) -> str:
     """Whether the actuators can do it, and which cannot."""
-    short = {name: judged for name, judged in solution.feasibility[analysis].items() if np.max(judged.factor) > 1}
+    short = solution.feasibility[analysis].short
     if not short:
         return "motors and patches can do it, as far as limits are given"
-    return (
-        "beyond their limits: "
-        + ", ".join(
-            f"{name} (factor {np.max(judged.factor):.3g}, from t = {np.nanmin(judged.saturation_time):g} s)"
-            for name, judged in short.items()
-        )
-        + "; details: ffrobot feasibility"
-    )
+    lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
+    return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility"
 
 
 def _table(*headers: str) -> Table:

@@ -69,7 +69,7 @@ def arm(link_file, tmp_path_factory):
 
 def test_patches_peak_by_peak(arm):
     solution = arm(limit=3000.0)
-    judged, array = solution.feasibility["motion"]["link"], solution.patches["link"]
+    judged, array = solution.feasibility["motion"].patches["link"], solution.patches["link"]
     outcome, voltages = solution.outcomes["motion"], solution.voltages["motion"]["link"]
     required = np.abs(voltages.required).max(axis=0)
     np.testing.assert_allclose(judged.required_moment, required * array.moment_per_volt, rtol=1e-12)
@@ -93,7 +93,7 @@ def test_strain_under_a_static_load_is_that_of_the_beam(arm):
     x = np.linspace(0.025, 0.075, 201)  # the first patch
     M = 7850.0 * 0.025 * 0.015 * 9.81 * (1 - x) ** 2 / 2
     expected = (0.0075 + 0.75e-3) * M.mean() / (2.068427e11 * 0.025 * 0.015**3 / 12)
-    assert solution.feasibility["motion"]["link"].strain[0] == pytest.approx(expected, rel=0.05)  # of ten modes
+    assert solution.feasibility["motion"].patches["link"].strain[0] == pytest.approx(expected, rel=0.05)  # of ten modes
 
 
 @pytest.mark.parametrize("word", ["limit", "layers", "thickness"])
@@ -101,8 +101,8 @@ def test_remedies_do(arm, word):
     """With the limit, layers or thickness named, and nothing else changed, the worst patch just suffices."""
     solution = arm()
     array, outcome = solution.patches["link"], solution.outcomes["motion"]
-    remedies = solution.feasibility["motion"]["link"].remedies
-    assert solution.feasibility["motion"]["link"].factor.max() > 2.0
+    remedies = solution.feasibility["motion"].patches["link"].remedies
+    assert solution.feasibility["motion"].patches["link"].factor.max() > 2.0
 
     def factor(**keys):
         layout = array.layout.model_copy(update=keys)
@@ -133,17 +133,17 @@ def test_number_of_patches_that_would_do(arm):
     assert needs(21) is None  # 21 × 0.05 m on 1 m
     least = min(needs(count) for count in range(10, 21))
     assert least < needs(10)
-    between = arm(limit=0.5 * (least + needs(10))).feasibility["motion"]["link"].remedies
+    between = arm(limit=0.5 * (least + needs(10))).feasibility["motion"].patches["link"].remedies
     assert 10 < between.count <= 20
     assert needs(between.count) <= 0.5 * (least + needs(10)) < needs(between.count - 1)
-    without = arm(limit=0.9 * least).feasibility["motion"]["link"].remedies
+    without = arm(limit=0.9 * least).feasibility["motion"].patches["link"].remedies
     assert (without.count, without.most_count) == (0, 20)
     assert without.most_factor == pytest.approx(needs(20) / (0.9 * least), rel=1e-9)
 
 
 def test_motors_peak_by_peak(arm):
     """τ = J θ̈ + m g L/2 cos θ of a link held straight, θ̇ = 0.2 cos 2t, and their product."""
-    motor = arm().feasibility["motion"]["O"]
+    motor = arm().feasibility["motion"].motors["O"]
     t = np.arange(51) * 0.01
     m = 7850.0 * 0.025 * 0.015
     theta, rate, acceleration = 0.1 * np.sin(2 * t), 0.2 * np.cos(2 * t), -0.4 * np.sin(2 * t)
