@@ -16,6 +16,7 @@ from ..mbs.scene_records import PztLayout
 
 Array = NDArray[np.float64]
 
+STEP = 0.1  # of the height, from one station to the next; less is a taper
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
 LEAST_WEIGHT = 1e-6  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
 ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
@@ -28,7 +29,7 @@ class PatchArray:
     Attributes:
         layout: the keys of the scene.
         edges: (k, 2) where each patch begins and ends along the link, m.
-        height: (k,) t_b, of the link in the plane under each patch, m.
+        height: (k,) t_b, of the link in the plane under each patch, its mean, m.
         moment_per_volt: (k,) c in N·m/V.
         turn: (n, k) φ'(x2) − φ'(x1) of the modes of the `PlanarBody`, rad per unit of modal coordinate.
         Phi_V: (n, k) modal forces per volt, in the same coordinates: c times `turn`, and more on one named face.
@@ -84,26 +85,37 @@ def moment_per_volt(layout: PztLayout, height: Array) -> Array:
 def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: PlanarBody) -> PatchArray:
     """Place the patches of `layout` on a link.
 
-    A patch works on the difference of the section rotations at its ends; on one named face also on its elongation,
-    since it pulls there. Raises `InputError` for patches beyond the link, on each other or across a step of its
-    section, and for weights that do not fit.
+    A patch works on the difference of the section rotations at its ends, piecewise where t_b changes gradually; on one
+    named face also on its elongation, since it pulls there; with `coupling = "surface"`, on the strain of the faces on
+    which it is outlined in the mesh. Raises `InputError` for patches beyond the link, on each other or across a step of
+    its section, for outlines that are not those of the layout, and for weights that do not fit.
     """
     key = f'{scene_path}: pzt "{layout.body}"'
     edges = patch_edges(layout, body.length)
     _check_edges(key, edges, body.length)
-    heights = np.array([_height(key, body, k, start, end) for k, (start, end) in enumerate(edges, 1)])
-    c = moment_per_volt(layout, heights)
-    ends = [[body.interpolate(x) for x in pair] for pair in edges.clip(0.0, body.length)]
+    pieces = [_pieces(key, body, k, start, end) for k, (start, end) in enumerate(edges, 1)]
+    height = np.array([np.average(heights, weights=np.diff(x)) for x, heights in pieces])
+    moments = [moment_per_volt(layout, heights) for _, heights in pieces]
+    c = np.array([np.average(moment, weights=np.diff(x)) for (x, _), moment in zip(pieces, moments, strict=True)])
+    turns = [np.diff([body.interpolate(end).rotation[2] for end in x], axis=0) for x, _ in pieces]
+    if layout.coupling == "surface":
+        per_volt = (c / (layout.width * height / 2))[:, None] * _outlined(key, layout, body, edges)
+    else:
+        per_volt = np.array([moment @ turn for moment, turn in zip(moments, turns, strict=True)])
+        per_volt += _pull(layout, body, edges)
     T = planar.modal_transform
-    turn = (np.array([end.rotation[2] - start.rotation[2] for start, end in ends]) @ T).T
-    Phi_V = c * turn
-    if layout.face in ("+y", "-y"):  # bending forwards (M > 0) is a pull above the axis, a push below it
-        side = 1.0 if layout.face == "+y" else -1.0
-        force = -side * layout.modulus * layout.d31 * layout.width * layout.layers
-        Phi_V += force * (np.array([end.translation[0] - start.translation[0] for start, end in ends]) @ T).T
+    turn, Phi_V = (np.array([turn.sum(axis=0) for turn in turns]) @ T).T, (per_volt @ T).T
     limit = np.full(len(edges), np.inf if layout.limit is None else layout.limit)
     weights, frequency = _weights(key, layout, planar), np.sqrt(planar.stiffness) / (2 * np.pi)
-    return PatchArray(layout, edges, heights, c, turn, Phi_V, limit, weights, frequency)
+    return PatchArray(layout, edges, height, c, turn, Phi_V, limit, weights, frequency)
+
+
+def _pull(layout: PztLayout, body: ModalBody, edges: Array) -> Array:
+    """(k, n) modal forces per volt along the link: bending forwards (M > 0) is a pull above the axis, a push below."""
+    side = {"+y": -1.0, "-y": 1.0}.get(layout.face or "", 0.0)
+    ends = [[body.interpolate(x).translation[0] for x in pair] for pair in edges.clip(0.0, body.length)]
+    stretch: Array = np.diff(ends, axis=1)[:, 0]
+    return side * layout.modulus * layout.d31 * layout.width * layout.layers * stretch
 
 
 def patch_edges(layout: PztLayout, length: float) -> Array:
@@ -198,25 +210,49 @@ def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
     return np.vstack([rows / size, np.sqrt(ENERGY_WEIGHT) * np.diag(softest)])
 
 
-def _height(key: str, body: ModalBody, number: int, start: float, end: float) -> float:
-    """The height of the link along y under a patch."""
-    heights = _covered_heights(body, start, end)
-    if np.ptp(heights) > 1e-9 * heights.max():
+def _pieces(key: str, body: ModalBody, number: int, start: float, end: float) -> tuple[Array, Array]:
+    """The stretches (m + 1,) into which a change of the link's height along y cuts a patch, and the heights (m,)."""
+    x = body.stations.position[:, 0]
+    slack = 1e-9 * body.length
+    covered = np.flatnonzero((x[1:] > start + slack) & (x[:-1] < end - slack))
+    heights = body.stations.height[covered]
+    jump = np.abs(np.diff(heights)) / np.maximum(heights[1:], heights[:-1])
+    if jump.max(initial=0.0) > STEP:
+        k = int(jump.argmax())
         raise InputError(
             f"{key}: expected patches on one section each, found patch {number} ({start:g} to {end:g} m) across a step"
-            f" of the height from {heights.min():g} to {heights.max():g} m"
+            f" of the height from {heights[k]:g} to {heights[k + 1]:g} m at {x[covered[k + 1]]:g} m"
         )
-    return float(heights[0])
+    changes = np.flatnonzero(jump > 1e-9)
+    ends = np.concatenate([[max(start, 0.0)], x[covered[changes + 1]], [min(end, body.length)]])
+    return ends, heights[np.append(changes, len(heights) - 1)]
+
+
+def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Array:
+    """(k, n) modal forces of unit membrane force (N/m): pressing the upper face, pulling the lower, halved on both."""
+    patches = body.surface_patches
+    if patches is None:
+        raise InputError(
+            f'{key}: coupling: expected "rotation", or a link whose file outlines the patches ([surface_patch]), found'
+            ' "surface" and none outlined'
+        )
+    found = (*edges.ravel(), layout.width)
+    outlined = (*patches.edges.ravel(), patches.width)
+    if len(found) != len(outlined) or not np.allclose(found, outlined, rtol=0.0, atol=1e-6 * body.length):
+        raise InputError(
+            f"{key}: coupling: expected the {len(patches.edges)} patches that the link file outlines, from"
+            f" {_places(patches.edges)} m and {patches.width:g} m wide, found {len(edges)}, from {_places(edges)} m and"
+            f" {layout.width:g} m wide"
+        )
+    faces = [sign * face for sign, face in ((-1.0, patches.top), (1.0, patches.bottom)) if face is not None]
+    return np.asarray(sum(faces) / len(faces))
+
+
+def _places(edges: Array) -> str:
+    return ", ".join(f"{start:g} to {end:g}" for start, end in edges)
 
 
 def section_height(body: ModalBody, start: float, end: float) -> float:
-    """The height of the link along y between two places of one section, m."""
-    return float(_covered_heights(body, start, end)[0])
-
-
-def _covered_heights(body: ModalBody, start: float, end: float) -> Array:
-    x = body.stations.position[:, 0]
-    slack = 1e-9 * body.length
-    covered = (x[1:] > start + slack) & (x[:-1] < end - slack)
-    heights: Array = body.stations.height[:-1][covered]
-    return heights
+    """The mean height of the link along y between two places, m."""
+    x, heights = _pieces("patch", body, 1, start, end)
+    return float(np.average(heights, weights=np.diff(x)))

@@ -25,10 +25,12 @@ from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.fcid import run_fcid
 from .mbs.model import ModalLoad, Model, build_model
+from .mbs.observation import body_motion
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.scene_file import load_scene
 from .mbs.scene_records import Analysis, Scene, split_point
 from .mbs.steering import Equipment
+from .mbs.stress import BodyStress, body_stress
 from .validation import did_you_mean, quoted
 
 Array = NDArray[np.float64]
@@ -71,6 +73,7 @@ class Solution:
         point_forces: likewise.
         predicted_shift: by analysis and point, (T, 2) m: what voltages within their limits leave undone.
         feasibility: by analysis.
+        stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
         skipped: what the scene did not need, one line each.
     """
@@ -86,6 +89,7 @@ class Solution:
     point_forces: dict[str, dict[str, PointForces]] = field(default_factory=dict)
     predicted_shift: dict[str, dict[str, Array]] = field(default_factory=dict)
     feasibility: dict[str, Feasibility] = field(default_factory=dict)
+    stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
 
@@ -105,6 +109,7 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
             outcome = _run(solution, analysis, watcher, interruption)
             solution.outcomes[analysis.name] = outcome
             _allocate(solution, outcome)
+            solution.stresses[analysis.name] = _stresses(solution, outcome)
             solution.seconds[analysis.name] = time.perf_counter() - started
             if outcome.status != "completed":
                 break
@@ -239,6 +244,16 @@ def _add_patches(scene: Scene, bodies: dict[str, LoadedBody]) -> dict[str, Struc
             bodies[layout.body] = replace(bare, planar=with_patches(bare.planar, bare.modal, layout))
             effects[layout.body] = structure_effect(bare.planar, bodies[layout.body].planar)
     return effects
+
+
+def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
+    """Of the bodies whose files hold modal stresses."""
+    found = {
+        name: body_stress(body.modal, body_motion(outcome, body.planar).modal)
+        for name, body in solution.bodies.items()
+        if body.modal is not None
+    }
+    return {name: stress for name, stress in found.items() if stress is not None}
 
 
 def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> list[ModalLoad]:

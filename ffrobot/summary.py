@@ -31,6 +31,9 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
         console.print(_voltages(solution))
     for name in solution.feasibility:
         console.print(f"{name}: {_verdict(solution, name)}")
+    if any(solution.stresses.values()):
+        console.print()
+        console.print(_stresses(solution))
     notes = Table.grid(padding=(0, 2))
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
@@ -81,6 +84,15 @@ def _verdict(solution: Solution, analysis: str) -> str:
         return "motors and patches can do it, as far as limits are given"
     lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
     return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility"
+
+
+def _stresses(solution: Solution) -> Table:
+    table = _table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)")
+    for name, by_body in solution.stresses.items():
+        for body, stress in by_body.items():
+            value, k, place = stress.largest()
+            table.add_row(name, body, f"{value / 1e6:.4g}", place, f"{solution.outcomes[name].time[k]:g}")
+    return table
 
 
 def _table(*headers: str) -> Table:

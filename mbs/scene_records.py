@@ -223,6 +223,7 @@ class PztLayout(Record):
     (of the squares of the deflections that this causes at points of the link) say what matters.
     `structural` names what of the patches is added to the link: "mass", "stiffness".
     Only for the judgement: `depoling_field` (V/m) and `strain_limit` of the material.
+    `coupling`: patches work on the section rotations at their ends, or on the faces of a solid that outlines them.
     """
 
     body: str
@@ -243,6 +244,7 @@ class PztLayout(Record):
     structural: tuple[Literal["mass", "stiffness"], ...] = ()
     depoling_field: Positive | None = None
     strain_limit: Positive | None = None
+    coupling: Literal["rotation", "surface"] = "rotation"
 
     @model_validator(mode="after")
     def _consistent(self) -> PztLayout:
