@@ -1,4 +1,7 @@
-"""The command line: `ffrobot link | solve | info | plot`. Heavy imports happen inside the commands that need them."""
+"""The command line: `ffrobot link | solve | feasibility | info | plot`.
+
+Heavy imports happen inside the commands that need them.
+"""
 
 from __future__ import annotations
 
@@ -93,6 +96,17 @@ def info(file: Path) -> None:
     from .info import describe
 
     click.echo(describe(file))
+
+
+@cli.command()
+@click.argument("results_file", metavar="RESULTS.h5", type=FILE)
+@click.option("--analysis", metavar="NAME", help="Of this analysis only.")
+def feasibility(results_file: Path, analysis: str | None) -> None:
+    """Say whether motors and patches can do what the analyses of a results file ask of them, and what would do."""
+    from .feasibility import print_feasibility
+    from .summary import summary_console
+
+    print_feasibility(results_file, analysis, summary_console())
 
 
 @cli.command()

@@ -9,7 +9,9 @@ import h5py
 import numpy as np
 
 from . import __version__
+from .actuation.feasibility import Feasibility
 from .actuation.patches import PatchArray
+from .actuation.points import PointForces, PointSet
 from .actuation.voltages import Voltages
 from .files import write_atomically
 from .mbs.analyses import Outcome
@@ -45,6 +47,17 @@ def write_results(solution: Solution, path: Path) -> None:
             _write_forces(group, outcome)
             for body_name, voltages in solution.voltages.get(name, {}).items():
                 _write_voltages(group.create_group(f"pzt/{body_name}"), solution.patches[body_name], voltages)
+            for body_name, forces in solution.point_forces.get(name, {}).items():
+                _write_point_forces(
+                    group.create_group(f"actuation_points/{body_name}"), solution.points[body_name], forces
+                )
+            for body_name, effect in solution.structure.items():
+                for key, pair in vars(effect).items():
+                    group[f"patch_structure/{body_name}/{key}"] = pair
+            for point, shift in solution.predicted_shift.get(name, {}).items():
+                group[f"points/{point}/predicted_shift"] = shift
+            if name in solution.feasibility:
+                _write_feasibility(group.create_group("feasibility"), solution, solution.feasibility[name])
             for body_name, stress in solution.stresses.get(name, {}).items():
                 _write_stress(group.create_group(f"stress/{body_name}"), stress)
         file.flush()
@@ -64,7 +77,7 @@ def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
     analysis = outcome.analysis
     group.attrs["kind"] = analysis.kind
-    group.attrs["integrator"] = "none" if analysis.kind == "static" else analysis.integrator
+    group.attrs["integrator"] = analysis.integrator if analysis.kind in ("pcid", "forward") else "none"
     group.attrs["tolerance"] = analysis.tolerance
     group.attrs["actuation"] = analysis.actuation or ""
     group.attrs["apply"] = analysis.apply or ""
@@ -123,4 +136,29 @@ def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) 
     group["edges"] = patches.edges
     group["moment_per_volt"] = patches.moment_per_volt
     group.attrs["condition_number"] = patches.condition_number
-    group.attrs["limit"] = np.inf if patches.limit is None else patches.limit
+    group["residual_force"] = voltages.unmet
+    group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
+
+
+def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
+    for joint, motor in judged.motors.items():
+        group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
+    for body, patches in judged.patches.items():
+        entry, layout = group.create_group(f"pzt/{body}"), solution.patches[body].layout
+        arrays = {key: value for key, value in vars(patches).items() if isinstance(value, np.ndarray)}
+        for key, values in (arrays | {"factor": patches.factor, "mode_factor": patches.mode_factor}).items():
+            entry[key] = values
+        entry.attrs["depoling_field"] = layout.depoling_field or np.inf
+        entry.attrs["strain_limit"] = layout.strain_limit or np.inf
+        entry.create_group("remedies").attrs.update(vars(patches.remedies))
+
+
+def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces) -> None:
+    group["force"] = forces.force
+    group["residual"] = forces.residual
+    group["residual_force"] = forces.unmet
+    group["position"] = np.array([point.position for point in points.points])
+    group["direction"] = points.direction.T
+    group.attrs["components"] = list(points.axes)
+    group.attrs["rank"] = forces.rank
+    group.attrs["condition_number"] = forces.condition_number

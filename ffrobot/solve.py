@@ -5,25 +5,35 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .actuation.patches import PatchArray, patch_array
-from .actuation.voltages import Voltages, solve_voltages
+from .actuation.feasibility import Feasibility, judge_motors, judge_patches
+from .actuation.patch_structure import StructureEffect, structure_effect, with_patches
+from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
+from .actuation.points import PointForces, PointSet, point_set, solve_point_forces, with_points
+from .actuation.prediction import predicted_shift, unmet_modal_forces
+from .actuation.voltages import Voltages, allocation, solve_voltages
 from .errors import InputError
 from .fe_models.modal_body import ModalBody
 from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
+from .mbs.fcid import run_fcid
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.observation import body_motion
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.scene_file import load_scene
 from .mbs.scene_records import Analysis, Scene, split_point
+from .mbs.steering import Equipment
 from .mbs.stress import BodyStress, body_stress
 from .validation import did_you_mean, quoted
+
+Array = NDArray[np.float64]
 
 
 class Watcher:
@@ -57,8 +67,12 @@ class Solution:
     """Everything a solve computed.
 
     Attributes:
+        structure: what patches that are part of their link change of it, by body.
         outcomes: by analysis, in the order of the scene.
         voltages: by analysis and body.
+        point_forces: likewise.
+        predicted_shift: by analysis and point, (T, 2) m: what voltages within their limits leave undone.
+        feasibility: by analysis.
         stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
         skipped: what the scene did not need, one line each.
@@ -68,8 +82,13 @@ class Solution:
     model: Model
     bodies: Mapping[str, LoadedBody]
     patches: Mapping[str, PatchArray]
+    points: Mapping[str, PointSet] = field(default_factory=dict)
+    structure: Mapping[str, StructureEffect] = field(default_factory=dict)
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
+    point_forces: dict[str, dict[str, PointForces]] = field(default_factory=dict)
+    predicted_shift: dict[str, dict[str, Array]] = field(default_factory=dict)
+    feasibility: dict[str, Feasibility] = field(default_factory=dict)
     stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
@@ -89,11 +108,7 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
             started = time.perf_counter()
             outcome = _run(solution, analysis, watcher, interruption)
             solution.outcomes[analysis.name] = outcome
-            if outcome.F_p is not None:
-                solution.voltages[analysis.name] = {
-                    body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
-                    for body, array in solution.patches.items()
-                }
+            _allocate(solution, outcome)
             solution.stresses[analysis.name] = _stresses(solution, outcome)
             solution.seconds[analysis.name] = time.perf_counter() - started
             if outcome.status != "completed":
@@ -108,15 +123,55 @@ def prepare(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     scene = load_scene(scene_path)
     bodies = {body.name: loaded for body, loaded in zip(scene.body, _load_bodies(scene, watcher), strict=True)}
     loaded = time.perf_counter()
+    structure = _add_patches(scene, bodies)
     patches = {
         layout.body: patch_array(scene.path, layout, modal, bodies[layout.body].planar)
         for layout in scene.pzt
         if (modal := bodies[layout.body].modal) is not None
     }
+    if any(analysis.kind != "forward" for analysis in scene.analysis) and scene.trajectory:
+        for array in patches.values():
+            check_reach(scene.path, array)
+    points = {
+        layout.body: point_set(scene.path, layout, bodies[layout.body].modal, bodies[layout.body].planar)
+        for layout in scene.actuation_points
+    }
+    for name, chosen in points.items():
+        bodies[name] = replace(bodies[name], planar=with_points(bodies[name].planar, chosen))
     model = build_model(scene, [body.planar for body in bodies.values()], _voltage_loads(scene, patches))
-    solution = Solution(scene, model, bodies, patches, skipped=tuple(_skipped(scene, bodies)))
+    solution = Solution(scene, model, bodies, patches, points, structure, skipped=tuple(_skipped(scene, bodies)))
     solution.seconds["links and files"] = loaded - began
     return solution
+
+
+def _allocate(solution: Solution, outcome: Outcome) -> None:
+    """What patches and actuation points have to do for what an inverse analysis found."""
+    name = outcome.analysis.name
+    if outcome.F_p is not None:
+        solution.voltages[name] = {
+            body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
+            for body, array in solution.patches.items()
+        }
+        if solution.patches:
+            unmet = unmet_modal_forces(outcome, solution.voltages[name])
+            solution.predicted_shift[name] = predicted_shift(outcome, unmet)
+        solution.feasibility[name] = _judge(solution, outcome)
+    if outcome.analysis.kind != "forward" and any(outcome.assembly.is_trajectory):
+        solution.point_forces[name] = {
+            body: solve_point_forces(points, outcome) for body, points in solution.points.items()
+        }
+
+
+def _judge(solution: Solution, outcome: Outcome) -> Feasibility:
+    """Whether motors and patches can do what an inverse analysis found."""
+    scene, name = solution.scene, outcome.analysis.name
+    patches = {}
+    for body, array in solution.patches.items():
+        loaded = solution.bodies[body]
+        assert loaded.modal is not None
+        trial = partial(with_patch_count, scene.path, array.layout, loaded.modal, loaded.planar)
+        patches[body] = judge_patches(array, solution.voltages[name][body], outcome, trial)
+    return Feasibility(judge_motors(outcome, {joint.name: joint for joint in scene.joint}), patches)
 
 
 def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Outcome:
@@ -128,18 +183,22 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
 
     if analysis.kind == "static":
         return run_static(model, analysis)
+    if analysis.kind == "fcid":
+        return run_fcid(model, analysis)
     if analysis.kind == "pcid":
         replayed = any(later.actuation == analysis.name for later in solution.scene.analysis)
         return run_pcid(model, analysis, replayed, progress)
     source = solution.outcomes[analysis.actuation] if analysis.actuation else None
-    if source is not None and analysis.apply != "trajectory" and source.tau is None:
-        raise InputError(
-            f'{solution.scene.path}: analysis "{analysis.name}": apply: expected motors that fit the mechanism'
-            f" ({model.rigid_freedom} of them) for {analysis.apply!r}, found {len(model.motors)}; name them with"
-            ' motor = true, or use apply = "trajectory"'
-        )
-    projector = {name: array.projector for name, array in solution.patches.items()}
-    return run_forward(model, analysis, source, projector, progress)
+    return run_forward(model, analysis, source, _equipment(solution), progress)
+
+
+def _equipment(solution: Solution) -> Equipment:
+    """The actuators of the scene, fresh for one run."""
+    return Equipment(
+        {name: allocation(array, limited=False) for name, array in solution.patches.items()},
+        {name: allocation(array, limited=True) for name, array in solution.patches.items()},
+        {name: points.actuator() for name, points in solution.points.items()},
+    )
 
 
 def _load_bodies(scene: Scene, watcher: Watcher) -> list[LoadedBody]:
@@ -173,6 +232,18 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
     return LoadedBody(planar, body.modal, body.path, body.computed)
+
+
+def _add_patches(scene: Scene, bodies: dict[str, LoadedBody]) -> dict[str, StructureEffect]:
+    """Adds mass and stiffness of patches to their links where the scene asks for it."""
+    effects = {}
+    for layout in scene.pzt:
+        bare = bodies[layout.body]
+        if layout.structural and bare.modal is not None:
+            patch_array(scene.path, layout, bare.modal, bare.planar)  # refuses patches that do not fit
+            bodies[layout.body] = replace(bare, planar=with_patches(bare.planar, bare.modal, layout))
+            effects[layout.body] = structure_effect(bare.planar, bodies[layout.body].planar)
+    return effects
 
 
 def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:

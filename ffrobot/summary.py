@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -28,6 +29,8 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     if any(solution.voltages.values()):
         console.print()
         console.print(_voltages(solution))
+    for name in solution.feasibility:
+        console.print(f"{name}: {_verdict(solution, name)}")
     if any(solution.stresses.values()):
         console.print()
         console.print(_stresses(solution))
@@ -44,7 +47,7 @@ def _analyses(solution: Solution) -> Table:
     table = _table("analysis", "kind", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
         analysis, reached = outcome.analysis, outcome.time[-1]
-        integrated = analysis.kind != "static"
+        integrated = analysis.kind in ("pcid", "forward")
         table.add_row(
             name,
             analysis.kind,
@@ -62,16 +65,25 @@ def _voltages(solution: Solution) -> Table:
     for name, by_body in solution.voltages.items():
         for body, values in by_body.items():
             patches = solution.patches[body]
-            limit = patches.limit
+            limit = patches.limit.min()
             table.add_row(
                 name,
                 body,
                 f"{values.largest:.0f}" if values.largest >= 1e3 else f"{values.largest:.3g}",
-                "none" if limit is None else f"{limit:g}",
-                "" if limit is None else f"{values.largest / limit:.3g}",
+                "none" if limit == np.inf else f"{limit:g}",
+                "" if limit == np.inf else f"{np.abs(values.required / patches.limit).max():.3g}",
                 f"{patches.condition_number:.3g}",
             )
     return table
+
+
+def _verdict(solution: Solution, analysis: str) -> str:
+    """Whether the actuators can do it, and which cannot."""
+    short = solution.feasibility[analysis].short
+    if not short:
+        return "motors and patches can do it, as far as limits are given"
+    lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
+    return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility"
 
 
 def _stresses(solution: Solution) -> Table:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,9 +12,9 @@ from ..errors import SolveError
 from . import _core
 from .initial_state import State, check_reach, undeformed_state
 from .model import ZERO, Array, Assembly, Model
-from .rows import Row
 from .scene_records import Analysis
 from .statics import static_equilibrium
+from .steering import Equipment, actuation_source, applied_actuators
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -53,6 +53,8 @@ class Outcome:
     evaluations: int
     wall_seconds: float
     recording: _core.Recording | None = field(default=None, repr=False)
+    shape: list[list[_core.TimeFunction]] | None = field(default=None, repr=False)  # prescribed p(t), FCID only
+    shape_force: Array | None = None  # (T, modes of all bodies) −λ_p, the forces that hold the shape; FCID only
 
     def coordinates(self, body: str) -> slice:
         """Columns of (R, θ, p) of a body in q, v and a."""
@@ -84,38 +86,24 @@ def run_pcid(model: Model, analysis: Analysis, keep_recording: bool, progress: P
     start = initial_state(assembly)
     check_reach(assembly, undeformed_state(assembly), analysis.times)
     recording = _core.Recording() if keep_recording else None
-    return _integrate(assembly, analysis, start, None, _resolver(assembly), recording, progress)
+    return _integrate(assembly, analysis, start, None, resolver_of(assembly), recording, progress)
 
 
 def run_forward(
     model: Model,
     analysis: Analysis,
     source: Outcome | None,
-    projector: Mapping[str, Array],
+    equipment: Equipment,
     progress: Progress,
 ) -> Outcome:
-    """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one.
-
-    `projector[body]` (n, n) is what the patches of a body make of the modal forces asked of them.
-    """
-    steered, applied = _steered_rows(model, analysis, source)
-    assembly = Assembly(model, model.joints, [*((row, ZERO) for row in steered), *model.loads])
-    steering = None
-    if source is not None:
-        assert source.recording is not None
-        inverse = source.assembly
-        resolver = _core.ActuationResolver(inverse.system, inverse.is_trajectory, inverse.motor_rows)
-        steering = _core.ReplayedActuation(
-            inverse.system,
-            source.recording,
-            resolver,
-            inverse.is_trajectory,
-            applied,
-            [projector.get(body.name, np.zeros((0, 0))) for body in model.bodies],
-        )
-        start = _transfer(source)
-    else:
-        start = initial_state(assembly)
+    """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one."""
+    if source is None:
+        assembly = Assembly(model, model.joints, model.loads)
+        return _integrate(assembly, analysis, initial_state(assembly), None, None, None, progress)
+    rows, actuators = applied_actuators(model, analysis, source, equipment)
+    assembly = Assembly(model, model.joints, [*((row, ZERO) for row in rows), *model.loads])
+    steering = _core.Actuation(actuation_source(source), actuators)
+    start = State(source.q[0].copy(), source.v[0].copy())  # bodies and their order are the same
     return _integrate(assembly, analysis, start, steering, None, None, progress)
 
 
@@ -128,7 +116,7 @@ def run_static(model: Model, analysis: Analysis) -> Outcome:
     assembly = Assembly(model, [*model.joints, *held], model.loads, list(model.motors.values()))
     state = static_equilibrium(assembly, undeformed_state(assembly))
     at_rest = State(state.q, np.zeros_like(state.q))
-    return _integrate(assembly, analysis, at_rest, None, _resolver(assembly), None, lambda _: True)
+    return _integrate(assembly, analysis, at_rest, None, resolver_of(assembly), None, lambda _: True)
 
 
 def initial_state(assembly: Assembly) -> State:
@@ -139,31 +127,12 @@ def initial_state(assembly: Assembly) -> State:
     return start
 
 
-def _resolver(assembly: Assembly) -> _core.ActuationResolver | None:
+def resolver_of(assembly: Assembly) -> _core.ActuationResolver | None:
     """What turns trajectory forces into motor and modal forces; None where the motors do not fit the mechanism."""
     model = assembly.model
     if not model.trajectories or len(model.motors) != model.rigid_freedom:
         return None
     return _core.ActuationResolver(assembly.system, assembly.is_trajectory, assembly.motor_rows)
-
-
-def _steered_rows(model: Model, analysis: Analysis, source: Outcome | None) -> tuple[list[Row], _core.AppliedActuation]:
-    """Rows along which the recorded actuation acts, in the order in which the core replays it."""
-    match analysis.apply:
-        case "trajectory":
-            assert source is not None
-            rows = [c.row for c in source.assembly.constraints if c.is_trajectory]
-            return rows, _core.AppliedActuation.trajectory
-        case "joints+pzt":
-            return list(model.motors.values()), _core.AppliedActuation.joints_and_patches
-        case "joints":
-            return list(model.motors.values()), _core.AppliedActuation.joints
-    return [], _core.AppliedActuation.joints
-
-
-def _transfer(source: Outcome) -> State:
-    """The first state of an earlier analysis: bodies and their order are the same."""
-    return State(source.q[0].copy(), source.v[0].copy())
 
 
 def _integrate(

@@ -57,7 +57,7 @@ def point_motion(outcome: Outcome, reference: str) -> PointMotion:
     point = body.points[label]
     q = outcome.q[:, outcome.coordinates(name)]
     deflection = q[:, 3:] @ point.translation.T
-    return PointMotion(q[:, :2] + _rotated(q[:, 2], point.position + deflection), deflection)
+    return PointMotion(q[:, :2] + rotated(q[:, 2], point.position + deflection), deflection)
 
 
 def trajectory_force(outcome: Outcome, trajectory: str) -> Array:
@@ -103,7 +103,7 @@ def energies(outcome: Outcome) -> dict[str, Array]:
 
 def _direction(outcome: Outcome, constraint: Constraint) -> Array:
     """The direction (T, 2) of a slide in global axes: fixed to the section of its first end."""
-    return _rotated(_section_angle(outcome, constraint.row.a), np.array(constraint.row.direction))
+    return rotated(_section_angle(outcome, constraint.row.a), np.array(constraint.row.direction))
 
 
 def _section_angle(outcome: Outcome, end: End) -> Array:
@@ -113,7 +113,7 @@ def _section_angle(outcome: Outcome, end: End) -> Array:
     return q[:, 2] + q[:, 3:] @ outcome.assembly.model.body(end.body).points[end.point].rotation
 
 
-def _rotated(theta: Array, vector: Array) -> Array:
+def rotated(theta: Array, vector: Array) -> Array:
     """A(θ) times vectors of the body frame, (T, 2)."""
     x, y = np.broadcast_to(vector, (len(theta), 2)).T
     return np.column_stack([np.cos(theta) * x - np.sin(theta) * y, np.sin(theta) * x + np.cos(theta) * y])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -120,26 +120,36 @@ def from_rigid_body(name: str, body: RigidBody) -> PlanarBody:
 
 
 def with_payload(body: PlanarBody, point: str, mass: float, inertia: float) -> PlanarBody:
-    """The body with a point mass (kg) and moment of inertia (kg·m²) on one of its points, modes made anew.
+    """The body with a point mass (kg) and moment of inertia (kg·m²) on one of its points, modes made anew."""
+    return with_masses(body, [body.points[point]], np.array([mass]), np.array([inertia]))
 
-    The mass is summed into every invariant as one more material point (integrals become sums); the modal mass
-    I + m ΦᵀΦ + I_p φᵀφ is brought back to the identity by a small eigenproblem.
+
+def with_masses(
+    body: PlanarBody, points: Sequence[PlanarPoint], masses: Array, inertias: Array, stiffness: Array | None = None
+) -> PlanarBody:
+    """The body with point masses (kg) and moments of inertia (kg·m²) at points of it, and more stiffness (n, n).
+
+    Masses are summed into every invariant as more material points (integrals become sums); the modal mass
+    I + Σ m ΦᵀΦ + I_p φᵀφ is brought back to the identity by a small eigenproblem.
     """
-    at = body.points[point]
-    (x, y), (Phi_x, Phi_y), phi = at.position, at.translation, at.rotation
+    x, y = np.array([at.position for at in points]).T
+    Phi_x, Phi_y = np.array([at.translation for at in points]).transpose(1, 0, 2)
+    phi = np.array([at.rotation for at in points])
+    xy = (Phi_x.T * masses) @ Phi_y
     loaded = replace(
         body,
-        mass=body.mass + mass,
-        inertia=body.inertia + mass * (x * x + y * y) + inertia,
-        first_moment=body.first_moment + mass * at.position,
-        S_bar=body.S_bar + mass * at.translation,
-        h=body.h + mass * (x * Phi_y - y * Phi_x) + inertia * phi,
-        j=body.j + mass * (x * Phi_x + y * Phi_y),
-        S_tilde=body.S_tilde + mass * (np.outer(Phi_x, Phi_y) - np.outer(Phi_y, Phi_x)),
-        m_xy=body.m_xy + mass * (np.outer(Phi_x, Phi_x) + np.outer(Phi_y, Phi_y)),
+        mass=body.mass + float(masses.sum()),
+        inertia=body.inertia + float(masses @ (x * x + y * y) + inertias.sum()),
+        first_moment=body.first_moment + np.array([masses @ x, masses @ y]),
+        S_bar=body.S_bar + np.array([masses @ Phi_x, masses @ Phi_y]),
+        h=body.h + (masses * x) @ Phi_y - (masses * y) @ Phi_x + inertias @ phi,
+        j=body.j + (masses * x) @ Phi_x + (masses * y) @ Phi_y,
+        S_tilde=body.S_tilde + xy - xy.T,
+        m_xy=body.m_xy + (Phi_x.T * masses) @ Phi_x + (Phi_y.T * masses) @ Phi_y,
     )
-    m_ff = np.eye(body.n_modes) + loaded.m_xy - body.m_xy + inertia * np.outer(phi, phi)
-    return _diagonalised(loaded, np.diag(body.stiffness), m_ff)
+    m_ff = np.eye(body.n_modes) + loaded.m_xy - body.m_xy + (phi.T * inertias) @ phi
+    K_ff = np.diag(body.stiffness)
+    return _diagonalised(loaded, K_ff if stiffness is None else K_ff + stiffness, m_ff)
 
 
 def _diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:

@@ -30,6 +30,10 @@ def load_scene(path: Path) -> Scene:
             key = "waypoints" if isinstance(item, Trajectory) and item.waypoints is not None else component
             derivatives = 2 if isinstance(item, Trajectory) else 0
             check_domain(function, times, f"{path}: {describe}: {key}", derivatives)
+    for analysis in keys.analysis:
+        for body, functions in (analysis.modal or {}).items():
+            for k, function in enumerate(functions):
+                check_domain(function, analysis.times, f'{path}: analysis "{analysis.name}": modal.{body}[{k}]')
     return Scene(**dict(keys), path=path.absolute(), text=path.read_text(encoding="utf-8"))
 
 
@@ -37,14 +41,6 @@ def _refuse_unavailable(data: dict[str, Any], path: Path) -> None:
     """Say so plainly, before the keys of what is not there yet are called wrong."""
     if data.get("space") == "spatial":
         raise InputError(f'{path}: space: expected "planar", found "spatial", which is not available yet')
-    analyses = data.get("analysis")
-    for analysis in analyses if isinstance(analyses, list) else []:
-        if isinstance(analysis, dict) and analysis.get("kind") == "fcid":
-            name = analysis.get("name")
-            raise InputError(
-                f'{path}: analysis "{name}": kind: expected "pcid", "forward" or "static", found "fcid", which is not'
-                " available yet"
-            )
 
 
 def _with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
@@ -65,7 +61,8 @@ def _problems(scene: SceneKeys) -> Iterator[str]:
     """Everything in the scene that refers to something that does not exist or does not fit."""
     for kind in ("body", "joint", "trajectory", "analysis"):
         yield from _duplicates(kind, (record.name for record in getattr(scene, kind)))
-    yield from _duplicates("pzt", (layout.body for layout in scene.pzt))
+    for kind in ("pzt", "actuation_points"):
+        yield from _duplicates(kind, (layout.body for layout in getattr(scene, kind)))
     yield from _body_problems(scene)
     yield from _joint_references(scene)
     yield from _pzt_problems(scene)
@@ -93,6 +90,16 @@ def _references(scene: SceneKeys) -> Iterator[tuple[str, str]]:
             yield f'trajectory "{trajectory.name}": angle', trajectory.angle
     for layout in scene.pzt:
         yield f'pzt "{layout.body}": body', layout.body
+        for point in layout.point_weights or ():
+            yield f'pzt "{layout.body}": point_weights', f"{layout.body}.{point}"
+    for points in scene.actuation_points:
+        yield f'actuation_points "{points.body}": body', points.body
+        for place in (*points.axial, *points.transverse):
+            if isinstance(place, str):
+                yield f'actuation_points "{points.body}"', f"{points.body}.{place}"
+    for analysis in scene.analysis:
+        for body in analysis.modal or ():
+            yield f'analysis "{analysis.name}": modal', body
     for k, load in enumerate(scene.load, 1):
         if load.point is not None:
             yield f"load no. {k}: point", load.point
@@ -131,9 +138,11 @@ def _joint_references(scene: SceneKeys) -> Iterator[str]:
 def _pzt_problems(scene: SceneKeys) -> Iterator[str]:
     rigid = [body.name for body in scene.body if body.rigid is not None]
     layouts = {layout.body: layout for layout in scene.pzt}
-    for name in layouts:
+    uses = [(f'pzt "{name}": body', name) for name in layouts]
+    uses += [(f'analysis "{a.name}": modal', name) for a in scene.analysis for name in a.modal or ()]
+    for key, name in uses:
         if name in rigid:
-            yield f'pzt "{name}": body: expected a flexible body, found "{name}", which is rigid'
+            yield f'{key}: expected a flexible body, found "{name}", which is rigid'
     for k, load in enumerate(scene.load, 1):
         if load.pzt is None or load.voltage is None:
             continue
@@ -148,8 +157,8 @@ def _pzt_problems(scene: SceneKeys) -> Iterator[str]:
 
 
 def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Analysis, ...]) -> Iterator[str]:
-    if analysis.kind == "pcid" and not scene.trajectory:
-        yield 'kind: expected at least one [[trajectory]] for "pcid", found none'
+    if analysis.kind in ("pcid", "fcid") and not scene.trajectory:
+        yield f'kind: expected at least one [[trajectory]] for "{analysis.kind}", found none'
     if analysis.actuation is None:
         return
     sources = {source.name: source for source in earlier}
@@ -159,12 +168,19 @@ def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Anal
         why = ", which does not come before this one" if later else did_you_mean(analysis.actuation, sources)
         yield f'actuation: expected an earlier analysis, {quoted(sources)}, found "{analysis.actuation}"{why}'
         return
-    if source.kind != "pcid":
-        yield f'actuation: expected an analysis of kind "pcid", found "{source.name}" of kind "{source.kind}"'
+    if source.kind not in ("pcid", "fcid"):
+        yield f'actuation: expected an analysis of kind "pcid" or "fcid", found "{source.name}" of kind "{source.kind}"'
     elif analysis.end > source.end:
         yield f'end: expected at most {source.end:g}, where "{source.name}" ends, found {analysis.end:g}'
     if analysis.apply == "joints+pzt" and not scene.pzt:
         yield 'apply: expected at least one [[pzt]] for "joints+pzt", found none'
+    if analysis.apply == "points" and not scene.actuation_points:
+        yield 'apply: expected at least one [[actuation_points]] for "points", found none'
+    if analysis.apply == "trajectory" and source.kind == "fcid":
+        yield (
+            f'apply: expected "joints", "joints+pzt" or "points" with an analysis of kind "fcid", found "trajectory":'
+            f' "{source.name}" takes more than the forces on its trajectories'
+        )
 
 
 def _prescribed(scene: SceneKeys) -> Iterator[tuple[str, Trajectory | Load, Any]]:

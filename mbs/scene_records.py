@@ -92,6 +92,7 @@ PointReference = Annotated[str, AfterValidator(_point)]
 Side = Annotated[str, AfterValidator(_side)]
 Vector2 = tuple[float, float]
 Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
 Expression = Annotated[TimeFunction, PlainValidator(_time_function)]
 WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints)]
 NotEmpty = AfterValidator(_not_empty)
@@ -134,7 +135,8 @@ class Joint(Record):
     """A joint between two points, or a point and the ground.
 
     `at` (m) is where it sits on the ground; `axis` the direction of a prismatic joint in the frame of the first body;
-    `motor` None leaves it to the default: driven in open chains.
+    `motor` None leaves it to the default: driven in open chains. Limits of the motor: N·m, rad/s, W (N, m/s where
+    prismatic).
     """
 
     name: Name
@@ -143,6 +145,9 @@ class Joint(Record):
     at: Vector2 = (0.0, 0.0)
     axis: Vector2 | None = None
     motor: bool | None = None
+    moment_limit: Positive | None = None
+    speed_limit: Positive | None = None
+    power_limit: Positive | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Joint:
@@ -211,6 +216,13 @@ class PztLayout(Record):
     """Equal piezoelectric patches along one link. Lengths in m, modulus in Pa, d31 in m/V, density kg/m³, limit in V.
 
     Centers are distances along the link from its root; `count` places them at (k − ½)·(length of link)/count.
+    `thickness` is that of one of `layers`, which lie on each other on one `face` or on both, driven against each other.
+    Without `face` they bend the link and do nothing else, as in the paper. `limit` is one for all or one for each.
+    `allocation = "least-squares"` is content with fewer patches than modes, or modes that no patch reaches.
+    Where voltages cannot produce all modal forces, `mode_weights` (of the squares of what is left) or `point_weights`
+    (of the squares of the deflections that this causes at points of the link) say what matters.
+    `structural` names what of the patches is added to the link: "mass", "stiffness".
+    Only for the judgement: `depoling_field` (V/m) and `strain_limit` of the material.
     `coupling`: patches work on the section rotations at their ends, or on the faces of a solid that outlines them.
     """
 
@@ -223,7 +235,15 @@ class PztLayout(Record):
     modulus: Positive
     d31: float
     density: Positive | None = None
-    limit: Positive | None = None
+    limit: Positive | Annotated[tuple[Positive, ...], NotEmpty] | None = None
+    layers: Annotated[int, Field(gt=0)] = 1
+    face: Literal["+y", "-y", "both"] | None = None
+    allocation: Literal["exact", "least-squares"] = "exact"
+    mode_weights: Annotated[tuple[NotNegative, ...], NotEmpty] | None = None
+    point_weights: dict[Name, NotNegative] | None = None
+    structural: tuple[Literal["mass", "stiffness"], ...] = ()
+    depoling_field: Positive | None = None
+    strain_limit: Positive | None = None
     coupling: Literal["rotation", "surface"] = "rotation"
 
     @model_validator(mode="after")
@@ -231,12 +251,42 @@ class PztLayout(Record):
         _one_of(self, ("count", "centers"))
         if self.d31 == 0.0:
             raise ValueError("expected a d31 other than 0, found 0: such patches do nothing")
+        if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
+            raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
+        if "mass" in self.structural and self.density is None:
+            raise ValueError('expected the key "density" beside structural = ["mass"], found none')
+        if self.mode_weights is not None and self.point_weights is not None:
+            raise ValueError('expected one of the keys "mode_weights" and "point_weights", found both')
+        for weights in (self.mode_weights, self.point_weights and tuple(self.point_weights.values())):
+            if weights is not None and not any(weights):
+                raise ValueError("expected weights that are not all 0, found only zeros")
         return self
 
     @property
     def patch_count(self) -> int:
         """Number of patches."""
         return len(self.centers) if self.centers is not None else (self.count or 0)
+
+
+Place = float | Annotated[str, AfterValidator(_name)]
+"""Where on a link: the distance from its root (m), or the name of one of its points."""
+
+
+class ActuationPoints(Record):
+    """Components of force on one body that carry its generalized driving forces (Shaban 2022, sec. 4).
+
+    `axial` and `transverse` say at which places a component along x or y of the body's frame acts. Without either,
+    as many as the body has coordinates are chosen.
+    """
+
+    body: str
+    axial: tuple[Place, ...] = ()
+    transverse: tuple[Place, ...] = ()
+
+    @property
+    def is_automatic(self) -> bool:
+        """Whether the components are left to the program."""
+        return not (self.axial or self.transverse)
 
 
 class Load(Record):
@@ -284,7 +334,9 @@ class Analysis(Record):
     """One run, with outputs at 0, output_step, …, end (s).
 
     Both are 0 where the file does not give them: in static analyses (t = 0 only), and in forward analyses that take
-    over the times of their actuation, which `load_scene` fills in.
+    over the times of their actuation, which `load_scene` fills in. `shape` of FCID says which p(t) is prescribed,
+    `modal` gives it: expressions for the first modes of a body, as its modal file numbers them; all others are 0.
+    `limits` keeps the actuators of a forward run within their limits.
     """
 
     name: Name
@@ -293,8 +345,10 @@ class Analysis(Record):
     output_step: Positive = 0.0
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
     actuation: str | None = None
-    apply: Literal["joints", "joints+pzt", "trajectory"] | None = None
+    apply: Literal["joints", "joints+pzt", "trajectory", "points"] | None = None
+    limits: bool = False
     shape: Literal["zero", "static", "given"] | None = None
+    modal: dict[Name, tuple[Expression, ...]] | None = None
     integrator: Literal["dop853"] = "dop853"
     max_steps: Annotated[int, Field(gt=0)] = 5_000_000
 
@@ -317,6 +371,16 @@ class Analysis(Record):
             raise ValueError(f'expected the key "actuation" only in kind = "forward", found kind = "{self.kind}"')
         if self.shape is not None and self.kind != "fcid":
             raise ValueError(f'expected the key "shape" only in kind = "fcid", found kind = "{self.kind}"')
+        if self.shape is None and self.kind == "fcid":
+            raise ValueError('expected the key "shape" in kind = "fcid", found none')
+        if self.modal is not None and self.shape != "given":
+            raise ValueError(f'expected the key "modal" only in shape = "given", found shape = "{self.shape}"')
+        if self.modal is None and self.shape == "given":
+            raise ValueError('expected the key "modal" in shape = "given", found none')
+        if self.limits and self.apply not in ("joints", "joints+pzt"):
+            raise ValueError(
+                f'expected limits = true only beside apply = "joints" or "joints+pzt", found apply = "{self.apply}"'
+            )
         return self
 
     @property
@@ -354,6 +418,7 @@ class SceneKeys(Record):
     joint: tuple[Joint, ...] = ()
     trajectory: tuple[Trajectory, ...] = ()
     pzt: tuple[PztLayout, ...] = ()
+    actuation_points: tuple[ActuationPoints, ...] = ()
     load: tuple[Load, ...] = ()
     payload: tuple[Payload, ...] = ()
     initial: Initial = Initial()

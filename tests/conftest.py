@@ -103,6 +103,10 @@ def case_copy_of_module(tmp_path_factory):
 
 
 def _copy(name, folder):
+    """The case, and beside it the links of the others, which it may share."""
+    ignored = shutil.ignore_patterns("*.h5", "*.figures")
     copy = folder / name
-    shutil.copytree(CASES / name, copy, ignore=shutil.ignore_patterns("*.h5", "*.figures"))
+    shutil.copytree(CASES / name, copy, ignore=ignored)
+    if "../two_link/" in (copy / "scene.toml").read_text(encoding="utf-8"):
+        shutil.copytree(CASES / "two_link", folder / "two_link", ignore=ignored)
     return copy / "scene.toml"

@@ -9,4 +9,5 @@ NB_MODULE(_core, m) {
   bind_time_function(m);
   bind_system(m);
   bind_run(m);
+  bind_actuation(m);
 }

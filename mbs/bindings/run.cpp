@@ -1,5 +1,4 @@
 #include "core/run.h"
-#include "core/replay.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
@@ -54,21 +53,7 @@ void bind_run(nb::module_ &m) {
       .def(nb::init<>())
       .def_prop_ro("steps", [](const Recording &r) { return r.times.size(); });
 
-  nb::class_<ActuationResolver>(m, "ActuationResolver", "Trajectory forces as motor forces and modal forces.")
-      .def(nb::init<const System &, std::vector<bool>, std::vector<Row>>(), "system"_a, "trajectory"_a, "motors"_a,
-           nb::keep_alive<1, 2>());
-
-  nb::enum_<AppliedActuation>(m, "AppliedActuation", "What of a recorded actuation a forward run applies.")
-      .value("trajectory", AppliedActuation::trajectory)
-      .value("joints", AppliedActuation::joints)
-      .value("joints_and_patches", AppliedActuation::joints_and_patches);
-
   nb::class_<Steering>(m, "Steering", "Steers a system from outside.");
-  nb::class_<ReplayedActuation, Steering>(m, "ReplayedActuation", "Actuation from the dense output of a recorded run.")
-      .def(nb::init<const System &, const Recording &, ActuationResolver, std::vector<bool>, AppliedActuation,
-                    std::vector<Eigen::MatrixXd>>(),
-           "inverse"_a, "recording"_a, "resolver"_a, "trajectory"_a, "applied"_a, "projector"_a, nb::keep_alive<1, 2>(),
-           nb::keep_alive<1, 3>());
 
   nb::class_<Run>(m, "Run", "Outputs of an analysis, one row per output time reached, and how it went.")
       .def_prop_ro("status", [](const Run &r) { return r.report.status; })

@@ -2,6 +2,7 @@
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -14,6 +15,7 @@ using namespace ffrobot;
 using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 namespace {
 
@@ -81,6 +83,26 @@ MatrixXd energies(const System &system, const MatrixXd &q, const MatrixXd &v) {
   return result;
 }
 
+using Samples = nb::ndarray<nb::numpy, double, nb::ndim<3>>;
+
+// C_q (T, constraints, coordinates) at the coordinates q (T, coordinates)
+Samples constraint_jacobians(const System &system, const RowMajorMatrix &q) {
+  check_size("q columns", q.cols(), system.coordinates);
+  Workspace w(system);
+  const auto T = static_cast<std::size_t>(q.rows()), m = system.constraints.size();
+  const auto n = static_cast<std::size_t>(system.coordinates);
+  auto *data = new double[T * m * n];
+  nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<double *>(p); });
+  const VectorXd rest = VectorXd::Zero(system.coordinates);
+  VectorXd value(static_cast<Eigen::Index>(m)), rate(value);
+  for (std::size_t i = 0; i < T; ++i) {
+    const VectorXd q_i = q.row(static_cast<Eigen::Index>(i)).transpose();
+    constraint_residuals(system, 0.0, q_i.data(), rest.data(), w, value.data(), rate.data());
+    Eigen::Map<RowMajorMatrix>(data + i * m * n, value.size(), system.coordinates) = constraint_jacobian(system, w);
+  }
+  return Samples(data, {T, m, n}, owner);
+}
+
 } // namespace
 
 void bind_system(nb::module_ &m) {
@@ -131,6 +153,7 @@ void bind_system(nb::module_ &m) {
       .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a,
            "Accelerations (coordinates,) and multipliers (constraints,).")
       .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q.")
+      .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, coordinates).")
       .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces of gravity, elasticity and drives.")
       .def("energies", &energies, "q"_a, "v"_a, "Kinetic, strain, gravitational energy and dissipated power (T, 4).");
 

@@ -34,20 +34,6 @@ void resultant(const System &system, const Workspace &w, const std::vector<Eigen
     }
 }
 
-// The same for a unit force along one row
-void add_row(const Workspace &w, const Row &row, const RowMotion &motion, Eigen::Ref<Eigen::VectorXd> Q) {
-  const auto add = [&](const MarkerReference &m, const Eigen::Vector3d &f) {
-    if (m.body < 0)
-      return;
-    const auto &arm = w.bodies[static_cast<std::size_t>(m.body)].markers[static_cast<std::size_t>(m.marker)].arm;
-    Q[3 * m.body] += f[0];
-    Q[3 * m.body + 1] += f[1];
-    Q[3 * m.body + 2] += arm.x() * f[1] - arm.y() * f[0] + f[2];
-  };
-  add(row.a, motion.coefficient_a);
-  add(row.b, motion.coefficient_b);
-}
-
 } // namespace
 
 void ActuationResolver::resolve(const Workspace &w) {
@@ -60,11 +46,11 @@ void ActuationResolver::resolve(const Workspace &w) {
     if (trajectory_[r])
       add_wrench(row, w.rows[r], -w.lambda[static_cast<Index>(r)], wrench_);
     else
-      add_row(w, row, w.rows[r], joint_system_.col(column++));
+      add_frame_gradient(row, w.rows[r], w.bodies, joint_system_.col(column++));
   }
   for (std::size_t i = 0; i < motors_.size(); ++i) {
     evaluate(motors_[i], w.bodies, motor_rows_[i]);
-    add_row(w, motors_[i], motor_rows_[i], joint_system_.col(column++));
+    add_frame_gradient(motors_[i], motor_rows_[i], w.bodies, joint_system_.col(column++));
   }
   rhs_.setZero();
   resultant(system_, w, wrench_, rhs_);

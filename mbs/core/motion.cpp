@@ -85,6 +85,15 @@ double ConstrainedMotion::error_size(double t, const double *y, const double *e)
   return size;
 }
 
+// Of applied loads on the modes of body b, at the last evaluation.
+Eigen::VectorXd ConstrainedMotion::applied_modal_force(std::size_t b) const {
+  const PlanarBodyState &state = workspace_.bodies[b];
+  Eigen::VectorXd F_p = state.modal_load;
+  if (state.has_wrench)
+    add_modal_force(system_.bodies[b], state, state.wrench, F_p);
+  return F_p;
+}
+
 void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
   const Index n = system_.coordinates;
   const auto raise = [](double &peak, double value) { peak = std::max(peak, value); };
@@ -98,8 +107,10 @@ void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
     if (modes > 0) {
       const auto &omega = frequency_[b];
       const VectorMap p(y + i + 3, modes), p_dot(v + 3, modes), p_ddot(a + 3, modes);
-      raise(peak.modal, std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(), 1e-12}));
-      raise(peak.modal_velocity, std::max({p_dot.norm(), p_ddot.cwiseQuotient(omega).norm(), 1e-12}));
+      applied_ = applied_modal_force(b).cwiseQuotient(omega); // may hold the links straight: p stays zero then
+      raise(peak.modal, std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
+                                  applied_.cwiseQuotient(omega).norm(), 1e-12}));
+      raise(peak.modal_velocity, std::max({p_dot.norm(), p_ddot.cwiseQuotient(omega).norm(), applied_.norm(), 1e-12}));
     }
   }
   const Eigen::VectorXd &lambda = has_lambda_ ? lambda_ : workspace_.lambda;

@@ -32,6 +32,8 @@ public:
   Workspace &workspace() { return workspace_; }
 
 private:
+  Eigen::VectorXd applied_modal_force(std::size_t b) const;
+
   const System &system_;
   Workspace workspace_;
   std::vector<int> group_;
@@ -46,7 +48,7 @@ private:
   };
   std::vector<BodyPeaks> body_peaks_;
   std::vector<double> multiplier_peaks_; // of each group
-  Eigen::VectorXd lambda_, shifted_, shifted_slope_;
+  Eigen::VectorXd lambda_, shifted_, shifted_slope_, applied_;
   bool has_lambda_ = false;
 };
 

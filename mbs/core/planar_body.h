@@ -103,6 +103,11 @@ void add_modal_force(const PlanarBody &body, const PlanarBodyState &state, const
 void static_force(const PlanarBody &body, const double *q, const Eigen::Vector2d &gravity, PlanarBodyState &state,
                   double *Q);
 
+// Generalized force M a - Q on (R, theta, p) that the motion (q, v, a) needs, beside gravity, elasticity, damping and
+// the applied loads. After kinematics.
+void required_force(const PlanarBody &body, const double *q, const double *v, const double *a,
+                    const Eigen::Vector2d &gravity, PlanarBodyState &state, double *f);
+
 // Kinetic, strain and gravitational energy.
 struct Energy {
   double kinetic = 0, strain = 0, gravitational = 0, dissipated_power = 0;

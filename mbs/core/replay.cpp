@@ -6,6 +6,23 @@ namespace ffrobot {
 
 using Eigen::Index;
 
+ActuationSource::ActuationSource(const System &system, std::vector<bool> is_trajectory,
+                                 std::optional<ActuationResolver> resolver)
+    : is_trajectory_(std::move(is_trajectory)), resolver_(std::move(resolver)) {
+  for (const auto &body : system.bodies)
+    modal_zero_.emplace_back(Eigen::VectorXd::Zero(body.modes()));
+  modal_force_ = modal_zero_;
+}
+
+void ActuationSource::resolve() {
+  if (!resolver_)
+    return;
+  resolver_->resolve(workspace());
+  tau_ = resolver_->tau();
+  for (std::size_t b = 0; b < modal_force_.size(); ++b)
+    modal_force_[b] = resolver_->modal_force()[b] + shape_force()[b];
+}
+
 RecordedMotion::RecordedMotion(const System &system, const Recording &recording)
     : motion_(system, {}, {}, nullptr), recording_(recording) {
   constexpr int remembered = 4;
@@ -38,32 +55,28 @@ void RecordedMotion::state(double t, double *y) {
   found->method.interpolate(t, y);
 }
 
-ReplayedActuation::ReplayedActuation(const System &inverse, const Recording &recording, ActuationResolver resolver,
-                                     std::vector<bool> trajectory, AppliedActuation applied,
-                                     std::vector<Eigen::MatrixXd> projector)
-    : inverse_(inverse), motion_(inverse, recording), resolver_(std::move(resolver)), workspace_(inverse),
-      trajectory_(std::move(trajectory)), applied_(applied), projector_(std::move(projector)),
-      y_(2 * inverse.coordinates), a_(inverse.coordinates) {}
+RecordedActuation::RecordedActuation(const System &system, const Recording &recording, std::vector<bool> is_trajectory,
+                                     std::optional<ActuationResolver> resolver)
+    : ActuationSource(system, std::move(is_trajectory), std::move(resolver)), system_(system),
+      motion_(system, recording), workspace_(system), y_(2 * system.coordinates), a_(system.coordinates) {}
 
-void ReplayedActuation::steer(double t, Workspace &forward) {
+void RecordedActuation::evaluate(double t) {
   motion_.state(t, y_.data());
-  accelerations(inverse_, t, y_.data(), y_.data() + inverse_.coordinates, workspace_, a_.data());
-  if (applied_ == AppliedActuation::trajectory) {
-    std::size_t drive = 0;
-    for (std::size_t r = 0; r < trajectory_.size(); ++r)
-      if (trajectory_[r])
-        forward.external_drive[drive++] = -workspace_.lambda[static_cast<Index>(r)];
-    return;
-  }
-  resolver_.resolve(workspace_);
-  for (Index i = 0; i < resolver_.tau().size(); ++i)
-    forward.external_drive[static_cast<std::size_t>(i)] = resolver_.tau()[i];
-  if (applied_ == AppliedActuation::joints_and_patches) {
-    forward.has_external_modal = true;
-    for (std::size_t b = 0; b < projector_.size(); ++b)
-      if (projector_[b].size())
-        forward.external_modal[b].noalias() = projector_[b] * resolver_.modal_force()[b];
-  }
+  accelerations(system_, t, y_.data(), y_.data() + system_.coordinates, workspace_, a_.data());
+  q_ = y_.head(system_.coordinates);
+  resolve();
+}
+
+FullyConstrainedActuation::FullyConstrainedActuation(const System &system, std::vector<ModalShape> shape,
+                                                     Eigen::VectorXd guess, std::vector<bool> is_trajectory,
+                                                     std::optional<ActuationResolver> resolver)
+    : ActuationSource(system, std::move(is_trajectory), std::move(resolver)), system_(system),
+      motion_(system, std::move(guess)), shape_(std::move(shape)) {}
+
+void FullyConstrainedActuation::evaluate(double t) {
+  motion_.set_shape(t, shape_);
+  motion_.solve(t); // was found at all output times before; a failure in between shows as a step that is refused
+  resolve();
 }
 
 } // namespace ffrobot

@@ -3,12 +3,42 @@
 
 #include "core/actuation.h"
 #include "core/dop853.h"
+#include "core/fcid.h"
 #include "core/integrate.h"
 #include "core/motion.h"
 
-#include <array>
+#include <optional>
 
 namespace ffrobot {
+
+// What an inverse analysis found, at any time of it.
+class ActuationSource {
+public:
+  virtual ~ActuationSource() = default;
+
+  // Everything below is that of time t afterwards.
+  virtual void evaluate(double t) = 0;
+
+  virtual const System &system() const = 0;
+  virtual const Workspace &workspace() const = 0; // kinematics, multipliers
+  virtual const Eigen::VectorXd &q() const = 0;
+  const Eigen::VectorXd &tau() const { return tau_; }                                     // (motors)
+  const std::vector<Eigen::VectorXd> &modal_force() const { return modal_force_; }        // F_p of each body
+  virtual const std::vector<Eigen::VectorXd> &shape_force() const { return modal_zero_; } // -lambda_p of each body
+  bool is_trajectory(std::size_t constraint) const { return is_trajectory_[constraint]; }
+
+protected:
+  // resolver: empty where the motors do not fit the mechanism; then neither tau nor modal forces are asked for.
+  ActuationSource(const System &system, std::vector<bool> is_trajectory, std::optional<ActuationResolver> resolver);
+
+  void resolve(); // tau and F_p from the workspace
+
+private:
+  std::vector<bool> is_trajectory_;
+  std::optional<ActuationResolver> resolver_;
+  Eigen::VectorXd tau_;
+  std::vector<Eigen::VectorXd> modal_force_, modal_zero_;
+};
 
 // The state of a recorded run at any time, by making the step around it again (order 7, like its outputs).
 class RecordedMotion {
@@ -31,30 +61,40 @@ private:
   std::size_t next_ = 0;
 };
 
-// How the recorded actuation enters the forward run.
-enum class AppliedActuation {
-  trajectory,        // the forces -lambda_s on their points: one drive per trajectory constraint
-  joints,            // the motor forces tau: one drive per motor
-  joints_and_patches // and the modal forces F_p, as far as the patches can produce them
-};
-
-class ReplayedActuation final : public Steering {
+// Partially constrained: from the recording of its run.
+class RecordedActuation final : public ActuationSource {
 public:
-  // projector[b]: (n, n) what the patches of body b make of the wanted F_p; empty where it has no patches.
-  ReplayedActuation(const System &inverse, const Recording &recording, ActuationResolver resolver,
-                    std::vector<bool> trajectory, AppliedActuation applied, std::vector<Eigen::MatrixXd> projector);
+  RecordedActuation(const System &system, const Recording &recording, std::vector<bool> is_trajectory,
+                    std::optional<ActuationResolver> resolver);
 
-  void steer(double t, Workspace &forward) override;
+  void evaluate(double t) override;
+  const System &system() const override { return system_; }
+  const Workspace &workspace() const override { return workspace_; }
+  const Eigen::VectorXd &q() const override { return q_; }
 
 private:
-  const System &inverse_;
+  const System &system_;
   RecordedMotion motion_;
-  ActuationResolver resolver_;
   Workspace workspace_;
-  std::vector<bool> trajectory_;
-  AppliedActuation applied_;
-  std::vector<Eigen::MatrixXd> projector_;
-  Eigen::VectorXd y_, a_;
+  Eigen::VectorXd y_, q_, a_;
+};
+
+// Fully constrained: solved anew at every time.
+class FullyConstrainedActuation final : public ActuationSource {
+public:
+  FullyConstrainedActuation(const System &system, std::vector<ModalShape> shape, Eigen::VectorXd guess,
+                            std::vector<bool> is_trajectory, std::optional<ActuationResolver> resolver);
+
+  void evaluate(double t) override;
+  const System &system() const override { return system_; }
+  const Workspace &workspace() const override { return motion_.workspace(); }
+  const Eigen::VectorXd &q() const override { return motion_.q(); }
+  const std::vector<Eigen::VectorXd> &shape_force() const override { return motion_.shape_force(); }
+
+private:
+  const System &system_;
+  FullyConstrained motion_;
+  std::vector<ModalShape> shape_;
 };
 
 } // namespace ffrobot

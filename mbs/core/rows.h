@@ -53,4 +53,8 @@ void jacobian(const Row &row, const RowMotion &motion, const std::vector<PlanarB
               const std::vector<PlanarBodyState> &states, const std::vector<Eigen::Index> &first_coordinate,
               Eigen::Ref<Eigen::VectorXd> gradient);
 
+// The part of it that belongs to the frames: (R, theta) of all bodies, three entries each. Adds to `gradient`.
+void add_frame_gradient(const Row &row, const RowMotion &motion, const std::vector<PlanarBodyState> &states,
+                        Eigen::Ref<Eigen::VectorXd> gradient);
+
 } // namespace ffrobot

@@ -204,6 +204,33 @@ void static_force(const System &system, double t, const double *q, Workspace &w,
   }
 }
 
+void required_force(const System &system, double t, const double *q, const double *v, const double *a, Workspace &w,
+                    double *f) {
+  update_kinematics(system, q, v, w);
+  apply_drives(system, t, w);
+  for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+    const Index i = system.first_coordinate[b];
+    required_force(system.bodies[b], q + i, v + i, a + i, system.gravity, w.bodies[b], f + i);
+  }
+}
+
+void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c) {
+  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+    const Row &row = system.constraints[r].row;
+    const RowMotion &motion = w.rows[r];
+    c[r] = motion.bias - w.targets[r].acceleration;
+    for (const auto &[m, coefficient] :
+         {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)}) {
+      if (m->body < 0)
+        continue;
+      const auto b = static_cast<std::size_t>(m->body);
+      const Index i = system.first_coordinate[b];
+      double size = 0;
+      c[r] += coefficient->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker, q + i, a + i, size));
+    }
+  }
+}
+
 double project(const System &system, double t, double *q, double *v, Workspace &w) {
   // Not tighter: rounding of positions, moved into modes with frequencies up to 1e5 rad/s, is noise in their forces.
   constexpr double tolerance = 1e-12;

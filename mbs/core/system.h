@@ -88,6 +88,13 @@ double project(const System &system, double t, double *q, double *v, Workspace &
 // Generalized forces of gravity, elasticity and drives on all coordinates, at rest.
 void static_force(const System &system, double t, const double *q, Workspace &w, double *Q);
 
+// f = M a - Q (coordinates): what constraints and actuators must supply for the accelerations a, drives taken off.
+void required_force(const System &system, double t, const double *q, const double *v, const double *a, Workspace &w,
+                    double *f);
+
+// Accelerations C_ddot (constraints) for accelerations a of the coordinates. Uses kinematics, rows and targets in w.
+void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c);
+
 // C_q (constraints x coordinates), dense, at the coordinates of the last evaluation.
 Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w);
 

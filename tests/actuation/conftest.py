@@ -25,7 +25,7 @@ condition = "{condition}"
 
 [modes]
 count = {count}
-family = "in-plane-bending"
+family = "{family}"
 """
 
 
@@ -36,9 +36,9 @@ def link_file(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
 
-        def write(name, condition="cantilever", count=10):
+        def write(name, condition="cantilever", count=10, family="in-plane-bending"):
             path = folder / f"{name}.toml"
-            path.write_text(LINK.format(name=name, condition=condition, count=count))
+            path.write_text(LINK.format(name=name, condition=condition, count=count, family=family))
             return path
 
         yield write
@@ -48,3 +48,9 @@ def link_file(tmp_path_factory):
 def cantilever(link_file):
     """The modal body of a cantilever with `count` bending modes."""
     return lambda count: cached_modal_body(link_file(f"cantilever{count}", count=count)).body
+
+
+@pytest.fixture(scope="session")
+def all_modes(link_file):
+    """A cantilever with the lowest modes of every kind, one axial mode among those that move in the plane."""
+    return cached_modal_body(link_file("all_modes", count=18, family="all")).body

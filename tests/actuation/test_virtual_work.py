@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from ffrobot.actuation.points import driving_forces
+from ffrobot.mbs.joint_space import motor_rates
 from ffrobot.mbs.observation import trajectory_force
 from ffrobot.solve import solve
 
@@ -39,12 +41,36 @@ point = "link2.tip"
 x = "1.5*cos(pi*t/4)"
 y = "sqrt(3)/2*cos(pi*t/4)"
 {patches}
+{points}
 [[analysis]]
 name = "inverse"
 kind = "pcid"
 end = 0.1
 output_step = 0.02
 tolerance = 1e-6
+
+[[analysis]]
+name = "straight"
+kind = "fcid"
+shape = "zero"
+end = 0.1
+output_step = 0.02
+
+[[analysis]]
+name = "sagging"
+kind = "fcid"
+shape = "static"
+end = 0.1
+output_step = 0.02
+"""
+POINTS = """
+[[actuation_points]]
+body = "link1"
+{own}
+
+[[actuation_points]]
+body = "link2"
+{own}
 """
 PATCHES = """
 [[pzt]]
@@ -55,44 +81,153 @@ width = 0.025
 thickness = 0.75e-3
 modulus = 63e9
 d31 = 110e-12
+{own}
 """
 
 
-@pytest.fixture(scope="module", params=["section", "frame"])
-def solution(request, link_file, tmp_path_factory):
+@pytest.fixture(scope="module")
+def solved_with(link_file, tmp_path_factory):
+    """The two-link arm with keys of its own for patches and points."""
     links = {"link1": link_file("link1", "simply-supported"), "link2": link_file("link2", "cantilever")}
-    patches = "".join(PATCHES.format(body=body) for body in links)
-    scene = tmp_path_factory.mktemp("scene") / "scene.toml"
-    scene.write_text(SCENE.format(motors=request.param, patches=patches, **links))
-    return solve(scene)
+
+    def run(motors="section", pzt="", points=""):
+        scene = tmp_path_factory.mktemp("scene") / "scene.toml"
+        patches = "".join(PATCHES.format(body=body, own=pzt) for body in links)
+        text = SCENE.format(motors=motors, patches=patches, points=POINTS.format(own=points), **links)
+        scene.write_text(text)
+        return solve(scene)
+
+    return run
 
 
-def test_power_of_motors_and_patches_is_that_of_the_force_on_the_tip(solution):
-    """Joint forces do none. To 1e-10 of the largest term, at every output after the start from rest."""
-    outcome, section = solution.outcomes["inverse"], solution.scene.motors == "section"
-    t = outcome.time
-    rate = -np.pi / 4 * np.sin(np.pi * t / 4)
-    tip_velocity = np.outer(rate, [1.5, np.sqrt(3) / 2])
-    target = (trajectory_force(outcome, "tip") * tip_velocity).sum(axis=1)
+@pytest.fixture(scope="module", params=["section", "frame"])
+def solution(request, solved_with):
+    return solved_with(request.param)
+
+
+@pytest.fixture(scope="module")
+def limited(solved_with):
+    """Patches at ±200 V; points too few to carry Q_a."""
+    return solved_with(pzt="limit = 200.0", points='transverse = [0.25, 0.5, "tip"]')
+
+
+ANALYSES = ["inverse", "straight", "sagging"]
+
+
+def velocity(outcome, body):
+    return outcome.v[:, outcome.coordinates(body)]
+
+
+def driving_power(outcome):
+    """Q_a · q̇ of every body: (T, terms)."""
+    return np.column_stack(
+        [(driving_forces(outcome, body) * velocity(outcome, body)).sum(axis=1) for body in ("link1", "link2")]
+    )
+
+
+def motor_power(solution, outcome):
+    """Angles turn with the section or with the frame, as the scene says."""
+    section = solution.scene.motors == "section"
 
     def turn(body, point):
-        """Rate of the angle that the motors work on."""
-        v = outcome.v[:, outcome.coordinates(body)]
-        rotation = outcome.assembly.model.body(body).points[point].rotation
-        return v[:, 2] + (v[:, 3:] @ rotation if section else 0.0)
+        v = velocity(outcome, body)
+        return v[:, 2] + (v[:, 3:] @ outcome.assembly.model.body(body).points[point].rotation if section else 0.0)
 
-    motors = [
-        outcome.tau[:, 0] * turn("link1", "root"),
-        outcome.tau[:, 1] * (turn("link2", "root") - turn("link1", "tip")),
-    ]
-    patches = [
-        ((solution.voltages["inverse"][body].required @ solution.patches[body].Phi_V.T)
-         * outcome.v[:, outcome.coordinates(body)][:, 3:]).sum(axis=1)
-        for body in ("link1", "link2")
-    ]  # fmt: skip
-    terms = np.column_stack([*motors, *patches, -target])
-    assert np.all(np.abs(terms[1:, :2]).max(axis=1) > 0.1)
-    assert np.all(np.abs(terms.sum(axis=1))[1:] < 1e-10 * np.abs(terms).max(axis=1)[1:])
+    rates = np.column_stack([turn("link1", "root"), turn("link2", "root") - turn("link1", "tip")])
+    np.testing.assert_allclose(motor_rates(outcome), rates, atol=1e-12)
+    return outcome.tau * rates
+
+
+def patch_power(solution, outcome, which):
+    """Of the patches of each link, and of the modal forces they leave unmet."""
+    patches, unmet = [], []
+    for body, array in solution.patches.items():
+        voltages = solution.voltages[outcome.analysis.name][body]
+        p_dot = velocity(outcome, body)[:, 3:]
+        patches.append(((getattr(voltages, which) @ array.Phi_V.T) * p_dot).sum(axis=1))
+        unmet.append((voltages.unmet * p_dot).sum(axis=1))
+    return np.column_stack(patches), np.column_stack(unmet)
+
+
+def check_sum_is_zero(*terms):
+    """To 1e-10 of the largest term, at every output after the start from rest."""
+    terms = np.column_stack(terms)[1:]
+    assert np.all(np.abs(terms).max(axis=1) > 1e-6)
+    assert np.all(np.abs(terms.sum(axis=1)) < 1e-10 * np.abs(terms).max(axis=1))
+
+
+def test_power_of_the_force_on_the_tip_is_that_of_Q_a(solution):
+    outcome = solution.outcomes["inverse"]
+    rate = -np.pi / 4 * np.sin(np.pi * outcome.time / 4)
+    tip_velocity = np.outer(rate, [1.5, np.sqrt(3) / 2])
+    check_sum_is_zero((trajectory_force(outcome, "tip") * tip_velocity).sum(axis=1), -driving_power(outcome))
+
+
+@pytest.mark.parametrize("analysis", ANALYSES)
+def test_power_of_motors_and_patches_is_that_of_Q_a(solution, analysis):
+    """Joint forces do none."""
+    outcome = solution.outcomes[analysis]
+    patches, _ = patch_power(solution, outcome, "required")
+    check_sum_is_zero(motor_power(solution, outcome), patches, -driving_power(outcome))
+
+
+@pytest.mark.parametrize("analysis", ANALYSES)
+def test_power_at_the_actuation_points_is_that_of_Q_a(solution, analysis):
+    """Thirteen components on each link, chosen by the program, carry all of Q_a."""
+    outcome = solution.outcomes[analysis]
+    for body in ("link1", "link2"):
+        chosen, forces = solution.points[body], solution.point_forces[analysis][body]
+        assert forces.rank == 13
+        assert forces.condition_number < 1e4
+        assert np.all(forces.residual <= 1e-11 * np.abs(forces.force).max())
+        terms = point_power(outcome, chosen, forces.force)
+        Q_a = (driving_forces(outcome, body) * velocity(outcome, body)).sum(axis=1)
+        if (body, analysis) == ("link1", "inverse"):  # no trajectory drives it
+            assert not np.any(forces.force)
+        else:  # the power of a link held straight is zero, that of its components is not
+            check_sum_is_zero(terms, -Q_a)
+
+
+def point_power(outcome, chosen, force):
+    """F_a · ṙ of every component, with the velocity of its point from R + A (x + Φ p)."""
+    q, v = (x[:, outcome.coordinates(chosen.body)] for x in (outcome.q, outcome.v))
+    c, s, w = np.cos(q[:, 2]), np.sin(q[:, 2]), v[:, 2]
+    powers = []
+    for point, direction, f in zip(chosen.points, chosen.direction.T, force.T, strict=True):
+        u = point.position + q[:, 3:] @ point.translation.T
+        u_dot = v[:, 3:] @ point.translation.T + w[:, None] * np.column_stack([-u[:, 1], u[:, 0]])
+        in_body = np.column_stack([c * v[:, 0] + s * v[:, 1], -s * v[:, 0] + c * v[:, 1]]) + u_dot
+        powers.append(f * (in_body @ direction))
+    return np.column_stack(powers)
+
+
+@pytest.mark.parametrize("analysis", ["inverse", "straight"])
+def test_power_that_limits_leave_unmet_is_residual_times_velocity(limited, analysis):
+    outcome = limited.outcomes[analysis]
+    patches, unmet = patch_power(limited, outcome, "within_limit")
+    assert np.abs(unmet).max() > 10 * np.abs(patches).max() or analysis == "straight"
+    assert np.abs(limited.voltages[analysis]["link1"].within_limit).max() == 200.0
+    check_sum_is_zero(motor_power(limited, outcome), patches, unmet, -driving_power(outcome))
+
+
+@pytest.mark.parametrize("analysis", ANALYSES)
+def test_power_that_motors_alone_leave_unmet_is_that_of_the_modal_forces(solution, analysis):
+    outcome = solution.outcomes[analysis]
+    p_dot = np.hstack([velocity(outcome, body)[:, 3:] for body in ("link1", "link2")])
+    check_sum_is_zero(motor_power(solution, outcome), outcome.F_p * p_dot, -driving_power(outcome))
+
+
+@pytest.mark.parametrize("analysis", ANALYSES)
+def test_power_that_too_few_points_leave_unmet_is_residual_times_velocity(limited, analysis):
+    outcome = limited.outcomes[analysis]
+    for body in ("link1", "link2"):
+        forces = limited.point_forces[analysis][body]
+        assert forces.force.shape == (6, 3)
+        Q_a = (driving_forces(outcome, body) * velocity(outcome, body)).sum(axis=1)
+        if np.any(Q_a):
+            assert forces.residual.max() > 1e-3
+            unmet = (forces.unmet * velocity(outcome, body)).sum(axis=1)
+            check_sum_is_zero(point_power(outcome, limited.points[body], forces.force), unmet, -Q_a)
 
 
 def test_checkpoint_of_voltages(solution):

@@ -6,6 +6,8 @@ import pytest
 TIP_X, TIP_Y = 'x = "1.5*cos(pi*t/4)"', 'y = "sqrt(3)/2*cos(pi*t/4)"'
 BETWEEN_A = 'between = ["link1.tip", "link2.root"]'
 FIRST_PZT = 'body = "link1"\ncount = 10'
+INITIAL = "[initial]\n"
+POINTS = '[[actuation_points]]\nbody = "link2"\n'
 
 # what is wrong: (file, {old: new}, what the message names)
 MISTAKES = {
@@ -53,6 +55,107 @@ MISTAKES = {
         "scene.toml",
         {FIRST_PZT: 'body = "link1"\ncenters = [0.1, 0.99]'},
         ['pzt "link1"', "patch 2 from 0.965 to 1.015 m"],
+    ),
+    "more modes than patches without least squares": (
+        "scene.toml",
+        {FIRST_PZT: 'body = "link1"\ncount = 4'},
+        ['pzt "link1": expected as many patches as modes (10) or more, found 4', 'allocation = "least-squares"'],
+    ),
+    "patches that reach no axial mode": (
+        "link1.toml",
+        {
+            "count = 10": "indices = [1, 3, 5, 7, 9, 11, 12, 14, 17, 18]",
+            'family = "in-plane-bending"': 'family = "all"',
+        },
+        ['pzt "link1": expected patches that reach every mode', "singular Φ_V", "no voltages serve mode 7 (1283 Hz)"],
+    ),
+    "limit of zero": (
+        "scene.toml",
+        {FIRST_PZT: f"{FIRST_PZT}\nlimit = 0.0", "density = 7600.0\nlimit = 200.0": "density = 7600.0"},
+        ['pzt "link1": limit: expected a number greater than 0', "found 0.0"],
+    ),
+    "limit of zero among others": (
+        "scene.toml",
+        {"limit = 200.0": f"limit = {[200.0] * 9 + [0.0]}"},
+        ['pzt "link1": limit[9]: expected a number greater than 0, found 0.0'],
+    ),
+    "motor limit of zero": (
+        "scene.toml",
+        {BETWEEN_A: f"{BETWEEN_A}\nmoment_limit = 0"},
+        ['joint "A": moment_limit: expected a number greater than 0, found 0'],
+    ),
+    "limits for other patches": (
+        "scene.toml",
+        {"limit = 200.0": "limit = [200.0, 100.0]"},
+        ['pzt "link1"', "expected 10 limits, one for each patch, found 2"],
+    ),
+    "overlapping patches": (
+        "scene.toml",
+        {FIRST_PZT: 'body = "link1"\ncenters = [0.1, 0.5, 0.13]'},
+        ['pzt "link1"', "patch 1 (0.075 to 0.125 m) and patch 3 (0.105 to 0.155 m) on the same place"],
+    ),
+    "patch on a rigid body": (
+        "scene.toml",
+        {
+            'link = "link2.toml"': "rigid = { mass = 3.0, inertia = 0.3, center = [0.5, 0.0],"
+            " points = { root = [0.0, 0.0], tip = [1.0, 0.0] } }"
+        },
+        ['pzt "link2": body: expected a flexible body, found "link2", which is rigid'],
+    ),
+    "more point components than coordinates": (
+        "scene.toml",
+        {INITIAL: f"{POINTS}axial = [1.0]\ntransverse = {[k / 20 for k in range(1, 15)]}\n\n{INITIAL}"},
+        ['actuation_points "link2": expected at most as many components as the body has coordinates (13), found 15'],
+    ),
+    "coincident points": (
+        "scene.toml",
+        {INITIAL: f"{POINTS}transverse = [0.5, 'tip', 1.0]\n\n{INITIAL}"},
+        ['actuation_points "link2": transverse: expected points apart', "two at tip and 1.0 that coincide"],
+    ),
+    "axial components of a link that only bends": (
+        "scene.toml",
+        {INITIAL: f"{POINTS}axial = [0.5, 1.0]\n\n{INITIAL}"},
+        ['actuation_points "link2": expected components that differ', "found 2 of which only 1 are independent"],
+    ),
+    "point beyond the end": (
+        "scene.toml",
+        {INITIAL: f"{POINTS}transverse = [1.1]\n\n{INITIAL}"},
+        ['actuation_points "link2": expected places within the link, 0 … 1 m, found 1.1 m'],
+    ),
+    "forces at points that are not there": (
+        "scene.toml",
+        {'apply = "joints+pzt"': 'apply = "points"'},
+        ['analysis "forward": apply: expected at least one [[actuation_points]] for "points", found none'],
+    ),
+    "trajectory forces of FCID": (
+        "scene.toml",
+        {'kind = "pcid"': 'kind = "fcid"\nshape = "zero"', 'apply = "joints+pzt"': 'apply = "trajectory"'},
+        ['analysis "forward": apply: expected "joints", "joints+pzt" or "points"', 'found "trajectory"'],
+    ),
+    "limits of a run without motors": (
+        "scene.toml",
+        {'apply = "joints+pzt"': 'apply = "trajectory"\nlimits = true'},
+        ['analysis "forward"', "expected limits = true only beside apply", 'found apply = "trajectory"'],
+    ),
+    "shape that is not given": (
+        "scene.toml",
+        {'kind = "pcid"': 'kind = "fcid"\nshape = "given"'},
+        ['analysis "inverse"', 'expected the key "modal" in shape = "given", found none'],
+    ),
+    "shape of an unknown body": (
+        "scene.toml",
+        {'kind = "pcid"': 'kind = "fcid"\nshape = "given"\nmodal = { link3 = ["0"] }'},
+        ['analysis "inverse": modal', 'found "link3"'],
+    ),
+    "mass of patches without density": (
+        "scene.toml",
+        {"density = 7600.0": 'structural = ["mass"]'},
+        ['pzt "link1"', 'expected the key "density" beside structural = ["mass"], found none'],
+    ),
+    "weights of modes and of points": (
+        "scene.toml",
+        {FIRST_PZT: f"{FIRST_PZT}\nmode_weights = {[1.0] * 10}\npoint_weights = {{ tip = 1.0 }}"},
+        ['pzt "link1"', 'expected one of the keys "mode_weights" and "point_weights", found both'],
     ),
     "too many modes": ("link1.toml", {"count = 10": "count = 500"}, ["link1.toml: modes.count", "found 500"]),
     "TOML syntax": (

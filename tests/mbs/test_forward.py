@@ -3,12 +3,28 @@
 import numpy as np
 import pytest
 from links import arm
-from mechanisms import always, forward, pcid, relative
+from mechanisms import always, forward, oracle_of, pcid, relative, revolute
+from scipy.optimize import lsq_linear
 
+from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import run_forward, run_pcid
+from ffrobot.mbs.fcid import run_fcid
 from ffrobot.mbs.observation import point_motion
+from ffrobot.mbs.scene_records import Analysis
+from ffrobot.mbs.steering import Equipment
 
-FULL = {"link1": np.eye(3), "link2": np.eye(3)}  # patches that reach every mode
+N = 3  # modes of a link
+UNLIMITED = np.full(N, np.inf)
+
+
+def patches(Phi, limit=UNLIMITED):
+    """The same patches on both links."""
+    return {
+        name: _core.Allocation(Phi, np.eye(N), np.linalg.pinv(Phi), limit, np.ones(N)) for name in ("link1", "link2")
+    }
+
+
+FULL = Equipment(patches(np.eye(N)))  # patches that reach every mode
 
 
 @pytest.fixture(scope="module")
@@ -16,10 +32,10 @@ def model():
     return arm()
 
 
-def pair(model, apply, tolerance, projector=FULL):
+def pair(model, apply, tolerance, equipment=FULL):
     inverse = run_pcid(model, pcid(tolerance=tolerance), True, always)
     analysis = forward(tolerance=tolerance, actuation="inverse", apply=apply)
-    outcome = run_forward(model, analysis, inverse, projector, always)
+    outcome = run_forward(model, analysis, inverse, equipment, always)
     assert outcome.status == "completed"
     return inverse, outcome
 
@@ -57,7 +73,7 @@ def test_joint_moments_alone_leave_the_path(model):
 
 
 def test_joint_moments_alone_are_the_full_actuation_with_patches_that_do_nothing(model):
-    nothing = {"link1": np.zeros((3, 3)), "link2": np.zeros((3, 3))}
+    nothing = Equipment(patches(np.zeros((N, N))))
     _, idle = pair(model, "joints+pzt", 1e-6, nothing)
     _, joints = pair(model, "joints", 1e-6)
     assert relative(idle.q, joints.q) < 1e-6
@@ -77,3 +93,70 @@ def test_outputs_between_those_of_the_inverse_run_are_as_good(model):
     outcome = run_forward(model, analysis, inverse, FULL, always)
     reference = run_pcid(model, pcid(tolerance=1e-7), False, always)
     assert departure(reference, outcome).max() < 1e-7
+
+
+@pytest.mark.parametrize("shape", ["zero", "static"])
+def test_forward_run_under_fcid_keeps_path_and_shape(model, shape):
+    """Links that ring in PCID keep a shape that is prescribed: straight, or sagging."""
+    analysis = Analysis(name="fcid", kind="fcid", shape=shape, end=1.0, output_step=0.01)
+    inverse = run_fcid(model, analysis)
+    following = forward(tolerance=1e-6, actuation="fcid", apply="joints+pzt")
+    outcome = run_forward(model, following, inverse, FULL, always)
+    assert departure(inverse, outcome).max() < 1e-6
+    modal = np.r_[inverse.coordinates("link1")][3:], np.r_[inverse.coordinates("link2")][3:]
+    for own in modal:
+        size = max(np.abs(inverse.q[:, own]).max(), 1e-3)
+        assert np.abs(outcome.q[:, own] - inverse.q[:, own]).max() < 1e-5 * size
+
+
+def limited_arm():
+    joints = [
+        revolute("O", "ground", "link1.root", moment_limit=12.0),
+        revolute("A", "link1.tip", "link2.root", moment_limit=4.0),
+    ]
+    return arm(joint=joints)
+
+
+@pytest.mark.parametrize("kind", ["pcid", "fcid"])
+def test_saturated_actuators_give_what_their_limits_leave(kind):
+    """M q̈ + C_mqᵀ λ = Q + T_qᵀ clip(τ) + Φ_V V at every output, V by SciPy's bounded least squares."""
+    model = limited_arm()
+    Phi = np.random.default_rng(2).standard_normal((N, N))
+    limit = np.array([3.0, 1.0, 0.5])
+    inverse = (
+        run_pcid(model, pcid(tolerance=1e-7), True, always)
+        if kind == "pcid"
+        else run_fcid(model, Analysis(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01))
+    )
+    analysis = forward(tolerance=1e-7, actuation="inverse", apply="joints+pzt", limits=True)
+    equipment = Equipment(limited_patches=patches(Phi, limit))
+    outcome = run_forward(model, analysis, inverse, equipment, always)
+    tau = np.clip(inverse.tau, [-12.0, -4.0], [12.0, 4.0])
+    assert np.any(tau != inverse.tau)
+    mechanism, saturated = oracle_of(outcome.assembly), 0
+    for k in range(0, 101, 10):
+        q, v = outcome.q[k], outcome.v[k]
+        load = mechanism.forces(outcome.time[k], q, v)
+        for row, moment in zip(model.motors.values(), tau[k], strict=True):
+            load += moment * mechanism.row(row, q, v).gradient
+        for name in ("link1", "link2"):
+            wanted = inverse.F_p[k, inverse.modal_columns(name)]
+            V = lsq_linear(Phi, wanted, (-limit, limit), method="bvls", tol=1e-14).x
+            saturated += np.count_nonzero(np.abs(V) >= limit)
+            load[mechanism.columns[name]][3:] += Phi @ V
+        C_q = np.array([row.gradient for row in mechanism.rows(q, v)])
+        inertia = mechanism.mass_matrix(q) @ outcome.a[k] + C_q.T @ outcome.lambda_[k]
+        assert relative(inertia, load) < 1e-6  # the inverse run between its outputs, to its tolerance
+    assert saturated > 10
+
+
+def test_limits_that_are_never_reached_change_nothing(model):
+    inverse = run_pcid(model, pcid(tolerance=1e-6), True, always)
+    wide = Equipment(limited_patches=patches(np.eye(N), np.full(N, 1e6)))
+    runs = [
+        run_forward(
+            model, forward(tolerance=1e-6, actuation="inverse", apply="joints+pzt", limits=limits), inverse, e, always
+        )
+        for limits, e in ((True, wide), (False, FULL))
+    ]
+    np.testing.assert_array_equal(runs[0].q, runs[1].q)

@@ -221,7 +221,7 @@ MISTAKES = [
     ("end = 1.0", "end = 1.0\ntolerance = 0", 'analysis "inverse": tolerance: expected a number of at least 1e-10', "found 0"),
     ("end = 1.0", 'end = 1.0\nintegrator = "dop"', 'analysis "inverse": integrator: expected "dop853", found "dop"', ""),
     ("end = 1.0", 'end = 1.0\nshape = "zero"', 'analysis "inverse": expected the key "shape" only in kind = "fcid"', "found"),
-    ('kind = "pcid"', 'kind = "fcid"', 'analysis "inverse": kind: expected "pcid", "forward" or', "not available yet"),
+    ('kind = "pcid"', 'kind = "fcid"', 'analysis "inverse": expected the key "shape" in kind = "fcid"', "found none"),
     ('kind = "pcid"', 'kind = "pcd"', 'analysis "inverse": kind: expected "pcid", "fcid", "forward" or "static"', '"pcid"?'),
     ('actuation = "inverse"', 'actuation = "invers"', 'analysis "forward": actuation: expected an earlier', '"inverse"?'),
     ('actuation = "inverse"', 'actuation = "forward"', 'analysis "forward": actuation: expected', "does not come before"),
@@ -257,7 +257,7 @@ def test_pcid_needs_a_trajectory(folder):
 
 
 def test_actuation_comes_from_pcid(folder):
-    with pytest.raises(InputError, match='actuation: expected an analysis of kind "pcid", found "inverse"'):
+    with pytest.raises(InputError, match='actuation: expected an analysis of kind "pcid" or "fcid", found "inv'):
         load(folder, SCENE.replace('kind = "pcid"', 'kind = "forward"', 1))
 
 

@@ -1,0 +1,191 @@
+"""Can these actuators do it? What is required of patches and motors against what they have, and what would do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..mbs.analyses import Outcome
+from ..mbs.joint_space import motor_rates
+from ..mbs.scene_records import Joint
+from .patches import PatchArray
+from .voltages import Voltages, voltage_gain
+
+Array = NDArray[np.float64]
+
+MOST_PATCHES = 200  # that are tried on one link
+
+
+@dataclass(frozen=True)
+class Remedies:
+    """What alone would make the patches suffice; infinite or 0 where the word has no meaning.
+
+    Attributes:
+        limit: largest voltage, V, of the patch that needs most.
+        layers: number of layers of the same thickness, at the same voltage.
+        thickness: of one layer, m, with the voltage raised in proportion (at the same field).
+        count: patches of the same size, evenly spread; 0 where even as many as have room do not do.
+        most_count: as many as have room.
+        most_factor: by how much those still fall short.
+    """
+
+    limit: float
+    layers: int
+    thickness: float
+    count: int
+    most_count: int
+    most_factor: float
+
+
+@dataclass(frozen=True)
+class PatchFeasibility:
+    """What is asked of the patches of one body in one analysis; k patches, n modes, peaks over time.
+
+    Attributes:
+        required_moment, available_moment: (k,) N·m, c times the required voltage, c times the limit.
+        saturation_time: (k,) s, when the limit is first exceeded; NaN where it never is.
+        field: (k,) V/m in a layer at the required voltage.
+        limited_field: (k,) V/m at the voltage within the limit.
+        strain: (k,) of the outer surface, from the bending of the link, its mean along the patch.
+        mode_required, mode_available: (n,) N/√kg, modal forces: wanted, and with every patch at its limit.
+        remedies: what would do.
+    """
+
+    required_moment: Array
+    available_moment: Array
+    saturation_time: Array
+    field: Array
+    limited_field: Array
+    strain: Array
+    mode_required: Array
+    mode_available: Array
+    remedies: Remedies
+
+    @property
+    def factor(self) -> Array:
+        """(k,) required over available moment: above 1 the patch cannot do it."""
+        return self.required_moment / self.available_moment
+
+    @property
+    def mode_factor(self) -> Array:
+        """(n,) required over available modal force: above 1 no voltages within the limits reach it, even alone."""
+        return self.mode_required / self.mode_available
+
+
+@dataclass(frozen=True)
+class MotorFeasibility:
+    """Peaks of one motor against its limits (infinite where none): N·m, rad/s, W; N and m/s where prismatic."""
+
+    moment: float
+    moment_limit: float
+    speed: float
+    speed_limit: float
+    power: float
+    power_limit: float
+    saturation_time: float
+
+    @property
+    def factor(self) -> float:
+        """The largest ratio of a peak to its limit."""
+        return max(self.moment / self.moment_limit, self.speed / self.speed_limit, self.power / self.power_limit)
+
+
+@dataclass(frozen=True)
+class Feasibility:
+    """Everything that one analysis asks of the actuators: motors by joint, patches by body."""
+
+    motors: dict[str, MotorFeasibility]
+    patches: dict[str, PatchFeasibility]
+
+    @property
+    def short(self) -> dict[str, tuple[float, float]]:
+        """Actuators that cannot do it: the factor they lack, and from what time on (s)."""
+        judged: dict[str, MotorFeasibility | PatchFeasibility] = {}
+        judged.update({f"motor {name}": motor for name, motor in self.motors.items()})
+        judged.update({f"patches of {name}": patches for name, patches in self.patches.items()})
+        return {
+            name: (float(np.max(j.factor)), float(np.nanmin(j.saturation_time)))
+            for name, j in judged.items()
+            if np.max(j.factor) > 1.0
+        }
+
+
+def judge_patches(
+    patches: PatchArray, voltages: Voltages, outcome: Outcome, with_count: Callable[[int], PatchArray | None]
+) -> PatchFeasibility:
+    """Required against available of the patches of one body.
+
+    `with_count(k)` makes an array of k such patches, evenly spread; None where they have no room.
+    """
+    assert outcome.F_p is not None
+    F_p = outcome.F_p[:, outcome.modal_columns(patches.body)]
+    p = outcome.q[:, outcome.coordinates(patches.body)][:, 3:]
+    required = np.abs(voltages.required).max(axis=0)
+    curvature = np.abs(p @ patches.turn).max(axis=0) / patches.layout.length
+    return PatchFeasibility(
+        required_moment=np.abs(patches.moment_per_volt) * required,
+        available_moment=np.abs(patches.moment_per_volt) * patches.limit,
+        saturation_time=_first_time(outcome.time, np.abs(voltages.required) > patches.limit),
+        field=required / patches.layout.thickness,
+        limited_field=np.abs(voltages.within_limit).max(axis=0) / patches.layout.thickness,
+        strain=patches.surface_distance * curvature,
+        mode_required=np.abs(F_p).max(axis=0),
+        mode_available=np.abs(patches.Phi_V) @ patches.limit,
+        remedies=_remedies(patches, required, F_p, with_count),
+    )
+
+
+def judge_motors(outcome: Outcome, joints: dict[str, Joint]) -> dict[str, MotorFeasibility]:
+    """Peaks of every motor against its limits."""
+    assert outcome.tau is not None
+    rates = motor_rates(outcome)
+    judged = {}
+    for k, name in enumerate(outcome.assembly.model.motors):
+        joint, moment, speed = joints[name], np.abs(outcome.tau[:, k]), np.abs(rates[:, k])
+        limits = [
+            np.inf if limit is None else limit for limit in (joint.moment_limit, joint.speed_limit, joint.power_limit)
+        ]
+        power = np.abs(outcome.tau[:, k] * rates[:, k])
+        beyond = np.any([values > limit for values, limit in zip((moment, speed, power), limits, strict=True)], axis=0)
+        judged[name] = MotorFeasibility(
+            float(moment.max()), limits[0], float(speed.max()), limits[1], float(power.max()), limits[2],
+            float(_first_time(outcome.time, beyond[:, None])[0]),
+        )  # fmt: skip
+    return judged
+
+
+def _first_time(time: Array, beyond: NDArray[np.bool_]) -> Array:
+    """The first of the times (T,) at which each column of `beyond` (T, k) holds; NaN where it never does."""
+    return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
+
+
+def _remedies(
+    patches: PatchArray, required: Array, F_p: Array, with_count: Callable[[int], PatchArray | None]
+) -> Remedies:
+    """What limit, layers, thickness or count alone would do, by c ∝ N (t_b + N t_p) for the patch that lacks most."""
+    worst = int(np.argmax(required / patches.limit))
+    factor = float(required[worst] / patches.limit[worst])
+    t_b, t_p, N = float(patches.height[worst]), patches.layout.thickness, patches.layout.layers
+    lever = max(factor, 1.0) * N * (t_b + N * t_p)  # of N' (t_b + N' t_p), the layers that would do
+    layers = max(N, int(np.ceil((-t_b + np.sqrt(t_b**2 + 4 * t_p * lever)) / (2 * t_p) - 1e-9)))
+    lever = max(factor, 1.0) * t_p * (t_b + N * t_p)  # of t (t_b + N t), the thickness that would do
+    thickness = (-t_b + np.sqrt(t_b**2 + 4 * N * lever)) / (2 * N)
+    count, most, most_factor = _count(patches, F_p, with_count)
+    return Remedies(float(required[worst]), layers, float(thickness), count, most, most_factor)
+
+
+def _count(patches: PatchArray, F_p: Array, with_count: Callable[[int], PatchArray | None]) -> tuple[int, int, float]:
+    """The smallest number of patches that do, the largest that has room, and what factor is missing then."""
+    most, missing = len(patches.edges), np.inf
+    limit = float(patches.limit.min())
+    for count in range(patches.Phi_V.shape[0], MOST_PATCHES):
+        array = with_count(count)
+        if array is None:
+            break
+        most, missing = count, float(np.abs(F_p @ voltage_gain(array).T).max() / limit)
+        if missing <= 1.0:
+            return count, most, missing
+    return 0, most, missing

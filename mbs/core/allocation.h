@@ -1,0 +1,44 @@
+// Voltages within limits: bounded weighted least squares, warm-started from one time to the next.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <vector>
+
+namespace ffrobot {
+
+// Minimises |W_sqrt (F - Phi V)|^2 over -limit <= V <= limit. Always has a solution; where it is not unique, the
+// smallest voltages relative to `scale` are picked.
+//
+// Active sets (P. B. Stark and R. L. Parker, Comput. Stat. 10, 1995: BVLS): voltages at a limit are held there, the
+// others go to their minimum or to the first limit on the way; then the one that presses most against the inner side of
+// its limit is let go. Ends after finitely many changes; from one time to the next there are few.
+class Allocation {
+public:
+  // Phi: (n, k) modal forces per volt; W_sqrt: (rows, n); gain: (k, n) the best voltages without limits, V = gain F,
+  // which are taken wherever they are within the limits (of many the smallest relative to scale, so that V does not
+  // jump where the first limit is met); limit: (k), infinite where there is none; scale: (k) ordinary voltages.
+  Allocation(Eigen::MatrixXd Phi, const Eigen::MatrixXd &W_sqrt, Eigen::MatrixXd gain, Eigen::VectorXd limit,
+             Eigen::VectorXd scale);
+
+  // Voltages (k) for the modal forces F (n).
+  const Eigen::VectorXd &solve(const Eigen::Ref<const Eigen::VectorXd> &F);
+
+  const Eigen::MatrixXd &Phi() const { return Phi_; }
+  unsigned long iterations() const { return iterations_; }
+
+private:
+  bool move();
+  void minimise();
+  bool release();
+
+  Eigen::MatrixXd Phi_, gain_, H_, back_; // in u = V / scale: H = A^T A, b = back F with A = W_sqrt Phi scale
+  Eigen::VectorXd limit_, scale_, bound_; // bound: limits of u
+  Eigen::VectorXd V_, u_, b_, gradient_, target_;
+  std::vector<int> held_; // sign of the limit at which a voltage is held, 0 where free
+  std::vector<Eigen::Index> free_, factorised_;
+  Eigen::LLT<Eigen::MatrixXd> llt_;
+  unsigned long iterations_ = 0;
+};
+
+} // namespace ffrobot

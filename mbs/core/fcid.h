@@ -1,0 +1,75 @@
+// Fully constrained inverse dynamics: the modal coordinates are prescribed too, so that everything is algebraic.
+#pragma once
+
+#include "core/actuation.h"
+#include "core/system.h"
+
+#include <Eigen/LU>
+#include <optional>
+#include <vector>
+
+namespace ffrobot {
+
+using ModalShape = std::vector<TimeFunction>; // p_k(t) of one body
+
+// C_m = 0, C_s = 0 and p = p(t) are as many equations as coordinates (Shaban 2022, sec. 5.1). With p known, (R, theta)
+// follow from C = 0, and their rates and accelerations from linear equations in the same matrix C_q,r; then
+//
+//     C_q,r^T lambda = -f_r,   -lambda_p = f_p + C_q,p^T lambda        with f = M q_ddot - Q
+//
+// give the forces that hold trajectories and shape. Needs as many constraints as the frames have coordinates.
+class FullyConstrained {
+public:
+  // guess: coordinates from which the first position is found; later ones start at the one before.
+  FullyConstrained(const System &system, Eigen::VectorXd guess);
+
+  // Shape p, p_dot, p_ddot at time t: fills the modal part of q, v, a.
+  void set_shape(double t, const std::vector<ModalShape> &shape);
+  void set_shape(const Eigen::VectorXd &p); // of all bodies, at rest
+
+  // The motion of the frames and all forces, for the shape that was set. False where no position is found.
+  bool solve(double t);
+
+  const Eigen::VectorXd &q() const { return q_; }
+  const Eigen::VectorXd &v() const { return v_; }
+  const Eigen::VectorXd &a() const { return a_; }
+  const Workspace &workspace() const { return workspace_; }                        // lambda, rows, kinematics
+  const std::vector<Eigen::VectorXd> &shape_force() const { return shape_force_; } // -lambda_p of each body
+  const Eigen::VectorXd &position_residual() const { return value_; }
+  const Eigen::VectorXd &velocity_residual() const { return rate_; }
+
+private:
+  bool find_position(double t);
+  void move_frames(Eigen::VectorXd &x, const Eigen::VectorXd &rhs, double sign);
+  void update_jacobian();
+
+  const System &system_;
+  Workspace workspace_;
+  Eigen::VectorXd q_, v_, a_, f_, value_, rate_, acceleration_;
+  Eigen::MatrixXd gradients_; // C_q,r^T: columns are (R, theta) parts of the constraints' gradients
+  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  double time_ = 0;
+  bool started_ = false;
+  std::vector<Eigen::VectorXd> shape_force_;
+};
+
+// What FCID reports, one row per time that was reached.
+struct FcidOutputs {
+  bool completed = true;
+  std::size_t reached = 0;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> q, v, a, lambda, shape_force, tau, F_p,
+      residual;
+};
+
+// resolver may be null; F_p then stays empty.
+FcidOutputs fully_constrained(const System &system, const std::vector<double> &times,
+                              const std::vector<ModalShape> &shape, const Eigen::VectorXd &guess,
+                              ActuationResolver *resolver);
+
+// The shape in which the links, at rest relative to their frames, need no modal forces beside those of motors and
+// joints (of the trajectory forces without a resolver): they sag under gravity and inertia as they would by themselves.
+// Rows p of all bodies, one per time; fewer where the iteration p <- p - K^-1 F_p(p) does not converge.
+Eigen::MatrixXd static_shape(const System &system, const std::vector<double> &times, const Eigen::VectorXd &guess,
+                             ActuationResolver *resolver);
+
+} // namespace ffrobot

@@ -1,0 +1,195 @@
+"""What is required against what there is, by hand; and remedies that do what they promise."""
+
+import numpy as np
+import pytest
+
+from ffrobot.actuation.feasibility import judge_motors
+from ffrobot.actuation.patches import patch_array, with_patch_count
+from ffrobot.actuation.prediction import predicted_shift, unmet_modal_forces
+from ffrobot.actuation.voltages import solve_voltages
+from ffrobot.solve import solve
+
+LIMIT = 200.0
+SCENE = """
+name = "arm"
+space = "planar"
+gravity = [0.0, -9.81]
+
+[[body]]
+name = "link"
+link = "{link}"
+
+[[joint]]
+name = "O"
+type = "revolute"
+between = ["ground", "link.root"]
+moment_limit = 10.0
+speed_limit = 0.2
+power_limit = 1e3
+
+[[trajectory]]
+name = "turn"
+{trajectory}
+
+[[pzt]]
+body = "link"
+count = 10
+length = 0.05
+width = 0.025
+thickness = 0.75e-3
+modulus = 63e9
+d31 = 110e-12
+limit = {limit}
+depoling_field = 5e5
+{own}
+{load}
+[[analysis]]
+name = "motion"
+kind = "{kind}"
+{times}
+"""
+RUN = "end = 0.5\noutput_step = 0.01"
+TURN = 'joint = "O"\nvalue = "0.1*sin(2*t)"'
+
+
+@pytest.fixture(scope="module")
+def arm(link_file, tmp_path_factory):
+    """One horizontal link of the paper, its motor moved as `trajectory` says."""
+
+    def run(kind="fcid", times=f'shape = "zero"\n{RUN}', trajectory=TURN, limit=LIMIT, own="", load=""):
+        scene = tmp_path_factory.mktemp("scene") / "scene.toml"
+        link = link_file("arm", "cantilever")
+        scene.write_text(
+            SCENE.format(link=link, kind=kind, times=times, trajectory=trajectory, limit=limit, own=own, load=load)
+        )
+        return solve(scene)
+
+    return run
+
+
+def test_patches_peak_by_peak(arm):
+    solution = arm(limit=3000.0)
+    judged, array = solution.feasibility["motion"].patches["link"], solution.patches["link"]
+    outcome, voltages = solution.outcomes["motion"], solution.voltages["motion"]["link"]
+    required = np.abs(voltages.required).max(axis=0)
+    np.testing.assert_allclose(judged.required_moment, required * array.moment_per_volt, rtol=1e-12)
+    np.testing.assert_allclose(judged.available_moment, 3000.0 * array.moment_per_volt, rtol=1e-12)
+    np.testing.assert_allclose(judged.factor, required / 3000.0, rtol=1e-12)
+    np.testing.assert_allclose(judged.field, required / 0.75e-3, rtol=1e-12)
+    assert judged.limited_field.max() == pytest.approx(3000.0 / 0.75e-3)
+    for k, since in enumerate(judged.saturation_time):
+        beyond = outcome.time[np.abs(voltages.required[:, k]) > 3000.0]
+        assert beyond[0] == since if beyond.size else np.isnan(since)
+    assert np.any(np.isnan(judged.saturation_time))
+    assert not np.all(np.isnan(judged.saturation_time))
+    np.testing.assert_allclose(judged.mode_required, np.abs(outcome.F_p).max(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(judged.mode_available, np.abs(array.Phi_V).sum(axis=1) * 3000.0, rtol=1e-12)
+    assert np.all(judged.strain == 0.0)  # held straight
+
+
+def test_strain_under_a_static_load_is_that_of_the_beam(arm):
+    """ε = (t_b/2 + t_p) M(x)/EI with M of the weight, averaged along the patch (formulation: Euler–Bernoulli)."""
+    solution = arm(times=f'shape = "static"\n{RUN}', trajectory='joint = "O"\nvalue = "0"')
+    x = np.linspace(0.025, 0.075, 201)  # the first patch
+    M = 7850.0 * 0.025 * 0.015 * 9.81 * (1 - x) ** 2 / 2
+    expected = (0.0075 + 0.75e-3) * M.mean() / (2.068427e11 * 0.025 * 0.015**3 / 12)
+    assert solution.feasibility["motion"].patches["link"].strain[0] == pytest.approx(expected, rel=0.05)  # of ten modes
+
+
+@pytest.mark.parametrize("word", ["limit", "layers", "thickness"])
+def test_remedies_do(arm, word):
+    """With the limit, layers or thickness named, and nothing else changed, the worst patch just suffices."""
+    solution = arm()
+    array, outcome = solution.patches["link"], solution.outcomes["motion"]
+    remedies = solution.feasibility["motion"].patches["link"].remedies
+    assert solution.feasibility["motion"].patches["link"].factor.max() > 2.0
+
+    def factor(**keys):
+        layout = array.layout.model_copy(update=keys)
+        body, planar = solution.bodies["link"].modal, solution.bodies["link"].planar
+        other = patch_array(solution.scene.path, layout, body, planar)
+        return np.abs(solve_voltages(other, outcome.F_p).required / other.limit).max()
+
+    match word:
+        case "limit":
+            assert factor(limit=remedies.limit) == pytest.approx(1.0, rel=1e-9)
+        case "layers":
+            assert factor(layers=remedies.layers) <= 1.0 < factor(layers=remedies.layers - 1)
+        case "thickness":
+            same_field = LIMIT * remedies.thickness / 0.75e-3
+            assert factor(thickness=remedies.thickness, limit=same_field) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_number_of_patches_that_would_do(arm):
+    """Found by trying; a limit between the needs of 10 and of 20 patches has an answer, a lower one has none."""
+    solution = arm()
+    array, outcome = solution.patches["link"], solution.outcomes["motion"]
+    body, planar = solution.bodies["link"].modal, solution.bodies["link"].planar
+
+    def needs(count):
+        other = with_patch_count(solution.scene.path, array.layout, body, planar, count)
+        return other and np.abs(solve_voltages(other, outcome.F_p).required).max()
+
+    assert needs(21) is None  # 21 × 0.05 m on 1 m
+    least = min(needs(count) for count in range(10, 21))
+    assert least < needs(10)
+    between = arm(limit=0.5 * (least + needs(10))).feasibility["motion"].patches["link"].remedies
+    assert 10 < between.count <= 20
+    assert needs(between.count) <= 0.5 * (least + needs(10)) < needs(between.count - 1)
+    without = arm(limit=0.9 * least).feasibility["motion"].patches["link"].remedies
+    assert (without.count, without.most_count) == (0, 20)
+    assert without.most_factor == pytest.approx(needs(20) / (0.9 * least), rel=1e-9)
+
+
+def test_motors_peak_by_peak(arm):
+    """τ = J θ̈ + m g L/2 cos θ of a link held straight, θ̇ = 0.2 cos 2t, and their product."""
+    motor = arm().feasibility["motion"].motors["O"]
+    t = np.arange(51) * 0.01
+    m = 7850.0 * 0.025 * 0.015
+    theta, rate, acceleration = 0.1 * np.sin(2 * t), 0.2 * np.cos(2 * t), -0.4 * np.sin(2 * t)
+    tau = m / 3 * acceleration + m * 9.81 / 2 * np.cos(theta)
+    assert motor.moment == pytest.approx(np.abs(tau).max(), rel=1e-9)
+    assert motor.speed == pytest.approx(0.2, rel=1e-12)
+    assert motor.power == pytest.approx(np.abs(tau * rate).max(), rel=1e-9)
+    assert (motor.moment_limit, motor.speed_limit, motor.power_limit) == (10.0, 0.2, 1e3)
+    assert motor.factor == pytest.approx(motor.moment / 10.0)
+    assert motor.saturation_time == 0.0
+
+
+def test_motors_without_limits_are_never_short(arm):
+    solution = arm()
+    joints = {
+        "O": solution.scene.joint[0].model_copy(update=dict.fromkeys(("moment_limit", "speed_limit", "power_limit")))
+    }
+    motor = judge_motors(solution.outcomes["motion"], joints)["O"]
+    assert motor.factor == 0.0
+    assert np.isnan(motor.saturation_time)
+
+
+def test_predicted_shift_of_the_tip_is_what_happens(arm):
+    """Held by its motor under its weight: patches at their limits against patches without, each solved statically."""
+    straight = arm(times=f'shape = "zero"\n{RUN}', trajectory='joint = "O"\nvalue = "0"')
+    voltages = straight.voltages["motion"]["link"]
+    tips = []
+    for volts in (voltages.required[0], voltages.within_limit[0]):
+        load = '\n[[load]]\npzt = "link"\nvoltage = [' + ", ".join(f'"{v!r}"' for v in volts) + "]\n"
+        held = arm(kind="static", times="", trajectory='joint = "O"\nvalue = "0"', load=load)
+        outcome = held.outcomes["motion"]
+        tips.append(outcome.q[0, 3:] @ outcome.assembly.model.body("link").points["tip"].translation[1])
+    assert abs(tips[0]) < 1e-12  # straight
+    np.testing.assert_allclose(straight.predicted_shift["motion"]["link.tip"][0], [0.0, tips[1]], rtol=1e-9, atol=1e-15)
+
+
+def test_predicted_shift_of_an_inclined_tip(arm):
+    """The shift across the link is the deflection that unmet modal forces leave."""
+    solution = arm(trajectory='point = "link.tip"\ny = "0.1*sin(2*t)"')
+    outcome = solution.outcomes["motion"]
+    unmet = unmet_modal_forces(outcome, solution.voltages["motion"])
+    np.testing.assert_array_equal(unmet, solution.voltages["motion"]["link"].unmet)
+    body = outcome.assembly.model.body("link")
+    deflection = -(unmet / body.stiffness) @ body.points["tip"].translation[1]
+    theta = outcome.q[:, 2]
+    expected = deflection[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
+    shift = predicted_shift(outcome, unmet)["link.tip"]
+    np.testing.assert_allclose(shift, expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_array_equal(shift, solution.predicted_shift["motion"]["link.tip"])

@@ -1,0 +1,112 @@
+"""Mass and stiffness of patches, against a finite element model of the link with the composite sections."""
+
+import numpy as np
+import pytest
+
+from ffrobot.actuation.patch_structure import structure_effect, with_patches
+from ffrobot.fe_models.link import cached_modal_body
+from ffrobot.mbs.planar_body import from_modal_body
+from ffrobot.mbs.scene_records import PztLayout
+
+E, RHO, H, B = 2.068427e11, 7850.0, 0.015, 0.025
+E_P, RHO_P, T_P = 63e9, 7600.0, 0.75e-3
+
+LINK = """
+name = "patched"
+[material]
+youngs_modulus = {E}
+poissons_ratio = 0.3
+density = {RHO}
+[geometry]
+kind = "beam"
+length = 1.0
+{segments}
+[mesh]
+elements = 40
+[reference]
+condition = "cantilever"
+[modes]
+count = 10
+family = "in-plane-bending"
+"""
+SEGMENT = """[[geometry.segment]]
+until = {until!r}
+section = {{ shape = "rectangle", height = {height!r}, width = {width!r} }}
+"""
+
+
+def layout(**keys):
+    tables = {"count": 10, "length": 0.05, "width": B, "thickness": T_P, "modulus": E_P, "d31": 110e-12}
+    return PztLayout(body="link", density=RHO_P, **(tables | keys))
+
+
+def composite_link(tmp_path, faces, mass, stiffness):
+    """A steel link with a rectangle under each patch that has the same EI and ρA as the composite section."""
+    EI, rho_A = E * B * H**3 / 12, RHO * B * H
+    outer, inner = H / 2 + T_P, H / 2
+    EI_p = EI + stiffness * faces * E_P * B * (outer**3 - inner**3) / 3
+    rho_A_p = rho_A + mass * faces * RHO_P * B * T_P
+    height = np.sqrt(12 * EI_p / E * RHO / rho_A_p)
+    sections = [(H, B), (float(height), float(rho_A_p / (RHO * height)))]
+    ends = [*np.round(np.arange(0.025, 1.0, 0.05), 3), 1.0]  # ten patches of 0.05 m, gaps as long between them
+    segments = "".join(
+        SEGMENT.format(until=float(end), height=sections[k % 2][0], width=sections[k % 2][1])
+        for k, end in enumerate(ends)
+    )
+    path = tmp_path / "patched.toml"
+    path.write_text(LINK.format(E=E, RHO=RHO, segments=segments))
+    return cached_modal_body(path).body
+
+
+def ritz_stiffness(bare, patched):
+    """K with patches in the modes of the bare link."""
+    back = np.linalg.inv(bare.modal_transform.T @ patched.modal_transform)
+    return back.T @ np.diag(patched.stiffness) @ back
+
+
+@pytest.mark.parametrize("face", [None, "both"])
+@pytest.mark.parametrize("structural", [("mass",), ("stiffness",), ("mass", "stiffness")])
+def test_frequencies_are_those_of_the_composite_link(cantilever, tmp_path, monkeypatch, face, structural):
+    """Ritz with 20 modes of the bare link: curvature has steps at patch edges that smooth modes only come near."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    body = cantilever(20)
+    bare = from_modal_body("link", body)
+    patched = with_patches(bare, body, layout(face=face, structural=structural))
+    reference = composite_link(tmp_path, 2 if face else 1, "mass" in structural, "stiffness" in structural)
+    effect = structure_effect(bare, patched)
+    ritz, exact = effect.frequency[1, :5], reference.frequency[:5]
+    assert np.all(ritz > exact * (1 - 1e-9))  # Rayleigh's principle
+    np.testing.assert_allclose(ritz, exact, rtol=1e-3)
+    if len(structural) == 1:  # together they cancel almost
+        np.testing.assert_allclose(ritz / effect.frequency[0, :5] - 1, exact / effect.frequency[0, :5] - 1, rtol=0.04)
+    assert effect.mass[1] == pytest.approx(reference.mass, rel=1e-12)
+    assert effect.inertia[1] == pytest.approx(reference.second_moment[0, 0], rel=1e-12)
+    np.testing.assert_allclose(patched.first_moment, reference.first_moment[:2], atol=1e-12)
+    np.testing.assert_allclose(np.abs(patched.S_bar[1, :5]), np.abs(reference.S_bar[1, :5]), rtol=2e-3)
+
+
+def test_modes_stay_orthonormal_and_the_transform_goes_back(cantilever):
+    """Φ of the patched link is Φ of the file times the transform; its invariants are sums over the same points."""
+    body = cantilever(10)
+    bare = from_modal_body("link", body)
+    patched = with_patches(bare, body, layout(structural=("mass", "stiffness")))
+    tip = body.interfaces["tip"].translation[:2] @ patched.modal_transform
+    np.testing.assert_allclose(patched.points["tip"].translation, tip, atol=1e-12)
+    np.testing.assert_allclose(patched.m_xy, np.eye(10), atol=1e-12)
+    K = ritz_stiffness(bare, patched)
+    gain = K - np.diag(bare.stiffness)
+    assert np.linalg.eigvalsh(gain).min() > -1e-9 * np.abs(gain).max()
+
+
+def test_one_face_couples_stretching_and_bending(all_modes):
+    """K gains a term between the axial mode and bending, of opposite sign on the opposite face, and none on both."""
+    bare = from_modal_body("link", all_modes)
+    axial = int(np.argmax(np.abs(bare.points["tip"].translation[0])))
+    cross = {}
+    for face in ("+y", "-y", "both"):
+        patched = with_patches(bare, all_modes, layout(face=face, structural=("stiffness",)))
+        K = ritz_stiffness(bare, patched)
+        cross[face] = np.delete(K[axial], axial)
+    np.testing.assert_allclose(cross["+y"], -cross["-y"], rtol=1e-6, atol=1e-3)
+    assert np.abs(cross["+y"]).max() > 1e3
+    assert np.abs(cross["both"]).max() < 1e-6 * np.abs(cross["+y"]).max()

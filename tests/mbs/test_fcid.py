@@ -1,0 +1,224 @@
+"""Fully constrained inverse dynamics: against the oracle, against PCID, and against rigid arms in closed form."""
+
+import numpy as np
+import pytest
+import velocity_transformation
+import zoo
+from links import arm, arm_links, quintic, ritz_link
+from mechanisms import assemble, make_model, oracle_of, pcid, relative, revolute
+
+from ffrobot.errors import InputError, SolveError
+from ffrobot.mbs import _core
+from ffrobot.mbs.analyses import Outcome, run_pcid
+from ffrobot.mbs.fcid import run_fcid, spline
+from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.scene_records import Analysis
+from ffrobot.mbs.time_functions import parse_expression
+
+OPEN = ["chain of 2", "backwards", "mixed", "mixed backwards", "tree", "loaded"]
+CLOSED = ["four-bar", "slider-crank"]
+TIMES = np.linspace(0.0, 0.2, 5)
+
+
+def fcid(shape, **keys):
+    return Analysis(name="fcid", kind="fcid", shape=shape, end=0.2, output_step=0.05, **keys)
+
+
+def given_shapes(model):
+    """Lively p(t) for every mode."""
+    return {
+        body.name: tuple(parse_expression(f"{0.03 / (k + 1)}*sin({3 + k}*t+{k})") for k in range(body.n_modes))
+        for body in model.bodies
+    }
+
+
+def solved(name, shape="given", **keys):
+    model = zoo.build(name, **keys)
+    analysis = fcid(shape, modal=given_shapes(model)) if shape == "given" else fcid(shape)
+    return model, run_fcid(model, analysis)
+
+
+@pytest.mark.parametrize("name", OPEN + CLOSED)
+def test_equations_of_motion_hold_with_the_forces_reported(name):
+    """M q̈ + C_qᵀ λ + (0, 0, λ_p) = Q and C = Ċ = C̈ = 0, each computed by the oracle alone."""
+    model, outcome = solved(name)
+    mechanism = oracle_of(outcome.assembly)
+    modal = [i for body in model.bodies for i in range(*mechanism.columns[body.name].indices(mechanism.size))[3:]]
+    for k, t in enumerate(TIMES):
+        q, v, a = outcome.q[k], outcome.v[k], outcome.a[k]
+        C, C_dot, C_q = mechanism.constraint_values(t, q, v)
+        held = np.zeros(mechanism.size)
+        held[modal] = outcome.shape_force[k]
+        inertia, Q = mechanism.mass_matrix(q) @ a, mechanism.forces(t, q, v)
+        assert relative(inertia + C_q.T @ outcome.lambda_[k], Q + held, np.abs(Q).max()) < 1e-11
+        bias = [row.bias for row in mechanism.rows(q, v)]
+        gamma = np.array([target(t)[2] for _, target in mechanism.constraints]) - bias
+        assert max(np.abs(C).max(), np.abs(C_dot).max()) < 1e-12
+        assert np.abs(C_q @ a - gamma).max() < 1e-11 * np.abs(a).max()
+        for body in model.bodies:  # given in the coordinates of its file
+            own = mechanism.columns[body.name]
+            got = np.array([q[own][3:], v[own][3:], a[own][3:]]) @ body.modal_transform.T
+            expected = np.transpose([function(t) for function in given_shapes(model)[body.name]])
+            np.testing.assert_allclose(got, expected, atol=1e-7 if name == "loaded" else 1e-14)  # payload: a spline
+
+
+@pytest.mark.parametrize("motors", ["section", "frame"])
+@pytest.mark.parametrize("name", OPEN + CLOSED)
+def test_motor_and_modal_forces_are_those_of_the_velocity_transformation(name, motors):
+    """[τ; F_p] = Dᵀ (M q̈ − Q) (Shaban 2022, Eqs. 18–21), D by its definition: one system for both."""
+    _, outcome = solved(name, motors=motors)
+    mechanism = oracle_of(outcome.assembly)
+    trajectory = np.array(outcome.assembly.is_trajectory)
+    for k, t in enumerate(TIMES):
+        q, v, a = outcome.q[k], outcome.v[k], outcome.a[k]
+        gradients = np.array([row.gradient for row in mechanism.rows(q, v)])
+        T_q = np.array([mechanism.row(row, q, v).gradient for row in outcome.assembly.model.motors.values()])
+        D = velocity_transformation.by_definition(mechanism, gradients[~trajectory], T_q)
+        force = D.T @ (mechanism.mass_matrix(q) @ a - mechanism.forces(t, q, v))
+        assert relative(np.concatenate([outcome.tau[k], outcome.F_p[k]]), force) < 1e-11
+
+
+@pytest.mark.parametrize("name", ["chain of 2", "mixed", "slider-crank", "loaded"])
+def test_the_shape_of_a_free_vibration_takes_no_force(name):
+    """p(t) as PCID finds it: FCID then gives the same λ, and nothing is needed to hold the shape."""
+    model = zoo.build(name)
+    assembly = assemble(model)
+    start = undeformed_state(assembly)
+    rng = np.random.default_rng(3)
+    q, v = start.q.copy(), start.v.copy()
+    for body, first in zip(model.bodies, assembly.first, strict=True):
+        modal = slice(first + 3, first + 3 + body.n_modes)
+        q[modal], v[modal] = 0.02 * rng.standard_normal((2, body.n_modes))
+    probe = _core.fully_constrained(assembly.system, [0.0], _jets(model, assembly, q, v, 0 * q), start.q, None)
+    a, lambda_ = assembly.system.evaluate(0.0, probe.q[0], probe.v[0])
+    run = _core.fully_constrained(assembly.system, [0.0], _jets(model, assembly, q, v, a), start.q, None)
+    assert relative(run.multipliers[0], lambda_) < 1e-10
+    assert relative(run.a[0], a) < 1e-11
+    assert np.abs(run.shape_force).max() < 1e-10 * np.abs(lambda_).max()
+
+
+def _jets(model, assembly, q, v, a):
+    """p + ṗ t + p̈ t²/2 for every body."""
+    shape = []
+    for body, first in zip(model.bodies, assembly.first, strict=True):
+        modal = range(first + 3, first + 3 + body.n_modes)
+        shape.append([parse_expression(f"{q[i]!r}+{v[i]!r}*t+{a[i] / 2!r}*t**2") for i in modal])
+    return shape
+
+
+def rigid(body):
+    """The same body without its modes."""
+    return ritz_link(body.name, "cantilever", mass=body.mass, EI=1e9, modes=1)
+
+
+def test_zero_shape_is_the_rigid_arm_in_closed_form():
+    """Two uniform links: τ of the double pendulum (Spong and Vidyasagar 1989, ch. 6); F_p of rods that move rigidly."""
+    model = arm()
+    outcome = run_fcid(model, Analysis(name="fcid", kind="fcid", shape="zero", end=1.0, output_step=0.05))
+    theta, w, alpha = (
+        np.array([x[:, outcome.coordinates(name)][:, 2] for name in ("link1", "link2")])
+        for x in (outcome.q, outcome.v, outcome.a)
+    )
+    m, L, g = 1.0, 1.0, 9.81
+    cosine, sine = np.cos(theta[1] - theta[0]), np.sin(theta[1] - theta[0])
+    pull = m * L * L / 2
+    elbow = m * L * L / 3 * alpha[1] + pull * (cosine * alpha[0] + sine * w[0] ** 2) + m * g * L / 2 * np.cos(theta[1])
+    shoulder = (
+        (m * L * L / 3 + m * L * L) * alpha[0]
+        + pull * (cosine * alpha[1] - sine * w[1] ** 2)
+        + 1.5 * m * g * L * np.cos(theta[0])
+        + elbow
+    )
+    assert relative(outcome.tau[:, 0], shoulder) < 1e-10
+    assert relative(outcome.tau[:, 1], elbow) < 1e-10
+    np.testing.assert_array_equal(outcome.q[:, outcome.coordinates("link2")][:, 3:], 0.0)
+
+    # Link 2 hangs from its root, the cantilever: only its own weight and inertia bend it, q(x) = ρA (a_y − g_y + α x).
+    link2 = model.body("link2")
+    s, c = np.sin(theta), np.cos(theta)
+    root = L * np.array([-s[0] * alpha[0] - c[0] * w[0] ** 2, c[0] * alpha[0] - s[0] * w[0] ** 2])  # R̈ of link 2
+    across = -s[1] * root[0] + c[1] * (root[1] + g)
+    F_p = np.outer(across, link2.S_bar[1]) + np.outer(alpha[1], link2.h)
+    assert relative(outcome.F_p[:, outcome.modal_columns("link2")], F_p) < 1e-10
+
+    # Link 1: the same, and what joint and motors do to its ends (simply supported: nothing but moments and rotations).
+    link1 = model.body("link1")
+    F_p = np.outer(c[0] * g, link1.S_bar[1]) + np.outer(alpha[0], link1.h)
+    ends = [link1.points[name].rotation for name in ("root", "tip")]
+    F_p += -np.outer(shoulder, ends[0]) + np.outer(elbow, ends[1])
+    assert relative(outcome.F_p[:, outcome.modal_columns("link1")], F_p) < 1e-10
+
+
+def test_static_shape_sags_as_in_closed_form():
+    """A horizontal cantilever, its motor at rest: w(L) = ρA g L⁴/8EI, τ = m g L/2, nothing left for patches."""
+    EI, mass = 5e3, 1.3
+    link = ritz_link("link1", "cantilever", EI=EI, mass=mass, modes=8, extra=0)
+    model = make_model(
+        [link],
+        joint=[revolute("O", "ground", "link1.root")],
+        trajectory=[{"name": "hold", "joint": "O", "value": "0"}],
+    )
+    outcome = run_fcid(model, fcid("static"))
+    sag = outcome.q[:, 3:] @ link.points["tip"].translation[1]
+    np.testing.assert_allclose(sag, -mass * 9.81 / (8 * EI), rtol=1e-9)
+    np.testing.assert_allclose(outcome.tau, mass * 9.81 / 2, rtol=1e-9)
+    assert np.abs(outcome.F_p).max() < 1e-11 * mass * 9.81
+
+
+def test_static_shape_needs_only_what_its_own_motion_takes():
+    """Inertia of p̈ is all that is left where loads vary slowly: orders of magnitude below links held straight."""
+    model = arm(arm_links(EI=3e4))
+    static, zero = (
+        run_fcid(model, Analysis(name="f", kind="fcid", shape=shape, end=1.0, output_step=0.01))
+        for shape in ("static", "zero")
+    )
+    assert np.abs(static.F_p).max() < 1e-3 * np.abs(zero.F_p).max()
+
+
+def test_a_spline_is_exact_for_polynomials_of_its_degree():
+    t = np.linspace(0.0, 2.0, 30)
+    (function,) = spline(t, (t**5 - 3 * t**2)[:, None])
+    for at in (0.0, 0.37, 1.234, 2.0):
+        np.testing.assert_allclose(
+            function(at), (at**5 - 3 * at**2, 5 * at**4 - 6 * at, 20 * at**3 - 6), rtol=1e-8, atol=1e-8
+        )
+
+
+def test_static_shape_of_links_that_are_too_soft():
+    with pytest.raises(
+        SolveError, match=r'analysis "fcid": no static shape was found at t = 0 s: the links are too soft'
+    ):
+        run_fcid(arm(arm_links(EI=0.2)), fcid("static"))
+
+
+def test_too_few_trajectories_are_refused():
+    model = arm(trajectory=[{"name": "lift", "point": "link2.tip", "y": quintic(1.3, 1.5)}])
+    with pytest.raises(InputError, match=r"as many trajectory components as .* degrees of freedom \(2\) .* found 1"):
+        run_fcid(model, fcid("zero"))
+
+
+def test_more_expressions_than_modes_are_refused():
+    model = arm()
+    expressions = tuple(parse_expression("0") for _ in range(4))
+    with pytest.raises(InputError, match=r"modal.link2: expected at most 3 expressions, one for each mode, found 4"):
+        run_fcid(model, fcid("given", modal={"link2": expressions}))
+
+
+def test_a_shape_out_of_reach_is_an_error():
+    """A second link bent by metres: its tip is farther from the elbow than the first link can make up for."""
+    model = arm()
+    modal = {"link2": (parse_expression("-50*t"),)}
+    with pytest.raises(SolveError, match=r"no position was found at t = .*: the prescribed shape takes the trajectory"):
+        run_fcid(model, fcid("given", modal=modal))
+
+
+def test_pcid_and_fcid_meet_in_stiff_links():
+    """The moments of PCID come to those of FCID as 1/ω, the vibration that a jump of the jerk leaves: as EI^(−1/2)."""
+    differences = []
+    for EI in (3e3, 3e4):
+        model = arm(arm_links(EI=EI), initial={"state": "static", "angles": {"link1": 0.4, "link2": 1.3}})
+        free: Outcome = run_pcid(model, pcid(output_step=0.05), False, lambda _: True)
+        held = run_fcid(model, Analysis(name="f", kind="fcid", shape="zero", end=1.0, output_step=0.05))
+        differences.append(relative(held.tau, free.tau))
+    assert differences[1] == pytest.approx(differences[0] / np.sqrt(10), rel=0.3)
+    assert differences[1] < 1e-3
