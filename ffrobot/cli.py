@@ -1,4 +1,4 @@
-"""The command line: `ffrobot link | solve | info | plot`. Heavy imports happen inside the commands that need them."""
+"""The command line. Heavy imports happen inside the commands that need them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def cli() -> None:
     \b
     Stage 1:  ffrobot link  LINK.toml   finite elements → modal body file
     Stage 2:  ffrobot solve SCENE.toml  modal bodies → moments and voltages
-    Then:     ffrobot info, ffrobot plot
+    Then:     ffrobot info, ffrobot plot, ffrobot report
     """
 
 
@@ -96,11 +96,26 @@ def info(file: Path) -> None:
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; RESULTS.figures if absent.")
 def plot(results_file: Path, output: Path | None) -> None:
     """Draw the standard figures of a results file, as PNG and PDF."""
-    from .figures import plot_results
+    from .figures.plot import plot_results
 
     folder = output or results_file.with_suffix(".figures")
     for path in plot_results(results_file, folder):
         click.echo(path)
+
+
+@cli.command()
+@click.argument("results_files", metavar="RESULTS.h5 …", nargs=-1, required=True, type=FILE)
+@click.option("-o", "--output", metavar="FILE.html", type=FILE, help="Where to write [RESULTS.html, of the first].")
+def report(results_files: tuple[Path, ...], output: Path | None) -> None:
+    """Write one self-contained HTML page: motion, histories, modes, tables.
+
+    Several results files come side by side, for comparison. The page needs no network and no other file.
+    """
+    from .report import write_report
+
+    path = output or results_files[0].with_suffix(".html")
+    write_report(results_files, path)
+    click.echo(path)
 
 
 def main() -> None:

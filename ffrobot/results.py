@@ -52,9 +52,9 @@ def write_results(solution: Solution, path: Path) -> None:
 def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
     """Path and hashes of the modal body file behind each flexible body."""
     return {
-        name: {"path": str(body.path), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
+        name: {"path": str(body.path.absolute()), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
         for name, body in solution.bodies.items()
-        if body.modal is not None
+        if body.modal is not None and body.path is not None
     }
 
 

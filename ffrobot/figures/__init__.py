@@ -1,5 +1,1 @@
 """Figures of a results file: those that `figures.toml` beside it names, or the standard ones of any scene."""
-
-from .plot import plot_results
-
-__all__ = ["plot_results"]

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 from ..errors import InputError
 from ..files import write_atomically
+from ..results_file import Results
 from .configurations import draw_configurations
 from .figure_file import FigureFile, FigureRecord, load_figures
 from .path import draw_path
-from .reading import Results
 from .standard import standard_figures
 from .style import new_axes, style
 from .time_history import draw_time_history
