@@ -67,7 +67,7 @@ def solve(scene_file: Path, output: Path | None) -> None:
     from .files import check_output
     from .progress import Display
     from .results import FORMAT, write_results
-    from .solve import solve as solve_scene
+    from .solution import solve as solve_scene
     from .summary import print_summary, summary_console
 
     path = output or scene_file.with_suffix(".results.h5")

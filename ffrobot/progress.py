@@ -6,7 +6,7 @@ import sys
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from .solve import Watcher
+from .solution import Watcher
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID

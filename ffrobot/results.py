@@ -21,7 +21,7 @@ from .mbs.observation import (
     trajectory_force,
     trajectory_target,
 )
-from .solve import Solution
+from .solution import Solution
 
 FORMAT = "ffrobot-results"
 FORMAT_VERSION = 1
@@ -29,6 +29,11 @@ FORMAT_VERSION = 1
 
 def write_results(solution: Solution, path: Path) -> None:
     """Write every analysis of a solution to `path`. Raises `SolveError` where that fails; no half file is left."""
+    write_atomically(path, results_image(solution), "results file")
+
+
+def results_image(solution: Solution) -> bytes:
+    """The content of the results file of a solution."""
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
@@ -46,7 +51,7 @@ def write_results(solution: Solution, path: Path) -> None:
                 _write_voltages(group.create_group(f"pzt/{body_name}"), solution.patches[body_name], voltages)
         file.flush()
         image: bytes = file.id.get_file_image()
-    write_atomically(path, image, "results file")
+    return image
 
 
 def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:

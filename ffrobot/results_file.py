@@ -8,6 +8,8 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BytesIO
+from os import PathLike
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -41,10 +43,20 @@ class Results:
     Raises `InputError` where `path` is no results file.
     """
 
-    def __init__(self, path: Path | str) -> None:
-        self.path = Path(path)
+    def __init__(self, path: PathLike[str] | str) -> None:
+        self._open(Path(path), path)
+
+    @classmethod
+    def from_image(cls, image: bytes, path: Path) -> Results:
+        """Results whose file is in memory only; messages call them `path`."""
+        results = cls.__new__(cls)
+        results._open(path, BytesIO(image))
+        return results
+
+    def _open(self, path: Path, content: PathLike[str] | str | BytesIO) -> None:
+        self.path = path
         try:
-            self._file = h5py.File(path, "r")
+            self._file = h5py.File(content, "r")
         except OSError as error:
             reason = "no such file" if not self.path.exists() else f"not a readable HDF5 file ({error})"
             raise InputError(f"{path}: expected a results file, found {reason}") from None
@@ -152,6 +164,25 @@ class Results:
         if k >= values.shape[1]:
             raise InputError(f'{self.path}: expected column {k} of "{dataset}", found {values.shape[1]} columns')
         return values[:, k : k + 1]
+
+    def columns(self, analysis: str) -> dict[str, Array]:
+        """Everything an analysis holds over time, one (T,) array each; `pandas.DataFrame` takes it as it is.
+
+        The name is the dataset's inside the analysis, with the column where it has several:
+        `points/link2.tip/position[0]`.
+        """
+        found: dict[str, Array] = {}
+        outputs = len(self.time(analysis))
+
+        def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
+            if not isinstance(item, h5py.Dataset) or item.shape[:1] != (outputs,):
+                return
+            values = np.asarray(item, dtype=float).reshape(outputs, -1)
+            labels = [name] if item.ndim == 1 else [f"{name}[{k}]" for k in range(values.shape[1])]
+            found.update(zip(labels, values.T, strict=True))
+
+        self._file[analysis].visititems(collect)
+        return found
 
     def _near(self, dataset: str) -> str:
         known: list[str] = []

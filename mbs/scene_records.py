@@ -363,3 +363,15 @@ class Scene(SceneKeys):
 
     path: Path
     text: str
+
+    def __repr__(self) -> str:
+        names = {
+            "bodies": [body.name for body in self.body],
+            "joints": [joint.name for joint in self.joint],
+            "trajectories": [trajectory.name for trajectory in self.trajectory],
+            "analyses": [analysis.name for analysis in self.analysis],
+        }
+        parts = [f"{kind} {', '.join(members)}" for kind, members in names.items() if members]
+        return f"Scene({self.name!r}): {'; '.join(parts)}"
+
+    __str__ = __repr__

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ffrobot.mbs.observation import trajectory_force
-from ffrobot.solve import solve
+from ffrobot.solution import solve
 
 SCENE = """
 name = "two_link"

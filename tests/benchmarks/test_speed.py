@@ -23,7 +23,7 @@ import pytest
 from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import initial_state, run_pcid
 from ffrobot.mbs.model import Assembly
-from ffrobot.solve import prepare
+from ffrobot.solution import prepare
 
 INVERSE = '\n[[analysis]]\nname = "inverse"\nkind = "pcid"\nend = 1.0\noutput_step = 0.001\ntolerance = 1e-6\n'
 EVALUATIONS = 1000
