@@ -118,6 +118,22 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     click.echo(path)
 
 
+@cli.command()
+@click.argument("kind", type=click.Choice(["link", "scene"]))
+def schema(kind: str) -> None:
+    r"""Print the JSON schema of link or scene files, for editors.
+
+    \b
+    ffrobot schema scene > scene.schema.json
+    and, as the first line of a scene file:  #:schema ./scene.schema.json
+    """
+    import json
+
+    from .schema import schema as schema_of
+
+    click.echo(json.dumps(schema_of(kind), indent=2, ensure_ascii=False))
+
+
 def main() -> None:
     """Run the command line: exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C."""
     stopped = False

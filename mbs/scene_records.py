@@ -92,8 +92,8 @@ PointReference = Annotated[str, AfterValidator(_point)]
 Side = Annotated[str, AfterValidator(_side)]
 Vector2 = tuple[float, float]
 Positive = Annotated[float, Field(gt=0.0)]
-Expression = Annotated[TimeFunction, PlainValidator(_time_function)]
-WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints)]
+Expression = Annotated[TimeFunction, PlainValidator(_time_function, json_schema_input_type=str | float)]
+WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints, json_schema_input_type=str)]
 NotEmpty = AfterValidator(_not_empty)
 
 
