@@ -69,7 +69,7 @@ def test_nothing_of_stage_1_is_there(environment):
 
 
 def test_scene_is_solved_as_here(environment, scene, two_link):
-    """NumPy 2 and a portable build there, Debian's NumPy and a tuned build here: the same to the tolerance asked for."""
+    """NumPy 2 and a portable build there, Debian's NumPy and a tuned build here."""
     done = run(environment / "ffrobot", "solve", "scene.toml", cwd=scene.parent)
     assert done.returncode == 0, done.stderr
     with h5py.File(scene.with_suffix(".results.h5")) as file:
