@@ -47,7 +47,8 @@ for place in "${MOUNTS[@]}"; do
   mountpoint -q "$SYSTEM/$place" || mount --bind "/$place" "$SYSTEM/$place"
 done
 cp /etc/resolv.conf "$SYSTEM/etc/resolv.conf"
-for file in /etc/apt/apt.conf.d/*proxy* /etc/pip.conf; do # how this machine reaches the network
+# How this machine reaches the network, and whom it trusts there.
+for file in /etc/apt/apt.conf.d/*proxy* /etc/pip.conf /etc/ssl/certs/ca-certificates.crt; do
   [[ ! -f $file ]] || install -D -m 644 "$file" "$SYSTEM$file"
 done
 
