@@ -11,7 +11,8 @@ from ffrobot.schema import schema
 
 INTRODUCTION = {
     "link": "What stage 1 reads. SI units; the link's axis is x, in-plane bending displaces along y.",
-    "scene": "What stage 2 reads. SI units, angles in rad; files are named relative to the scene's folder.",
+    "scene": "What stage 2 reads. SI units, angles in rad; files are named relative to the scene's folder. Values that"
+    " the program cannot do yet are refused, with a message that says so.",
 }
 
 
@@ -31,7 +32,7 @@ def _records(described: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _section(name: str, record: dict[str, Any]) -> Iterator[str]:
-    yield from (f"## {name}", "", record.get("description", "").replace("\n\n", "\n\n"), "")
+    yield from (f"## {name}", "", record.get("description", ""), "")
     yield from ("| key | value | default |", "|---|---|---|")
     required = record.get("required", [])
     for key, entry in record["properties"].items():
@@ -73,4 +74,5 @@ def _array(entry: dict[str, Any]) -> str:
     if "prefixItems" in entry:
         kinds = [_kind(item) for item in entry["prefixItems"]]
         return f"{len(kinds)} of: {kinds[0]}" if len(set(kinds)) == 1 else ", ".join(kinds)
-    return "list of " + _kind(entry.get("items", {}))
+    kind = _kind(entry.get("items", {}))
+    return kind.replace("table ", "tables ", 1) if kind.startswith("table ") else f"list of {kind}"

@@ -114,7 +114,7 @@ from_debian = {"numpy", "scipy", "h5py"}
 project = tomllib.loads(Path("pyproject.toml").read_text())
 extras = project["project"]["optional-dependencies"]
 wanted = project["build-system"]["requires"] + project["project"]["dependencies"]
-wanted += [line for extra in ("plot", "report", "test") for line in extras[extra]]
+wanted += [line for extra in ("plot", "report", "docs", "test") for line in extras[extra]]
 wanted = [line for line in wanted if re.match(r"[\w.-]+", line)[0] not in from_debian]
 Path(".venv/requirements.txt").write_text("\n".join(wanted) + "\n")
 
