@@ -53,6 +53,5 @@ for file in /etc/apt/apt.conf.d/*proxy* /etc/pip.conf /etc/ssl/certs/ca-certific
 done
 
 rm -rf "$SYSTEM/root/ffrobot"
-mkdir -p "$SYSTEM/root/ffrobot"
-git archive HEAD | tar -x -C "$SYSTEM/root/ffrobot"
+git clone -q --no-hardlinks "$PWD" "$SYSTEM/root/ffrobot" # a repository: ruff leaves out what git does
 chroot "$SYSTEM" env -C /root/ffrobot HOME=/root LANG=C.UTF-8 ./test.sh "$@"

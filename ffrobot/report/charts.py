@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from dataclasses import dataclass, field
+from html import escape
 from itertools import pairwise
 from typing import Any
 
@@ -42,7 +43,7 @@ class Chart:
     def add(self, label: str, x: Array, y: Array, **style: Any) -> None:  # noqa: ANN401 (a trace's own keys)
         """Add a curve y(x)."""
         mode = "lines" if len(y) > 1 else "markers"
-        self.traces.append({"type": "scatter", "mode": mode, "name": label, **_coordinates(x, y), **style})
+        self.traces.append({"type": "scatter", "mode": mode, "name": plain(label), **_coordinates(x, y), **style})
 
     @property
     def layout(self) -> dict[str, Any]:
@@ -61,12 +62,17 @@ class Chart:
         if self.equal_axes:
             y_axis |= {"scaleanchor": "x"}
         return {
-            "title": {"text": self.title},
+            "title": {"text": plain(self.title)},
             "xaxis": {"title": {"text": self.x_label, "standoff": 5}},
             "yaxis": y_axis,
             "shapes": lines,
             "showlegend": True,
         }
+
+
+def plain(text: str) -> str:
+    """`text` as Plotly shows it literally: it would take <b> for bold."""
+    return escape(text, quote=False)
 
 
 def encoded(values: Array, kind: str = "f4") -> dict[str, str]:

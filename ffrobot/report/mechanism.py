@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..figures.palette import COLORS
 from ..results_file import Array
-from .charts import encoded
+from .charts import encoded, plain
 from .outline import Outline, body_outline, points_outline
 from .runs import Run, Target, targets
 
@@ -65,7 +65,7 @@ def mechanism(runs: Sequence[Run]) -> Mechanism:
         bodies = [_motion(run, name, frames, notes) for name in _ordered_bodies(run)]
         entries.append(
             {
-                "label": run.label,
+                "label": plain(run.label),
                 "color": COLORS[k % len(COLORS)],
                 "visible": run.analysis == run.results.analyses[0],
                 "time": encoded(time[frames]),
@@ -163,7 +163,7 @@ def _body_data(run: Run, body: BodyMotion, bodies: Sequence[BodyMotion]) -> dict
 
 def _path_data(target: Target, bodies: Sequence[BodyMotion], frames: Indices) -> dict[str, Any]:
     """A point to be followed, and the path it should take where both components are specified."""
-    data: dict[str, Any] = {"name": target.point, "point": _index(target.point, bodies)}
+    data: dict[str, Any] = {"name": plain(target.point), "point": _index(target.point, bodies)}
     if target.columns == (0, 1):
         data["target"] = encoded(target.wanted[frames[frames < len(target.wanted)]])
     return data

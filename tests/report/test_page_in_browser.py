@@ -1,7 +1,9 @@
 """The page in a real browser: no errors, no network, everything drawn, a mechanism that moves as it was solved."""
 
 import io
+import shutil
 
+import h5py
 import numpy as np
 import pytest
 from PIL import Image
@@ -136,6 +138,18 @@ def test_histories_show_what_the_file_holds(paused, two_link):
     drawn = np.array(paused.value(f"Array.from({curve}._inputArray || {curve}.y._inputArray || {curve}.y)"))
     expected = two_link.file["inverse/points/link2.tip/deflection"][:, 1]
     np.testing.assert_allclose(drawn, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_names_are_shown_as_they_are(browser, page, two_link, tmp_path):
+    """A browser would take <b> for bold, and so would Plotly."""
+    path = shutil.copy(two_link.folder / "scene.results.h5", tmp_path)
+    with h5py.File(path, "r+") as file:
+        file.attrs["name"] = "<b>A & B</b>"
+    browser.open(page(path, two_link.folder / "scene.results.h5"))
+    assert browser.value("document.querySelector('h1').textContent").startswith("<b>A & B</b>")
+    legend = "[...document.querySelectorAll('#mechanism .legendtext')].map((item) => item.textContent)"
+    assert "<b>A & B</b>: inverse" in browser.value(legend)
+    assert browser.complaints == []
 
 
 def test_nothing_on_the_page_sends_data_away(paused):

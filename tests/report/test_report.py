@@ -1,6 +1,8 @@
 """What a report is made of: outlines, trees of joints, curves of many points, tables, and what it refuses."""
 
 import shutil
+import subprocess
+import sys
 
 import h5py
 import numpy as np
@@ -179,3 +181,22 @@ def test_modal_body_beside_results_that_were_moved(two_link, tmp_path):
         assert results.modal_body("link1").name == "link1"
         with pytest.raises(InputError, match='"link2" was solved with, found none'):
             results.modal_body("link2")
+
+
+def test_report_needs_no_matplotlib(two_link, tmp_path):
+    """The extra `report` brings Plotly only."""
+    program = (
+        "import sys; sys.modules['matplotlib'] = None\nfrom ffrobot.cli import cli\n"
+        f"cli(['report', {str(two_link.folder / 'scene.results.h5')!r}, '-o', 'r.html'], standalone_mode=False)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "r.html").exists()
+
+
+@pytest.mark.parametrize("missing", ["jinja2", "plotly"])
+def test_what_is_not_installed_is_named(two_link, tmp_path, monkeypatch, missing):
+    monkeypatch.setitem(sys.modules, missing, None)
+    monkeypatch.delitem(sys.modules, "plotly.offline", raising=False)
+    with pytest.raises(SolveError, match=rf"a report needs {missing}.*pip install 'ffrobot\[report\]'"):
+        write_report([two_link.folder / "scene.results.h5"], tmp_path / "r.html")
