@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -29,11 +30,26 @@ class Run:
 
 
 def sources(files: Sequence[Results]) -> list[str]:
-    """What tells the files apart: nothing, the names of their scenes, or the files' own."""
+    """What tells the files apart: nothing for one, the names of their scenes, or where their paths differ."""
     if len(files) == 1:
         return [""]
     names = [results.name for results in files]
-    return names if len(set(names)) == len(names) else [str(results.path) for results in files]
+    return names if len(set(names)) == len(names) else distinct_parts([results.path for results in files])
+
+
+def distinct_parts(paths: Sequence[Path]) -> list[str]:
+    """Each path without what all have at start and end: `beam` and `solid` of `c/beam/r.h5` and `c/solid/r.h5`.
+
+    The same file twice gets numbers.
+    """
+    parts = [path.absolute().parts for path in paths]
+    shortest = min(len(p) for p in parts)
+    start = next((k for k in range(shortest) if len({p[k] for p in parts}) > 1), shortest - 1)
+    end = next((k for k in range(shortest - start) if len({p[-1 - k] for p in parts}) > 1), 0)
+    labels = ["/".join(p[start : len(p) - end]) for p in parts]
+    if len(set(labels)) == len(labels):
+        return labels
+    return [f"{label} ({k + 1})" for k, label in enumerate(labels)]
 
 
 def runs(files: Sequence[Results]) -> list[Run]:

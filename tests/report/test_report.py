@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -14,7 +15,7 @@ from ffrobot.report import write_report
 from ffrobot.report.charts import MAX_POINTS, kept_outputs
 from ffrobot.report.mechanism import hanging
 from ffrobot.report.outline import body_outline, points_outline
-from ffrobot.report.runs import runs, targets
+from ffrobot.report.runs import distinct_parts, runs, targets
 from ffrobot.report.tables import peaks_table
 from ffrobot.results_file import Results
 
@@ -66,6 +67,20 @@ def test_curve_of_many_points_keeps_its_peaks():
     assert len(kept) <= MAX_POINTS + 2
     assert {0, 123_456, 234_567, 299_999} <= set(kept)
     assert len(kept_outputs(values[:MAX_POINTS])) == MAX_POINTS
+
+
+@pytest.mark.parametrize(
+    ("paths", "labels"),
+    [
+        (["/c/beam/r.h5", "/c/solid/r.h5"], ["beam", "solid"]),
+        (["/c/beam/r.h5", "/c/beam/q.h5"], ["r.h5", "q.h5"]),
+        (["/c/r.h5", "/c/deep/er/r.h5"], ["r.h5", "deep/er/r.h5"]),
+        (["/a/x/r.h5", "/b/x/s.h5", "/b/x/r.h5"], ["a/x/r.h5", "b/x/s.h5", "b/x/r.h5"]),
+        (["/c/r.h5", "/c/r.h5"], ["r.h5 (1)", "r.h5 (2)"]),
+    ],
+)
+def test_files_of_the_same_scene_are_told_apart_by_their_paths(paths, labels):
+    assert distinct_parts([Path(path) for path in paths]) == labels
 
 
 def test_forward_analyses_are_measured_against_the_path_they_should_follow(results):
