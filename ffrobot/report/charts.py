@@ -85,8 +85,9 @@ def encoded(values: Array, kind: str = "f4") -> dict[str, str]:
 
 
 def style(k: int) -> dict[str, Any]:
-    """Colour and dashes of the k-th curve of a chart."""
-    return {"line": {"color": COLORS[k % len(COLORS)], "dash": DASHES[k // len(COLORS) % len(DASHES)], "width": 1.5}}
+    """Colour, dashes and width of the k-th curve of a chart: thinner and thinner, so that none hides another."""
+    width = max(1.2, 3.6 * 0.75**k)
+    return {"line": {"color": COLORS[k % len(COLORS)], "dash": DASHES[k // len(COLORS) % len(DASHES)], "width": width}}
 
 
 def shades(count: int) -> list[str]:
