@@ -14,6 +14,7 @@ from ..mesh.records import RectangleSection, SectionRecord, TubeSection
 from ..validation import load_toml, validate
 from .constitutive import is_stable
 from .link_records import BeamLink, Link, Material, OrthotropicMaterial, SolidLink
+from .section_stress import contains
 
 
 def read_link(path: Path) -> Link:
@@ -38,6 +39,7 @@ def _beam_link(link: BeamLink, path: Path) -> BeamLink:
     _check_beam_interfaces(link, path)
     _check_modes(link, path)
     _check_beam_material(link, path)
+    _check_beam_stress(link, path)
     return link
 
 
@@ -134,9 +136,21 @@ def _check_modes(link: Link, path: Path) -> None:
 def _check_beam_material(link: BeamLink, path: Path) -> None:
     bends = any(family.endswith("bending") for family in link.families)
     shear = bends and link.model.theory == "timoshenko"
-    use = "torsion" if "torsion" in link.families else "shear" if shear else None
+    use = "torsion" if "torsion" in link.families else "shear" if shear else "strains" if link.stress.points else None
     if use and link.material.poissons_ratio is None:
         _reject(path, "material.poissons_ratio", f"a value, for {use} (modes.family = {link.modes.family!r})", "none")
+
+
+def _check_beam_stress(link: BeamLink, path: Path) -> None:
+    if link.stress.surface:
+        _reject(path, "stress.surface", "points, not a surface, on a beam", "true")
+    for name, (x, y, z) in link.stress.points.items():
+        key, length = f"stress.points.{name}", link.geometry.length
+        if not 0.0 <= x <= length:
+            _reject(path, key, f"x within the length, 0 … {length:g} m", f"{x:g} m")
+        shape = link.shapes[int(np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right"))]
+        if not contains(shape, y, z):
+            _reject(path, key, f"y, z within the section, a {shape.shape}, at x = {x:g} m", f"{y:g}, {z:g} m")
 
 
 def _check_shape(link: SolidLink, path: Path) -> None:

@@ -17,6 +17,7 @@ from ..mesh.records import (
     NotNegative,
     Positive,
     RectangleSection,
+    SectionRecord,
     SolidGeometry,
     SolidMeshRecord,
     SurfacePatches,
@@ -135,13 +136,15 @@ class BeamLink(_Link):
     model: BeamModel = BeamModel()
 
     @property
+    def shapes(self) -> list[SectionRecord]:
+        """The section of each segment."""
+        records = [segment.section for segment in self.geometry.segment or ()]
+        return records if self.geometry.section is None else [*records, self.geometry.section]
+
+    @property
     def sections(self) -> list[Section]:
         """Section properties of each segment. Without Poisson's ratio, J and k belong to ν = 0: nothing uses them."""
-        nu = self.material.poissons_ratio or 0.0
-        records = [segment.section for segment in self.geometry.segment or ()]
-        if self.geometry.section is not None:
-            records.append(self.geometry.section)
-        return [_properties(record, nu) for record in records]
+        return [_properties(record, self.material.poissons_ratio or 0.0) for record in self.shapes]
 
     @property
     def places(self) -> dict[str, float]:

@@ -18,9 +18,11 @@ from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.model import ModalLoad, Model, build_model
+from .mbs.observation import body_motion
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.scene_file import load_scene
 from .mbs.scene_records import Analysis, Scene, split_point
+from .mbs.stress import BodyStress, body_stress
 from .validation import did_you_mean, quoted
 
 
@@ -57,6 +59,7 @@ class Solution:
     Attributes:
         outcomes: by analysis, in the order of the scene.
         voltages: by analysis and body.
+        stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
         skipped: what the scene did not need, one line each.
     """
@@ -67,6 +70,7 @@ class Solution:
     patches: Mapping[str, PatchArray]
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
+    stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
 
@@ -90,6 +94,7 @@ def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
                     body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
                     for body, array in solution.patches.items()
                 }
+            solution.stresses[analysis.name] = _stresses(solution, outcome)
             solution.seconds[analysis.name] = time.perf_counter() - started
             if outcome.status != "completed":
                 break
@@ -169,6 +174,16 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
     return LoadedBody(planar, body.modal, body.path, body.computed)
+
+
+def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
+    """Of the bodies whose files hold modal stresses."""
+    found = {
+        name: body_stress(body.modal, body_motion(outcome, body.planar).modal)
+        for name, body in solution.bodies.items()
+        if body.modal is not None
+    }
+    return {name: stress for name, stress in found.items() if stress is not None}
 
 
 def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> list[ModalLoad]:

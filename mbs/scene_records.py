@@ -211,6 +211,7 @@ class PztLayout(Record):
     """Equal piezoelectric patches along one link. Lengths in m, modulus in Pa, d31 in m/V, density kg/m³, limit in V.
 
     Centers are distances along the link from its root; `count` places them at (k − ½)·(length of link)/count.
+    `coupling`: patches work on the section rotations at their ends, or on the faces of a solid that outlines them.
     """
 
     body: str
@@ -223,6 +224,7 @@ class PztLayout(Record):
     d31: float
     density: Positive | None = None
     limit: Positive | None = None
+    coupling: Literal["rotation", "surface"] = "rotation"
 
     @model_validator(mode="after")
     def _consistent(self) -> PztLayout:

@@ -1,1 +1,1 @@
-"""Figures of a results file: those that `figures.toml` beside it names, or the standard ones of any scene."""
+"""Figures of results (those that `figures.toml` beside them names, or the standard ones) and of modal bodies."""
