@@ -57,7 +57,7 @@ def points_outline(names: Sequence[str], at: Array, deflection: Array) -> Outlin
     k = len(names)
     if {"root", "mid", "tip"} <= set(names):
         s = np.linspace(0.0, 1.0, CURVE_POINTS)
-        weights = np.zeros((CURVE_POINTS, k))
+        weights: Array = np.zeros((CURVE_POINTS, k))
         weights[:, names.index("root")] = (1 - s) * (1 - 2 * s)
         weights[:, names.index("mid")] = 4 * s * (1 - s)
         weights[:, names.index("tip")] = s * (2 * s - 1)

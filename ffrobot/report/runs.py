@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from os.path import abspath
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +43,7 @@ def distinct_parts(paths: Sequence[Path]) -> list[str]:
 
     The same file twice gets numbers.
     """
-    parts = [path.absolute().parts for path in paths]
+    parts = [Path(abspath(path)).parts for path in paths]  # without ".."
     shortest = min(len(p) for p in parts)
     start = next((k for k in range(shortest) if len({p[k] for p in parts}) > 1), shortest - 1)
     end = next((k for k in range(shortest - start) if len({p[-1 - k] for p in parts}) > 1), 0)

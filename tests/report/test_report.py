@@ -73,6 +73,7 @@ def test_curve_of_many_points_keeps_its_peaks():
     ("paths", "labels"),
     [
         (["/c/beam/r.h5", "/c/solid/r.h5"], ["beam", "solid"]),
+        (["../beam/r.h5", "r.h5"], ["beam", Path.cwd().name]),
         (["/c/beam/r.h5", "/c/beam/q.h5"], ["r.h5", "q.h5"]),
         (["/c/r.h5", "/c/deep/er/r.h5"], ["r.h5", "deep/er/r.h5"]),
         (["/a/x/r.h5", "/b/x/s.h5", "/b/x/r.h5"], ["a/x/r.h5", "b/x/s.h5", "b/x/r.h5"]),
