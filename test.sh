@@ -2,7 +2,7 @@
 # Sets up what is missing, then checks style and types and runs the tests. Arguments go to pytest.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
-source scripts/setup.sh
+WITH_TEST_PACKAGES=yes source scripts/setup.sh
 
 # mypy needs the packages where they are once installed: ffrobot.mesh, not mesh.
 rm -rf build/types

@@ -187,6 +187,11 @@ class ModalBody:
         _freeze(self)
         _check(self)
 
+    def __repr__(self) -> str:
+        modes = f"{self.mode_count} modes of {self.frequency[0]:.5g} … {self.frequency[-1]:.5g} Hz"
+        link = f"{self.kind}, {self.reference_condition}, {self.length:.5g} m, {self.mass:.5g} kg"
+        return f"ModalBody({self.name!r}): {link}, {modes}, interfaces {', '.join(self.interfaces)}"
+
     @property
     def mode_count(self) -> int:
         """Number of modes, n."""

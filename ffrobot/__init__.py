@@ -1,8 +1,78 @@
 """ffrobot: what motors and piezoelectric patches must do so that a flexible robot follows its path.
 
 One way for data: mesh → fe_models → modal body → mbs → actuation → results → pictures.
+
+From Python, everything the command line does takes a line each:
+
+    body = ffrobot.make_link("arm.toml").body      # stage 1: ffrobot link
+    results = ffrobot.solve("scene.toml")          # stage 2: ffrobot solve
+    results["inverse/joints/shoulder/moment"]      # (T,) N·m
+    ffrobot.plot_results("scene.results.h5", "figures")
+    ffrobot.write_report(["scene.results.h5"], "report.html")
+
+Names are loaded when they are first used: importing the package costs a few milliseconds.
 """
 
-from importlib.metadata import version
+from __future__ import annotations
 
-__version__ = version("ffrobot")
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .api import load_scene, make_link, plot_results, read_modal_body, solve, write_report
+    from .errors import FfrobotError, InputError, SolveError
+    from .fe_models.modal_body import ModalBody
+    from .mbs.scene_file import make_scene
+    from .mbs.scene_records import Scene
+    from .results_file import Results
+
+    __version__: str
+
+_HOME = {
+    "load_scene": ".api",
+    "make_link": ".api",
+    "plot_results": ".api",
+    "read_modal_body": ".api",
+    "solve": ".api",
+    "write_report": ".api",
+    "FfrobotError": ".errors",
+    "InputError": ".errors",
+    "SolveError": ".errors",
+    "ModalBody": ".fe_models.modal_body",
+    "make_scene": ".mbs.scene_file",
+    "Scene": ".mbs.scene_records",
+    "Results": ".results_file",
+}
+
+__all__ = [
+    "FfrobotError",
+    "InputError",
+    "ModalBody",
+    "Results",
+    "Scene",
+    "SolveError",
+    "load_scene",
+    "make_link",
+    "make_scene",
+    "plot_results",
+    "read_modal_body",
+    "solve",
+    "write_report",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value: object = version("ffrobot")
+    elif name in _HOME:
+        value = getattr(import_module(_HOME[name], __name__), name)
+    else:
+        raise AttributeError(f"module 'ffrobot' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME, "__version__"])

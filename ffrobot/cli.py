@@ -1,7 +1,4 @@
-"""The command line: `ffrobot link | solve | feasibility | info | plot`.
-
-Heavy imports happen inside the commands that need them.
-"""
+"""The command line. Heavy imports happen inside the commands that need them."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ def cli() -> None:
     \b
     Stage 1:  ffrobot link  LINK.toml   finite elements → modal body file
     Stage 2:  ffrobot solve SCENE.toml  modal bodies → moments and voltages
-    Then:     ffrobot info, ffrobot plot
+    Then:     ffrobot info, ffrobot plot, ffrobot report
     """
 
 
@@ -74,7 +71,7 @@ def solve(scene_file: Path, output: Path | None) -> None:
     from .files import check_output
     from .progress import Display
     from .results import FORMAT, write_results
-    from .solve import solve as solve_scene
+    from .solution import solve as solve_scene
     from .summary import print_summary, summary_console
 
     path = output or scene_file.with_suffix(".results.h5")
@@ -114,10 +111,41 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
 def plot(file: Path, output: Path | None) -> None:
     """Draw the figures of a results file, or mesh and modes of a modal body file, as PNG and PDF."""
-    from .figures import plot_file
+    from .figures.plot import plot_file
 
     for path in plot_file(file, output or file.with_suffix(".figures")):
         click.echo(path)
+
+
+@cli.command()
+@click.argument("results_files", metavar="RESULTS.h5 …", nargs=-1, required=True, type=FILE)
+@click.option("-o", "--output", metavar="FILE.html", type=FILE, help="Where to write [RESULTS.html, of the first].")
+def report(results_files: tuple[Path, ...], output: Path | None) -> None:
+    """Write one self-contained HTML page: motion, histories, modes, tables.
+
+    Several results files come side by side, for comparison. The page needs no network and no other file.
+    """
+    from .report import write_report
+
+    path = output or results_files[0].with_suffix(".html")
+    write_report(results_files, path)
+    click.echo(path)
+
+
+@cli.command()
+@click.argument("kind", type=click.Choice(["link", "scene"]))
+def schema(kind: str) -> None:
+    r"""Print the JSON schema of link or scene files, for editors.
+
+    \b
+    ffrobot schema scene > scene.schema.json
+    and, as the first line of a scene file:  #:schema ./scene.schema.json
+    """
+    import json
+
+    from .schema import schema as schema_of
+
+    click.echo(json.dumps(schema_of(kind), indent=2, ensure_ascii=False))
 
 
 def main() -> None:

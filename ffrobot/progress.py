@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from .parallel import is_first
-from .solve import Watcher
+from .solution import Watcher
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID

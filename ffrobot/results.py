@@ -24,7 +24,7 @@ from .mbs.observation import (
     trajectory_target,
 )
 from .mbs.stress import BodyStress
-from .solve import Solution
+from .solution import Solution
 
 FORMAT = "ffrobot-results"
 FORMAT_VERSION = 1
@@ -32,6 +32,11 @@ FORMAT_VERSION = 1
 
 def write_results(solution: Solution, path: Path) -> None:
     """Write every analysis of a solution to `path`. Raises `SolveError` where that fails; no half file is left."""
+    write_atomically(path, results_image(solution), "results file")
+
+
+def results_image(solution: Solution) -> bytes:
+    """The content of the results file of a solution."""
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
@@ -62,15 +67,15 @@ def write_results(solution: Solution, path: Path) -> None:
                 _write_stress(group.create_group(f"stress/{body_name}"), stress)
         file.flush()
         image: bytes = file.id.get_file_image()
-    write_atomically(path, image, "results file")
+    return image
 
 
 def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
     """Path and hashes of the modal body file behind each flexible body."""
     return {
-        name: {"path": str(body.path), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
+        name: {"path": str(body.path.absolute()), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
         for name, body in solution.bodies.items()
-        if body.modal is not None
+        if body.modal is not None and body.path is not None
     }
 
 

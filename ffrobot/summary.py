@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from .mbs.analyses import Outcome
-from .solve import Solution
+from .solution import Solution
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
 

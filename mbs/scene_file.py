@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from os import PathLike
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..errors import InputError
 from ..validation import did_you_mean, load_toml, quoted, validate
 from .scene_records import GROUND, Analysis, Load, Scene, SceneKeys, Trajectory
 from .time_functions import check_domain
+
+MADE_IN_PYTHON = "<scene made in Python>"
 
 
 def load_scene(path: Path) -> Scene:
@@ -20,6 +26,38 @@ def load_scene(path: Path) -> Scene:
     (their points, the length of a link) is checked when these are known.
     """
     data = load_toml(path, "scene file")
+    return _scene(data, path, path.read_text(encoding="utf-8"))
+
+
+def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)
+    """A scene from Python, with the keys of a scene file: tables are dictionaries, arrays of tables lists of them.
+
+    Files it names are looked for in `folder`. NumPy numbers and arrays, tuples and paths may stand for numbers, lists
+    and text; keys that are None are left out. Raises `InputError` as `load_scene` does.
+    """
+    import tomli_w
+
+    path = Path(folder) / MADE_IN_PYTHON
+    try:
+        text = tomli_w.dumps(_plain(keys))
+    except TypeError as error:
+        raise InputError(f"{path}: expected numbers, text, lists and tables, found something else: {error}") from None
+    return _scene(tomllib.loads(text), path, text)
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 (whatever TOML may hold)
+    """`value` in the types of TOML."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return str(value) if isinstance(value, PathLike) else value
+
+
+def _scene(data: dict[str, Any], path: Path, text: str) -> Scene:
+    """The validated scene of `data`, which was read from `path` as `text`."""
     _refuse_unavailable(data, path)
     keys = validate(SceneKeys, _with_times_of_actuation(data), path)
     problems = [f"{path}: {problem}" for problem in _problems(keys)]
@@ -34,7 +72,7 @@ def load_scene(path: Path) -> Scene:
         for body, functions in (analysis.modal or {}).items():
             for k, function in enumerate(functions):
                 check_domain(function, analysis.times, f'{path}: analysis "{analysis.name}": modal.{body}[{k}]')
-    return Scene(**dict(keys), path=path.absolute(), text=path.read_text(encoding="utf-8"))
+    return Scene(**dict(keys), path=path.absolute(), text=text)
 
 
 def _refuse_unavailable(data: dict[str, Any], path: Path) -> None:

@@ -93,8 +93,8 @@ Side = Annotated[str, AfterValidator(_side)]
 Vector2 = tuple[float, float]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
-Expression = Annotated[TimeFunction, PlainValidator(_time_function)]
-WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints)]
+Expression = Annotated[TimeFunction, PlainValidator(_time_function, json_schema_input_type=str | float)]
+WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints, json_schema_input_type=str)]
 NotEmpty = AfterValidator(_not_empty)
 
 
@@ -430,3 +430,15 @@ class Scene(SceneKeys):
 
     path: Path
     text: str
+
+    def __repr__(self) -> str:
+        names = {
+            "bodies": [body.name for body in self.body],
+            "joints": [joint.name for joint in self.joint],
+            "trajectories": [trajectory.name for trajectory in self.trajectory],
+            "analyses": [analysis.name for analysis in self.analysis],
+        }
+        parts = [f"{kind} {', '.join(members)}" for kind, members in names.items() if members]
+        return f"Scene({self.name!r}): {'; '.join(parts)}"
+
+    __str__ = __repr__

@@ -20,6 +20,9 @@ readonly DEBIAN_PACKAGES=(
   python3-dolfinx python3-dolfinx-real python3-petsc4py python3-slepc4py libopenblas0-serial
   gmsh python3-gmsh python3-meshio python3-h5py python3-scipy python3-numpy
 )
+# What only tests need, in which pages are opened; test.sh asks for it.
+TEST_PACKAGES=()
+[[ -z ${WITH_TEST_PACKAGES:-} ]] || TEST_PACKAGES=(chromium chromium-driver)
 readonly SETUP_LOG=.venv/setup.log
 
 # die MESSAGE: what is wrong and what to do about it.
@@ -57,16 +60,16 @@ once() {
 
 digest() { sha256sum | cut -c 1-64; }
 
-# Name and version of every listed Debian package that is installed, one a line.
+# installed_packages PACKAGE…: name and version of those that are installed, one a line.
 installed_packages() {
-  dpkg-query -W -f '${db:Status-Status} ${Package} ${Version}\n' "${DEBIAN_PACKAGES[@]}" 2>/dev/null |
+  dpkg-query -W -f '${db:Status-Status} ${Package} ${Version}\n' "$@" 2>/dev/null |
     sed -n 's/^installed //p' || true
 }
 
 missing_packages() {
   local installed package
-  installed=" $(installed_packages | cut -d ' ' -f 1 | tr '\n' ' ')"
-  for package in "${DEBIAN_PACKAGES[@]}"; do
+  installed=" $(installed_packages "${DEBIAN_PACKAGES[@]}" "${TEST_PACKAGES[@]}" | cut -d ' ' -f 1 | tr '\n' ' ')"
+  for package in "${DEBIAN_PACKAGES[@]}" "${TEST_PACKAGES[@]}"; do
     [[ $installed == *" $package "* ]] || printf '%s\n' "$package"
   done
 }
@@ -110,7 +113,8 @@ from pathlib import Path
 from_debian = {"numpy", "scipy", "h5py"}
 project = tomllib.loads(Path("pyproject.toml").read_text())
 extras = project["project"]["optional-dependencies"]
-wanted = project["build-system"]["requires"] + project["project"]["dependencies"] + extras["plot"] + extras["test"]
+wanted = project["build-system"]["requires"] + project["project"]["dependencies"]
+wanted += [line for extra in ("plot", "report", "docs", "test") for line in extras[extra]]
 wanted = [line for line in wanted if re.match(r"[\w.-]+", line)[0] not in from_debian]
 Path(".venv/requirements.txt").write_text("\n".join(wanted) + "\n")
 
@@ -170,7 +174,7 @@ setup() {
   fi
   once venv "$venv_key" "making the virtual environment .venv" make_venv
 
-  dependencies_key=$({ installed_packages && cat pyproject.toml; } | digest)
+  dependencies_key=$({ installed_packages "${DEBIAN_PACKAGES[@]}" && cat pyproject.toml; } | digest)
   once dependencies "$dependencies_key" "installing Python packages" install_dependencies
   once build "$(build_key) $dependencies_key" "building ffrobot" build_package
   once check "$(<.venv/build.stamp)" "checking the environment" check_environment

@@ -13,7 +13,7 @@ import matplotlib as mpl
 import numpy as np
 
 from ffrobot.mbs.observation import joint_forces, trajectory_force
-from ffrobot.solve import Solution, solve
+from ffrobot.solution import Solution, solve
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..fe_models.modal_body import ModalBody
-from .style import COLORS, ORDERED
+from .palette import COLORS
+from .style import ORDERED
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

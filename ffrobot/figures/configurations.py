@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..results_file import Array, Results
 from .figure_file import FigureRecord
 from .path import draw_paths
-from .reading import Array, Results
 from .style import legend, shades
 
 CURVE_POINTS = 41

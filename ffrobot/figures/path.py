@@ -5,8 +5,8 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 
 from ..errors import InputError
+from ..results_file import Results
 from .figure_file import FigureRecord
-from .reading import Results
 from .style import legend, line_style
 
 

@@ -12,11 +12,11 @@ from ..errors import InputError
 from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
 from ..files import write_atomically
+from ..results_file import Results
 from .body_shape import draw_mesh, draw_modes
 from .configurations import draw_configurations
 from .figure_file import FigureFile, FigureRecord, load_figures
 from .path import draw_path
-from .reading import Results
 from .standard import standard_figures
 from .style import new_axes, style
 from .time_history import draw_time_history

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..results_file import Results
 from .figure_file import Curve, FigureRecord
-from .reading import Results
 
 SNAPSHOTS = 5
 
@@ -33,7 +33,7 @@ def _configurations(results: Results) -> Iterator[FigureRecord]:
         times = results.time(f"{analysis}/time")
         snapshots = np.linspace(times[0], times[-1], SNAPSHOTS if len(times) > 1 else 1)
         yield FigureRecord(
-            name=_name("configurations", analysis),
+            name=file_name("configurations", analysis),
             title=f"configurations, {analysis}",
             kind="configurations",
             analysis=analysis,
@@ -55,7 +55,7 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
         curves = [Curve(data=data, label="specified") for data in wanted]
         curves += [Curve(data=data + component, label=data.split("/")[0]) for data in reached]
         yield FigureRecord(
-            name=_name("path", name),
+            name=file_name("path", name),
             title=f"path of {point}",
             kind="path" if in_plane else "time",
             curves=tuple(curves),
@@ -69,7 +69,7 @@ def _angles(results: Results) -> Iterator[FigureRecord]:
         if any(np.ptp(results.data(name)) for name in datasets):
             curves = tuple(Curve(data=name, label=name.split("/")[0]) for name in datasets)
             yield FigureRecord(
-                name=_name("angle", body), title=f"angle of {body}", curves=curves, y_label="angle (rad)"
+                name=file_name("angle", body), title=f"angle of {body}", curves=curves, y_label="angle (rad)"
             )
 
 
@@ -79,7 +79,9 @@ def _deflections(results: Results) -> Iterator[FigureRecord]:
         if any(results.data(name).any() for name in datasets):
             curves = tuple(Curve(data=name, label=name.split("/")[0]) for name in datasets)
             title = f"transverse deflection of {point}"
-            yield FigureRecord(name=_name("deflection", point), title=title, curves=curves, y_label="deflection (m)")
+            yield FigureRecord(
+                name=file_name("deflection", point), title=title, curves=curves, y_label="deflection (m)"
+            )
 
 
 def _over_time(results: Results, group: str, dataset: str, y_label: str, title: str) -> Iterator[FigureRecord]:
@@ -95,7 +97,7 @@ def _over_time(results: Results, group: str, dataset: str, y_label: str, title: 
                 for k in range(columns)
             ]
         if curves:
-            name = _name(dataset, member)
+            name = file_name(dataset, member)
             yield FigureRecord(name=name, title=f"{title} {member}", curves=tuple(curves), y_label=y_label)
 
 
@@ -106,7 +108,7 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
             limit = limits.get(body)
             for dataset, title in (("required_voltage", "voltages required"), ("voltage", "voltages within the limit")):
                 yield FigureRecord(
-                    name=_name(dataset, analysis, body),
+                    name=file_name(dataset, analysis, body),
                     title=f"{title}, patches of {body}, {analysis}",
                     curves=(Curve(data=f"{analysis}/pzt/{body}/{dataset}", label="patch"),),
                     y_label="voltage (V)",
@@ -119,7 +121,7 @@ def _members(results: Results, group: str) -> list[str]:
     return list(dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/{group}")))
 
 
-def _name(*parts: str) -> str:
+def file_name(*parts: str) -> str:
     """A file name: everything but letters, digits, `.` and `-` becomes `_`."""
     joined = "_".join(parts)
     return "".join(c if c.isascii() and (c.isalnum() or c in ".-") else "_" for c in joined)

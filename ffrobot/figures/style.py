@@ -9,10 +9,10 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from .palette import COLORS
+
 SIZE = (3.5, 2.7)  # inches: one column of a journal page
 
-# Okabe and Ito, "Color universal design" (2008), without the yellow that paper swallows.
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 MARKERS = ("s", "^", "o", "D", "v", "P", "X")
 DASHES = ("-", "--", "-.", ":")
 MARKERS_A_CURVE = 14

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 
+from ..results_file import Results
 from .figure_file import Curve, FigureRecord
-from .reading import Results, read_points
-from .style import COLORS, legend, line_style, shades
+from .palette import COLORS
+from .reading import read_points
+from .style import legend, line_style, shades
 
 
 def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> None:

@@ -7,7 +7,7 @@ from ffrobot.actuation.feasibility import judge_motors
 from ffrobot.actuation.patches import patch_array, with_patch_count
 from ffrobot.actuation.prediction import predicted_shift, unmet_modal_forces
 from ffrobot.actuation.voltages import solve_voltages
-from ffrobot.solve import solve
+from ffrobot.solution import solve
 
 LIMIT = 200.0
 SCENE = """

@@ -6,7 +6,7 @@ import pytest
 from ffrobot.actuation.points import driving_forces
 from ffrobot.mbs.joint_space import motor_rates
 from ffrobot.mbs.observation import trajectory_force
-from ffrobot.solve import solve
+from ffrobot.solution import solve
 
 SCENE = """
 name = "two_link"

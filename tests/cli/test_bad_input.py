@@ -229,6 +229,8 @@ def test_mistake_in_a_link_of_its_own(two_link_copy, refused, link):
         (("plot", "nowhere.h5"), "nowhere.h5: expected a results file, found no such file"),
         (("plot", "scene.toml"), "scene.toml: expected a results file, found not"),
         (("plot", "other.h5"), "other.h5: expected a results file"),
+        (("report", "other.h5"), "other.h5: expected a results file"),
+        (("report", "other.h5", "-o", "scene.toml"), 'scene.toml: output: expected a name that ends in ".html"'),
     ],
 )
 def test_files_that_are_not_what_they_should_be(two_link_copy, refused, arguments, named):

@@ -11,11 +11,12 @@ FORBIDDEN = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "matplotlib")
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--help"], ["link", "solve", "info", "plot", "Stage 1", "Stage 2"]),
+        (["--help"], ["link", "solve", "info", "plot", "report", "schema", "Stage 1", "Stage 2"]),
         (["link", "--help"], ["LINK.toml", "-o, --output BODY.h5", "--force", "up to date"]),
         (["solve", "--help"], ["SCENE.toml", "-o, --output RESULTS.h5", "SCENE.results.h5", "stage 1"]),
         (["info", "-h"], ["FILE.h5", "modal body", "results"]),
         (["plot", "-h"], ["RESULTS.h5", "-o, --output DIR", "PNG and PDF"]),
+        (["report", "-h"], ["RESULTS.h5 …", "-o, --output FILE.html", "self-contained"]),
     ],
 )
 def test_help(ffrobot, arguments, told):

@@ -9,8 +9,8 @@ import pytest
 
 from ffrobot.cli import cli
 from ffrobot.errors import InputError
-from ffrobot.figures import plot_results
 from ffrobot.figures.figure_file import load_figures
+from ffrobot.figures.plot import plot_results
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -99,6 +99,6 @@ def test_wrong_results_are_refused(tmp_path):
 
 
 def test_matplotlib_is_loaded_for_plotting_only():
-    program = "import sys, ffrobot.cli, ffrobot.solve; print('matplotlib' in sys.modules)"
+    program = "import sys, ffrobot.cli, ffrobot.solution; print('matplotlib' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"

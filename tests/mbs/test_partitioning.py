@@ -8,7 +8,7 @@ import pytest
 from ffrobot.mbs.analyses import run_pcid
 from ffrobot.mbs.initial_state import undeformed_state
 from ffrobot.mbs.partitioning import choose_partition, complete, integrate_partitioned
-from ffrobot.solve import solve
+from ffrobot.solution import solve
 
 CASES = Path(__file__).parents[2] / "cases"
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ffrobot.mbs.observation import point_motion
-from ffrobot.solve import solve
+from ffrobot.solution import solve
 
 LINK = """
 name = "arm"

@@ -94,15 +94,15 @@ class Solution:
     skipped: tuple[str, ...] = ()
 
 
-def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
-    """Run every analysis of a scene; stage 1 runs first for links that are not up to date.
+def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
+    """Run every analysis of a scene or a scene file; stage 1 runs first for links that are not up to date.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
     So does Ctrl-C during an analysis.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
     watcher = watcher or Watcher()
-    solution = prepare(scene_path, watcher)
+    solution = prepare(scene, watcher)
     with Interruption() as interruption:
         for analysis in solution.scene.analysis:
             started = time.perf_counter()
@@ -116,11 +116,12 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     return solution
 
 
-def prepare(scene_path: Path, watcher: Watcher | None = None) -> Solution:
+def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     """Everything of a scene but its analyses: bodies, patches, model. Raises `InputError` as `solve` does."""
     watcher = watcher or Watcher()
     began = time.perf_counter()
-    scene = load_scene(scene_path)
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene)
     bodies = {body.name: loaded for body, loaded in zip(scene.body, _load_bodies(scene, watcher), strict=True)}
     loaded = time.perf_counter()
     structure = _add_patches(scene, bodies)

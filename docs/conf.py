@@ -1,0 +1,29 @@
+"""Sphinx configuration: Markdown pages, the command reference from the code, the keys of files from their schema."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import ffrobot
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from key_tables import write_key_tables
+
+project = "ffrobot"
+author = "the ffrobot developers"
+version = release = ffrobot.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_click"]
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+html_theme = "furo"
+html_title = f"ffrobot {version}"
+autodoc_typehints = "description"
+exclude_patterns = ["_build"]
+
+
+def setup(app: Any) -> None:  # noqa: ANN401 (Sphinx)
+    """Write the pages that are generated, before Sphinx looks for pages."""
+    app.connect("builder-inited", lambda app: write_key_tables(Path(app.srcdir) / "reference"))

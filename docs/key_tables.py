@@ -1,0 +1,78 @@
+"""Pages with every key of link and scene files, from the schemas that `ffrobot schema` prints."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ffrobot.schema import schema
+
+INTRODUCTION = {
+    "link": "What stage 1 reads. SI units; the link's axis is x, in-plane bending displaces along y.",
+    "scene": "What stage 2 reads. SI units, angles in rad; files are named relative to the scene's folder. Values that"
+    " the program cannot do yet are refused, with a message that says so.",
+}
+
+
+def write_key_tables(folder: Path) -> None:
+    """Write `link_keys.md` and `scene_keys.md` into `folder`."""
+    for kind, introduction in INTRODUCTION.items():
+        lines = [f"# Keys of a {kind} file", "", introduction, ""]
+        lines += [line for name, record in _records(schema(kind)) for line in _section(name, record)]
+        (folder / f"{kind}_keys.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _records(described: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The whole file first, then every table in it."""
+    if "properties" in described:
+        yield "the file", described
+    yield from ((name, record) for name, record in described["$defs"].items() if "properties" in record)
+
+
+def _section(name: str, record: dict[str, Any]) -> Iterator[str]:
+    yield from (f"## {name}", "", record.get("description", ""), "")
+    yield from ("| key | value | default |", "|---|---|---|")
+    required = record.get("required", [])
+    for key, entry in record["properties"].items():
+        default = "required" if key in required else _code(entry.get("default"))
+        yield f"| `{key}` | {_kind(entry)} | {default} |"
+    yield ""
+
+
+def _code(default: object) -> str:
+    return "" if default in (None, [], {}) else f"`{json.dumps(default, ensure_ascii=False)}`"
+
+
+def _kind(entry: dict[str, Any]) -> str:
+    """What a value has to be, in words."""
+    if "$ref" in entry:
+        name = entry["$ref"].rpartition("/")[2]
+        return f"table [{name}](#{name.lower()})"
+    if "const" in entry:
+        return f'`"{entry["const"]}"`'
+    if "enum" in entry:
+        return ", ".join(f'`"{word}"`' for word in entry["enum"])
+    for alternatives in ("anyOf", "oneOf"):
+        if alternatives in entry:
+            return " or ".join(dict.fromkeys(_kind(item) for item in entry[alternatives]))
+    if entry.get("type") == "array":
+        return _array(entry)
+    if entry.get("type") == "object":
+        return "table of " + _kind(entry.get("additionalProperties", {}))
+    words = {"number": "number", "integer": "whole number", "boolean": "`true` or `false`"}
+    kind = words.get(str(entry.get("type")), "file name" if entry.get("format") == "path" else "text")
+    bounds = [f"{sign} {entry[key]:g}" for key, sign in BOUNDS.items() if key in entry]
+    return " ".join([kind, ", ".join(bounds)]).strip()
+
+
+BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
+
+
+def _array(entry: dict[str, Any]) -> str:
+    if "prefixItems" in entry:
+        kinds = [_kind(item) for item in entry["prefixItems"]]
+        return f"{len(kinds)} of: {kinds[0]}" if len(set(kinds)) == 1 else ", ".join(kinds)
+    kind = _kind(entry.get("items", {}))
+    return kind.replace("table ", "tables ", 1) if kind.startswith("table ") else f"list of {kind}"

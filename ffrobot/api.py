@@ -1,0 +1,77 @@
+"""What the command line does, for use from Python; paths may be text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .fe_models.link import LinkOutcome
+    from .fe_models.modal_body import ModalBody
+    from .mbs.scene_records import Scene
+    from .results_file import Results
+    from .solution import Watcher
+
+AnyPath = str | PathLike[str]
+
+
+def solve(scene: Scene | AnyPath, output: AnyPath | None = None, watcher: Watcher | None = None) -> Results:
+    """Run the analyses of a scene, or of a scene file, and return the results: `ffrobot solve`.
+
+    They are written to `output` where one is given, and kept in memory otherwise. `watcher` is told how it goes.
+    Raises `InputError` for anything wrong with the scene, `SolveError` where an analysis does not reach its end; what
+    was computed until then is in `output` all the same.
+    """
+    from .files import check_output
+    from .mbs.scene_records import Scene
+    from .results import FORMAT, results_image, write_results
+    from .results_file import Results
+    from .solution import solve as run
+
+    if output is not None:
+        check_output(Path(output), FORMAT)
+    solution = run(scene if isinstance(scene, Scene) else Path(scene), watcher)
+    if output is not None:
+        write_results(solution, Path(output))
+    for outcome in solution.outcomes.values():
+        outcome.check_completed()
+    if output is not None:
+        return Results(output)
+    return Results.from_image(results_image(solution), solution.scene.path)
+
+
+def load_scene(path: AnyPath) -> Scene:
+    """Read and validate a scene file. Raises `InputError` with a line for each wrong key."""
+    from .mbs.scene_file import load_scene
+
+    return load_scene(Path(path))
+
+
+def make_link(path: AnyPath, output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
+    """Compute the modal body of a link file unless it is up to date: `ffrobot link`. See `fe_models.link`."""
+    from .fe_models.link import make_link
+
+    return make_link(Path(path), None if output is None else Path(output), force)
+
+
+def read_modal_body(path: AnyPath) -> ModalBody:
+    """Read and check a modal body file. Raises `InputError` naming what is wrong with it."""
+    from .fe_models.modal_body_file import read_modal_body
+
+    return read_modal_body(Path(path))
+
+
+def plot_results(results: AnyPath, folder: AnyPath) -> list[Path]:
+    """Draw the figures of a results file into `folder`: `ffrobot plot`. Returns the files written."""
+    from .figures.plot import plot_results
+
+    return plot_results(Path(results), Path(folder))
+
+
+def write_report(results: Sequence[AnyPath], path: AnyPath) -> None:
+    """Write one HTML page about results files: `ffrobot report`."""
+    from .report import write_report
+
+    write_report([Path(file) for file in results], Path(path))

@@ -1,0 +1,50 @@
+"""JSON schemas of link and scene files, generated from the records that validate these files.
+
+Editors complete and check TOML files by them. What ties several keys together (a revolute joint has no axis) is beyond
+a schema: the records and the readers of the files say so.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import TypeAdapter
+from pydantic.json_schema import GenerateJsonSchema
+
+DIALECT = GenerateJsonSchema.schema_dialect
+
+
+def schema(kind: str) -> dict[str, Any]:
+    """The JSON schema of a "link" or "scene" file, as a dictionary."""
+    if kind == "scene":
+        from .mbs.scene_records import SceneKeys
+
+        described = TypeAdapter(SceneKeys).json_schema()
+    else:
+        from .fe_models.link_records import Link
+
+        described = TypeAdapter(Link).json_schema()
+        described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
+    return {"$schema": DIALECT, **_for_toml(described), "title": f"ffrobot {kind} file"}
+
+
+def _for_toml(node: Any) -> Any:  # noqa: ANN401 (any part of a JSON document)
+    """`node` without what TOML has not (null), and without titles that only repeat the key."""
+    if isinstance(node, list):
+        return [_for_toml(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    cleaned = {key: _for_toml(item) for key, item in node.items() if not _is_noise(key, item, node)}
+    alternatives = [item for item in cleaned.get("anyOf", []) if item != {"type": "null"}]
+    if len(alternatives) == 1:
+        del cleaned["anyOf"]
+        return alternatives[0] | cleaned
+    if alternatives:
+        cleaned["anyOf"] = alternatives
+    return cleaned
+
+
+def _is_noise(key: str, item: object, node: dict[str, Any]) -> bool:
+    """Automatic titles, and defaults that stand for "not given": None, and 0 where the key has to be positive."""
+    unset = item is None or (key == "default" and item == node.get("exclusiveMinimum"))
+    return unset or (key == "title" and isinstance(item, str))

@@ -1,0 +1,78 @@
+"""Tutorial and how-to pages, run as a reader would: files saved, commands typed, Python entered, answers compared."""
+
+import doctest
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = [DOCS / "tutorial.md", *sorted((DOCS / "howto").glob("*.md"))]
+
+BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<content>.*?)^```$", re.DOTALL | re.MULTILINE)
+FILE = re.compile(r"`([\w.]+\.(?:toml|csv))`")  # the last one in the paragraph before a file
+DOCTEST = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+class Reader:
+    """Somebody at an empty folder with a shell and a Python session."""
+
+    def __init__(self, folder, page, environment):
+        self.folder, self.page, self.environment = folder, page, environment
+        self.session = {}
+        self.ran = 0
+
+    def follow(self, text):
+        for match in BLOCK.finditer(text):
+            line = text.count("\n", 0, match.start("content")) + 1
+            language, content = match["language"], match["content"]
+            if language in ("toml", "text"):
+                names = FILE.findall(text[: match.start()].rstrip().split("\n\n")[-1])
+                assert names, f"{self.page}:{line}: a file without a name in the paragraph before it"
+                (self.folder / names[-1]).write_text(content, encoding="utf-8")
+            elif language == "console":
+                for command, expected in re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", content, flags=re.MULTILINE):
+                    self.type(command, expected, line)
+            elif language == "pycon":
+                self.enter(content, line)
+            elif language == "python":
+                exec(compile(content, f"{self.page}:{line}", "exec"), self.session)
+                self.ran += 1
+            else:
+                pytest.fail(f"{self.page}:{line}: no way to run {language}")
+
+    def type(self, command, expected, line):
+        """Run a command; `…` in the answer stands for anything, blanks at the ends of lines do not count."""
+        done = subprocess.run(
+            ["bash", "-c", command], cwd=self.folder, env=self.environment, text=True, timeout=120,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{self.page}:{line}: {command}\n{done.stdout}"
+        if expected:
+            found = "\n".join(text.rstrip() for text in done.stdout.strip().splitlines())
+            pattern = ".*".join(re.escape(part) for part in expected.strip().split("…"))
+            assert re.fullmatch(pattern, found, re.DOTALL), f"{self.page}:{line}: {command}\n{done.stdout}"
+        self.ran += 1
+
+    def enter(self, content, line):
+        """Run a Python session with its answers."""
+        test = doctest.DocTestParser().get_doctest(content, self.session, str(self.page), str(self.page), line)
+        runner = doctest.DocTestRunner(optionflags=DOCTEST, verbose=False)
+        report = []
+        runner.run(test, out=report.append, clear_globs=False)
+        assert runner.failures == 0, "".join(report)
+        self.session.update(test.globs)
+        self.ran += len(test.examples)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_page_does_what_it_says(page, ffrobot, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
+    environment = ffrobot.environment | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    reader = Reader(tmp_path, page, environment)
+    reader.follow(page.read_text(encoding="utf-8"))
+    assert reader.ran >= 3

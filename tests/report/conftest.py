@@ -1,0 +1,86 @@
+"""Pages of solved cases, and a real browser to open them in."""
+
+import json
+import shutil
+import time
+
+import pytest
+from selenium.webdriver import Chrome, ChromeOptions, ChromeService
+
+from ffrobot.cli import cli
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+
+
+@pytest.fixture(scope="session")
+def page(tmp_path_factory):
+    """Write the report of results files; returns its path."""
+
+    def write(*results):
+        path = tmp_path_factory.mktemp("report") / "report.html"
+        cli(["report", *map(str, results), "-o", str(path)], standalone_mode=False)
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def two_link_page(page, two_link):
+    return page(two_link.folder / "scene.results.h5")
+
+
+class Browser:
+    """Chromium without a window."""
+
+    def __init__(self):
+        options = ChromeOptions()
+        options.binary_location = CHROMIUM
+        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+                         "--force-device-scale-factor=1", "--window-size=1400,1000"):  # fmt: skip
+            options.add_argument(argument)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        self.driver = Chrome(options=options, service=ChromeService(DRIVER))
+
+    def open(self, path):
+        """Load a page and wait until the mechanism is drawn."""
+        self.driver.get_log("browser")  # of the page before
+        self.driver.get(path.as_uri())
+        self.wait('document.querySelector("#mechanism .main-svg") !== null')
+
+    def run(self, script, *arguments):
+        return self.driver.execute_script(script, *arguments)
+
+    def value(self, expression):
+        """The value of an expression; numbers keep all digits."""
+        return json.loads(self.run(f"return JSON.stringify({expression})"))
+
+    def wait(self, condition, seconds=20):
+        end = time.monotonic() + seconds
+        while not self.run(f"return {condition}"):
+            assert time.monotonic() < end, f"not within {seconds} s: {condition}"
+            time.sleep(0.05)
+
+    def slide(self, name, value):
+        """Move a slider as a user does."""
+        self.run(
+            "const slider = document.getElementById(arguments[0]); slider.value = arguments[1];"
+            'slider.dispatchEvent(new Event("input"))',
+            name, value,
+        )  # fmt: skip
+
+    @property
+    def complaints(self):
+        """What the page wrote to the console."""
+        return [entry["message"] for entry in self.driver.get_log("browser")]
+
+    def screenshot(self, selector):
+        return self.driver.find_element("css selector", selector).screenshot_as_png
+
+
+@pytest.fixture(scope="session")
+def browser():
+    if CHROMIUM is None or DRIVER is None:
+        pytest.skip("chromium and chromium-driver are not installed; test.sh installs them")
+    browser = Browser()
+    yield browser
+    browser.driver.quit()

@@ -1,0 +1,166 @@
+"""The page in a real browser: no errors, no network, everything drawn, a mechanism that moves as it was solved."""
+
+import io
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from PIL import Image
+
+INVERSE_BLUE = (0x00, 0x72, 0xB2)
+
+
+def draw_all(browser):
+    """Scroll through the page until every chart has been near the window."""
+    browser.run("window.scrollTo(0, 0)")
+    height = browser.value("document.body.scrollHeight")
+    for y in range(0, height, 700):
+        browser.run(f"window.scrollTo(0, {y})")
+        browser.wait(
+            "[...document.querySelectorAll('[data-chart]')].every((c) => { const r = c.getBoundingClientRect();"
+            "return r.top > innerHeight || r.bottom < 0 || c.querySelector('.main-svg') })"
+        )
+    browser.run("window.scrollTo(0, 0)")
+
+
+@pytest.fixture
+def paused(browser, two_link_page):
+    """The two-link page, standing still at t = 0, to scale."""
+    browser.open(two_link_page)
+    browser.slide("exaggeration", 0)
+    browser.slide("time", 0)
+    return browser
+
+
+def joints_drawn(browser, run):
+    """Coordinates of the points of a run, by name."""
+    drawn = browser.value(
+        f"(() => {{ const r = MECHANISM.runs.findIndex((run) => run.label === '{run}'), run = MECHANISM.runs[r];"
+        "const names = run.bodies.flatMap((body) => body.names).filter((name) => !name.endsWith('.mid'));"
+        "const trace = stage.data[first[r] + run.bodies.length];"
+        "return names.map((name, i) => [name, trace.x[i], trace.y[i]]) })()"
+    )
+    return {name: np.array(at) for name, *at in drawn}
+
+
+def solved(two_link, point, t, analysis="inverse"):
+    (row,) = two_link.rows(analysis, [t])
+    return two_link.file[f"{analysis}/points/{point}/position"][row]
+
+
+def show(browser, t, exaggeration=1.0):
+    browser.slide("exaggeration", np.log10(exaggeration))
+    browser.slide("time", 1000 * t)
+    browser.wait(f"Math.abs(state.t - {t}) < 1e-9")
+
+
+@pytest.mark.parametrize("cases", [("two_link",), ("slider_crank", "two_link")])
+def test_page_opens_without_a_complaint(browser, page, request, cases):
+    folders = [request.getfixturevalue(case).folder for case in cases]
+    browser.open(page(*(folder / "scene.results.h5" for folder in folders)))
+    draw_all(browser)
+    charts = browser.value("places.length")
+    assert charts == len(browser.run("return document.querySelectorAll('[data-chart] .main-svg:first-child')"))
+    assert charts >= 10 * len(cases)
+    assert browser.complaints == []
+    assert browser.value('performance.getEntriesByType("resource").map((entry) => entry.name)') == []
+
+
+def test_mechanism_plays_by_itself(browser, two_link_page):
+    browser.open(two_link_page)
+    browser.wait("state.playing && state.t > 0")
+    before, at = joints_drawn(browser, "inverse"), browser.value("state.t")
+    browser.wait(f"state.t > {at} + 0.05")
+    after = joints_drawn(browser, "inverse")
+    assert np.linalg.norm(after["link2.tip"] - before["link2.tip"]) > 1e-3
+    browser.run("document.getElementById('play').click()")
+    assert browser.value("state.playing") is False
+
+
+@pytest.mark.parametrize("t", [0.0, 0.25, 1.0])
+def test_mechanism_is_where_it_was_solved(paused, two_link, t):
+    show(paused, t)
+    for point, at in joints_drawn(paused, "inverse").items():
+        np.testing.assert_allclose(at, solved(two_link, point, t), rtol=0, atol=1e-6)  # numbers of 7 digits
+
+
+def test_links_bend_as_much_as_the_slider_says_and_stay_joined(paused, two_link):
+    t = 0.1
+    show(paused, t, 40.0)
+    factor = paused.value("state.s")  # the slider has steps
+    assert 39 < factor < 41
+    drawn = joints_drawn(paused, "inverse")
+    np.testing.assert_allclose(drawn["link2.root"], drawn["link1.tip"], rtol=0, atol=1e-6)
+    # Link 2 is fixed to its frame at the root, so that its tip alone moves: by its deflection, exaggerated.
+    (row,) = two_link.rows("inverse", [t])
+    theta = two_link.file["inverse/bodies/link2/angle"][row]
+    deflection = two_link.file["inverse/points/link2.tip/deflection"][row]
+    turned = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]]) @ deflection
+    assert np.linalg.norm(turned) > 8e-4  # m: 0.83 mm at that time (checkpoints of the case)
+    moved = drawn["link2.tip"] - solved(two_link, "link2.tip", t)
+    np.testing.assert_allclose(moved, (factor - 1) * turned, rtol=0, atol=5e-6)
+
+
+def test_hidden_run_catches_up_when_shown(paused, two_link):
+    show(paused, 1.0)
+    hidden = joints_drawn(paused, "joints_only")["link2.tip"]
+    np.testing.assert_allclose(hidden, solved(two_link, "link2.tip", 0.0), rtol=0, atol=1e-6)
+    paused.run(
+        "const run = MECHANISM.runs.findIndex((r) => r.label === 'joints_only');"
+        "Plotly.restyle(stage, { visible: true }, stage.data.map((_, i) => i).filter("
+        "(i) => i >= first[run] && (run + 1 === first.length || i < first[run + 1])))"
+    )
+    paused.wait("Math.abs(stage.data[first[2] + 3].x.length - 1001) < 1")  # the path taken, up to the end
+    shown = joints_drawn(paused, "joints_only")["link2.tip"]
+    np.testing.assert_allclose(shown, solved(two_link, "link2.tip", 1.0, "joints_only"), rtol=0, atol=1e-6)
+
+
+def test_picture_of_the_mechanism(paused):
+    """Pixels: the robot is there, in its colour, and elsewhere at another time."""
+    pictures = []
+    for t in (0.0, 1.0):
+        show(paused, t, 50.0)
+        paused.wait("!stage._transitioning")
+        image = np.asarray(Image.open(io.BytesIO(paused.screenshot("#mechanism"))).convert("RGB"), dtype=int)
+        pictures.append(np.abs(image - INVERSE_BLUE).max(axis=2) < 40)
+    start, end = pictures
+    # Two links of about 300 pixels each, two edges of two pixels.
+    assert start.sum() > 1000
+    assert end.sum() > 1000
+    assert (start & ~end).sum() > 500
+
+
+def test_histories_show_what_the_file_holds(paused, two_link):
+    draw_all(paused)
+    curve = "document.querySelector('[data-chart=\"deflection_link2.tip\"]').data.find((d) => d.name === 'inverse')"
+    # Plotly decodes the binary text into a typed array of its own.
+    drawn = np.array(paused.value(f"Array.from({curve}._inputArray || {curve}.y._inputArray || {curve}.y)"))
+    expected = two_link.file["inverse/points/link2.tip/deflection"][:, 1]
+    np.testing.assert_allclose(drawn, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_names_are_shown_as_they_are(browser, page, two_link, tmp_path):
+    """A browser would take <b> for bold, and so would Plotly."""
+    path = shutil.copy(two_link.folder / "scene.results.h5", tmp_path)
+    with h5py.File(path, "r+") as file:
+        file.attrs["name"] = "<b>A & B</b>"
+    browser.open(page(path, two_link.folder / "scene.results.h5"))
+    assert browser.value("document.querySelector('h1').textContent").startswith("<b>A & B</b>")
+    legend = "[...document.querySelectorAll('#mechanism .legendtext')].map((item) => item.textContent)"
+    assert "<b>A & B</b>: inverse" in browser.value(legend)
+    assert browser.complaints == []
+
+
+def test_nothing_on_the_page_sends_data_away(paused):
+    draw_all(paused)
+    buttons = set(paused.value("[...document.querySelectorAll('.modebar-btn')].map((b) => b.dataset.title)"))
+    assert {"Download plot", "Reset axes"} <= buttons
+    assert not [title for title in buttons if "share" in title.lower() or "cloud" in title.lower()]
+    assert paused.value("document.links.length") == paused.value("document.querySelectorAll('a[href^=\"#\"]').length")
+
+
+def test_voltage_charts_mark_the_limit(paused):
+    draw_all(paused)
+    shapes = "document.querySelector('[data-chart=\"required_voltage_inverse_link1\"]').layout.shapes.map((s) => s.y0)"
+    assert paused.value(shapes) == [-200, 200]  # V, `limit` in the scene file

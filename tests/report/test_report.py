@@ -1,0 +1,218 @@
+"""What a report is made of: outlines, trees of joints, curves of many points, tables, and what it refuses."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from ffrobot.cli import cli
+from ffrobot.errors import InputError, SolveError
+from ffrobot.report import write_report
+from ffrobot.report.charts import MAX_POINTS, kept_outputs
+from ffrobot.report.mechanism import hanging
+from ffrobot.report.outline import body_outline, points_outline
+from ffrobot.report.runs import distinct_parts, runs, targets
+from ffrobot.report.tables import peaks_table
+from ffrobot.results_file import Results
+
+
+@pytest.fixture
+def results(two_link):
+    with Results(two_link.folder / "scene.results.h5") as results:
+        yield results
+
+
+def test_outline_of_a_link_is_its_section_moved_along(results):
+    """Ten bending modes at once: edges are half a height off the axis, and turn with the section."""
+    body = results.modal_body("link2")
+    p = 1e-3 * np.arange(1.0, 11.0)
+    outline = body_outline(body, p[None])
+    deformed = outline.at + outline.modes @ p
+    upper = deformed[: len(deformed) // 2]
+    for x in (0.0, 0.5, 1.0):
+        place = body.interpolate(x)
+        # Plane sections of small rotation θ: r = (x, h/2) + Φ p + θ (−h/2, 0); h = 0.015 m (link2.toml).
+        theta = place.rotation[2] @ p
+        expected = np.array([x, 0.0075]) + place.translation[:2] @ p + theta * np.array([-0.0075, 0.0])
+        assert np.linalg.norm(upper - expected, axis=1).min() < 1e-12
+    np.testing.assert_array_equal(outline.at[0], outline.at[-1])
+
+
+def test_outline_through_points_is_a_parabola():
+    at = np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])
+    deflection = np.array([[[0.0, 0.0], [0.0, 0.3], [0.0, 0.4]]])
+    outline = points_outline(["root", "mid", "tip"], at, deflection)
+    x, y = (outline.at + outline.modes @ outline.p[0]).T
+    np.testing.assert_allclose(y, 0.8 * x - 0.4 * x**2, atol=1e-15)  # through those three points
+
+
+def test_bodies_hang_from_the_ground(slider_crank):
+    with Results(slider_crank.folder / "scene.results.h5") as results:
+        tree = hanging(results.scene)
+    assert tree == {
+        "crank": ("crank.root", "ground"),
+        "rod": ("rod.root", "crank.tip"),
+        "slider": ("slider.pin", "rod.tip"),
+    }
+
+
+def test_curve_of_many_points_keeps_its_peaks():
+    values = np.sin(np.linspace(0, 7, 300_000))
+    values[123_456], values[234_567] = 9.0, -9.0
+    kept = kept_outputs(values)
+    assert len(kept) <= MAX_POINTS + 2
+    assert {0, 123_456, 234_567, 299_999} <= set(kept)
+    assert len(kept_outputs(values[:MAX_POINTS])) == MAX_POINTS
+
+
+@pytest.mark.parametrize(
+    ("paths", "labels"),
+    [
+        (["/c/beam/r.h5", "/c/solid/r.h5"], ["beam", "solid"]),
+        (["../beam/r.h5", "r.h5"], ["beam", Path.cwd().name]),
+        (["/c/beam/r.h5", "/c/beam/q.h5"], ["r.h5", "q.h5"]),
+        (["/c/r.h5", "/c/deep/er/r.h5"], ["r.h5", "deep/er/r.h5"]),
+        (["/a/x/r.h5", "/b/x/s.h5", "/b/x/r.h5"], ["a/x/r.h5", "b/x/s.h5", "b/x/r.h5"]),
+        (["/c/r.h5", "/c/r.h5"], ["r.h5 (1)", "r.h5 (2)"]),
+    ],
+)
+def test_files_of_the_same_scene_are_told_apart_by_their_paths(paths, labels):
+    assert distinct_parts([Path(path) for path in paths]) == labels
+
+
+def test_forward_analyses_are_measured_against_the_path_they_should_follow(results):
+    by_name = {run.analysis: targets(run) for run in runs([results])}
+    assert [target.point for target in by_name["joints_only"]] == ["link2.tip"]
+    t = results.time("inverse")
+    path = np.column_stack([1.5 * np.cos(np.pi * t / 4), np.sqrt(3) / 2 * np.cos(np.pi * t / 4)])  # scene.toml
+    np.testing.assert_allclose(by_name["joints_only"][0].wanted, path, atol=1e-14)
+
+
+def test_peaks_are_those_of_the_file(results, two_link):
+    rows = {(analysis, what): (value, at) for analysis, what, value, at in peaks_table(runs([results])).rows}
+    moment = np.abs(two_link.file["inverse/joints/O/moment"][()])
+    value, at = rows["inverse", "motor of joint O"]
+    assert value == f"{moment.max():.6g} N·m"
+    assert float(at) == pytest.approx(two_link.file["inverse/time"][moment.argmax()], abs=1e-12)
+
+
+def test_page_says_where_it_comes_from(two_link_page, two_link):
+    text = two_link_page.read_text(encoding="utf-8")
+    body = text[: text.index('<script type="application/json"')]
+    assert "damping, which is zero" in body  # what was skipped
+    for name in ("link1", "link2"):
+        file = Results(two_link.folder / "scene.results.h5").modal_files[name]
+        assert file.sha256 in body
+        assert file.input_hash in body
+    assert "ffrobot 0.1.0" in body
+    assert "y = &#34;sqrt(3)/2*cos(pi*t/4)&#34;" in body  # the scene's text
+
+
+def copy_of(case, folder):
+    return shutil.copy(case.folder / "scene.results.h5", folder)
+
+
+def test_page_without_modal_bodies_draws_links_through_their_points(two_link, tmp_path):
+    path = tmp_path / "scene.results.h5"
+    copy_of(two_link, path)
+    with h5py.File(path, "r+") as file:
+        file.attrs["modal_bodies"] = file.attrs["modal_bodies"].replace('.h5"', '.gone.h5"')
+    write_report([path], tmp_path / "r.html")
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "link1 is drawn through its points only" in text
+    assert "No modal body file is where it was" in text
+
+
+def test_results_that_stopped_early_have_a_page(two_link, tmp_path):
+    path = copy_of(two_link, tmp_path / "stopped.results.h5")
+    with h5py.File(path, "r+") as file:
+        del file["joints_only"]
+        for name, dataset in list(_datasets(file["forward"])):
+            values = dataset[:300]
+            del file["forward"][name]
+            file["forward"][name] = values
+        file["forward"].attrs["status"] = "interrupted"
+    write_report([path], tmp_path / "r.html")
+    assert "<td>interrupted</td><td>0.299</td><td>300</td>" in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+def _datasets(group):
+    found = {}
+    group.visititems(lambda name, item: found.update({name: item}) if isinstance(item, h5py.Dataset) else None)
+    return found.items()
+
+
+def test_texts_of_a_scene_are_no_markup(two_link, tmp_path):
+    path, evil = copy_of(two_link, tmp_path / "evil.results.h5"), "</script><script>alert(1)</script>"
+    with h5py.File(path, "r+") as file:
+        file.attrs["name"] = evil
+        file.attrs["scene"] = file.attrs["scene"] + f"# {evil}"
+        file.move("joints_only", "x<")
+        file.attrs["scene"] = file.attrs["scene"].replace('"joints_only"', '"x<"')
+    write_report([path, path], tmp_path / "r.html")
+    assert "<script>alert" not in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("output", "complaint"),
+    [("r.pdf", 'expected a name that ends in ".html"'), (".", "expected a file name, found a folder")],
+)
+def test_outputs_that_are_refused(two_link, tmp_path, output, complaint):
+    with pytest.raises(InputError, match=complaint):
+        write_report([two_link.folder / "scene.results.h5"], tmp_path / output)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_inputs_that_are_refused(two_link, tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        write_report([two_link.folder / "scene.results.h5", tmp_path / "absent.h5"], tmp_path / "r.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folder_that_is_not_there(two_link, tmp_path):
+    with pytest.raises(SolveError, match="cannot write the report"):
+        write_report([two_link.folder / "scene.results.h5"], tmp_path / "nowhere" / "r.html")
+
+
+def test_page_goes_beside_the_first_file(two_link, tmp_path, capsys):
+    path = copy_of(two_link, tmp_path / "scene.results.h5")
+    cli(["report", str(path)], standalone_mode=False)
+    assert capsys.readouterr().out == f"{tmp_path / 'scene.results.html'}\n"
+    size = (tmp_path / "scene.results.html").stat().st_size
+    assert size < 8e6  # Plotly takes 4.8 MB of it
+
+
+def test_modal_body_beside_results_that_were_moved(two_link, tmp_path):
+    path = copy_of(two_link, tmp_path / "scene.results.h5")
+    with Results(path) as results:
+        file = results.modal_files["link1"]
+        shutil.copy(file.path, tmp_path / file.path.name)
+    with h5py.File(path, "r+") as stored:
+        stored.attrs["modal_bodies"] = stored.attrs["modal_bodies"].replace(str(file.path.parent), "/nowhere")
+    with Results(path) as results:
+        assert results.modal_body("link1").name == "link1"
+        with pytest.raises(InputError, match='"link2" was solved with, found none'):
+            results.modal_body("link2")
+
+
+def test_report_needs_no_matplotlib(two_link, tmp_path):
+    """The extra `report` brings Plotly only."""
+    program = (
+        "import sys; sys.modules['matplotlib'] = None\nfrom ffrobot.cli import cli\n"
+        f"cli(['report', {str(two_link.folder / 'scene.results.h5')!r}, '-o', 'r.html'], standalone_mode=False)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "r.html").exists()
+
+
+@pytest.mark.parametrize("missing", ["jinja2", "plotly"])
+def test_what_is_not_installed_is_named(two_link, tmp_path, monkeypatch, missing):
+    monkeypatch.setitem(sys.modules, missing, None)
+    monkeypatch.delitem(sys.modules, "plotly.offline", raising=False)
+    with pytest.raises(SolveError, match=rf"a report needs {missing}.*pip install 'ffrobot\[report\]'"):
+        write_report([two_link.folder / "scene.results.h5"], tmp_path / "r.html")

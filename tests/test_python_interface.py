@@ -1,0 +1,136 @@
+"""`import ffrobot`: what the command line does, in a few lines of Python."""
+
+import tomllib
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import ffrobot
+
+ROOT = Path(__file__).parents[1]
+KEYS = {"time", "bodies/arm/angle", "points/arm.tip/position[0]", "joints/shoulder/moment", "energy/kinetic"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with the link file of an arm and its modal body."""
+    folder = tmp_path_factory.mktemp("arm")
+    (folder / "arm.toml").write_text(
+        """
+name = "arm"
+material = { youngs_modulus = 70e9, poissons_ratio = 0.33, density = 2700.0 }
+geometry = { kind = "beam", length = 0.6, section = { shape = "tube", outer = 0.02, inner = 0.016 } }
+mesh = { elements = 10 }
+reference = { condition = "cantilever" }
+modes = { count = 3, family = "in-plane-bending" }
+""",
+        encoding="utf-8",
+    )
+    ffrobot.make_link(folder / "arm.toml")
+    return folder
+
+
+def swing(folder, **changes):
+    keys = {
+        "name": "swing",
+        "gravity": np.array([0.0, -9.81]),
+        "body": [{"name": "arm", "modal": folder / "arm.h5"}],
+        "joint": [{"name": "shoulder", "type": "revolute", "between": ("ground", "arm.root")}],
+        "initial": {"state": "static"},
+        "trajectory": [{"name": "turn", "joint": "shoulder", "value": "0.5*sin(t)"}],
+        "analysis": [{"name": "inverse", "kind": "pcid", "end": np.float64(0.02), "output_step": 0.001}],
+    }
+    return ffrobot.make_scene(folder=folder, **keys | changes)
+
+
+@pytest.fixture(scope="module")
+def results(folder):
+    return ffrobot.solve(swing(folder))
+
+
+def test_scene_made_in_python_is_the_scene_of_a_file(folder, results):
+    scene = swing(folder)
+    (folder / "swing.toml").write_text(scene.text, encoding="utf-8")
+    from_file = ffrobot.solve(folder / "swing.toml")
+    assert ffrobot.load_scene(folder / "swing.toml").analysis == scene.analysis
+    assert results.columns("inverse").keys() >= KEYS
+    for name, values in from_file.columns("inverse").items():
+        np.testing.assert_array_equal(values, results.columns("inverse")[name])
+
+
+def test_results_in_memory_are_those_of_a_file(folder, results, tmp_path):
+    stored = ffrobot.solve(swing(folder), tmp_path / "r.h5")
+    assert list(folder.glob("*.results.h5")) == []
+    with h5py.File(tmp_path / "r.h5") as file:
+        moment = file["inverse/joints/shoulder/moment"][()]
+    for holder in (results, stored):
+        np.testing.assert_array_equal(holder["inverse/joints/shoulder/moment"], moment)
+        np.testing.assert_array_equal(holder.data("inverse/joints/shoulder/moment")[:, 0], moment)
+    assert results.time("inverse")[-1] == 0.02
+    assert results.modal_body("arm").mode_count == 3
+    ffrobot.write_report([tmp_path / "r.h5"], tmp_path / "r.html")
+    assert (tmp_path / "r.html").is_file()
+
+
+def test_columns_split_what_has_several(results):
+    columns = results.columns("inverse")
+    assert {values.shape for values in columns.values()} == {(21,)}
+    tip = results["inverse/points/arm.tip/position"]
+    np.testing.assert_array_equal(columns["points/arm.tip/position[1]"], tip[:, 1])
+
+
+def test_a_load_of_python_numbers(folder):
+    """A scene varied in a loop: twice the payload, so much more moment at rest."""
+    moments = []
+    for mass in np.linspace(0.0, 1.0, 3)[1:]:
+        held = {"name": "rest", "kind": "static"}
+        scene = swing(folder, payload=[{"point": "arm.tip", "mass": mass}], analysis=[held])
+        moments.append(ffrobot.solve(scene)["rest/joints/shoulder/moment"][0])
+    # The arm lies straight along x but for its sag: 0.5 kg more at 0.6 m.
+    assert moments[1] - moments[0] == pytest.approx(0.5 * 9.81 * 0.6, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"gravitas": 1.0}, 'gravitas: expected one of the keys .*did you mean "gravity"'),
+        ({"gravity": "down"}, 'gravity: expected a list, found "down"'),
+        ({"body": [{"name": "arm", "link": "absent.toml"}]}, 'body "arm": link: expected an existing file'),
+        ({"gravity": [0.0, 1j]}, "expected numbers, text, lists and tables"),
+        ({"analysis": None}, "analysis: expected a value, since this key is required"),
+    ],
+)
+def test_mistakes_are_named_as_in_a_file(folder, changes, complaint):
+    with pytest.raises(ffrobot.InputError, match=complaint) as error:
+        swing(folder, **changes)
+    assert "<scene made in Python>: " in str(error.value)
+
+
+def test_run_that_stops_early_keeps_its_file(folder, tmp_path):
+    few = {"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.001, "max_steps": 3}
+    with pytest.raises(ffrobot.SolveError, match="raise max_steps"):
+        ffrobot.solve(swing(folder, analysis=[few]), tmp_path / "r.h5")
+    with ffrobot.Results(tmp_path / "r.h5") as results:
+        assert results.attributes("inverse")["status"] == "too many steps"
+
+
+def test_objects_print_what_they_are(folder, results):
+    # 2700 kg/m³ · π/4 (0.02² − 0.016²) m² · 0.6 m = 0.18322 kg
+    body = ffrobot.read_modal_body(folder / "arm.h5")
+    assert repr(body).startswith("ModalBody('arm'): beam, cantilever, 0.6 m, 0.18322 kg, 3 modes of ")
+    assert repr(swing(folder)) == ("Scene('swing'): bodies arm; joints shoulder; trajectories turn; analyses inverse")
+    assert repr(results).splitlines()[1] == "  inverse: pcid, 21 outputs up to 0.02 s, completed"
+    closed = ffrobot.solve(swing(folder))
+    closed.close()
+    assert repr(closed).endswith("closed")
+
+
+def test_every_public_name_is_there():
+    assert set(ffrobot.__all__) <= set(dir(ffrobot))
+    for name in ffrobot.__all__:
+        assert getattr(ffrobot, name).__doc__
+    with pytest.raises(AttributeError, match="no attribute 'sovle'"):
+        ffrobot.sovle  # noqa: B018
+    assert ffrobot.__version__ == tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]

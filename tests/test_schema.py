@@ -1,0 +1,122 @@
+"""JSON schemas: they take what the program takes, and refuse the mistakes in single keys that it refuses."""
+
+import copy
+import json
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from ffrobot.errors import InputError
+from ffrobot.fe_models.link_file import read_link
+from ffrobot.mbs.scene_file import load_scene, make_scene
+from ffrobot.schema import schema
+
+CASES = Path(__file__).parents[1] / "cases"
+SCENES = sorted(CASES.glob("*/scene.toml"))
+LINKS = sorted(path for path in CASES.glob("*/*.toml") if path.name not in ("scene.toml", "figures.toml"))
+
+
+@pytest.fixture(scope="module")
+def validator(ffrobot):
+    """Validators of what the command prints."""
+
+    def make(kind):
+        done = ffrobot("schema", kind)
+        assert done.returncode == 0, done.stderr
+        printed = json.loads(done.stdout)
+        assert printed == schema(kind)
+        cls = jsonschema.validators.validator_for(printed)
+        cls.check_schema(printed)
+        return cls(printed)
+
+    return {kind: make(kind) for kind in ("link", "scene")}
+
+
+def parsed(path):
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.parent.name)
+def test_scenes_of_the_cases_pass(validator, path):
+    load_scene(path)
+    validator["scene"].validate(parsed(path))
+
+
+@pytest.mark.parametrize("path", LINKS, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_links_of_the_cases_pass(validator, path):
+    read_link(path)
+    validator["link"].validate(parsed(path))
+
+
+def edited(data, keys, value):
+    """A copy of `data` with one entry replaced, added, or (None) left out."""
+    data = copy.deepcopy(data)
+    *path, last = keys
+    table = data
+    for key in path:
+        table = table[key]
+    if value is None:
+        del table[last]
+    else:
+        table[last] = value
+    return data
+
+
+SCENE_MISTAKES = {
+    "unknown key": (("moters",), "section"),
+    "unknown key in a table": (("initial", "angels"), {}),
+    "missing key": (("gravity",), None),
+    "wrong type": (("analysis", 0, "end"), "1.0"),
+    "not a number": (("gravity",), [0.0, "down"]),
+    "too many numbers": (("gravity",), [0.0, -9.81, 0.0]),
+    "number out of range": (("pzt", 0, "length"), -0.05),
+    "tolerance out of range": (("analysis", 0, "tolerance"), 1e-18),
+    "unknown word": (("joint", 0, "type"), "revolut"),
+    "list for an expression": (("trajectory", 0, "x"), ["t"]),
+    "table for a list": (("body",), {"name": "link1"}),
+    "missing key in a table": (("pzt", 0, "d31"), None),
+}
+LINK_MISTAKES = {
+    "unknown key": (("material", "densty"), 1.0),
+    "missing key": (("geometry", "length"), None),
+    "negative": (("material", "density"), -7850.0),
+    "unknown section": (("geometry", "section", "shape"), "square"),
+    "unknown family": (("modes", "family"), "bending"),
+    "no whole number": (("mesh", "elements"), 2.5),
+    "unknown kind": (("geometry", "kind"), "shell"),
+}
+
+
+@pytest.mark.parametrize(("keys", "value"), SCENE_MISTAKES.values(), ids=SCENE_MISTAKES)
+def test_mistakes_in_a_scene_are_refused_by_both(validator, keys, value):
+    folder = CASES / "two_link"
+    data = edited(parsed(folder / "scene.toml"), keys, value)
+    with pytest.raises(InputError):
+        make_scene(folder=folder, **data)
+    assert not validator["scene"].is_valid(data)
+
+
+@pytest.mark.parametrize(("keys", "value"), LINK_MISTAKES.values(), ids=LINK_MISTAKES)
+def test_mistakes_in_a_link_are_refused_by_both(validator, tmp_path, keys, value):
+    import tomli_w
+
+    data = edited(parsed(CASES / "two_link" / "link1.toml"), keys, value)
+    (tmp_path / "link.toml").write_text(tomli_w.dumps(data), encoding="utf-8")
+    with pytest.raises(InputError):
+        read_link(tmp_path / "link.toml")
+    assert not validator["link"].is_valid(data)
+
+
+def test_schema_knows_only_what_toml_can_say():
+    for kind in ("link", "scene"):
+        text = json.dumps(schema(kind))
+        assert '"null"' not in text
+        assert ": null" not in text
+
+
+def test_key_of_the_schema_itself_is_none_of_the_file(validator):
+    """`#:schema` is a comment to TOML: a file that names its schema is still a file of the program."""
+    text = "#:schema ./scene.schema.json\n" + (CASES / "two_link" / "scene.toml").read_text(encoding="utf-8")
+    validator["scene"].validate(tomllib.loads(text))

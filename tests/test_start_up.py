@@ -1,0 +1,55 @@
+"""What it takes to import the package and to ask the program for help.
+
+Bounds are the aims of the project on a quiet machine; where the machine is busy the bare interpreter is slow as well.
+"""
+
+import re
+import statistics
+import subprocess
+import sys
+import time
+
+HEAVY = ("numpy", "scipy", "h5py", "pydantic", "rich", "dolfinx", "matplotlib", "plotly")
+IMPORT_AIM, HELP_AIM = 0.05, 0.2  # s
+
+
+def seconds(*command, runs=7):
+    """Median time of a command."""
+    taken = []
+    for _ in range(runs):
+        began = time.perf_counter()
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        taken.append(time.perf_counter() - began)
+    return statistics.median(taken)
+
+
+def busy():
+    """How much slower than on a quiet machine (0.03 s) the interpreter starts."""
+    return max(1.0, seconds(sys.executable, "-c", "pass") / 0.03)
+
+
+def loaded(program):
+    done = subprocess.run([sys.executable, "-c", f"import sys\n{program}\nprint(*sys.modules)"],
+                          capture_output=True, text=True, check=True)  # fmt: skip
+    return set(done.stdout.split())
+
+
+def test_import_takes_a_few_milliseconds():
+    def cost():
+        done = subprocess.run([sys.executable, "-X", "importtime", "-c", "import ffrobot"],
+                              capture_output=True, text=True, check=True)  # fmt: skip
+        return float(re.search(r"\|\s*(\d+) \| ffrobot$", done.stderr, flags=re.MULTILINE)[1]) * 1e-6
+
+    assert statistics.median(cost() for _ in range(7)) < IMPORT_AIM * busy()
+
+
+def test_import_loads_nothing_heavy():
+    assert not loaded("import ffrobot") & set(HEAVY)
+
+
+def test_help_comes_at_once(ffrobot):
+    assert seconds(ffrobot.path, "--help") < HELP_AIM * busy()
+
+
+def test_help_loads_nothing_heavy():
+    assert not loaded("import ffrobot.cli") & set(HEAVY)
