@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from ..mesh.compat import compiled_form, geometry_degree, lagrange_element, lagrange_space, node_map
 from ..mesh.slices import section_quadrature
 from .elasticity import SolidModel
+from .tensors import LEVI_CIVITA
 
 Floats = NDArray[np.float64]
-
-LEVI_CIVITA = np.array([[[(a - b) * (b - c) * (c - a) / 2 for c in range(3)] for b in range(3)] for a in range(3)])
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 
 from ..mesh.records import InterfaceRecord
 from .modal_body import Interface
+from .tensors import LEVI_CIVITA
 
 if TYPE_CHECKING:
     from .invariants import Invariants
 
 Floats = NDArray[np.float64]
-
-# ε_abc, (3, 3, 3).
-LEVI_CIVITA = np.array([[[(a - b) * (b - c) * (c - a) / 2 for c in range(3)] for b in range(3)] for a in range(3)])
 
 
 @dataclass(frozen=True)
