@@ -61,7 +61,8 @@ def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
     analysis = outcome.analysis
     group.attrs["kind"] = analysis.kind
-    group.attrs["integrator"] = "none" if analysis.kind == "static" else analysis.integrator
+    group.attrs["integrator"] = "none" if analysis.kind == "static" else outcome.integrator.name
+    group.attrs["integrator_reason"] = "" if analysis.kind == "static" else outcome.integrator.reason
     group.attrs["tolerance"] = analysis.tolerance
     group.attrs["actuation"] = analysis.actuation or ""
     group.attrs["apply"] = analysis.apply or ""

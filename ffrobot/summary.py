@@ -29,6 +29,9 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
         console.print()
         console.print(_voltages(solution))
     notes = Table.grid(padding=(0, 2))
+    for name, outcome in solution.outcomes.items():
+        if outcome.analysis.kind != "static" and outcome.analysis.integrator == "auto":
+            notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
         notes.add_row("skipped", "; ".join(solution.skipped))
@@ -38,13 +41,14 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
 
 
 def _analyses(solution: Solution) -> Table:
-    table = _table("analysis", "kind", "t (s)", "steps", "error aim", "constraints", "wall (s)")
+    table = _table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
         analysis, reached = outcome.analysis, outcome.time[-1]
         integrated = analysis.kind != "static"
         table.add_row(
             name,
             analysis.kind,
+            outcome.integrator.name if integrated else "",
             f"{reached:g}" if outcome.status == "completed" else f"{reached:g} of {analysis.end:g}",
             f"{outcome.steps}" if integrated else "",
             f"{analysis.tolerance:.0e}" if integrated else "",
@@ -75,7 +79,7 @@ def _table(*headers: str) -> Table:
     """Columns of text without lines: the first ones left, numbers right; names fold where they must."""
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for k, header in enumerate(headers):
-        if k < 2:
+        if k < 2 or header == "integrator":
             table.add_column(header, overflow="fold")
         else:
             table.add_column(header, justify="right", no_wrap=True)

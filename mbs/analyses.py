@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import SolveError
 from . import _core
 from .initial_state import State, check_reach, undeformed_state
+from .integrators import METHODS, Choice, choose_integrator
 from .model import ZERO, Array, Assembly, Model
 from .rows import Row
 from .scene_records import Analysis
@@ -52,6 +53,7 @@ class Outcome:
     rejected: int
     evaluations: int
     wall_seconds: float
+    integrator: Choice
     recording: _core.Recording | None = field(default=None, repr=False)
 
     def coordinates(self, body: str) -> slice:
@@ -116,7 +118,8 @@ def run_forward(
         start = _transfer(source)
     else:
         start = initial_state(assembly)
-    return _integrate(assembly, analysis, start, steering, None, None, progress)
+    replayed = source.integrator if source else None
+    return _integrate(assembly, analysis, start, steering, None, None, progress, replayed)
 
 
 def run_static(model: Model, analysis: Analysis) -> Outcome:
@@ -174,16 +177,19 @@ def _integrate(
     resolver: _core.ActuationResolver | None,
     recording: _core.Recording | None,
     progress: Progress,
+    replayed: Choice | None = None,
 ) -> Outcome:
     began = time.perf_counter()
+    integrator = choose_integrator(assembly, analysis, start, replayed)
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, steering, analysis.times.tolist(), start.q, start.v,
-        analysis.tolerance, analysis.max_steps, resolver, progress, recording,
+        analysis.tolerance, analysis.max_steps, METHODS[integrator.name], analysis.spectral_radius, resolver, progress,
+        recording,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     reached = len(run.q)
     return Outcome(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers,
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
-        _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, recording,
+        _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, integrator, recording,
     )  # fmt: skip

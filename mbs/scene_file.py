@@ -161,6 +161,11 @@ def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Anal
         return
     if source.kind != "pcid":
         yield f'actuation: expected an analysis of kind "pcid", found "{source.name}" of kind "{source.kind}"'
+    elif source.integrator == "generalized-alpha":
+        yield (
+            f"actuation: expected an analysis whose steps can be made again to replay it (any integrator but"
+            f' "generalized-alpha"), found "{source.name}" with that'
+        )
     elif analysis.end > source.end:
         yield f'end: expected at most {source.end:g}, where "{source.name}" ends, found {analysis.end:g}'
     if analysis.apply == "joints+pzt" and not scene.pzt:

@@ -293,7 +293,8 @@ class Analysis(Record):
     actuation: str | None = None
     apply: Literal["joints", "joints+pzt", "trajectory"] | None = None
     shape: Literal["zero", "static", "given"] | None = None
-    integrator: Literal["dop853"] = "dop853"
+    integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
+    spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8  # of generalized-alpha at infinite frequency
     max_steps: Annotated[int, Field(gt=0)] = 5_000_000
 
     @model_validator(mode="after")
@@ -313,6 +314,11 @@ class Analysis(Record):
             )
         if self.actuation is not None and self.kind != "forward":
             raise ValueError(f'expected the key "actuation" only in kind = "forward", found kind = "{self.kind}"')
+        if "spectral_radius" in self.model_fields_set and self.integrator != "generalized-alpha":
+            raise ValueError(
+                'expected the key "spectral_radius" only with integrator = "generalized-alpha", found integrator ='
+                f' "{self.integrator}"'
+            )
         if self.shape is not None and self.kind != "fcid":
             raise ValueError(f'expected the key "shape" only in kind = "fcid", found kind = "{self.kind}"')
         return self

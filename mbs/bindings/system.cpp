@@ -1,4 +1,5 @@
 #include "core/system.h"
+#include "core/motion.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
@@ -56,6 +57,21 @@ std::tuple<VectorXd, VectorXd, MatrixXd> constraints(const System &system, doubl
   VectorXd value(m), rate(m);
   constraint_residuals(system, t, q.data(), v.data(), w, value.data(), rate.data());
   return {value, rate, constraint_jacobian(system, w)};
+}
+
+// x of N x + C_q^T nu = r, C_q x = c (iteration_matrix.h)
+VectorXd newton_step(const System &system, double t, const VectorXd &q, const VectorXd &v, double damping_factor,
+                     double stiffness_factor, const VectorXd &r, const VectorXd &c) {
+  VectorXd x(system.coordinates), y(2 * system.coordinates), slope(y.size());
+  y << q, v;
+  check_size("y", y.size(), slope.size());
+  check_size("r", r.size(), x.size());
+  check_size("c", c.size(), static_cast<Eigen::Index>(system.constraints.size()));
+  ConstrainedMotion motion(system, {}, {}, nullptr);
+  motion.slope(t, y.data(), slope.data());
+  motion.factorise(damping_factor, stiffness_factor);
+  motion.solve(r.data(), c.data(), x.data());
+  return x;
 }
 
 VectorXd force_at_rest(const System &system, double t, const VectorXd &q) {
@@ -132,6 +148,8 @@ void bind_system(nb::module_ &m) {
            "Accelerations (coordinates,) and multipliers (constraints,).")
       .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q.")
       .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces of gravity, elasticity and drives.")
+      .def("newton_step", &newton_step, "t"_a, "q"_a, "v"_a, "damping_factor"_a, "stiffness_factor"_a, "r"_a, "c"_a,
+           "x of (M + damping_factor D + stiffness_factor K) x + C_q^T nu = r, C_q x = c; r on modes alone.")
       .def("energies", &energies, "q"_a, "v"_a, "Kinetic, strain, gravitational energy and dissipated power (T, 4).");
 
   m.def(

@@ -284,7 +284,7 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
                  PlanarBodyState &s) {
   const double *p = q + 3, *p_dot = v + 3;
   const Vector2d g = rotate_back(s, gravity);
-  const Vector2d moment = body.first_moment + s.Wp.head<2>(); // s = s0 + S_bar p
+  const Vector2d moment = s.moment = body.first_moment + s.Wp.head<2>();
   Vector3d Q = frame_force(body, p, p_dot, g, moment, s);
 
   // Known part of the modal forces: Q_f = theta_dot^2 p - K p - D p_dot + W^T z + extra
@@ -303,10 +303,10 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
 
   // The frame after elimination of p
   const Vector2d coupling = perpendicular(moment) - s.G.col(2).head<2>();
-  double inertia = body.inertia + weighted(body, p, p) - s.G(2, 2);
+  s.inertia = body.inertia + weighted(body, p, p);
   if (body.j.size())
-    inertia += 2 * body.j.dot(VectorMap(p, body.modes()));
-  factorise_rotation(coupling, inertia, s);
+    s.inertia += 2 * body.j.dot(VectorMap(p, body.modes()));
+  factorise_rotation(coupling, s.inertia - s.G(2, 2), s);
   s.free_frame = backward(s.L, forward(s.L, Q - WQ.head<3>()).cwiseProduct(s.D_inverse));
 
   for (Index k = 0; k < body.markers(); ++k)

@@ -74,6 +74,8 @@ struct PlanarBodyState {
   Eigen::Vector3d L;             // (L_10, L_20, L_21)
   Eigen::Vector3d D_inverse;
   Eigen::Vector3d free_frame; // free (a, alpha) of the body frame, body axes
+  Eigen::Vector2d moment;     // s0 + S_bar p
+  double inertia = 0;         // m_thetatheta
 };
 
 // Positions and velocities of the markers for q = (R, theta, p), v = its rates.
