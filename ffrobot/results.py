@@ -36,10 +36,12 @@ def write_results(solution: Solution, path: Path) -> None:
         file.attrs["name"] = solution.scene.name
         file.attrs["scene"] = solution.scene.text
         file.attrs["skipped"] = list(solution.skipped)
+        file.attrs["geometric_stiffening"] = solution.stiffened
         file.attrs["modal_bodies"] = json.dumps(_modal_files(solution))
         for name, outcome in solution.outcomes.items():
             group = file.create_group(name)
             _write_attributes(group, outcome)
+            group.attrs["stiffening_effect"] = solution.stiffening_effects[name]
             _write_motion(group, outcome)
             _write_forces(group, outcome)
             for body_name, voltages in solution.voltages.get(name, {}).items():

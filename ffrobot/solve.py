@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from .fe_models.modal_body import ModalBody
 from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
+from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.scene_file import load_scene
@@ -58,6 +59,8 @@ class Solution:
         outcomes: by analysis, in the order of the scene.
         voltages: by analysis and body.
         seconds: wall time by stage.
+        stiffened: whether geometric stiffening is in the equations.
+        stiffening_effects: by analysis, the largest relative change of a mode's stiffness by the loads of the run.
         skipped: what the scene did not need, one line each.
     """
 
@@ -69,6 +72,8 @@ class Solution:
     voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
+    stiffened: bool = False
+    stiffening_effects: dict[str, float] = field(default_factory=dict)
 
 
 def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
@@ -81,19 +86,33 @@ def solve(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     watcher = watcher or Watcher()
     solution = prepare(scene_path, watcher)
     with Interruption() as interruption:
-        for analysis in solution.scene.analysis:
-            started = time.perf_counter()
-            outcome = _run(solution, analysis, watcher, interruption)
-            solution.outcomes[analysis.name] = outcome
-            if outcome.F_p is not None:
-                solution.voltages[analysis.name] = {
-                    body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
-                    for body, array in solution.patches.items()
-                }
-            solution.seconds[analysis.name] = time.perf_counter() - started
-            if outcome.status != "completed":
-                break
+        if not _run_all(solution, watcher, interruption):
+            solution = _assembled(solution.scene, solution.bodies, solution.seconds, stiffened=True)
+            _run_all(solution, watcher, interruption)
     return solution
+
+
+def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> bool:
+    """Run the analyses; False where `geometric_stiffening = "auto"` asks for all of them again, stiffened."""
+    stiffening = {name: body.planar.stiffening for name, body in solution.bodies.items()}
+    for analysis in solution.scene.analysis:
+        started = time.perf_counter()
+        outcome = _run(solution, analysis, watcher, interruption)
+        effect = estimated_effect(outcome, stiffening)
+        automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
+        if automatic and effect > NOTABLE and outcome.status != "interrupted":
+            return False
+        solution.stiffening_effects[analysis.name] = effect
+        solution.outcomes[analysis.name] = outcome
+        if outcome.F_p is not None:
+            solution.voltages[analysis.name] = {
+                body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
+                for body, array in solution.patches.items()
+            }
+        solution.seconds[analysis.name] = time.perf_counter() - started
+        if outcome.status != "completed":
+            break
+    return True
 
 
 def prepare(scene_path: Path, watcher: Watcher | None = None) -> Solution:
@@ -102,16 +121,27 @@ def prepare(scene_path: Path, watcher: Watcher | None = None) -> Solution:
     began = time.perf_counter()
     scene = load_scene(scene_path)
     bodies = {body.name: loaded for body, loaded in zip(scene.body, _load_bodies(scene, watcher), strict=True)}
-    loaded = time.perf_counter()
+    seconds = {"links and files": time.perf_counter() - began}
+    return _assembled(scene, bodies, seconds, stiffened=scene.geometric_stiffening is True)
+
+
+def _assembled(scene: Scene, bodies: Mapping[str, LoadedBody], seconds: dict[str, float], stiffened: bool) -> Solution:
+    """The equations of a scene, with or without geometric stiffening."""
     patches = {
         layout.body: patch_array(scene.path, layout, modal, bodies[layout.body].planar)
         for layout in scene.pzt
         if (modal := bodies[layout.body].modal) is not None
     }
-    model = build_model(scene, [body.planar for body in bodies.values()], _voltage_loads(scene, patches))
-    solution = Solution(scene, model, bodies, patches, skipped=tuple(_skipped(scene, bodies)))
-    solution.seconds["links and files"] = loaded - began
-    return solution
+    for name, body in bodies.items():
+        if stiffened and body.modal is not None and body.planar.stiffening is None:
+            raise InputError(
+                f"{scene.path}: geometric_stiffening: expected modal bodies with geometric stiffness, found none in"
+                f' that of "{name}"'
+            )
+    planar = [body.planar if stiffened else replace(body.planar, stiffening=None) for body in bodies.values()]
+    model = build_model(scene, planar, _voltage_loads(scene, patches))
+    skipped = tuple(_skipped(scene, bodies))
+    return Solution(scene, model, bodies, patches, seconds=seconds, skipped=skipped, stiffened=stiffened)
 
 
 def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Outcome:

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from .mbs.analyses import Outcome
+from .mbs.geometric_stiffening import NOTABLE
 from .solve import Solution
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
@@ -32,12 +33,24 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     for name, outcome in solution.outcomes.items():
         if outcome.analysis.kind != "static" and outcome.analysis.integrator == "auto":
             notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
+    notes.add_row(*_stiffening(solution))
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
         notes.add_row("skipped", "; ".join(solution.skipped))
     console.print()
     console.print(notes)
     console.print(f"results    {path}", soft_wrap=True)
+
+
+def _stiffening(solution: Solution) -> tuple[str, str]:
+    """What loads along the links do to their stiffness, and whether the equations know."""
+    effect = max(solution.stiffening_effects.values(), default=0.0)
+    changes = f"loads change a mode's stiffness by up to {100 * effect:.2g} %"
+    if solution.stiffened:
+        return "stiffening", f"geometric stiffening is on: {changes}"
+    if effect > NOTABLE:
+        return "warning", f"geometric stiffening is off, and {changes}: consider geometric_stiffening = true"
+    return "stiffening", f"geometric stiffening is off: {changes}"
 
 
 def _analyses(solution: Solution) -> Table:

@@ -25,12 +25,15 @@ _STATUS = {
     _core.IntegrationStatus.step_underflow: "step underflow",
     _core.IntegrationStatus.too_many_steps: "too many steps",
     _core.IntegrationStatus.interrupted: "interrupted",
+    _core.IntegrationStatus.diverged: "diverged",
 }
 _ADVICE = {
     "step underflow": "no step is small enough there: the motion turns singular (a stretched arm, a jump in a"
     " trajectory) or the load grows without bound",
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
     "interrupted": "stopped on request",
+    "diverged": "a link is bent by as much as it is long, which small deformations do not describe: loads beyond"
+    " buckling, a spin that needs geometric_stiffening = true, or an arm without motors that falls apart",
 }
 
 

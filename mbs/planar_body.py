@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fe_models.modal_body import ModalBody
+from . import geometric_stiffening
+from .geometric_stiffening import GeometricStiffening
 from .scene_records import RigidBody
 
 Array = NDArray[np.float64]
@@ -52,6 +54,7 @@ class PlanarBody:
     points: Mapping[str, PlanarPoint]
     modal_transform: Array
     length: float | None
+    stiffening: GeometricStiffening | None = None  # left out of the equations where None
 
     @property
     def n_modes(self) -> int:
@@ -60,7 +63,10 @@ class PlanarBody:
 
 
 def from_modal_body(name: str, body: ModalBody) -> PlanarBody:
-    """The planar part of a modal body: modes without motion in the plane are left out, their p stay zero."""
+    """The planar part of a modal body: modes without motion in the plane are left out, their p stay zero.
+
+    Geometric stiffness comes along where the file has it; who wants equations without it puts None in its place.
+    """
     m_xy = body.S_bar_kl[0, 0] + body.S_bar_kl[1, 1]
     in_plane = np.flatnonzero(np.diag(m_xy) > NEGLIGIBLE)
     block = np.ix_(in_plane, in_plane)
@@ -89,6 +95,7 @@ def from_modal_body(name: str, body: ModalBody) -> PlanarBody:
         ),
         modal_transform=np.eye(len(omega))[:, in_plane],
         length=body.length,
+        stiffening=geometric_stiffening.from_modal_body(body, in_plane),
     )
     return _diagonalised(planar, body.stiffness[block], np.eye(len(in_plane)))
 
@@ -137,6 +144,7 @@ def with_payload(body: PlanarBody, point: str, mass: float, inertia: float) -> P
         j=body.j + mass * (x * Phi_x + y * Phi_y),
         S_tilde=body.S_tilde + mass * (np.outer(Phi_x, Phi_y) - np.outer(Phi_y, Phi_x)),
         m_xy=body.m_xy + mass * (np.outer(Phi_x, Phi_x) + np.outer(Phi_y, Phi_y)),
+        stiffening=body.stiffening and body.stiffening.with_payload(point, at.position, mass, inertia),
     )
     m_ff = np.eye(body.n_modes) + loaded.m_xy - body.m_xy + inertia * np.outer(phi, phi)
     return _diagonalised(loaded, np.diag(body.stiffness), m_ff)
@@ -168,10 +176,11 @@ def _diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:
             }
         ),
         modal_transform=body.modal_transform @ T,
+        stiffening=body.stiffening and body.stiffening.transformed(T),
     )
 
 
-def core_arguments(body: PlanarBody, markers: list[PlanarPoint]) -> dict[str, Any]:
+def core_arguments(body: PlanarBody, markers: list[PlanarPoint], names: list[str]) -> dict[str, Any]:
     """Arguments of `_core.System.add_body`; terms that vanish are passed as empty arrays, which the core skips."""
     n = body.n_modes
     size = np.sqrt(body.mass) * max((float(np.linalg.norm(m.position)) for m in markers), default=0.0)
@@ -188,6 +197,7 @@ def core_arguments(body: PlanarBody, markers: list[PlanarPoint]) -> dict[str, An
         "S_tilde": _unless_negligible(body.S_tilde, 1.0),
         "m_xy": np.zeros((0, 0)) if np.abs(body.m_xy - np.eye(n)).max(initial=0.0) < NEGLIGIBLE else body.m_xy,
         "marker_positions": [m.position for m in markers],
+        **geometric_stiffening.core_arguments(body.stiffening, names),
     }
 
 

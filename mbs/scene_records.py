@@ -354,6 +354,7 @@ class SceneKeys(Record):
     space: Literal["planar", "spatial"] = "planar"
     gravity: Vector2
     motors: Literal["section", "frame"] = "section"
+    geometric_stiffening: bool | Literal["auto"] = False
     body: Annotated[tuple[Body, ...], NotEmpty]
     joint: tuple[Joint, ...] = ()
     trajectory: tuple[Trajectory, ...] = ()

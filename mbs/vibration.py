@@ -88,6 +88,6 @@ def ringing(assembly: Assembly, state: State, modes: Vibrations) -> Array:
     forces = np.abs(modes.force) * amplitude
     group = np.array(assembly.groups)
     sizes = np.array([np.abs(lambda_[group == g]).max() + forces[group == g].sum() for g in group])
-    sizes = np.maximum(sizes, 1e-3 * sizes.max())
+    sizes = np.maximum(sizes, max(1e-3 * float(sizes.max()), 1e-300))
     result = (forces / sizes[:, None]).max(axis=0)
     return result

@@ -52,7 +52,8 @@ void bind_run(nb::module_ &m) {
       .value("completed", IntegrationStatus::completed)
       .value("step_underflow", IntegrationStatus::step_underflow)
       .value("too_many_steps", IntegrationStatus::too_many_steps)
-      .value("interrupted", IntegrationStatus::interrupted);
+      .value("interrupted", IntegrationStatus::interrupted)
+      .value("diverged", IntegrationStatus::diverged);
 
   nb::enum_<MethodKind>(m, "MethodKind", "The integrators.")
       .value("dopri5", MethodKind::dopri5)

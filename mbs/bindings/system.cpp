@@ -26,7 +26,8 @@ void check_size(const char *name, Eigen::Index got, Eigen::Index expected) {
 
 PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
                      const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
-                     const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions) {
+                     const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions,
+                     const std::vector<MatrixXd> &second_order, const MatrixXd &K_omega) {
   const auto n = stiffness.size();
   check_size("W rows", W.rows(), 3 + 3 * static_cast<Eigen::Index>(marker_positions.size()));
   check_size("W columns", W.cols(), n);
@@ -34,7 +35,14 @@ PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, 
        {std::pair("damping", damping.rows()), {"j", j.size()}, {"S_tilde", S_tilde.rows()}, {"m_xy", m_xy.rows()}})
     if (size)
       check_size(name, size, n);
-  return {mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions, {}};
+  PlanarBody body{mass,    inertia, first_moment,     stiffness, damping, W,      j,
+                  S_tilde, m_xy,    marker_positions, {},        {},      K_omega};
+  for (std::size_t row = 0; row < second_order.size(); ++row)
+    if (second_order[row].size()) {
+      check_size("second_order", second_order[row].rows(), n);
+      body.second_order.push_back({static_cast<Eigen::Index>(row), second_order[row]});
+    }
+  return body;
 }
 
 // (a, lambda) at one state
@@ -123,12 +131,13 @@ void bind_system(nb::module_ &m) {
           "add_body",
           [](System &s, double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
              const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
-             const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions) {
-            s.bodies.push_back(
-                make_body(mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions));
+             const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions,
+             const std::vector<MatrixXd> &second_order, const MatrixXd &K_omega) {
+            s.bodies.push_back(make_body(mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy,
+                                         marker_positions, second_order, K_omega));
           },
           "mass"_a, "inertia"_a, "first_moment"_a, "stiffness"_a, "damping"_a, "W"_a, "j"_a, "S_tilde"_a, "m_xy"_a,
-          "marker_positions"_a)
+          "marker_positions"_a, "second_order"_a, "K_omega"_a)
       .def(
           "add_constraint", [](System &s, const Row &row, const TimeFunction &f) { s.constraints.push_back({row, f}); },
           "row"_a, "target"_a)

@@ -98,6 +98,10 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     std::copy_n(method.last_slope(), system.size(), method.first_slope());
     system.accepted(t, y.data(), method.first_slope());
     record();
+    if (!system.is_sensible(y.data())) {
+      report.status = IntegrationStatus::diverged;
+      break;
+    }
     // Steps that were shortened to land on an output tell what the step asked for would have cost.
     const double asked = std::clamp(h, step, 2 * step);
     h = control.after_accepted(asked, size * std::pow(asked / step, method.error_order()));

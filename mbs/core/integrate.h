@@ -23,6 +23,7 @@ enum class IntegrationStatus {
   step_underflow, // no step size meets the tolerance
   too_many_steps,
   interrupted, // by the caller
+  diverged,    // beyond what the equations describe
 };
 
 struct IntegrationReport {

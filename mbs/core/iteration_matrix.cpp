@@ -37,11 +37,16 @@ IterationMatrix<Scalar>::IterationMatrix(const System &system)
 
 template <class Scalar>
 void IterationMatrix<Scalar>::factorise_body(const PlanarBody &body, const PlanarBodyState &state, Body &b) {
-  if (body.S_tilde.size()) {
-    b.W.row(2) = state.W.row(2);
-    b.G.row(2).noalias() = (b.W.row(2).template cast<Scalar>() * b.e_inverse.asDiagonal()) * b.W.transpose();
-    b.G.col(2) = b.G.row(2).transpose();
-  }
+  const auto update = [&](Index row) {
+    b.G.row(row).noalias() = (b.W.row(row).template cast<Scalar>() * b.e_inverse.asDiagonal()) * b.W.transpose();
+    b.G.col(row) = b.G.row(row).transpose();
+  };
+  if (body.S_tilde.size() || !body.second_order.empty())
+    b.W = state.W.topRows(b.W.rows());
+  if (body.S_tilde.size())
+    update(2);
+  for (const auto &second : body.second_order)
+    update(second.row);
   b.cosine = state.cosine;
   b.sine = state.sine;
   Matrix3 frame = -b.G.template topLeftCorner<3, 3>();

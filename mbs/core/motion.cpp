@@ -104,7 +104,9 @@ double ConstrainedMotion::error_size(double t, const double *y, const double *e)
   shifted_ = VectorMap(y, 2 * n) + VectorMap(e, 2 * n);
   slope(t, shifted_.data(), shifted_slope_.data());
   const auto length_of = [&](std::size_t g) { return group_is_moment_[g] ? length_ : 1.0; };
-  double largest = 0;
+  double largest = 0; // or what little would move the bodies, where nothing has happened yet
+  for (std::size_t b = 0; b < system_.bodies.size(); ++b)
+    largest += system_.bodies[b].mass * body_peaks_[b].acceleration;
   for (std::size_t g = 0; g < group_is_moment_.size(); ++g)
     largest = std::max(largest, multiplier_peaks_[static_cast<Index>(g)] / length_of(g));
   measure_groups(lambda_, group_now_);
@@ -136,7 +138,10 @@ void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
     if (modes > 0) {
       const auto &omega = frequency_[b];
       const VectorMap p(y + i + 3, modes), p_dot(v + 3, modes), p_ddot(a + 3, modes);
-      raise(peak.modal, std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(), 1e-12}));
+      // where nothing has happened yet: a thousandth of what the acceleration would do to the softest mode
+      const double force = std::sqrt(system_.bodies[b].mass) * peak.acceleration;
+      raise(peak.modal, std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
+                                  1e-3 * force / std::pow(omega.minCoeff(), 2), 1e-12}));
       raise(peak.modal_velocity, std::max({p_dot.norm(), p_ddot.cwiseQuotient(omega).norm(), 1e-12,
                                            std::sqrt(system_.bodies[b].mass) * peak.velocity}));
     }
@@ -159,6 +164,16 @@ void ConstrainedMotion::factorise(Complex damping_factor, Complex stiffness_fact
 
 void ConstrainedMotion::constraint_values(double t, const double *y, double *value, double *rate) {
   constraint_residuals(system_, t, y, y + system_.coordinates, workspace_, value, rate);
+}
+
+// Small deformations end long before the mean square of a body's deflection, p^T p / m, is that of its radius.
+bool ConstrainedMotion::is_sensible(const double *y) const {
+  for (std::size_t b = 0; b < system_.bodies.size(); ++b) {
+    const PlanarBody &body = system_.bodies[b];
+    if (!(VectorMap(y + system_.first_coordinate[b] + 3, body.modes()).squaredNorm() <= body.inertia))
+      return false;
+  }
+  return true;
 }
 
 double ConstrainedMotion::initial_step() const {

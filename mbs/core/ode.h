@@ -25,6 +25,9 @@ public:
   // The run starts at, or an accepted step ended in, (t, y, dy): the state of the last error_size, if any.
   virtual void accepted(double t, const double *y, const double *dy) = 0;
 
+  // Whether y is still something that the equations describe; where it is not, the run ends as diverged.
+  virtual bool is_sensible(const double *y) const = 0;
+
   // First step size to try.
   virtual double initial_step() const = 0;
 
