@@ -1,5 +1,6 @@
 #include "core/planar_body.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ffrobot {
@@ -29,7 +30,7 @@ template <int Rows>
 void project_fixed(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
   using Sum = Eigen::Array<double, Rows, 1>;
   Sum Wp = Sum::Zero(), Wp_dot = Sum::Zero(), Wk = Sum::Zero();
-  const double *column = s.W.data();
+  const double *column = s.W_active.data();
   const double *stiffness = body.stiffness.data();
   const double *damping = body.damping.cols() == 1 ? body.damping.data() : nullptr;
   for (Index i = 0; i < body.modes(); ++i, column += Rows) {
@@ -41,13 +42,19 @@ void project_fixed(const PlanarBody &body, const double *p, const double *p_dot,
     Wp_dot += w * p_dot[i];
     Wk += w * k;
   }
-  s.Wp = Wp;
-  s.Wp_dot = Wp_dot;
-  s.Wk = Wk;
+  for (std::size_t i = 0; i < s.active.size(); ++i) {
+    const auto k = static_cast<Index>(i), row = s.active[i];
+    s.Wp[row] = Wp[k];
+    s.Wp_dot[row] = Wp_dot[k];
+    s.Wk[row] = Wk[k];
+  }
 }
 
 void project(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
-  switch (s.padded_rows) {
+  switch (s.W_active.rows()) {
+  case 0:
+    s.Wk.setZero();
+    return;
   case 4:
     return project_fixed<4>(body, p, p_dot, s);
   case 8:
@@ -67,6 +74,9 @@ void project(const PlanarBody &body, const double *p, const double *p_dot, Plana
 
 void update_gram(Index row, PlanarBodyState &s) {
   s.W_transposed.col(row) = s.W.row(row).transpose();
+  const auto k = std::find(s.active.begin(), s.active.end(), row) - s.active.begin();
+  s.W_active.row(k) = s.W.row(row);
+  s.W_active_transposed.col(k) = s.W.row(row).transpose();
   s.G.row(row).noalias() = s.W.row(row) * s.W_transposed;
   s.G.col(row) = s.G.row(row).transpose();
 }
@@ -209,13 +219,15 @@ void add_mobility(const PlanarBody &body, Index k, Index l, PlanarBodyState &s) 
 }
 
 // out += W^T z over the rows that carry anything
-void accumulate_rows(const PlanarBodyState &s, const Eigen::VectorXd &z, Index rows, Index n, double *out) {
-  Index i = 0;
-  for (; i + 2 < rows; i += 3) {
-    const double *w0 = s.W_transposed.data() + i * n, *w1 = w0 + n, *w2 = w1 + n;
-    const double z0 = z[i], z1 = z[i + 1], z2 = z[i + 2];
+void accumulate_rows(const PlanarBodyState &s, const Eigen::VectorXd &z, Index n, double *out) {
+  const std::size_t count = s.active.size();
+  const auto factor = [&](std::size_t i) { return i < count ? z[s.active[i]] : 0.0; };
+  for (std::size_t i = 0; i < count; i += register_width) {
+    const double *w0 = s.W_active_transposed.data() + static_cast<Index>(i) * n, *w1 = w0 + n, *w2 = w1 + n,
+                 *w3 = w2 + n;
+    const double z0 = factor(i), z1 = factor(i + 1), z2 = factor(i + 2), z3 = factor(i + 3);
     for (Index k = 0; k < n; ++k)
-      out[k] += z0 * w0[k] + z1 * w1[k] + z2 * w2[k];
+      out[k] += z0 * w0[k] + z1 * w1[k] + z2 * w2[k] + z3 * w3[k];
   }
 }
 
@@ -228,6 +240,17 @@ PlanarBodyState::PlanarBodyState(const PlanarBody &body) : markers(static_cast<s
   W.topRows(rows) = body.W;
   W_transposed = W.transpose();
   G = W * W_transposed;
+  for (Index row = 0; row < rows; ++row) {
+    const bool moves = std::any_of(body.second_order.begin(), body.second_order.end(),
+                                   [&](const SecondOrder &second) { return second.row == row; });
+    if (moves || (row == 2 && body.S_tilde.size()) || !body.W.row(row).isZero(0))
+      active.push_back(row);
+  }
+  const auto count = static_cast<Index>(active.size());
+  W_active = Eigen::MatrixXd::Zero((count + register_width - 1) / register_width * register_width, n);
+  for (Index i = 0; i < count; ++i)
+    W_active.row(i) = W.row(active[static_cast<std::size_t>(i)]);
+  W_active_transposed = W_active.transpose();
   for (auto *v : {&Wp, &Wp_dot, &Wk, &W_extra, &z, &z_response, &displacement, &convective})
     *v = Eigen::VectorXd::Zero(padded_rows);
   extra = modal_load = curvature = Eigen::VectorXd::Zero(n);
@@ -379,7 +402,7 @@ Vector3d frame_response(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, 
 
 void accelerations(const PlanarBody &body, const double *q, const double *v, const Eigen::Matrix3Xd &constraint_wrench,
                    PlanarBodyState &s, double *a) {
-  const Index n = body.modes(), rows = body.W.rows();
+  const Index n = body.modes();
   const Vector3d x = s.free_frame + frame_response(body, constraint_wrench, s, s.z_response);
   s.z_response += s.z;
   s.z_response.head<3>() -= s.free_frame;
@@ -395,7 +418,7 @@ void accelerations(const PlanarBody &body, const double *q, const double *v, con
   if (body.damping.cols() == 1)
     for (Index i = 0; i < n; ++i)
       p_ddot[i] -= body.damping(i, 0) * p_dot[i];
-  accumulate_rows(s, s.z_response, rows, n, p_ddot);
+  accumulate_rows(s, s.z_response, n, p_ddot);
 }
 
 Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, Index k, const double *q,
@@ -422,7 +445,7 @@ void respond(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, PlanarBodyS
   dq[1] = dR.y();
   dq[2] = x[2];
   std::fill(dq + 3, dq + 3 + body.modes(), 0.0);
-  accumulate_rows(s, s.z_response, body.W.rows(), body.modes(), dq + 3);
+  accumulate_rows(s, s.z_response, body.modes(), dq + 3);
 }
 
 void add_modal_force(const PlanarBody &body, const PlanarBodyState &s, const Eigen::Matrix3Xd &wrench,

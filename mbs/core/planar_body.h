@@ -72,8 +72,11 @@ struct PlanarBodyState {
   Eigen::MatrixXd mobility;           // (3 markers, 3 markers), global
 
   // internals of the elimination
-  Eigen::Index padded_rows;       // rows of W, padded for vector registers
-  Eigen::MatrixXd W;              // (padded_rows, n)
+  Eigen::Index padded_rows;         // rows of W, padded for vector registers
+  Eigen::MatrixXd W;                // (padded_rows, n)
+  std::vector<Eigen::Index> active; // rows of W that carry anything; products with W need only these
+  Eigen::MatrixXd W_active;         // (active, padded for vector registers; n)
+  Eigen::MatrixXd W_active_transposed;
   Eigen::MatrixXd W_transposed;   // (n, padded_rows)
   Eigen::MatrixXd G;              // (padded_rows, padded_rows)
   Eigen::VectorXd Wp, Wp_dot, Wk; // W p, W p_dot, W (K p + D p_dot), W as it is at p
