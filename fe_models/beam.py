@@ -20,7 +20,7 @@ from scipy.special import roots_legendre
 
 from ..mesh.compat import ElementName, assemble_matrix, basix_element, cell_dofs, cell_vertices, function_space
 from ..mesh.interval import cells_containing
-from .link_file import BeamLink, Family
+from .link_records import BeamLink, Family
 from .section import Section
 
 Floats = NDArray[np.float64]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,10 +16,15 @@ from ..errors import InputError
 # First of all that load dolfinx: mesh.compat sets PETSc up.
 from ..mesh.interval import graded_nodes, interval_mesh, with_points
 from .beam import R_X, U_X, FamilyModel, family_model
+from .beam_stress import beam_stresses
 from .eigen import lowest_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
-from .link_file import FAMILIES, BeamLink, Family
+from .link_records import FAMILIES, BeamLink, Family, Link
+from .lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
+
+# Elements are not cut closer to their ends than this fraction of their length.
+SLIVER = 0.01
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -40,7 +46,7 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         SolveError: the eigensolver did not converge.
     """
     length = link.geometry.length
-    named = {"root": 0.0, "tip": length, **{item.name: item.position for item in link.interface}}
+    named = link.places
     nodes = _element_boundaries(link)
     mesh = interval_mesh(nodes)
     # The fields are read on a mesh of their own: there also the middle and the interfaces are vertices.
@@ -49,15 +55,18 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
     models: dict[Family, FamilyModel] = {}
     for family in link.families:
         progress(f"{link.name}: assembling {family}")
-        models[family] = family_model(link, family, mesh, stations.x)
+        models[family] = _loaded(family_model(link, family, mesh, stations.x), link, stations.x)
     progress(f"{link.name}: solving for the modes")
     modes = select(models, _wanted(link, models, path))
     fields = canonical(station_fields(models, modes, stations.x.size))
     progress(f"{link.name}: integrating the inertia")
-    integrals = shape_integrals(link, stations, fields)
-    omega = np.sqrt([mode.omega2 for mode in modes])
+    interfaces = {name: _interface(stations, fields, place) for name, place in named.items()}
+    attached = lumps(link.interface, interfaces)
+    integrals = with_lumped_masses(shape_integrals(link, stations, fields), attached)
+    omega: Floats = np.sqrt([mode.omega2 for mode in modes])
     translation, rotation = np.moveaxis(fields[:R_X], 0, 1), np.moveaxis(fields[R_X:], 0, 1)
     position = _on_axis(stations.x)
+    kept = Stations(position, translation, rotation, _heights(link, stations.x), stations.element)
     return ModalBody(
         name=link.name,
         kind=link.geometry.kind,
@@ -67,15 +76,28 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         frequency=omega / (2 * np.pi),
         stiffness=np.diag(omega**2),
         modal_mass=modal_mass(models, modes),
-        damping_ratio=_damping_ratio(link, omega),
+        damping_ratio=damping_ratio(link, omega),
         family=tuple(mode.family for mode in modes),
-        geometric_stiffness=geometric_stiffness(link, stations, fields, named),
-        interfaces={name: _interface(stations, fields, place) for name, place in named.items()},
-        stations=Stations(position, translation, rotation, _heights(link, stations.x), stations.element),
+        geometric_stiffness=with_lumped_loads(geometric_stiffness(link, stations, fields, named), attached),
+        interfaces=interfaces,
+        stations=kept,
+        stress=beam_stresses(link, kept, omega**2, attached),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         input_hash=input_hash,
         ffrobot_version=__version__,
     )
+
+
+def _loaded(model: FamilyModel, link: BeamLink, stations: Floats) -> FamilyModel:
+    """The eigenproblem with the masses on interfaces: M ← M + Σ m w wᵀ + J θ θᵀ, w and θ the motion there."""
+    M = model.M
+    for record in link.interface:
+        station = np.argmin(np.abs(stations - link.places[record.name]))
+        weights = lump_weights(record.mass, record.inertia)
+        for row, values in model.fields.items():
+            if weights[row]:
+                M = M + weights[row] * (values[station].T @ values[station])
+    return replace(model, M=M.tocsr())
 
 
 def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[Mode]:
@@ -117,6 +139,11 @@ def canonical(fields: Floats) -> Floats:
     The dominant translation is positive at the station nearest the root where it exceeds half its largest value; of a
     mode without translation, the twist.
     """
+    return fields * canonical_signs(fields)
+
+
+def canonical_signs(fields: Floats) -> Floats:
+    """(n,) 1 or −1: what `canonical` multiplies each mode by."""
     signs = np.ones(fields.shape[2])
     for k in range(signs.size):
         rows = fields[U_X:R_X, :, k]
@@ -124,14 +151,24 @@ def canonical(fields: Floats) -> Floats:
             rows = fields[R_X:, :, k]
         dominant = rows[np.argmax(np.abs(rows).max(axis=1))]
         signs[k] = np.sign(dominant[np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max())])
-    return fields * signs
+    return signs
 
 
 def _element_boundaries(link: BeamLink) -> Floats:
+    """As the link file wants them, and one more at each attached mass: shear and moment jump there."""
     if link.mesh.nodes is not None:
-        return np.array(link.mesh.nodes)
-    assert link.mesh.elements is not None
-    return graded_nodes(link.geometry.breakpoints, link.mesh.elements)
+        nodes = np.array(link.mesh.nodes)
+    else:
+        assert link.mesh.elements is not None
+        nodes = graded_nodes(link.geometry.breakpoints, link.mesh.elements)
+    for record in link.interface:
+        place = link.places[record.name]
+        i = int(np.clip(np.searchsorted(nodes, place), 1, nodes.size - 1))
+        nearest = np.min(np.abs(nodes[i - 1 : i + 1] - place))
+        # Next to a node that jump does no harm, a sliver of an element does: its stiffness is all rounding.
+        if any(lump_weights(record.mass, record.inertia)) and nearest > SLIVER * (nodes[i] - nodes[i - 1]):
+            nodes = with_points(nodes, [place])
+    return nodes
 
 
 def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) -> Sequence[int]:
@@ -162,7 +199,7 @@ def _heights(link: BeamLink, x: Floats) -> Floats:
     return heights[np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")]
 
 
-def _damping_ratio(link: BeamLink, omega: Floats) -> Floats:
+def damping_ratio(link: Link, omega: Floats) -> Floats:
     """(n,) ζ as given, or of Rayleigh damping D = aM + bK: ζ = a/(2ω) + bω/2."""
     if link.damping.rayleigh is not None:
         a, b = link.damping.rayleigh

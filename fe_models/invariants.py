@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
 from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
-from .link_file import BeamLink
+from .link_records import BeamLink
 
 Floats = NDArray[np.float64]
 # N in N at x (m), and at which cell by its middle: N may jump from cell to cell.

@@ -16,7 +16,9 @@ from platformdirs import user_cache_path
 
 from ..errors import FfrobotError, SolveError
 from ..files import check_output
-from .link_file import BeamLink, read_link
+from ..parallel import on_first, processes
+from .link_file import read_link
+from .link_records import Link, SolidLink
 from .modal_body import ModalBody
 from .modal_body_file import FORMAT, FORMAT_VERSION, read_modal_body, write_modal_body
 
@@ -43,12 +45,15 @@ class LinkOutcome:
     seconds: float
 
 
-def input_hash(link: BeamLink) -> str:
+def input_hash(link: Link) -> str:
     """SHA-256 of what a modal body depends on: the link as checked, defaults filled in, and the program's algorithm.
 
-    Comments, the order of keys, 1 for 1.0 and dates of files change nothing.
+    A part's file counts by its content. Comments, the order of keys, 1 for 1.0, dates of files change nothing.
     """
-    content = {"format": FORMAT_VERSION, "algorithm": ALGORITHM_VERSION, "link": link.model_dump(mode="json")}
+    record = link.model_dump(mode="json")
+    if isinstance(link, SolidLink) and link.geometry.file is not None:
+        record["geometry"]["file"] = hashlib.sha256(link.geometry.file.read_bytes()).hexdigest()
+    content = {"format": FORMAT_VERSION, "algorithm": ALGORITHM_VERSION, "link": record}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
@@ -63,6 +68,8 @@ def make_link(
         force: compute and overwrite in any case.
         progress: is told what is being done, one line a step.
 
+    Under mpirun all processes call; only the first writes, and computes the links that are beams.
+
     Raises:
         InputError: the link file is wrong, or `output` is some other file that would be lost.
         SolveError: the modes cannot be computed, or the file cannot be written.
@@ -71,9 +78,9 @@ def make_link(
     link = read_link(link_path)
     path = output if output is not None else link_path.with_suffix(".h5")
     digest = input_hash(link)
-    if not force and (body := _up_to_date(path, digest)) is not None:
-        return LinkOutcome(path, body, False, time.perf_counter() - start)
-    check_output(path, FORMAT, force=force)
+    if not force and on_first(lambda: _up_to_date(path, digest) is not None):
+        return LinkOutcome(path, read_modal_body(path), False, time.perf_counter() - start)
+    on_first(lambda: check_output(path, FORMAT, force=force))
     return _compute(link, link_path, path, digest, start, progress)
 
 
@@ -98,7 +105,7 @@ def cached_modal_body(link_path: Path, progress: Progress | None = None) -> Link
 
 
 def _compute(
-    link: BeamLink,
+    link: Link,
     link_path: Path,
     path: Path,
     digest: str,
@@ -106,17 +113,39 @@ def _compute(
     progress: Progress | None,
     make_folder: bool = False,
 ) -> LinkOutcome:
+    def write(body: ModalBody) -> ModalBody:
+        write_modal_body(path, body, make_folder=make_folder)
+        return body
+
+    def make() -> ModalBody:
+        return _modal_body(link, link_path, digest, progress or _silent)
+
+    if processes() == 1:
+        body = write(make())
+    elif isinstance(link, SolidLink):
+        body = make()
+        on_first(lambda: bool(write(body)))
+    else:  # too small to share out
+        on_first(lambda: bool(write(make())))
+        body = read_modal_body(path)
+    return LinkOutcome(path, body, True, time.perf_counter() - start)
+
+
+def _modal_body(link: Link, link_path: Path, digest: str, progress: Progress) -> ModalBody:
     try:
+        if isinstance(link, SolidLink):
+            from .solid_link import solid_modal_body
+
+            return solid_modal_body(link, link_path, digest, progress)
         from .beam_link import beam_modal_body
+
+        return beam_modal_body(link, link_path, digest, progress)
     except ModuleNotFoundError as error:
         raise SolveError(
             f"{link_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "
             "install dolfinx and slepc4py (Debian: python3-dolfinx python3-slepc4py), or use a modal body file made "
             "elsewhere"
         ) from None
-    body = beam_modal_body(link, link_path, digest, progress or _silent)
-    write_modal_body(path, body, make_folder=make_folder)
-    return LinkOutcome(path, body, True, time.perf_counter() - start)
 
 
 def _up_to_date(path: Path, digest: str) -> ModalBody | None:

@@ -1,164 +1,23 @@
-"""The link file: what stage 1 reads, checked key by key.
-
-A stepped beam gives `[[geometry.segment]]` tables in place of `section`: each with the `section` that holds from the
-end of the segment before (from the root, for the first) to `until` (m from the root); the last one ends at `length`.
-`[mesh] nodes = [0.0, …, length]` sets the element boundaries one by one in place of `elements`.
-"""
+"""The link file: read, and checked for all that one key alone cannot tell (the records check the keys)."""
 
 from __future__ import annotations
 
 from itertools import pairwise
+from math import isclose
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import NoReturn
 
-from pydantic import Field
+import numpy as np
 
 from ..errors import InputError
-from ..validation import Record, load_toml, validate
-from .section import Section, rectangle, tube
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Family = Literal["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
-
-FAMILIES: tuple[Family, ...] = ("in-plane-bending", "out-of-plane-bending", "axial", "torsion")
+from ..mesh.records import RectangleSection, SectionRecord, TubeSection
+from ..validation import load_toml, validate
+from .constitutive import is_stable
+from .link_records import BeamLink, Link, Material, OrthotropicMaterial, SolidLink
+from .section_stress import contains
 
 
-class Material(Record):
-    """Linear elastic, isotropic."""
-
-    youngs_modulus: Positive  # Pa
-    density: Positive  # kg/m³
-    # Needed for torsion and shear only.
-    poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)] | None = None
-
-
-class RectangleSection(Record):
-    """Solid rectangle."""
-
-    shape: Literal["rectangle"]
-    height: Positive  # along y, m
-    width: Positive  # along z, m
-
-
-class CircleSection(Record):
-    """Solid circle."""
-
-    shape: Literal["circle"]
-    diameter: Positive  # m
-
-
-class TubeSection(Record):
-    """Circular tube."""
-
-    shape: Literal["tube"]
-    outer: Positive  # diameter, m
-    inner: Positive  # diameter, m
-
-
-SectionRecord = Annotated[RectangleSection | CircleSection | TubeSection, Field(discriminator="shape")]
-
-
-class Segment(Record):
-    """A stretch of constant section."""
-
-    until: Positive  # m from the root
-    section: SectionRecord
-
-
-class BeamGeometry(Record):
-    """A straight beam along x, of one section or of several in a row."""
-
-    kind: Literal["beam"]
-    length: Positive  # m
-    section: SectionRecord | None = None
-    segment: Annotated[tuple[Segment, ...], Field(min_length=1)] | None = None
-
-    @property
-    def breakpoints(self) -> list[float]:
-        """Ends of the stretches of constant section, m from the root: 0, …, length."""
-        if self.segment is None:
-            return [0.0, self.length]
-        return [0.0, *(segment.until for segment in self.segment)]
-
-
-class BeamMesh(Record):
-    """Element boundaries: `elements` of them as equal as the steps of the section allow, or the list of `nodes`."""
-
-    elements: Annotated[int, Field(ge=1, le=100_000)] | None = None
-    nodes: Annotated[tuple[float, ...], Field(min_length=2)] | None = None  # m from the root
-
-
-class BeamModel(Record):
-    """Which beam theory."""
-
-    theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli"
-
-
-class Reference(Record):
-    """How the link's frame is held to it (formulation.md, section 2)."""
-
-    condition: Literal["cantilever", "simply-supported"]
-    # A beam's section moves as a plate in any case: for beams both words mean the same.
-    coupling: Literal["mean", "rigid"] | None = None
-
-
-class Modes(Record):
-    """The lowest `count` modes of a family, or those numbered `indices` (1 is the lowest)."""
-
-    count: Annotated[int, Field(ge=1)] | None = None
-    indices: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
-    family: Family | Literal["all"] = "all"
-
-
-class Damping(Record):
-    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK."""
-
-    ratio: NotNegative | tuple[NotNegative, ...] | None = None
-    rayleigh: tuple[NotNegative, NotNegative] | None = None
-
-
-class NamedInterface(Record):
-    """A point of the axis where joints and loads attach, besides root and tip."""
-
-    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
-    position: NotNegative  # m from the root
-    coupling: Literal["mean", "rigid"] | None = None
-
-
-class BeamLink(Record):
-    """A whole link file with `geometry.kind = "beam"`."""
-
-    name: Annotated[str, Field(min_length=1)]
-    material: Material
-    geometry: BeamGeometry
-    mesh: BeamMesh
-    model: BeamModel = BeamModel()
-    reference: Reference
-    modes: Modes
-    damping: Damping = Damping()
-    interface: tuple[NamedInterface, ...] = ()
-
-    @property
-    def families(self) -> tuple[Family, ...]:
-        """The mode families asked for."""
-        return FAMILIES if self.modes.family == "all" else (self.modes.family,)
-
-    @property
-    def sections(self) -> list[Section]:
-        """Section properties of each segment. Without Poisson's ratio, J and k belong to ν = 0: nothing uses them."""
-        nu = self.material.poissons_ratio or 0.0
-        records = [segment.section for segment in self.geometry.segment or ()]
-        if self.geometry.section is not None:
-            records.append(self.geometry.section)
-        return [_properties(record, nu) for record in records]
-
-
-# A solid link adds its record here: `kind` picks what the whole file must look like, mesh and model included.
-_RECORDS: dict[str, type[BeamLink]] = {"beam": BeamLink}
-
-
-def read_link(path: Path) -> BeamLink:
+def read_link(path: Path) -> Link:
     """Read and check the link file at `path`.
 
     Raises:
@@ -168,14 +27,33 @@ def read_link(path: Path) -> BeamLink:
     geometry = data.get("geometry")
     kind = geometry.get("kind", "beam") if isinstance(geometry, dict) else "beam"
     if kind == "solid":
-        raise InputError(f'{path}: geometry.kind: solid links are not available yet, expected "beam", found "solid"')
-    link = validate(_RECORDS.get(kind, BeamLink) if isinstance(kind, str) else BeamLink, data, path)
-    for check in (_check_geometry, _check_mesh, _check_interfaces, _check_modes, _check_material):
-        check(link, path)
+        return _solid_link(validate(SolidLink, data, path), path)
+    if kind != "beam":
+        _reject(path, "geometry.kind", '"beam" or "solid"', repr(kind))
+    return _beam_link(validate(BeamLink, data, path), path)
+
+
+def _beam_link(link: BeamLink, path: Path) -> BeamLink:
+    _check_beam_geometry(link, path)
+    _check_beam_mesh(link, path)
+    _check_beam_interfaces(link, path)
+    _check_modes(link, path)
+    _check_beam_material(link, path)
+    _check_beam_stress(link, path)
     return link
 
 
-def _check_geometry(link: BeamLink, path: Path) -> None:
+def _solid_link(link: SolidLink, path: Path) -> SolidLink:
+    _check_shape(link, path)
+    _check_solid_mesh(link, path)
+    _check_solid_interfaces(link, path)
+    _check_modes(link, path)
+    _check_solid_materials(link, path)
+    _check_surface_patches(link, path)
+    return link
+
+
+def _check_beam_geometry(link: BeamLink, path: Path) -> None:
     geometry = link.geometry
     if (geometry.section is None) == (geometry.segment is None):
         _reject(path, "geometry", "either section or [[geometry.segment]]", _both_or_neither(geometry.section))
@@ -185,11 +63,21 @@ def _check_geometry(link: BeamLink, path: Path) -> None:
     if ends and ends[-1] != geometry.length:
         _reject(path, "geometry.segment", f"the last until at the length, {geometry.length}", ends[-1])
     for record in [geometry.section, *(segment.section for segment in geometry.segment or ())]:
-        if isinstance(record, TubeSection) and record.inner >= record.outer:
-            _reject(path, "geometry.section.inner", f"less than outer, {record.outer}", record.inner)
+        _check_section(record, "geometry.section", path)
+        if isinstance(record, RectangleSection) and record.wall is not None:
+            _reject(path, "geometry.section.wall", 'no wall where geometry.kind = "beam"', record.wall)
 
 
-def _check_mesh(link: BeamLink, path: Path) -> None:
+def _check_section(record: SectionRecord | None, key: str, path: Path) -> None:
+    if isinstance(record, TubeSection) and record.inner >= record.outer:
+        _reject(path, f"{key}.inner", f"less than outer, {record.outer}", record.inner)
+    if isinstance(record, RectangleSection) and record.wall is not None:
+        half = min(record.height, record.width) / 2
+        if record.wall >= half:
+            _reject(path, f"{key}.wall", f"less than half of height and width, {half:g}", record.wall)
+
+
+def _check_beam_mesh(link: BeamLink, path: Path) -> None:
     breakpoints, length = link.geometry.breakpoints, link.geometry.length
     mesh = link.mesh
     if (mesh.elements is None) == (mesh.nodes is None):
@@ -207,19 +95,32 @@ def _check_mesh(link: BeamLink, path: Path) -> None:
         _reject(path, "mesh.nodes", f"a node at every step of the section, {missing} too", mesh.nodes)
 
 
-def _check_interfaces(link: BeamLink, path: Path) -> None:
+def _check_names(link: Link, path: Path) -> None:
     # `mid` is the name under which results give the point at exactly half length.
-    taken = {"root", "tip", "mid"}
+    taken = {"mid"}
     for interface in link.interface:
         if interface.name in taken:
             _reject(path, "interface.name", f"a name besides {', '.join(sorted(taken))}", interface.name)
-        if interface.position > link.geometry.length:
-            expected = f"within the length, {link.geometry.length}"
-            _reject(path, f"interface.position of {interface.name}", expected, interface.position)
         taken.add(interface.name)
 
 
-def _check_modes(link: BeamLink, path: Path) -> None:
+def _check_beam_interfaces(link: BeamLink, path: Path) -> None:
+    _check_names(link, path)
+    for interface in link.interface:
+        key = f"interface.{{}} of {interface.name}"
+        for name in ("normal", "group"):
+            if getattr(interface, name) is not None:
+                _reject(path, key.format(name), f"no {name} on a beam", getattr(interface, name))
+        if interface.name in ("root", "tip"):
+            if interface.position is not None:
+                _reject(path, key.format("position"), "none: it is an end of the beam", interface.position)
+        elif not isinstance(interface.position, float):
+            _reject(path, key.format("position"), "one number, m from the root", interface.position)
+        elif interface.position > link.geometry.length:
+            _reject(path, key.format("position"), f"within the length, {link.geometry.length}", interface.position)
+
+
+def _check_modes(link: Link, path: Path) -> None:
     modes, damping = link.modes, link.damping
     if (modes.count is None) == (modes.indices is None):
         _reject(path, "modes", "either count or indices", _both_or_neither(modes.count))
@@ -232,20 +133,104 @@ def _check_modes(link: BeamLink, path: Path) -> None:
         _reject(path, "damping.ratio", f"one number, or one for each of the {number} modes", len(damping.ratio))
 
 
-def _check_material(link: BeamLink, path: Path) -> None:
+def _check_beam_material(link: BeamLink, path: Path) -> None:
     bends = any(family.endswith("bending") for family in link.families)
     shear = bends and link.model.theory == "timoshenko"
-    use = "torsion" if "torsion" in link.families else "shear" if shear else None
+    use = "torsion" if "torsion" in link.families else "shear" if shear else "strains" if link.stress.points else None
     if use and link.material.poissons_ratio is None:
         _reject(path, "material.poissons_ratio", f"a value, for {use} (modes.family = {link.modes.family!r})", "none")
 
 
-def _properties(record: RectangleSection | CircleSection | TubeSection, nu: float) -> Section:
-    if isinstance(record, RectangleSection):
-        return rectangle(record.height, record.width, nu)
-    if isinstance(record, CircleSection):
-        return tube(record.diameter, 0.0, nu)
-    return tube(record.outer, record.inner, nu)
+def _check_beam_stress(link: BeamLink, path: Path) -> None:
+    if link.stress.surface:
+        _reject(path, "stress.surface", "points, not a surface, on a beam", "true")
+    for name, (x, y, z) in link.stress.points.items():
+        key, length = f"stress.points.{name}", link.geometry.length
+        if not 0.0 <= x <= length:
+            _reject(path, key, f"x within the length, 0 … {length:g} m", f"{x:g} m")
+        shape = link.shapes[int(np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right"))]
+        if not contains(shape, y, z):
+            _reject(path, key, f"y, z within the section, a {shape.shape}, at x = {x:g} m", f"{y:g}, {z:g} m")
+
+
+def _check_shape(link: SolidLink, path: Path) -> None:
+    geometry = link.geometry
+    if (geometry.section is None) == (geometry.file is None):
+        _reject(path, "geometry", "either section or file", _both_or_neither(geometry.section))
+    _check_section(geometry.section, "geometry.section", path)
+    tip = geometry.tip_section
+    if tip is not None and (
+        not isinstance(tip, RectangleSection)
+        or not isinstance(geometry.section, RectangleSection)
+        or tip.wall is not None
+        or geometry.section.wall is not None
+    ):
+        _reject(path, "geometry.tip_section", "a taper between two rectangles without wall", "another shape")
+    if geometry.file is not None and geometry.hole:
+        _reject(path, "geometry.hole", "no holes where geometry.file gives the part", len(geometry.hole))
+    if np.linalg.norm(np.cross(geometry.x_axis, geometry.y_axis)) < 1e-6:
+        _reject(path, "geometry.y_axis", f"a direction across x_axis, {list(geometry.x_axis)}", list(geometry.y_axis))
+
+
+def _check_solid_mesh(link: SolidLink, path: Path) -> None:
+    geometry, mesh = link.geometry, link.mesh
+    if mesh.size is not None and mesh.divisions is not None:
+        _reject(path, "mesh", "either size or divisions", "both")
+    plain = isinstance(geometry.section, RectangleSection) and geometry.section.wall is None and not geometry.hole
+    if mesh.divisions is not None and not plain:
+        _reject(path, "mesh.divisions", "a box, of one section or tapered, for a structured mesh", "another shape")
+    if mesh.cell == "hexahedron" and not plain:
+        _reject(path, "mesh.cell", '"tetrahedron", since hexahedra are made in boxes only', '"hexahedron"')
+    if mesh.divisions is not None and link.surface_patch is not None:
+        _reject(path, "mesh.divisions", "size in its place, where patches are outlined in the mesh", "both")
+
+
+def _check_solid_interfaces(link: SolidLink, path: Path) -> None:
+    _check_names(link, path)
+    for interface in link.interface:
+        key = f"interface.{{}} of {interface.name}"
+        if interface.group is not None and interface.position is not None:
+            _reject(path, key.format("group"), "either group or position", "both")
+        if interface.normal is not None and not isinstance(interface.position, tuple):
+            _reject(path, key.format("normal"), "it beside a position of three numbers", interface.position)
+        if isinstance(interface.position, tuple) and interface.normal is None:
+            _reject(path, key.format("normal"), "the outward normal of the face at position", "none")
+        if isinstance(interface.position, float):
+            if interface.position > link.geometry.length:
+                _reject(path, key.format("position"), f"within the length, {link.geometry.length}", interface.position)
+            if interface.coupling == "rigid":
+                _reject(path, key.format("coupling"), '"mean" for a cross section inside the part', '"rigid"')
+        if interface.group is None and interface.position is None and interface.name not in ("root", "tip"):
+            _reject(path, key.format("position"), "either group or position", "neither")
+
+
+def _check_solid_materials(link: SolidLink, path: Path) -> None:
+    for key, material in [("material", link.material), *((f"region {r.group}", r.material) for r in link.region)]:
+        if isinstance(material, Material) and material.poissons_ratio is None:
+            _reject(path, f"{key}.poissons_ratio", "a value: solids need it", "none")
+        if isinstance(material, OrthotropicMaterial) and not is_stable(material):
+            _reject(path, f"{key}.poissons_ratio", "ratios that leave the energy positive", material.poissons_ratio)
+    if link.region and link.geometry.file is None:
+        _reject(path, "region", "geometry.file, a mesh with that physical volume group", "a generated shape")
+
+
+def _check_surface_patches(link: SolidLink, path: Path) -> None:
+    patches = link.surface_patch
+    if patches is None:
+        return
+    if (patches.count is None) == (patches.centers is None):
+        _reject(path, "surface_patch", "either count or centers", _both_or_neither(patches.count))
+    section = link.geometry.section
+    if not isinstance(section, RectangleSection) or link.geometry.tip_section is not None:
+        _reject(path, "surface_patch", "a rectangular section without taper to lie on", "another shape")
+    if patches.width > section.width and not isclose(patches.width, section.width):
+        _reject(path, "surface_patch.width", f"at most the width of the section, {section.width}", patches.width)
+    edges = sorted(patches.edges(link.geometry.length))
+    slack = 1e-9 * link.geometry.length
+    if edges[0][0] < -slack or edges[-1][1] > link.geometry.length + slack:
+        _reject(path, "surface_patch", f"patches within the link, 0 … {link.geometry.length:g} m", edges)
+    if any(after[0] < before[1] - slack for before, after in pairwise(edges)):
+        _reject(path, "surface_patch", "patches that do not overlap", edges)
 
 
 def _both_or_neither(value: object) -> str:

@@ -48,7 +48,8 @@ class Stations:
         position: (k, 3) in m.
         translation: (k, 3, n), as in `Interface`.
         rotation: (k, 3, n), as in `Interface`.
-        height: (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1.
+        height: (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a
+            taper, the height in the middle between the two).
         element: (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known.
     """
 
@@ -70,11 +71,52 @@ class PictureMesh:
         points: (p, 3) in m.
         cells: (c, v) points of each cell.
         mode_shapes: (p, 3, n) displacement per unit of modal coordinate.
+        edges: (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture.
     """
 
     points: Floats
     cells: Integers
     mode_shapes: Floats
+    edges: Integers | None = None
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class StressPoint:
+    """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy.
+
+    Attributes:
+        position: (3,) in m, undeformed.
+        stress: (6, n) in Pa per unit of modal coordinate.
+        strain: (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain.
+    """
+
+    position: Floats
+    stress: Floats
+    strain: Floats
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class OutlinedPatches:
+    """Piezoelectric patches whose outlines are edges of the mesh, on the faces at largest (top) and smallest y.
+
+    Attributes:
+        edges: (k, 2) begin and end of each patch, m from the root.
+        width: along z, in m.
+        top: (k, n) ∫ t·ε(Φ)t ds over each patch, with t the link's direction: modal forces per unit of membrane force
+            (N/m, positive in tension), in m² per unit of modal coordinate; None where no patches are on that face.
+        bottom: (k, n) likewise.
+    """
+
+    edges: Floats
+    width: float
+    top: Floats | None = None
+    bottom: Floats | None = None
 
     def __post_init__(self) -> None:
         _freeze(self)
@@ -106,6 +148,9 @@ class ModalBody:
         interfaces: by name; `root` and `tip` always.
         stations: along the axis.
         mesh: for pictures.
+        stress: modal stresses by the name of their point, where the link file asks for them.
+        surface_stress: (p, 6, n) stress at the points of `mesh`, as in `StressPoint`; None where not asked for.
+        surface_patches: modal forces of patches outlined in the mesh; None where there are none.
         input_hash: of the link file's content.
         ffrobot_version: that made it.
 
@@ -132,6 +177,9 @@ class ModalBody:
     stations: Stations
     mesh: PictureMesh
     geometric_stiffness: Mapping[str, Floats] = field(default_factory=dict)
+    stress: Mapping[str, StressPoint] = field(default_factory=dict)
+    surface_stress: Floats | None = None
+    surface_patches: OutlinedPatches | None = None
     input_hash: str = ""
     ffrobot_version: str = ""
 
@@ -289,6 +337,20 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         shapes.append((f"interfaces/{name}/position", interface.position, (3,)))
         shapes.append((f"interfaces/{name}/translation", interface.translation, (3, n)))
         shapes.append((f"interfaces/{name}/rotation", interface.rotation, (3, n)))
+    for name, point in body.stress.items():
+        shapes.append((f"stress/points/{name}/position", point.position, (3,)))
+        shapes.append((f"stress/points/{name}/stress", point.stress, (6, n)))
+        shapes.append((f"stress/points/{name}/strain", point.strain, (6, n)))
+    if body.mesh.edges is not None:
+        shapes.append(("mesh.edges", body.mesh.edges, (len(body.mesh.edges), 2)))
+    if body.surface_stress is not None:
+        shapes.append(("stress/surface", body.surface_stress, (p, 6, n)))
+    if body.surface_patches is not None:
+        patches = np.shape(body.surface_patches.edges)[0]
+        shapes.append(("surface_patches/edges", body.surface_patches.edges, (patches, 2)))
+        for face in ("top", "bottom"):
+            if (values := getattr(body.surface_patches, face)) is not None:
+                shapes.append((f"surface_patches/{face}", values, (patches, n)))
     return shapes
 
 

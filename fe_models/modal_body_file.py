@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import write_atomically
-from .modal_body import Interface, ModalBody, PictureMesh, Stations
+from .modal_body import Interface, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -93,7 +93,20 @@ def _body(file: h5py.File) -> ModalBody:
         interfaces={name: Interface(**_arrays(interfaces[name], Interface)) for name in interfaces},
         stations=Stations(**_arrays(stations, Stations)),
         mesh=PictureMesh(**_arrays(file["mesh"], PictureMesh)),
+        **_optional(file),
     )
+
+
+def _optional(file: h5py.File) -> dict[str, Any]:
+    """What only the files of links have that ask for it: modal stresses, patches outlined in the mesh."""
+    found: dict[str, Any] = {}
+    points = file.get("stress/points", {})
+    found["stress"] = {name: StressPoint(**_arrays(points[name], StressPoint)) for name in points}
+    if "stress/surface" in file:
+        found["surface_stress"] = _array(file, "stress/surface")
+    if "surface_patches" in file:
+        found["surface_patches"] = OutlinedPatches(**_arrays(file["surface_patches"], OutlinedPatches))
+    return found
 
 
 def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any]:
@@ -138,6 +151,11 @@ def _image(body: ModalBody) -> bytes:
             _write_arrays(file.create_group(f"interfaces/{name}"), vars(interface))
         _write_arrays(file.create_group("stations"), vars(body.stations))
         _write_arrays(file.create_group("mesh"), vars(body.mesh))
+        for name, point in body.stress.items():
+            _write_arrays(file.create_group(f"stress/points/{name}"), vars(point))
+        _write_arrays(file, {"stress/surface": body.surface_stress})
+        if body.surface_patches is not None:
+            _write_arrays(file.create_group("surface_patches"), vars(body.surface_patches))
         file.flush()
         image: bytes = file.id.get_file_image()
         return image

@@ -11,6 +11,7 @@ from types import FrameType
 import click
 
 from .errors import FfrobotError
+from .parallel import is_first
 
 FILE = click.Path(path_type=Path)
 
@@ -42,6 +43,8 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
 
     with Display() as display:
         outcome = make_link(link_file, output, force, display.stage)
+    if not is_first():
+        return
     body = outcome.body
     verb = f"computed in {outcome.seconds:.2f} s" if outcome.computed else "up to date"
     click.echo(
@@ -92,14 +95,13 @@ def info(file: Path) -> None:
 
 
 @cli.command()
-@click.argument("results_file", metavar="RESULTS.h5", type=FILE)
-@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; RESULTS.figures if absent.")
-def plot(results_file: Path, output: Path | None) -> None:
-    """Draw the standard figures of a results file, as PNG and PDF."""
-    from .figures import plot_results
+@click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
+def plot(file: Path, output: Path | None) -> None:
+    """Draw the figures of a results file, or mesh and modes of a modal body file, as PNG and PDF."""
+    from .figures import plot_file
 
-    folder = output or results_file.with_suffix(".figures")
-    for path in plot_results(results_file, folder):
+    for path in plot_file(file, output or file.with_suffix(".figures")):
         click.echo(path)
 
 
@@ -124,5 +126,6 @@ def main() -> None:
             sys.exit(130)
         if not isinstance(error, FfrobotError):
             raise
-        click.echo(f"ffrobot: {error}", err=True)
+        if is_first():
+            click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)

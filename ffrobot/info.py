@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 
 import h5py
+import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
@@ -35,15 +38,15 @@ def describe(path: Path) -> str:
 
 
 def _modal_body(body: ModalBody) -> str:
-    x, y, z = body.first_moment / body.mass
+    center = _place(body, body.first_moment / body.mass)
     lines = [
         f"modal body {body.name!r}: {body.kind}, {body.reference_condition} reference condition, {body.length:g} m",
         f"made by ffrobot {body.ffrobot_version} from input {body.input_hash[:12]}",
-        f"mass {body.mass:.6g} kg, center of mass ({x:.6g}, {y:.6g}, {z:.6g}) m",
-        "interfaces: "
-        + ", ".join(f"{name} at ({', '.join(f'{c:g}' for c in i.position)}) m" for name, i in body.interfaces.items()),
+        f"mass {body.mass:.6g} kg, center of mass {center}",
+        "interfaces: " + ", ".join(f"{name} at {_place(body, i.position)}" for name, i in body.interfaces.items()),
         f"stations: {len(body.stations.position)} along the axis",
         f"geometric stiffness: {', '.join(body.geometric_stiffness) or 'none'}",
+        *_optional(body),
     ]
     modes = Table("mode", "family", "frequency (Hz)", "ω (rad/s)", "damping ratio")
     for k, family in enumerate(body.family):
@@ -52,6 +55,24 @@ def _modal_body(body: ModalBody) -> str:
             f"{k + 1}", family, f"{frequency:.6f}", f"{6.283185307179586 * frequency:.5f}", f"{body.damping_ratio[k]:g}"
         )
     return "\n".join(lines) + "\n" + _rendered(modes)
+
+
+def _place(body: ModalBody, position: NDArray[np.float64]) -> str:
+    """Coordinates (3,) as text, rounding errors of solids as what they are: 0."""
+    x, y, z = np.where(np.abs(position) < 1e-12 * body.length, 0.0, position)
+    return f"({x:.6g}, {y:.6g}, {z:.6g}) m"
+
+
+def _optional(body: ModalBody) -> Iterator[str]:
+    """Lines on what only some modal bodies have."""
+    for name, point in body.stress.items():
+        yield f"modal stresses at {name}, {_place(body, point.position)}"
+    if body.surface_stress is not None:
+        yield f"modal stresses on the surface, at {len(body.surface_stress)} points"
+    if (patches := body.surface_patches) is not None:
+        faces = " and ".join(face for face in ("top", "bottom") if getattr(patches, face) is not None)
+        places = ", ".join(f"{start:g} … {end:g}" for start, end in patches.edges)
+        yield f"patches outlined in the mesh, {faces}, {patches.width:g} m wide: {places} m"
 
 
 def _results(file: h5py.File) -> str:

@@ -6,6 +6,7 @@ import sys
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from .parallel import is_first
 from .solve import Watcher
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ class Display(Watcher):
         self._task: TaskID | None = None
 
     def __enter__(self) -> Display:
-        if sys.stderr.isatty():
+        if sys.stderr.isatty() and is_first():
             from rich.console import Console
             from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 

@@ -21,6 +21,7 @@ from .mbs.observation import (
     trajectory_force,
     trajectory_target,
 )
+from .mbs.stress import BodyStress
 from .solve import Solution
 
 FORMAT = "ffrobot-results"
@@ -46,6 +47,8 @@ def write_results(solution: Solution, path: Path) -> None:
             _write_forces(group, outcome)
             for body_name, voltages in solution.voltages.get(name, {}).items():
                 _write_voltages(group.create_group(f"pzt/{body_name}"), solution.patches[body_name], voltages)
+            for body_name, stress in solution.stresses.get(name, {}).items():
+                _write_stress(group.create_group(f"stress/{body_name}"), stress)
         file.flush()
         image: bytes = file.id.get_file_image()
     write_atomically(path, image, "results file")
@@ -104,6 +107,16 @@ def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["reaction_moment"] = forces.reaction_moment
         if forces.motor is not None:
             entry["moment"] = forces.motor
+
+
+def _write_stress(group: h5py.Group, stress: BodyStress) -> None:
+    for name, point in stress.points.items():
+        for key, values in vars(point).items():
+            group[f"points/{name}/{key}"] = values
+        group[f"points/{name}/stress"].attrs["columns"] = ["xx", "yy", "zz", "yz", "xz", "xy"]
+    if stress.surface is not None:
+        for key, values in vars(stress.surface).items():
+            group[f"surface/{key}"] = values
 
 
 def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) -> None:

@@ -19,9 +19,11 @@ from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
+from .mbs.observation import body_motion
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.scene_file import load_scene
 from .mbs.scene_records import Analysis, Scene, split_point
+from .mbs.stress import BodyStress, body_stress
 from .validation import did_you_mean, quoted
 
 
@@ -58,6 +60,7 @@ class Solution:
     Attributes:
         outcomes: by analysis, in the order of the scene.
         voltages: by analysis and body.
+        stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
         stiffened: whether geometric stiffening is in the equations.
         stiffening_effects: by analysis, the largest relative change of a mode's stiffness by the loads of the run.
@@ -70,6 +73,7 @@ class Solution:
     patches: Mapping[str, PatchArray]
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     voltages: dict[str, dict[str, Voltages]] = field(default_factory=dict)
+    stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
     stiffened: bool = False
@@ -109,6 +113,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
                 body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
                 for body, array in solution.patches.items()
             }
+        solution.stresses[analysis.name] = _stresses(solution, outcome)
         solution.seconds[analysis.name] = time.perf_counter() - started
         if outcome.status != "completed":
             break
@@ -198,6 +203,16 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
     return LoadedBody(planar, body.modal, body.path, body.computed)
+
+
+def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
+    """Of the bodies whose files hold modal stresses."""
+    found = {
+        name: body_stress(body.modal, body_motion(outcome, body.planar).modal)
+        for name, body in solution.bodies.items()
+        if body.modal is not None
+    }
+    return {name: stress for name, stress in found.items() if stress is not None}
 
 
 def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> list[ModalLoad]:

@@ -29,6 +29,9 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     if any(solution.voltages.values()):
         console.print()
         console.print(_voltages(solution))
+    if any(solution.stresses.values()):
+        console.print()
+        console.print(_stresses(solution))
     notes = Table.grid(padding=(0, 2))
     for name, outcome in solution.outcomes.items():
         if outcome.analysis.kind != "static" and outcome.analysis.integrator == "auto":
@@ -85,6 +88,15 @@ def _voltages(solution: Solution) -> Table:
                 "" if limit is None else f"{values.largest / limit:.3g}",
                 f"{patches.condition_number:.3g}",
             )
+    return table
+
+
+def _stresses(solution: Solution) -> Table:
+    table = _table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)")
+    for name, by_body in solution.stresses.items():
+        for body, stress in by_body.items():
+            value, k, place = stress.largest()
+            table.add_row(name, body, f"{value / 1e6:.4g}", place, f"{solution.outcomes[name].time[k]:g}")
     return table
 
 

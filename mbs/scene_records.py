@@ -211,6 +211,7 @@ class PztLayout(Record):
     """Equal piezoelectric patches along one link. Lengths in m, modulus in Pa, d31 in m/V, density kg/m³, limit in V.
 
     Centers are distances along the link from its root; `count` places them at (k − ½)·(length of link)/count.
+    `coupling`: patches work on the section rotations at their ends, or on the faces of a solid that outlines them.
     """
 
     body: str
@@ -223,6 +224,7 @@ class PztLayout(Record):
     d31: float
     density: Positive | None = None
     limit: Positive | None = None
+    coupling: Literal["rotation", "surface"] = "rotation"
 
     @model_validator(mode="after")
     def _consistent(self) -> PztLayout:
@@ -283,6 +285,9 @@ class Analysis(Record):
 
     Both are 0 where the file does not give them: in static analyses (t = 0 only), and in forward analyses that take
     over the times of their actuation, which `load_scene` fills in.
+
+    `integrator`: see `integrators.choose_integrator` for "auto"; `spectral_radius` is what a step of generalized-alpha
+    leaves of vibrations far above one over its size.
     """
 
     name: Name
@@ -348,7 +353,10 @@ def check_steps(end: float, step: float) -> None:
 
 
 class SceneKeys(Record):
-    """Everything a scene file may contain; lists of tables keep the singular name they have in the file."""
+    """Everything a scene file may contain; lists of tables keep the singular name they have in the file.
+
+    `geometric_stiffening` "auto": where the loads of a run change the stiffness of a mode by more than 1 %.
+    """
 
     name: Annotated[str, Field(min_length=1)]
     space: Literal["planar", "spatial"] = "planar"

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import SolveError
+from .cells import CellName
 
 # Before dolfinx does it: PETSc's own signal handlers would answer a closed pipe or a kill with a page on debuggers.
 petsc4py.init(["ffrobot", "-no_signal_handler"])
@@ -25,7 +26,7 @@ import dolfinx  # noqa: E402
 import ufl  # noqa: E402
 from dolfinx import fem  # noqa: E402
 from dolfinx.fem import FunctionSpace  # noqa: E402
-from dolfinx.mesh import Mesh, create_mesh  # noqa: E402
+from dolfinx.mesh import CellType, GhostMode, Mesh, create_cell_partitioner, create_mesh  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
 _OLD = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 7)
@@ -84,6 +85,51 @@ def cell_vertices(mesh: Mesh) -> Floats:
     return vertices
 
 
+def create_solid_mesh(comm: MPI.Comm, cell: CellName, degree: int, cells: Integers, points: Floats) -> Mesh:
+    """Mesh of tetrahedra or hexahedra, distributed over `comm` without ghost cells.
+
+    Args:
+        comm: every rank calls, each with its share of the input.
+        cell: "tetrahedron" or "hexahedron".
+        degree: 1 or 2, of the geometry.
+        cells: (c, v) points of each cell, in gmsh's order of nodes.
+        points: (p, 3) in m.
+    """
+    # dolfinx's own order of nodes: dolfinx[i] = gmsh[order[i]].
+    order = dolfinx.cpp.io.perm_gmsh(getattr(CellType, cell), cells.shape[1])
+    nodes = np.ascontiguousarray(cells[:, order], dtype=np.int64)
+    if _OLD:
+        scalar = ufl.FiniteElement("Lagrange", ufl.Cell(cell, geometric_dimension=3), degree, variant="equispaced")
+        with _compiling():
+            return create_mesh(comm, nodes, points, ufl.Mesh(ufl.VectorElement(scalar)), GhostMode.none)
+    element = basix_ufl.element("Lagrange", cell, degree, basix.LagrangeVariant.equispaced, shape=(3,))
+    partitioner = create_cell_partitioner(GhostMode.none)
+    with _compiling():
+        return create_mesh(comm, nodes, points, ufl.Mesh(element), partitioner)
+
+
+def geometry_nodes(mesh: Mesh) -> Integers:
+    """(c, v) nodes of each local cell, rows of `mesh.geometry.x`, in dolfinx's order; its corners come first."""
+    dofmap = mesh.geometry.dofmap
+    cells = mesh.topology.index_map(mesh.topology.dim).size_local
+    if not _OLD:
+        return np.asarray(dofmap, dtype=np.int64)[:cells]
+    return np.asarray(dofmap.array, dtype=np.int64).reshape(-1, dofmap.links(0).size if cells else 1)[:cells]
+
+
+def geometry_degree(mesh: Mesh) -> int:
+    """Polynomial degree of the cells' shape."""
+    cmap = mesh.geometry.cmap
+    return int(cmap.degree)
+
+
+def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
+    """Basix element that maps the reference cell to the cells of `mesh`, by `geometry_nodes`."""
+    cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
+    equispaced = basix.LagrangeVariant.equispaced
+    return basix.create_element(_FAMILIES["P"], cell, geometry_degree(mesh), equispaced)
+
+
 def cell_dofs(space: FunctionSpace) -> Integers:
     """(c, d) degrees of freedom of each cell, in the order of `basix_element`'s basis."""
     dofs = space.dofmap.list
@@ -105,6 +151,24 @@ def assemble_matrix(form: ufl.Form) -> sp.csr_matrix:
     return sp.csr_matrix((matrix.data.copy(), matrix.indices.copy(), matrix.indptr.copy()), shape=(test, trial))
 
 
+def compiled_form(form: ufl.Form) -> fem.Form:
+    """`form` ready to be assembled."""
+    with _compiling():
+        return fem.form(form)
+
+
+def lagrange_element(space: FunctionSpace) -> basix.finite_element.FiniteElement:
+    """Basix element of one component of a vector Lagrange space."""
+    scalar = space.sub(0) if space.num_sub_spaces else space
+    return scalar.element.basix_element
+
+
+def node_map(space: FunctionSpace) -> Integers:
+    """(c, d) nodes of each cell of this process, ghosts too; component i of node k is degree of freedom 3k + i."""
+    nodes = space.dofmap.list
+    return np.asarray(nodes.array if _OLD else nodes, dtype=np.int64).reshape(-1, lagrange_element(space).dim)
+
+
 @contextmanager
 def _compiling() -> Iterator[None]:
     """FFCx compiles what it does not find in its cache (`fenics` in the XDG cache folder): mute its and gcc's log.
@@ -123,3 +187,27 @@ def _compiling() -> Iterator[None]:
         ) from None
     finally:
         logging.disable(before)
+
+
+def lagrange_space(mesh: Mesh, degree: int, *, vector: bool) -> FunctionSpace:
+    """Continuous Lagrange functions on a mesh of solids: scalar ones, or one for each direction of space."""
+    return _space(mesh, degree, (3,) if vector else ())
+
+
+def constant_space(mesh: Mesh, shape: tuple[int, ...]) -> FunctionSpace:
+    """Functions that are constant in each cell, with values of `shape`."""
+    return _space(mesh, 0, shape)
+
+
+def _space(mesh: Mesh, degree: int, shape: tuple[int, ...]) -> FunctionSpace:
+    options: dict[str, Any] = {"discontinuous": degree == 0}
+    if degree:
+        options["lagrange_variant"] = basix.LagrangeVariant.gll_warped
+    cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
+    with _compiling():
+        if _OLD:
+            element = basix_ufl.create_element(_FAMILIES["P"], cell, degree, **options)
+            wrap = {0: lambda e: e, 1: basix_ufl.VectorElement, 2: basix_ufl.TensorElement}[len(shape)]
+            return fem.FunctionSpace(mesh, wrap(element, *([shape] if len(shape) == 2 else shape)))
+        element = basix_ufl.element(_FAMILIES["P"], cell, degree, shape=shape or None, **options)
+        return fem.functionspace(mesh, element)

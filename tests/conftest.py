@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,11 +61,15 @@ def ffrobot(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def solved(ffrobot, tmp_path_factory):
-    """Copy a case, edit the text of its scene, run it."""
+    """Copy a case, edit the text of its scene and of its link files, run it."""
 
-    def solve(name, edit=lambda text: text):
+    def solve(name, edit=lambda text: text, edit_link=lambda text: text):
         scene = _copy(name, tmp_path_factory.mktemp("solved"))
         scene.write_text(edit(scene.read_text(encoding="utf-8")), encoding="utf-8")
+        for body in tomllib.loads(scene.read_text(encoding="utf-8"))["body"]:
+            if "link" in body:
+                link = scene.parent / body["link"]
+                link.write_text(edit_link(link.read_text(encoding="utf-8")), encoding="utf-8")
         done = ffrobot("solve", "scene.toml", cwd=scene.parent)
         assert done.returncode == 0, done.stderr
         file = h5py.File(scene.with_suffix(".results.h5"), "r")
@@ -87,6 +92,12 @@ def slider_crank(solved):
 def case_copy(tmp_path):
     """Copy a case by its name; returns the scene file of the copy."""
     return lambda name: _copy(name, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def case_copy_of_module(tmp_path_factory):
+    """As `case_copy`, for fixtures that serve a whole module."""
+    return lambda name: _copy(name, tmp_path_factory.mktemp("case"))
 
 
 def _copy(name, folder):

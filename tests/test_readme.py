@@ -36,7 +36,10 @@ def test_arm_of_the_readme_swings_a_quarter_turn(arm):
     assert moment == pytest.approx(9.81 * length * (bar / 2 + payload), rel=1e-3)
 
 
-@pytest.mark.parametrize("document", ["README.md", "cases/two_link/README.md", "cases/slider_crank/README.md"])
+DOCUMENTS = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("cases/*/README.md"))]
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
 def test_readmes_link_to_what_is_there(document):
     path = ROOT / document
     links = re.findall(r"\]\((?!http)([^)#]+)\)", path.read_text(encoding="utf-8"))

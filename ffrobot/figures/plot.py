@@ -1,14 +1,18 @@
-"""From a results file to a folder of figures, PNG and PDF."""
+"""From a results file, or a modal body file, to a folder of figures, PNG and PDF."""
 
 from __future__ import annotations
 
 from io import BytesIO
 from pathlib import Path
 
+import h5py
 from matplotlib.figure import Figure
 
 from ..errors import InputError
+from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
+from ..fe_models.modal_body_file import read_modal_body
 from ..files import write_atomically
+from .body_shape import draw_mesh, draw_modes
 from .configurations import draw_configurations
 from .figure_file import FigureFile, FigureRecord, load_figures
 from .path import draw_path
@@ -23,6 +27,30 @@ DRAW = {"time": draw_time_history, "path": draw_path, "configurations": draw_con
 METADATA = {"png": {"Software": None}, "pdf": {"CreationDate": None, "Producer": None, "Creator": None}}
 
 
+def plot_file(path: Path, folder: Path) -> list[Path]:
+    """Draw the figures of a results file or of a modal body file, whichever it is, into `folder`: see the two."""
+    try:
+        with h5py.File(path, "r") as file:
+            is_body = file.attrs.get("format") == MODAL_FORMAT
+    except OSError:
+        is_body = False
+    return plot_modal_body(path, folder) if is_body else plot_results(path, folder)
+
+
+def plot_modal_body(path: Path, folder: Path) -> list[Path]:
+    """Draw mesh and lowest modes of a modal body file into `folder`, which is made when absent.
+
+    Returns the files written, a PNG and a PDF of each. Raises `InputError` where the file cannot be read.
+    """
+    _check_folder(folder)
+    body = read_modal_body(path)
+    with style():
+        return [
+            *_write(draw_mesh(body), folder, "mesh"),
+            *_write(draw_modes(body), folder, "modes"),
+        ]
+
+
 def plot_results(results_path: Path, folder: Path) -> list[Path]:
     """Draw the figures of a results file into `folder`, which is made when absent.
 
@@ -30,18 +58,13 @@ def plot_results(results_path: Path, folder: Path) -> list[Path]:
     Returns the files written, a PNG and a PDF of each figure. Raises `InputError` where the results or `figures.toml`
     cannot be read, or name what is not there.
     """
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: output: expected a folder, found a file")
+    _check_folder(folder)
     figure_file = results_path.parent / "figures.toml"
-    written = []
+    written: list[Path] = []
     with Results(results_path) as results, style():
         figures = load_figures(figure_file) if figure_file.is_file() else FigureFile(figure=standard_figures(results))
         for record in figures.figure:
-            picture = draw(record, results)
-            for extension in ("png", "pdf"):
-                path = folder / f"{record.name}.{extension}"
-                write_atomically(path, _image(picture, extension), "figure", make_folder=True)
-                written.append(path)
+            written += _write(draw(record, results), folder, record.name)
     return written
 
 
@@ -54,6 +77,19 @@ def draw(record: FigureRecord, results: Results) -> Figure:
     if record.y_range is not None:
         axes.set_ylim(*record.y_range)
     return picture
+
+
+def _check_folder(folder: Path) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: output: expected a folder, found a file")
+
+
+def _write(picture: Figure, folder: Path, name: str) -> list[Path]:
+    """The PNG and the PDF of a picture."""
+    paths = [folder / f"{name}.{extension}" for extension in METADATA]
+    for path, extension in zip(paths, METADATA, strict=True):
+        write_atomically(path, _image(picture, extension), "figure", make_folder=True)
+    return paths
 
 
 def _image(picture: Figure, extension: str) -> bytes:

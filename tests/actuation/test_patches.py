@@ -1,6 +1,7 @@
 """Patches on a link from stage 1: deflection in closed form, virtual work, and what is refused."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from ffrobot.actuation.patches import patch_array
 from ffrobot.actuation.voltages import solve_voltages
 from ffrobot.errors import InputError
+from ffrobot.fe_models.modal_body import OutlinedPatches
 from ffrobot.mbs.planar_body import from_modal_body, with_payload
 from ffrobot.mbs.scene_records import PztLayout
 
@@ -119,3 +121,71 @@ def test_patches_at_one_place_cannot_reach_two_modes(cantilever):
 def test_patch_beyond_the_link_is_refused(cantilever, center, number):
     with pytest.raises(InputError, match=rf'pzt "link": expected patches within the link.*found patch {number} from'):
         patches(cantilever(10), centers=(center,))
+
+
+def tapered(body, rise):
+    """The same modes under heights that change linearly along the link by `rise` in all, as a file states them."""
+    x = body.stations.position[:, 0]
+    middles = np.append((x[1:] + x[:-1]) / 2, x[-1])
+    return replace(body, stations=replace(body.stations, height=0.015 * (1 + rise * middles)))
+
+
+def test_patches_on_a_taper_bend_with_the_local_lever_arm(cantilever):
+    """Φ_V = ∫ c(x) φ'' dx over the patch, c = E d31 w (t_p + t_b(x))/2; stations share it out to second order."""
+    body = cantilever(4)
+    found = patches(tapered(body, -0.4), centers=(0.47,), length=0.2)
+    nodes, weights = np.polynomial.legendre.leggauss(5)
+    expected = np.zeros(4)
+    ends = np.concatenate([[0.37], np.arange(8, 12) * 0.05, [0.57]])
+    for start, end in pairwise(ends):
+        for x, w in zip((start + end) / 2 + (end - start) / 2 * nodes, (end - start) / 2 * weights, strict=True):
+            c = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015 * (1 - 0.4 * x)) / 2
+            near = [body.interpolate(at).rotation[2] for at in (x - 1e-5, x + 1e-5)]
+            expected += w * c * (near[1] - near[0]) / 2e-5
+    np.testing.assert_allclose(found.Phi_V[:, 0], expected, rtol=1e-3, atol=1e-6 * np.abs(expected).max())
+    mean_height = 0.015 * (1 - 0.4 * 0.47)
+    assert found.moment_per_volt[0] == pytest.approx(C / 0.01575 * (0.75e-3 + mean_height), rel=1e-3)
+    constant = patches(body, centers=(0.47,), length=0.2)
+    assert abs(found.Phi_V[0, 0] / constant.Phi_V[0, 0] - 1) > 0.1
+
+
+def test_a_step_of_more_than_a_tenth_under_a_patch_is_refused(cantilever):
+    body = cantilever(4)
+    x = body.stations.position[:, 0]
+    for factor, fine in ((1.05, True), (1.2, False)):
+        stepped = replace(body, stations=replace(body.stations, height=np.where(x < 0.5, 0.015, 0.015 * factor)))
+        patches(stepped, centers=(0.3, 0.7))
+        if fine:
+            patches(stepped, centers=(0.5,))
+            continue
+        with pytest.raises(InputError, match=r"across a step of the height from 0\.015 to 0\.018 m at 0\.5 m"):
+            patches(stepped, centers=(0.5,))
+
+
+def outlined(body, faces=("top", "bottom"), width=0.025, count=10):
+    """The link with ten patches outlined on it, and the strain integrals of plane sections on its faces."""
+    edges = (np.arange(count)[:, None] + 0.5) / count + np.array([-0.025, 0.025])
+    turn = np.array([body.interpolate(b).rotation[2] - body.interpolate(a).rotation[2] for a, b in edges])
+    strains = {"top": -0.0075 * width * turn, "bottom": 0.0075 * width * turn}
+    return replace(body, surface_patches=OutlinedPatches(edges, width, **{face: strains[face] for face in faces}))
+
+
+@pytest.mark.parametrize("faces", [("top",), ("bottom",), ("top", "bottom")])
+def test_patches_on_the_surface_work_as_on_the_sections(cantilever, faces):
+    """Where sections stay plane the two couplings are one: N b h/2 = c V, halved where both faces have patches."""
+    body = outlined(cantilever(6), faces)
+    found, rotation = patches(body, coupling="surface"), patches(body)
+    np.testing.assert_allclose(found.Phi_V, rotation.Phi_V, rtol=1e-12)
+    np.testing.assert_array_equal(found.moment_per_volt, rotation.moment_per_volt)
+
+
+def test_surface_patches_of_another_layout_are_refused(cantilever):
+    body = outlined(cantilever(6))
+    with pytest.raises(InputError, match=r'pzt "link": coupling: expected "rotation", or a link whose file outlines'):
+        patches(cantilever(6), coupling="surface")
+    with pytest.raises(InputError, match=r"expected the 10 patches that the link file outlines, .* found 9, from"):
+        patches(body, coupling="surface", count=9)
+    with pytest.raises(InputError, match=r"0\.025 m wide, found 10, .* and 0\.02 m wide"):
+        patches(body, coupling="surface", width=0.02)
+    with pytest.raises(InputError, match=r"from 0\.025 to 0\.075, .* found 10, from 0\.03 to 0\.07"):
+        patches(body, coupling="surface", length=0.04)

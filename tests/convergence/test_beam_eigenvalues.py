@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from ffrobot.errors import SolveError
 from ffrobot.fe_models.beam import family_model
 from ffrobot.fe_models.eigen import lowest_modes
-from ffrobot.fe_models.link_file import FAMILIES, BeamLink
+from ffrobot.fe_models.link_records import FAMILIES, BeamLink
 from ffrobot.mesh.interval import interval_mesh
 from ffrobot.validation import validate
 

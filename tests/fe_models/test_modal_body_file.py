@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 from ffrobot.errors import InputError, SolveError
 from ffrobot.fe_models.link import make_link
+from ffrobot.fe_models.modal_body import OutlinedPatches, StressPoint
 from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
+from ffrobot.info import describe
 
 
 @pytest.fixture
@@ -36,6 +39,45 @@ def test_round_trip_is_exact(outcome):
     assert isinstance(read.mass, float)
     assert set(read.interfaces) == {"root", "tip", "grip"}
     assert "force/grip/x" in read.geometric_stiffness
+
+
+def test_what_only_some_bodies_have(outcome, tmp_path):
+    n, p = 12, len(outcome.body.mesh.points)
+    rng = np.random.default_rng(0)
+    points = {name: StressPoint(*(rng.normal(size=shape) for shape in ((3,), (6, n), (6, n)))) for name in ("a", "b")}
+    patches = OutlinedPatches(np.array([[0.1, 0.2], [0.4, 0.5]]), 0.02, bottom=rng.normal(size=(2, n)))
+    surface = rng.normal(size=(p, 6, n))
+    body = replace(outcome.body, stress=points, surface_stress=surface, surface_patches=patches)
+    path = tmp_path / "full.h5"
+    write_modal_body(path, body)
+    read = read_modal_body(path)
+    assert set(read.stress) == {"a", "b"}
+    np.testing.assert_array_equal(read.stress["b"].strain, points["b"].strain)
+    np.testing.assert_array_equal(read.surface_stress, surface)
+    np.testing.assert_array_equal(read.surface_patches.edges, patches.edges)
+    np.testing.assert_array_equal(read.surface_patches.bottom, patches.bottom)
+    assert read.surface_patches.top is None
+    assert read.surface_patches.width == 0.02
+    told = describe(path)
+    assert f"modal stresses on the surface, at {p} points" in told
+    assert "patches outlined in the mesh, bottom, 0.02 m wide: 0.1 … 0.2, 0.4 … 0.5 m" in told
+    plain = read_modal_body(outcome.path)
+    assert (plain.stress, plain.surface_stress, plain.surface_patches) == ({}, None, None)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"stress": {"a": StressPoint(np.zeros(3), np.zeros((6, 11)), np.zeros((6, 12)))}}, "stress/points/a/stress"),
+        ({"surface_stress": np.zeros((3, 6, 12))}, r"stress/surface: expected shape \(61, 6, 12\)"),
+        ({"surface_patches": OutlinedPatches(np.zeros((2, 2)), 0.02, np.zeros((1, 12)))}, "surface_patches/top"),
+        ({"surface_stress": np.full((61, 6, 12), np.nan)}, "stress/surface: expected finite numbers"),
+    ],
+)
+def test_shapes_of_what_only_some_bodies_have(link_file, changes, message):
+    body = make_link(link_file(family="all", count=12)).body
+    with pytest.raises(InputError, match=message):
+        replace(body, **changes)
 
 
 def test_datasets_of_the_interface(outcome):

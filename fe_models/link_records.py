@@ -1,0 +1,179 @@
+"""A whole link file as records: what stage 1 reads, checked key by key. `geometry.kind` picks beam or solid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from ..mesh.records import (
+    BeamGeometry,
+    BeamMesh,
+    CircleSection,
+    Coupling,
+    InterfaceRecord,
+    Name,
+    NotNegative,
+    Positive,
+    RectangleSection,
+    SectionRecord,
+    SolidGeometry,
+    SolidMeshRecord,
+    SurfacePatches,
+    TubeSection,
+    Vector,
+)
+from ..validation import Record
+from .section import Section, rectangle, tube
+
+Family = Literal["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
+
+FAMILIES: tuple[Family, ...] = ("in-plane-bending", "out-of-plane-bending", "axial", "torsion")
+
+Poisson = Annotated[float, Field(gt=-1, lt=0.5)]
+
+
+class Material(Record):
+    """Linear elastic, isotropic."""
+
+    youngs_modulus: Positive  # Pa
+    density: Positive  # kg/m³
+    # Beams need it for torsion and shear only, solids always.
+    poissons_ratio: Poisson | None = None
+
+
+class OrthotropicMaterial(Record):
+    """Linear elastic, with three planes of symmetry along the axes of the link (solids only)."""
+
+    youngs_modulus: tuple[Positive, Positive, Positive]  # E_x, E_y, E_z in Pa
+    poissons_ratio: Vector  # ν_xy, ν_yz, ν_xz: contraction along the second under a pull along the first
+    shear_modulus: tuple[Positive, Positive, Positive]  # G_xy, G_yz, G_xz in Pa
+    density: Positive  # kg/m³
+
+
+def _symmetry(material: object) -> str:
+    """Which record a material table is: three Young's moduli make it orthotropic."""
+    table = material if isinstance(material, Mapping) else vars(material)
+    moduli = table.get("youngs_modulus")
+    return "orthotropic" if isinstance(moduli, list | tuple) else "isotropic"
+
+
+SolidMaterial = Annotated[
+    Annotated[Material, Tag("isotropic")] | Annotated[OrthotropicMaterial, Tag("orthotropic")],
+    Discriminator(_symmetry),
+]
+
+
+class Region(Record):
+    """The part of a solid inside a physical volume `group` of its mesh file, of another material."""
+
+    group: Annotated[str, Field(min_length=1)]
+    material: SolidMaterial
+
+
+class BeamModel(Record):
+    """Which beam theory."""
+
+    theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli"
+
+
+class Reference(Record):
+    """How the link's frame is held to it (formulation.md, section 2).
+
+    `coupling` says how a solid's end faces are held; default: mean for simply-supported, rigid for cantilever. A beam's
+    section moves as a plate in any case: both words mean the same there.
+    """
+
+    condition: Literal["cantilever", "simply-supported"]
+    coupling: Coupling | None = None
+
+
+class Modes(Record):
+    """The lowest `count` modes of a family, or those numbered `indices` (1 is the lowest)."""
+
+    count: Annotated[int, Field(ge=1)] | None = None
+    indices: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
+    family: Family | Literal["all"] = "all"
+
+
+class Damping(Record):
+    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK."""
+
+    ratio: NotNegative | tuple[NotNegative, ...] | None = None
+    rayleigh: tuple[NotNegative, NotNegative] | None = None
+
+
+class StressRecovery(Record):
+    """Where modal stresses are kept: named `points` (m, link frame), and on the whole `surface` of a solid."""
+
+    points: dict[Name, Vector] = Field(default_factory=dict)
+    surface: bool = False
+
+
+class _Link(Record):
+    """What all link files have."""
+
+    name: Annotated[str, Field(min_length=1)]
+    reference: Reference
+    modes: Modes
+    damping: Damping = Damping()
+    interface: tuple[InterfaceRecord, ...] = ()
+    stress: StressRecovery = StressRecovery()
+
+    @property
+    def families(self) -> tuple[Family, ...]:
+        """The mode families asked for."""
+        return FAMILIES if self.modes.family == "all" else (self.modes.family,)
+
+
+class BeamLink(_Link):
+    """A whole link file with `geometry.kind = "beam"`."""
+
+    material: Material
+    geometry: BeamGeometry
+    mesh: BeamMesh
+    model: BeamModel = BeamModel()
+
+    @property
+    def shapes(self) -> list[SectionRecord]:
+        """The section of each segment."""
+        records = [segment.section for segment in self.geometry.segment or ()]
+        return records if self.geometry.section is None else [*records, self.geometry.section]
+
+    @property
+    def sections(self) -> list[Section]:
+        """Section properties of each segment. Without Poisson's ratio, J and k belong to ν = 0: nothing uses them."""
+        return [_properties(record, self.material.poissons_ratio or 0.0) for record in self.shapes]
+
+    @property
+    def places(self) -> dict[str, float]:
+        """Every interface, root and tip too, by name: m from the root."""
+        named = {item.name: item.position for item in self.interface if isinstance(item.position, float)}
+        return {"root": 0.0, "tip": self.geometry.length} | named
+
+
+class SolidLink(_Link):
+    """A whole link file with `geometry.kind = "solid"`."""
+
+    material: SolidMaterial
+    region: tuple[Region, ...] = ()
+    geometry: SolidGeometry
+    mesh: SolidMeshRecord = SolidMeshRecord()
+    surface_patch: SurfacePatches | None = None
+
+    @property
+    def coupling(self) -> Coupling:
+        """How the supports of the reference condition hold the end faces."""
+        return self.reference.coupling or ("rigid" if self.reference.condition == "cantilever" else "mean")
+
+
+Link = BeamLink | SolidLink
+
+
+def _properties(record: RectangleSection | CircleSection | TubeSection, nu: float) -> Section:
+    if isinstance(record, RectangleSection):
+        return rectangle(record.height, record.width, nu)
+    if isinstance(record, CircleSection):
+        return tube(record.diameter, 0.0, nu)
+    return tube(record.outer, record.inner, nu)

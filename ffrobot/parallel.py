@@ -1,0 +1,48 @@
+"""Runs under `mpirun`: which process this is, and work for the first one alone. mpi4py is loaded only there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+from .errors import FfrobotError
+
+T = TypeVar("T")
+
+# Set by Open MPI, MPICH and Intel MPI, and Slurm's own launcher.
+_SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE")
+_RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
+
+
+def processes() -> int:
+    """How many processes run this program together; 1 without mpirun."""
+    return _environment(_SIZES, 1)
+
+
+def is_first() -> bool:
+    """Whether this is the process that reads, writes and prints."""
+    return _environment(_RANKS, 0) == 0
+
+
+def on_first(work: Callable[[], T]) -> T:
+    """What `work` returns, done by the first process alone; its `FfrobotError` is raised on all. Collective."""
+    if processes() == 1:
+        return work()
+    from mpi4py import MPI
+
+    result: T | None = None
+    error: FfrobotError | None = None
+    if MPI.COMM_WORLD.rank == 0:
+        try:
+            result = work()
+        except FfrobotError as failure:
+            error = failure
+    result, error = MPI.COMM_WORLD.bcast((result, error))
+    if error is not None:
+        raise error
+    return cast(T, result)
+
+
+def _environment(names: tuple[str, ...], default: int) -> int:
+    return next((int(os.environ[name]) for name in names if name in os.environ), default)

@@ -1,0 +1,136 @@
+"""What must hold for a part's mesh before anything is computed on it, and what can be mended."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NoReturn
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from ..errors import InputError
+from .cells import Floats
+from .jacobian import SLIVER, cell_quality, jacobians, reference_nodes
+from .part_mesh import PartMesh, facet_keys
+from .records import SolidGeometry
+
+# Smallest determinant of a curved cell's Jacobian relative to its largest.
+_CURVED = 0.005
+METRES = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
+_NAMES = {"m": "metres", "mm": "millimetres", "in": "inches"}
+# A part may reach beyond its interfaces (bosses around joints); farther out than this it is taken for a slip.
+_LENGTHS = (0.2, 5.0)
+
+
+def check_shape(part: PartMesh, geometry: SolidGeometry, where: str) -> None:
+    """Check the extent of a placed part.
+
+    Raises:
+        InputError: it has no thickness, or its length is so wrong that the unit must be.
+    """
+    extent = np.ptp(part.points[part.corners.ravel()], axis=0)
+    if extent.min() <= 1e-9 * extent.max():
+        axis = "xyz"[int(np.argmin(extent))]
+        raise InputError(
+            f"{where}: expected a part of some thickness, found all nodes in one plane: zero elements along {axis}"
+        )
+    ratio = extent[0] / geometry.length
+    if _LENGTHS[0] < ratio < _LENGTHS[1]:
+        return
+    others = {unit: ratio * metres / METRES[geometry.unit] for unit, metres in METRES.items() if unit != geometry.unit}
+    likely = [unit for unit, corrected in others.items() if 0.8 < corrected < 1.25]
+    hint = f': looks like {_NAMES[likely[0]]}: geometry.unit = "{likely[0]}"' if likely else ""
+    raise InputError(f"{where}: expected a part {geometry.length:g} m long, found {extent[0]:g} m along x{hint}")
+
+
+def check_connected(part: PartMesh, where: str) -> None:
+    """Check that the cells hang together by their faces.
+
+    Raises:
+        InputError: they do not.
+    """
+    facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
+    _, number = np.unique(facet_keys(facets, len(part.points)), return_inverse=True)
+    cell = np.repeat(np.arange(len(part.cells)), len(part.shape.facets))
+    incidence = sp.csr_matrix((np.ones(cell.size, dtype=np.int8), (cell, number)))
+    count, piece = connected_components(incidence @ incidence.T, directed=False)
+    if count == 1:
+        return
+    middles = part.points[part.corners].mean(axis=1)
+    listed = [
+        f"{np.sum(piece == k)} elements around {_show(middles[piece == k].mean(axis=0))}" for k in range(min(count, 4))
+    ]
+    more = f", and {count - 4} more" if count > 4 else ""
+    raise InputError(
+        f"{where}: expected one connected part, found {count}: {'; '.join(listed)}{more}. Parts that touch must share "
+        "their nodes"
+    )
+
+
+def oriented(part: PartMesh) -> PartMesh:
+    """`part` with its cells mirrored where all of them are left-handed, as some formats number them."""
+    determinants = _determinants(part)
+    if np.all(determinants.max(axis=1) < 0):
+        nodes = reference_nodes(part.cell, part.degree)
+        swapped = nodes[:, [1, 0, 2]]
+        order = np.argmin(np.linalg.norm(nodes[None] - swapped[:, None], axis=2), axis=1)
+        return replace(part, cells=part.cells[:, order])
+    return part
+
+
+def check_quality(part: PartMesh, where: str) -> None:
+    """Check every cell's shape.
+
+    Raises:
+        InputError: some are inverted or flat; says how many and where.
+    """
+    determinants = _determinants(part)
+    largest = np.abs(determinants).max(axis=1)
+    inverted = determinants.min(axis=1) <= 1e-6 * largest
+    # A flat cell's determinant has no sign to speak of.
+    flat = cell_quality(part.points[part.corners], part.cell) < SLIVER
+    if np.any(inverted & ~flat):
+        _reject_cells(part, inverted & ~flat, "inverted elements", "elements with their nodes in order", where)
+    if np.any(flat):
+        _reject_cells(part, flat, "flat elements (slivers)", "elements of some volume", where)
+
+
+def straightened(part: PartMesh) -> PartMesh:
+    """Move mid-side nodes of cells that curved edges turn over towards the middle of their edges, until none is left.
+
+    Where a coarse cell has two edges on one smooth curve its corner between them is (nearly) flat.
+    """
+    if part.degree == 1:
+        return part
+    points = part.points.copy()
+    shape = part.shape
+    corners = len(shape.corners)
+    for _ in range(20):
+        determinants = _determinants(part.moved(points))
+        bad = np.flatnonzero(determinants.min(axis=1) < _CURVED * determinants.max(axis=1))
+        if not bad.size:
+            break
+        ends = part.cells[bad][:, shape.edges].reshape(-1, 2)
+        middle, once = np.unique(part.cells[bad][:, corners : corners + len(shape.edges)], return_index=True)
+        straight = points[ends[once]].mean(axis=1)
+        points[middle] = straight + 0.7 * (points[middle] - straight)
+    return part.moved(points)
+
+
+def _determinants(part: PartMesh) -> Floats:
+    """(c, s) determinants of the Jacobian at the corners, and in curved cells at the other nodes of degree 2 too."""
+    at = reference_nodes(part.cell, part.degree)
+    determinants: Floats = np.linalg.det(jacobians(part.points[part.cells], part.cell, part.degree, at))
+    return determinants
+
+
+def _reject_cells(part: PartMesh, bad: NDArray[np.bool_], what: str, expected: str, where: str) -> NoReturn:
+    middles = part.points[part.corners[bad]].mean(axis=1)
+    listed = ", ".join(_show(middle) for middle in middles[:3])
+    raise InputError(f"{where}: expected {expected}, found {np.sum(bad)} {what} of {len(bad)}, e.g. at {listed} m")
+
+
+def _show(point: Floats) -> str:
+    return f"({', '.join(f'{value:.4g}' for value in point)})"

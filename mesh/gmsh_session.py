@@ -1,0 +1,218 @@
+"""gmsh, used quietly: started and always ended, one thread, no output, interrupts left to the program.
+
+Importing this loads gmsh.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import gmsh
+import numpy as np
+
+from ..errors import InputError
+from .cells import Floats, Integers
+from .defaults import CIRCLE, GROWTH
+from .jacobian import SLIVER, cell_quality
+from .source import RawMesh
+
+# gmsh's numbers of volume elements, under the names that meshio uses.
+VOLUME_ELEMENTS = {
+    4: "tetra",
+    11: "tetra10",
+    29: "tetra20",
+    5: "hexahedron",
+    17: "hexahedron20",
+    12: "hexahedron27",
+    6: "wedge",
+    7: "pyramid",
+    13: "wedge18",
+    14: "pyramid14",
+    18: "wedge15",
+    19: "pyramid13",
+}
+# gmsh's newer algorithm, HXT, makes better meshes faster, but other ones in every run.
+_DELAUNAY = 1
+# A mesh too coarse for the shape crosses itself: then finer ones along curved faces are tried. Now and then one has a
+# flat cell: a slightly smaller size gives another mesh. Factors of the elements around a circle, and of the size:
+_ATTEMPTS = ((1, 1.0), (1, 0.94), (1, 0.88), (2, 0.5), (4, 0.25))
+
+
+@contextmanager
+def gmsh_session() -> Iterator[None]:
+    """An empty gmsh model; reproducible: one thread, no settings files."""
+    interrupt = signal.getsignal(signal.SIGINT)
+    with _stdout_silenced():
+        gmsh.initialize([], False)
+        try:
+            signal.signal(signal.SIGINT, interrupt)
+            for name, value in (
+                ("General.Terminal", 0),
+                ("General.NumThreads", 1),
+                ("General.AbortOnError", 0),
+                ("Mesh.Algorithm3D", _DELAUNAY),
+            ):
+                gmsh.option.setNumber(name, value)
+            yield
+        finally:
+            gmsh.finalize()
+
+
+@contextmanager
+def _stdout_silenced() -> Iterator[None]:
+    # OpenCASCADE writes to the process's standard output itself, past Python.
+    sys.stdout.flush()
+    kept = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def volume_and_surface() -> tuple[float, float]:
+    """Of all volumes of the model, and of the faces of these, in the model's units."""
+    occ = gmsh.model.occ
+    faces = gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)
+    return sum(occ.getMass(*e) for e in gmsh.model.getEntities(3)), sum(occ.getMass(*e) for e in faces)
+
+
+def mesh_model(size: float, where: str, around: int = CIRCLE) -> None:
+    """Fill the model with tetrahedra of edge length `size`, finer along curved faces, and bend them to these.
+
+    Args:
+        size: in the model's unit.
+        where: beginning of the error's message: file and key.
+        around: elements on a full circle of a curved face.
+
+    Raises:
+        InputError: gmsh cannot mesh the shape.
+    """
+    problem: object = None
+    for finer, smaller in _ATTEMPTS:
+        gmsh.option.setNumber("Mesh.MeshSizeMax", smaller * size)
+        curved = _refine_curved_faces(smaller * size, around * finer)
+        try:
+            gmsh.model.mesh.generate(3)
+        except Exception as error:  # gmsh raises nothing more special
+            problem = error
+        else:
+            if not _has_slivers():
+                if curved:
+                    gmsh.model.mesh.setOrder(2)
+                return
+            problem = "some are flat"
+        gmsh.model.mesh.clear()
+    raise InputError(f"{where}: expected a shape that elements of {size:g} can fill, found that they cannot: {problem}")
+
+
+def _has_slivers() -> bool:
+    tags, points, _ = gmsh.model.mesh.getNodes()
+    place = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    place[tags.astype(np.int64)] = np.arange(len(tags))
+    _, _, nodes = gmsh.model.mesh.getElements(3)
+    corners = points.reshape(-1, 3)[place[np.concatenate(nodes).astype(np.int64)].reshape(-1, 4)]
+    return bool(np.min(cell_quality(corners, "tetrahedron")) < SLIVER)
+
+
+def _refine_curved_faces(size: float, around: int) -> bool:
+    """Ask for `around` elements on a full circle; whether the model has curved faces at all."""
+    by_size: dict[float, list[int]] = {}
+    curved = [face for face in gmsh.model.getEntities(2) if gmsh.model.getType(*face) != "Plane"]
+    for dim, tag in curved:
+        wanted = float(f"{2 * np.pi / max(_curvature(dim, tag), 1e-12) / around:.6g}")
+        if wanted < size:
+            by_size.setdefault(wanted, []).append(tag)
+    fields = [_growing_field(wanted, size, tags) for wanted, tags in by_size.items()]
+    if fields:
+        smallest = gmsh.model.mesh.field.add("Min")
+        gmsh.model.mesh.field.setNumbers(smallest, "FieldsList", fields)
+        gmsh.model.mesh.field.setAsBackgroundMesh(smallest)
+    return bool(curved)
+
+
+def _curvature(dim: int, tag: int) -> float:
+    """Largest curvature of a face, from a few points on it."""
+    low, high = gmsh.model.getParametrizationBounds(dim, tag)
+    parameters = [
+        (low[0] + a * (high[0] - low[0]), low[1] + b * (high[1] - low[1]))
+        for a in (0.1, 0.5, 0.9)
+        for b in (0.1, 0.5, 0.9)
+    ]
+    return float(np.max(np.abs(gmsh.model.getCurvature(dim, tag, np.ravel(parameters)))))
+
+
+def _growing_field(begin: float, end: float, faces: list[int]) -> int:
+    """A size field: `begin` on `faces`, growing with the distance from them up to `end`."""
+    field = gmsh.model.mesh.field
+    distance = field.add("Distance")
+    field.setNumbers(distance, "FacesList", faces)
+    size = int(field.add("Threshold"))
+    values = {"IField": distance, "LcMin": begin, "LcMax": end, "DistMin": 0.0, "DistMax": (end - begin) / GROWTH}
+    for name, value in values.items():
+        field.setNumber(size, name, value)
+    return size
+
+
+def extract_mesh() -> RawMesh:
+    """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
+    number, points = _points()
+    groups = {dim: {tag: _group_name(dim, tag) for _, tag in gmsh.model.getPhysicalGroups(dim)} for dim in (2, 3)}
+    region_of = {
+        int(entity): name
+        for tag, name in groups[3].items()
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(3, tag)
+    }
+    blocks: list[tuple[str, Integers, str | None]] = []
+    for _, volume in gmsh.model.getEntities(3):
+        for kind, cells in _elements(3, volume, number):
+            blocks.append((VOLUME_ELEMENTS.get(kind, f"gmsh type {kind}"), cells, region_of.get(volume)))
+    faces: dict[str, list[Integers]] = {}
+    for tag, name in groups[2].items():
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(2, tag):
+            for kind, cells in _elements(2, int(entity), number):
+                corners = gmsh.model.mesh.getElementProperties(kind)[5]
+                faces.setdefault(name, []).append(cells[:, :corners])
+    surfaces = sum(cells.shape[0] for _, face in gmsh.model.getEntities(2) for _, cells in _elements(2, face, number))
+    return RawMesh(points, tuple(blocks), faces, {}, surfaces)
+
+
+def _group_name(dim: int, tag: int) -> str:
+    return gmsh.model.getPhysicalName(dim, tag) or str(tag)
+
+
+def _points() -> tuple[Integers, Floats]:
+    """Row of each node tag of gmsh, and (p, 3) coordinates."""
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
+    number[tags.astype(np.int64)] = np.arange(len(tags))
+    return number, np.asarray(coordinates, dtype=np.float64).reshape(-1, 3)
+
+
+def _elements(dim: int, entity: int, number: Integers) -> Iterator[tuple[int, Integers]]:
+    for kind, tags, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
+        yield int(kind), number[np.asarray(nodes, dtype=np.int64)].reshape(len(tags), -1)
+
+
+def read_msh(path: Path, where: str) -> RawMesh:
+    """A mesh in gmsh's own format.
+
+    Raises:
+        InputError: gmsh cannot read it.
+    """
+    with gmsh_session():
+        try:
+            gmsh.open(str(path))
+            return extract_mesh()
+        except Exception as error:  # gmsh raises nothing more special
+            raise InputError(
+                f"{where}: expected a mesh that gmsh can read, found one that it cannot: {error}"
+            ) from None

@@ -1,0 +1,84 @@
+"""Shape functions of straight and curved cells in gmsh's order of nodes, with NumPy alone: for checks and volumes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import product
+
+import numpy as np
+
+from .cells import CELLS, CellName, Floats
+
+# Quality below which a cell is flat.
+SLIVER = 1e-3
+
+
+@lru_cache
+def reference_nodes(cell: CellName, degree: int) -> Floats:
+    """(v, 3) nodes on the reference cell: corners, then middles of edges, faces and (hexahedra) the cell."""
+    shape = CELLS[cell]
+    if degree == 1:
+        return shape.corners
+    middles = [shape.corners[shape.edges].mean(axis=1)]
+    if cell == "hexahedron":
+        middles += [shape.corners[shape.facets].mean(axis=1), np.full((1, 3), 0.5)]
+    return np.concatenate([shape.corners, *middles])
+
+
+@lru_cache
+def _exponents(cell: CellName, degree: int) -> list[tuple[int, ...]]:
+    """The monomials X^a Y^b Z^c that the shape functions combine."""
+    all_of = product(range(degree + 1), repeat=3)
+    return [powers for powers in all_of if cell == "hexahedron" or sum(powers) <= degree]
+
+
+def shape_functions(cell: CellName, degree: int, X: Floats) -> Floats:
+    """(q, v) values at `X` (q, 3)."""
+    return _monomials(cell, degree, X) @ _coefficients(cell, degree)
+
+
+def jacobians(nodes: Floats, cell: CellName, degree: int, X: Floats) -> Floats:
+    """(c, q, 3, 3) derivatives ∂x_i/∂X_d of cells with `nodes` (c, v, 3), at `X` (q, 3)."""
+    slopes = _monomial_slopes(cell, degree, X) @ _coefficients(cell, degree)  # (3, q, v)
+    J: Floats = np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
+    return J
+
+
+def cell_quality(corners: Floats, cell: CellName) -> Floats:
+    """(c,) 1 for regular tetrahedra and cubes, 0 for flat cells.
+
+    Volume of a tetrahedron relative to that of the regular one with the same mean square edge; smallest determinant of
+    a hexahedron's Jacobian relative to the product of its edges.
+
+    Args:
+        corners: (c, v, 3) of each cell.
+        cell: their shape.
+    """
+    J = jacobians(corners, cell, 1, CELLS[cell].corners)
+    determinants = np.abs(np.linalg.det(J))
+    if cell == "tetrahedron":
+        edges = corners[:, CELLS[cell].edges]
+        squares = np.sum((edges[:, :, 1] - edges[:, :, 0]) ** 2, axis=2)
+        quality: Floats = np.sqrt(2) * determinants.min(axis=1) / np.maximum(squares.mean(axis=1), 1e-200) ** 1.5
+        return quality
+    sides = np.prod(np.linalg.norm(J, axis=2), axis=2)
+    scaled: Floats = np.min(determinants / np.maximum(sides, 1e-300), axis=1)
+    return scaled
+
+
+def _coefficients(cell: CellName, degree: int) -> Floats:
+    return np.linalg.inv(_monomials(cell, degree, reference_nodes(cell, degree)))
+
+
+def _monomials(cell: CellName, degree: int, X: Floats) -> Floats:
+    return np.stack([np.prod(X**powers, axis=1) for powers in _exponents(cell, degree)], axis=1)
+
+
+def _monomial_slopes(cell: CellName, degree: int, X: Floats) -> Floats:
+    slopes = np.zeros((3, len(X), len(_exponents(cell, degree))))
+    for k, powers in enumerate(_exponents(cell, degree)):
+        for d in range(3):
+            lowered = np.array(powers)
+            lowered[d] = max(lowered[d] - 1, 0)
+            slopes[d, :, k] = powers[d] * np.prod(X**lowered, axis=1)
+    return slopes

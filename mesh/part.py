@@ -1,0 +1,122 @@
+"""A link's part as a mesh with its faces named: which source makes it, where it stands, what is checked.
+
+Runs on one process; gmsh and meshio are loaded where they are used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .cells import Floats
+from .checks import METRES, check_connected, check_quality, check_shape, oriented, straightened
+from .defaults import default_order, default_size
+from .faces import named_faces
+from .part_mesh import PartMesh
+from .records import InterfaceRecord, RectangleSection, SolidGeometry, SolidMeshRecord, SurfacePatches
+from .source import Source, source_from
+from .structured import Divisions, structured_box
+
+Progress = Callable[[str], None]
+
+_STEP = (".step", ".stp")
+
+
+def part_mesh(
+    geometry: SolidGeometry,
+    record: SolidMeshRecord,
+    interfaces: Sequence[InterfaceRecord],
+    patches: SurfacePatches | None,
+    path: Path,
+    progress: Progress,
+) -> PartMesh:
+    """Make or read the part, put it into the link's frame, check it, name its faces.
+
+    Args:
+        geometry: of the link file.
+        record: its table `mesh`.
+        interfaces: its tables `interface`.
+        patches: its table `surface_patch`.
+        path: the link file, named in errors.
+        progress: is told what is being done.
+
+    Raises:
+        InputError: the part cannot be read or meshed, its mesh is unsound, or a face is not there.
+    """
+    where = f"{path}: geometry" if geometry.file is None else f"{path}: geometry.file: {geometry.file.name}"
+    progress("meshing" if geometry.file is None or _is_step(geometry.file) else f"reading {geometry.file.name}")
+    source = _source(geometry, record, patches, path, where)
+    part = _placed(source.part, geometry) if geometry.file is not None else source.part
+    check_shape(part, geometry, where)
+    part = oriented(part)
+    if geometry.file is None or _is_step(geometry.file):
+        part = straightened(part)
+    check_quality(part, where)
+    check_connected(part, where)
+    return named_faces(replace(source, part=part), geometry, interfaces, patches, path)
+
+
+def _is_step(file: Path) -> bool:
+    return file.suffix.lower() in _STEP
+
+
+def _source(
+    geometry: SolidGeometry, record: SolidMeshRecord, patches: SurfacePatches | None, path: Path, where: str
+) -> Source:
+    file = geometry.file
+    if file is None:
+        if record.divisions is not None or record.cell == "hexahedron":
+            return Source(_box(geometry, record), {}, {})
+        from .shapes import mesh_shape
+
+        return mesh_shape(geometry, record, patches, path)
+    if _is_step(file):
+        from .step import mesh_step
+
+        return mesh_step(file, record, METRES[geometry.unit], where)
+    for key in ("cell", "size", "divisions"):
+        if getattr(record, key) is not None:
+            raise InputError(
+                f"{path}: mesh.{key}: expected none, since {file.name} is a mesh, found {getattr(record, key)}"
+            )
+    if file.suffix.lower() == ".msh":
+        from .gmsh_session import read_msh
+
+        return source_from(read_msh(file, where), where)
+    from .mesh_files import read_foreign
+
+    return source_from(read_foreign(file, where), where)
+
+
+def _box(geometry: SolidGeometry, record: SolidMeshRecord) -> PartMesh:
+    """Structured cells; without `divisions`, as many as their size makes."""
+    root = geometry.section
+    tip = geometry.tip_section or root
+    assert isinstance(root, RectangleSection)
+    assert isinstance(tip, RectangleSection)
+    cell = record.cell or "tetrahedron"
+    ends = (root.height, root.width), (tip.height, tip.width)
+    divisions = record.divisions or _divisions(geometry.length, np.array(ends), record)
+    return structured_box(geometry.length, *ends, divisions, cell)
+
+
+def _divisions(length: float, ends: Floats, record: SolidMeshRecord) -> Divisions:
+    """Layers along x, y, z that come nearest to the wanted size; `ends` (2, 2) are height and width at root and tip."""
+    height, width = ends.mean(axis=0)
+    volume, surface = length * height * width, 2 * (length * (height + width) + height * width)
+    size = record.size or default_size(volume, surface, record.order or default_order("hexahedron"))
+    x, y, z = (max(1, round(extent / size)) for extent in (length, height, width))
+    return x, y, z
+
+
+def _placed(part: PartMesh, geometry: SolidGeometry) -> PartMesh:
+    """The part of a file in the link's frame, in m."""
+    x_axis, y_axis = np.array(geometry.x_axis), np.array(geometry.y_axis)
+    z_axis = np.cross(x_axis, y_axis)
+    x_axis, z_axis = x_axis / np.linalg.norm(x_axis), z_axis / np.linalg.norm(z_axis)
+    axes = np.stack([x_axis, np.cross(z_axis, x_axis), z_axis])
+    return part.moved(METRES[geometry.unit] * (part.points - np.array(geometry.origin)) @ axes.T)

@@ -1,0 +1,88 @@
+"""The mesh of a solid part as NumPy arrays, wherever it comes from: what the sources give and dolfinx is built from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cells import CELLS, Cell, CellName, Floats, Integers
+
+Tags = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class PartMesh:
+    """A solid part, meshed.
+
+    Attributes:
+        points: (p, 3) in m, in the link's frame once `placed`.
+        cells: (c, v) points of each cell, in gmsh's order of nodes.
+        cell: their shape.
+        degree: 1 (corners only) or 2 (curved cells: gmsh's 10 or 27 nodes).
+        cell_tag: (c,) which region each cell belongs to.
+        regions: volume group → its tag.
+        facets: (f, 3 or 4) corners of the tagged facets, all of them on the boundary.
+        facet_tag: (f,) which face each belongs to; a facet has one tag.
+        faces: name → tag in `facet_tag`; two names may share a face.
+    """
+
+    points: Floats
+    cells: Integers
+    cell: CellName
+    degree: int
+    cell_tag: Tags
+    regions: Mapping[str, int] = field(default_factory=dict)
+    facets: Integers = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
+    facet_tag: Tags = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    faces: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def shape(self) -> Cell:
+        """Topology of the cells."""
+        return CELLS[self.cell]
+
+    @property
+    def corners(self) -> Integers:
+        """(c, 4 or 8) corners of each cell."""
+        return self.cells[:, : len(self.shape.corners)]
+
+    def moved(self, points: Floats) -> PartMesh:
+        """The same mesh at other `points` (p, 3)."""
+        return replace(self, points=points)
+
+
+def facet_keys(facets: Integers, points: int) -> Integers:
+    """(f,) a number for each of `facets` (f, 3 or 4) that tells it among all facets of a mesh of so many `points`.
+
+    The three smallest of its corners identify a facet of either shape.
+    """
+    low = np.sort(facets, axis=1).astype(np.int64)
+    return (low[:, 0] * points + low[:, 1]) * points + low[:, 2]
+
+
+def boundary_facets(part: PartMesh) -> tuple[Integers, Integers]:
+    """The facets that only one cell has.
+
+    Returns:
+        (b, 3 or 4) corners, counter-clockwise seen from outside, and (b,) the cell of each.
+    """
+    facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
+    _, first, count = np.unique(facet_keys(facets, len(part.points)), return_index=True, return_counts=True)
+    alone = np.sort(first[count == 1])
+    return facets[alone], alone // len(part.shape.facets)
+
+
+def facet_geometry(points: Floats, facets: Integers) -> tuple[Floats, Floats, Floats]:
+    """Centroid (f, 3), unit outward normal (f, 3) and area (f,) of straight facets; quadrilaterals as two triangles."""
+    fan = [facets[:, [0, k, k + 1]] for k in range(1, facets.shape[1] - 1)]
+    vectors = [np.cross(points[t[:, 1]] - points[t[:, 0]], points[t[:, 2]] - points[t[:, 0]]) / 2 for t in fan]
+    areas = [np.linalg.norm(vector, axis=1) for vector in vectors]
+    area = np.sum(areas, axis=0)
+    moments = sum(a[:, None] * points[t].mean(axis=1) for a, t in zip(areas, fan, strict=True))
+    total = np.sum(vectors, axis=0)
+    size = np.linalg.norm(total, axis=1)
+    safe = np.where(area > 0, area, 1.0)
+    return moments / safe[:, None], total / np.where(size > 0, size, 1.0)[:, None], area

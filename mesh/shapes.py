@@ -1,0 +1,139 @@
+"""Solid shapes drawn out along x, by gmsh's OpenCASCADE kernel: box, cylinder, tube, hollow rectangle, taper, holes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NoReturn
+
+import gmsh
+
+from ..errors import InputError
+from .defaults import BAR, CIRCLE, default_order, default_size
+from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
+from .records import (
+    CircleSection,
+    Hole,
+    RectangleSection,
+    SectionRecord,
+    SolidGeometry,
+    SolidMeshRecord,
+    SurfacePatches,
+)
+from .source import Source, source_from
+
+_VOLUME, _FACE = 3, 2
+DimTags = list[tuple[int, int]]
+
+
+def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, patches: SurfacePatches | None, path: Path) -> Source:
+    """Tetrahedra in the shape that `geometry` describes, the outlines of the `patches` along edges of elements.
+
+    Raises:
+        InputError: a hole leaves the section, or the shape cannot be meshed.
+    """
+    _check_holes(geometry, path)
+    with gmsh_session():
+        body = _body(geometry)
+        for hole in geometry.hole:
+            body, _ = gmsh.model.occ.cut(body, [_hole(hole, geometry.section)])
+        if patches is not None:
+            _outline(body, geometry, patches)
+        gmsh.model.occ.synchronize()
+        size = record.size or default_size(*volume_and_surface(), record.order or default_order("tetrahedron"))
+        around = BAR if isinstance(geometry.section, CircleSection) else CIRCLE
+        mesh_model(size, f"{path}: geometry", around)
+        return source_from(extract_mesh(), f"{path}: geometry")
+
+
+def _body(geometry: SolidGeometry) -> DimTags:
+    section, length, occ = geometry.section, geometry.length, gmsh.model.occ
+    if isinstance(section, RectangleSection):
+        if isinstance(geometry.tip_section, RectangleSection):
+            return _taper(section, geometry.tip_section, length)
+        body = [_box(length, section.height, section.width)]
+        if section.wall is None:
+            return body
+        inner = _box(length, section.height - 2 * section.wall, section.width - 2 * section.wall)
+        return _dim_tags(occ.cut(body, [inner])[0])
+    if isinstance(section, CircleSection):
+        return [(_VOLUME, occ.addCylinder(0, 0, 0, length, 0, 0, section.diameter / 2))]
+    assert section is not None
+    outer, inner = (occ.addCylinder(0, 0, 0, length, 0, 0, d / 2) for d in (section.outer, section.inner))
+    return _dim_tags(occ.cut([(_VOLUME, outer)], [(_VOLUME, inner)])[0])
+
+
+def _box(length: float, height: float, width: float) -> tuple[int, int]:
+    return _VOLUME, gmsh.model.occ.addBox(0, -height / 2, -width / 2, length, height, width)
+
+
+def _taper(root: RectangleSection, tip: RectangleSection, length: float) -> DimTags:
+    wires = [_wire(x, section) for x, section in ((0.0, root), (length, tip))]
+    return _dim_tags(gmsh.model.occ.addThruSections(wires, makeSolid=True, makeRuled=True))
+
+
+def _wire(x: float, section: RectangleSection) -> int:
+    """The outline of a rectangle at x."""
+    occ, h, w = gmsh.model.occ, section.height / 2, section.width / 2
+    points = [occ.addPoint(x, y, z) for y, z in ((-h, -w), (h, -w), (h, w), (-h, w))]
+    lines = [occ.addLine(first, second) for first, second in zip(points, points[1:] + points[:1], strict=True)]
+    return int(occ.addWire(lines))
+
+
+def _hole(hole: Hole, section: SectionRecord | None) -> tuple[int, int]:
+    reach = 2 * max(_breadths(section))
+    z = -reach / 2
+    cylinder = gmsh.model.occ.addCylinder(hole.position, hole.offset, z, 0, 0, reach, hole.diameter / 2)
+    return _VOLUME, cylinder
+
+
+def _breadths(section: SectionRecord | None) -> tuple[float, float]:
+    """Extent along y and z of a section."""
+    if isinstance(section, RectangleSection):
+        return section.height, section.width
+    if isinstance(section, CircleSection):
+        return section.diameter, section.diameter
+    assert section is not None
+    return section.outer, section.outer
+
+
+def _check_holes(geometry: SolidGeometry, path: Path) -> None:
+    """Holes stay within the outline of the side view; that of a taper is taken at the narrower side of each hole."""
+    for hole in geometry.hole:
+        radius = hole.diameter / 2
+        begin, end = hole.position - radius, hole.position + radius
+        if begin <= 0 or end >= geometry.length:
+            _reject(path, "position", f"holes within the length, 0 … {geometry.length:g} m", f"{begin:g} … {end:g}")
+        height = min(_height(geometry, begin), _height(geometry, end))
+        if abs(hole.offset) + radius >= height / 2:
+            low, high = hole.offset - radius, hole.offset + radius
+            _reject(path, "diameter", f"holes within ±{height / 2:g} m of the axis", f"{low:g} … {high:g}")
+
+
+def _height(geometry: SolidGeometry, x: float) -> float:
+    root = _breadths(geometry.section)[0]
+    tip = _breadths(geometry.tip_section)[0] if geometry.tip_section is not None else root
+    return root + (tip - root) * x / geometry.length
+
+
+def _outline(body: DimTags, geometry: SolidGeometry, patches: SurfacePatches) -> None:
+    """Press the rectangles under the patches into the faces at largest and smallest y."""
+    assert isinstance(geometry.section, RectangleSection)
+    half = geometry.section.height / 2
+    sides = {"top": [half], "bottom": [-half], "both": [half, -half]}[patches.faces]
+    rectangles: DimTags = []
+    for begin, end in patches.edges(geometry.length):
+        begin, end = max(begin, 0.0), min(end, geometry.length)
+        for y in sides:
+            face = gmsh.model.occ.addRectangle(begin, -patches.width / 2, 0, end - begin, patches.width)
+            gmsh.model.occ.rotate([(_FACE, face)], 0, 0, 0, 1, 0, 0, 1.5707963267948966)
+            gmsh.model.occ.translate([(_FACE, face)], 0, y, 0)
+            rectangles.append((_FACE, face))
+    gmsh.model.occ.fragment(body, rectangles)
+
+
+def _dim_tags(entities: DimTags) -> DimTags:
+    return [entity for entity in entities if entity[0] == _VOLUME]
+
+
+def _reject(path: Path, key: str, expected: str, found: str) -> NoReturn:
+    raise InputError(f"{path}: geometry.hole.{key}: expected {expected}, found {found}")

@@ -1,0 +1,234 @@
+"""Cross sections x = const of a solid mesh: quadrature on the plane figure in which the plane cuts the cells.
+
+Every cell is cut in its reference coordinates, where it is a few tetrahedra, by marching through these: a tetrahedron
+that the plane cuts contributes one triangle or two. Where the map of the cell bends, the corners and the mid-sides of
+each triangle are moved onto the plane along the faces of the tetrahedra, so that the pieces still meet, and the
+triangle becomes one with six nodes: what remains is of third order in its size.
+
+Importing this loads dolfinx.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import basix
+import numpy as np
+from numpy.typing import NDArray
+
+from .cells import HEXAHEDRON, KUHN, TETRAHEDRON, Floats, Integers
+from .compat import coordinate_element, geometry_degree, geometry_nodes
+
+if TYPE_CHECKING:
+    from dolfinx.mesh import Mesh
+
+# Nodes closer to the plane than this, relative to the length of the part, lie in it.
+IN_PLANE = 1e-9
+
+
+@dataclass(frozen=True)
+class SectionQuadrature:
+    """Quadrature on the part of a cross section that lies in this process's cells.
+
+    Attributes:
+        cells: (q,) local cell of each point.
+        X: (q, 3) its reference coordinates there.
+        weights: (q,) in m²; their sum over all processes is the area of the section.
+        points: (q, 3) in m.
+        y_range: smallest and largest y of the section, in m; (inf, −inf) where no cell is cut.
+    """
+
+    cells: Integers
+    X: Floats
+    weights: Floats
+    points: Floats
+    y_range: tuple[float, float]
+
+
+def section_quadrature(mesh: Mesh, x: float, degree: int) -> SectionQuadrature:
+    """Quadrature on the cross section at `x` (m), exact for polynomials of `degree` in the coordinates.
+
+    Where faces of cells lie in the plane, the section is that of the material towards larger x; at the end of the part
+    that towards smaller x. All processes of the mesh must call.
+
+    Args:
+        mesh: of tetrahedra or hexahedra, of degree 1 or 2.
+        x: where the plane cuts; beyond the part the section is empty.
+        degree: of the rule on each triangle that the section consists of.
+    """
+    nodes = geometry_nodes(mesh)
+    coordinates = mesh.geometry.x
+    begin, end = _extent(mesh)
+    tolerance = IN_PLANE * (end - begin)
+    at_end = abs(x - end) <= tolerance
+    f = (coordinates[:, 0] - x)[nodes]
+    above = _above(f, at_end, tolerance)
+    cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
+    if not cut.size:
+        return SectionQuadrature(cut, np.empty((0, 3)), np.empty(0), np.empty((0, 3)), (np.inf, -np.inf))
+    cells = _Cells(mesh, cut, coordinates[nodes[cut]], f[cut])
+    return _integrate(cells, _march(cells, at_end, tolerance), degree)
+
+
+def _above(f: Floats, at_end: bool, tolerance: float) -> NDArray[np.bool_]:
+    """Which points at distance `f` count as lying above the plane: those in it do only at the end of the part."""
+    return f >= -tolerance if at_end else f > tolerance
+
+
+def _extent(mesh: Mesh) -> tuple[float, float]:
+    """Smallest and largest x of the whole part."""
+    x = mesh.geometry.x[:, 0]
+    local = (x.min(), x.max()) if x.size else (np.inf, -np.inf)
+    if mesh.comm.size == 1:
+        return local
+    ranges = np.array(mesh.comm.allgather(local))
+    return float(ranges[:, 0].min()), float(ranges[:, 1].max())
+
+
+class _Cells:
+    """The cells that a plane cuts: `index` (k,) local numbers, `nodes` (k, v, 3) and distances `f` (k, v) of nodes."""
+
+    def __init__(self, mesh: Mesh, index: Integers, nodes: Floats, f: Floats) -> None:
+        self.index, self.nodes, self.f = index, nodes, f
+        self.element = coordinate_element(mesh)
+        self.tetrahedral = self.element.cell_type == basix.CellType.tetrahedron
+        self.affine = self.tetrahedral and geometry_degree(mesh) == 1
+
+    def basis(self, X: Floats, derivatives: int) -> Floats:
+        """(1 + 3 or 1, q, v) values, and derivatives along X, of the shape functions at `X` (q, 3)."""
+        table: Floats = self.element.tabulate(derivatives, X)[..., 0]
+        return table
+
+    def distance(self, cell: Integers, X: Floats) -> tuple[Floats, Floats]:
+        """Distance from the plane (q,) and its gradient (q, 3) along X, at `X` (q, 3) in `cell` (q,)."""
+        table = np.einsum("dqv,qv->dq", self.basis(X, 1), self.f[cell])
+        return table[0], table[1:].T
+
+
+@dataclass(frozen=True)
+class _Triangles:
+    """Pieces of the section, in reference coordinates.
+
+    Attributes:
+        cell: (t,) which of the cut cells each lies in.
+        ends: (t, 3, 2, 3) ends, above and below the plane, of the edges that the corners lie on.
+        corners: (t, 3, 3).
+    """
+
+    cell: Integers
+    ends: Floats
+    corners: Floats
+
+
+# Edges (above, below) that carry the corners of the triangles, by how many of a tetrahedron's four corners lie above;
+# these are numbered first.
+_CUTS: dict[int, list[list[tuple[int, int]]]] = {
+    1: [[(0, 1), (0, 2), (0, 3)]],
+    2: [[(0, 2), (0, 3), (1, 3)], [(0, 2), (1, 3), (1, 2)]],
+    3: [[(0, 3), (1, 3), (2, 3)]],
+}
+
+
+def _march(cells: _Cells, at_end: bool, tolerance: float) -> _Triangles:
+    """Cut the tetrahedra that the cells consist of."""
+    points, tetrahedra = _lattice(cells.tetrahedral, cells.affine, cells.element.degree)
+    f = cells.f if cells.affine else cells.f @ cells.basis(points, 0)[0].T
+    inside = _above(f, at_end, tolerance)[:, tetrahedra]  # (k, tetrahedra, 4)
+    count = inside.sum(axis=2)
+    pieces: list[tuple[Integers, Integers]] = []
+    for number, cuts in _CUTS.items():
+        cell, which = np.nonzero(count == number)
+        order = np.argsort(~inside[cell, which], axis=1, kind="stable")
+        sorted_corners = np.take_along_axis(tetrahedra[which], order, axis=1)
+        pieces.extend((cell, sorted_corners[:, np.array(cut)]) for cut in cuts)
+    cell = np.concatenate([piece[0] for piece in pieces])
+    edges = np.concatenate([piece[1] for piece in pieces])  # (t, 3, 2) points of the lattice
+    f_ends = f[cell[:, None, None], edges]
+    t = np.clip(f_ends[..., 0] / (f_ends[..., 0] - f_ends[..., 1]), 0.0, 1.0)
+    ends = points[edges]
+    corners = ends[..., 0, :] + t[..., None] * (ends[..., 1, :] - ends[..., 0, :])
+    if not cells.affine:
+        along = (ends[..., 1, :] - ends[..., 0, :]).reshape(-1, 3)
+        corners = _onto_plane(cells, np.repeat(cell, 3), corners.reshape(-1, 3), along).reshape(-1, 3, 3)
+    return _Triangles(cell, ends, corners)
+
+
+@lru_cache
+def _lattice(tetrahedral: bool, affine: bool, degree: int) -> tuple[Floats, Integers]:
+    """The reference cell as tetrahedra: points (l, 3) and corners (m, 4). Curved cells are divided once more."""
+    if affine:
+        return TETRAHEDRON.corners, np.arange(4).reshape(1, 4)
+    n = degree
+    axis = np.arange(n) / n
+    origins = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 1, 1, 3)
+    tetrahedra = (origins + HEXAHEDRON.corners[KUHN] / n).reshape(-1, 4, 3)
+    if tetrahedral:
+        # The Kuhn tetrahedra of the cube with 1 ≥ X ≥ Y ≥ Z fill one of its six, which shears into the reference cell.
+        X, Y, Z = np.moveaxis(tetrahedra.mean(axis=1), -1, 0)
+        tetrahedra = tetrahedra[(X > Y) & (Y > Z)] @ np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
+    points, corners = np.unique(np.round(tetrahedra.reshape(-1, 3) * n) / n, axis=0, return_inverse=True)
+    return points, corners.reshape(-1, 4)
+
+
+def _onto_plane(cells: _Cells, cell: Integers, X: Floats, along: Floats) -> Floats:
+    """Move reference points `X` (q, 3) onto the plane in the directions `along` (q, 3), by Newton."""
+    for _ in range(4):
+        f, gradient = cells.distance(cell, X)
+        slope = np.einsum("qi,qi->q", gradient, along)
+        step = np.divide(f, slope, out=np.zeros_like(f), where=slope != 0)
+        X = X - np.clip(step, -0.5, 0.5)[:, None] * along
+    return X
+
+
+def _integrate(cells: _Cells, triangles: _Triangles, degree: int) -> SectionQuadrature:
+    """Quadrature on the triangles: three nodes where the cells are affine, six elsewhere."""
+    nodes = triangles.corners if cells.affine else _with_mid_sides(cells, triangles)
+    basis, derivatives, rule = _triangle_rule(1 if cells.affine else 2, degree)
+    X = np.einsum("qa,tai->tqi", basis, nodes)
+    tangents = np.einsum("dqa,tai->dtqi", derivatives, nodes)
+    flat = X.reshape(-1, 3)
+    cell = np.repeat(triangles.cell, len(rule))
+    corner_values = cells.nodes[cell]
+    table = cells.basis(flat, 1)
+    points = np.einsum("qv,qvi->qi", table[0], corner_values)
+    # Rows y and z of the Jacobian give the tangents in the plane.
+    J = np.einsum("dqv,qvi->qid", table[1:], corner_values[..., 1:])
+    first, second = (np.einsum("qid,qd->qi", J, tangent.reshape(-1, 3)) for tangent in tangents)
+    weights = np.tile(rule, len(triangles.cell)) * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    kept = weights > 1e-14 * weights.max(initial=0.0)
+    y_range = _y_range(cells, triangles.cell, nodes)
+    return SectionQuadrature(cells.index[cell[kept]], flat[kept], weights[kept], points[kept], y_range)
+
+
+def _with_mid_sides(cells: _Cells, triangles: _Triangles) -> Floats:
+    """(t, 6, 3): corners and mid-sides, in the order of basix's triangle of degree 2.
+
+    The two corners of a side lie on two edges of one face of a tetrahedron (or on opposite edges): moving along the sum
+    of these edges stays in that face, so neighbours find the same point.
+    """
+    directions = triangles.ends[:, :, 1] - triangles.ends[:, :, 0]
+    pairs = np.array([[1, 2], [0, 2], [0, 1]])
+    middle = triangles.corners[:, pairs].mean(axis=2).reshape(-1, 3)
+    along = directions[:, pairs].sum(axis=2).reshape(-1, 3)
+    moved = _onto_plane(cells, np.repeat(triangles.cell, 3), middle, along).reshape(-1, 3, 3)
+    return np.concatenate([triangles.corners, moved], axis=1)
+
+
+@lru_cache
+def _triangle_rule(nodes_degree: int, degree: int) -> tuple[Floats, Floats, Floats]:
+    """Shape functions (q, a), their derivatives (2, q, a) and weights (q,) on the reference triangle."""
+    variant = basix.LagrangeVariant.equispaced
+    element = basix.create_element(basix.ElementFamily.P, basix.CellType.triangle, nodes_degree, variant)
+    points, weights = basix.make_quadrature(basix.CellType.triangle, max(degree, 1))
+    table = element.tabulate(1, points)[..., 0]
+    return table[0], table[1:], weights
+
+
+def _y_range(cells: _Cells, cell: NDArray[np.int64], nodes: Floats) -> tuple[float, float]:
+    if not cell.size:
+        return np.inf, -np.inf
+    table = cells.basis(nodes.reshape(-1, 3), 0)[0]
+    y = np.einsum("qv,qv->q", table, cells.nodes[np.repeat(cell, nodes.shape[1]), :, 1])
+    return float(y.min()), float(y.max())

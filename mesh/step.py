@@ -1,0 +1,103 @@
+"""Parts from STEP files, through gmsh's OpenCASCADE kernel."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import gmsh
+
+from ..errors import InputError
+from .defaults import default_order, default_size
+from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
+from .records import SolidMeshRecord
+from .source import Source, source_from
+
+# Units of length that a STEP file can declare, in mm: OpenCASCADE turns all numbers into millimetres.
+_SI_PREFIXES = {"$": 1e3, ".MILLI.": 1.0, ".CENTI.": 10.0, ".DECI.": 100.0, ".MICRO.": 1e-3, ".KILO.": 1e6}
+_OTHER_UNITS = {"INCH": 25.4, "FOOT": 304.8, "MILE": 1609344.0}
+
+
+def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> Source:
+    """Tetrahedra in the volumes of a STEP file, in the file's own numbers.
+
+    Volumes that touch are joined. Labels of volumes and faces in the file name groups.
+
+    Args:
+        file: the STEP file.
+        record: `size` in m.
+        scale: the file's unit in m.
+        where: beginning of the message of an error.
+
+    Raises:
+        InputError: the file is corrupt, holds no closed volume, or cannot be meshed.
+    """
+    declared = _declared_unit(file)
+    with gmsh_session():
+        gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+        try:
+            gmsh.model.occ.importShapes(str(file), highestDimOnly=False)
+            gmsh.model.occ.synchronize()
+        except Exception as error:  # gmsh raises nothing more special
+            raise InputError(
+                f"{where}: expected a STEP file, found one that OpenCASCADE cannot read: {error}"
+            ) from None
+        _check_volumes(where)
+        _join()
+        _name_groups()
+        order = record.order or default_order("tetrahedron")
+        size = record.size / scale * declared if record.size else default_size(*volume_and_surface(), order)
+        mesh_model(size, where)
+        source = source_from(extract_mesh(), where)
+    return replace(source, part=source.part.moved(source.part.points / declared))
+
+
+def _declared_unit(file: Path) -> float:
+    """The unit of length that the file declares, in mm; millimetres if none."""
+    text = re.sub(r"\s+", "", file.read_text(encoding="latin-1")).upper()
+    units = [entity for entity in text.split(";") if "LENGTH_UNIT()" in entity]
+    # An inch is declared as so many millimetres: the conversion comes first.
+    for entity in units:
+        if (other := re.search(r"CONVERSION_BASED_UNIT\('(\w+)'", entity)) and other[1] in _OTHER_UNITS:
+            return _OTHER_UNITS[other[1]]
+    prefixes = [found[1] for entity in units if (found := re.search(r"SI_UNIT\((\$|\.\w+\.),\.METRE\.\)", entity))]
+    return _SI_PREFIXES.get(prefixes[0], 1.0) if prefixes else 1.0
+
+
+def _check_volumes(where: str) -> None:
+    if gmsh.model.getEntities(3):
+        return
+    faces = len(gmsh.model.getEntities(2))
+    found = (
+        f"{faces} faces that enclose none: an open surface; close its gaps and export a solid"
+        if faces
+        else "nothing: the file is empty or corrupt"
+    )
+    raise InputError(f"{where}: expected a closed volume, found {found}")
+
+
+def _join() -> None:
+    """Make volumes that touch share their faces; the labels go with the pieces."""
+    volumes = gmsh.model.getEntities(3)
+    if len(volumes) < 2:
+        return
+    labels = [gmsh.model.getEntityName(*volume) for volume in volumes]
+    _, pieces = gmsh.model.occ.fragment(volumes, [])
+    gmsh.model.occ.synchronize()
+    for label, of_volume in zip(labels, pieces, strict=False):
+        for piece in of_volume:
+            gmsh.model.setEntityName(*piece, label)
+
+
+def _name_groups() -> None:
+    """Physical groups from the labels: the last part of "Shapes/Arm/Hub"."""
+    for dim in (2, 3):
+        groups: dict[str, list[int]] = {}
+        for entity in gmsh.model.getEntities(dim):
+            label = gmsh.model.getEntityName(*entity).split("/")[-1].strip()
+            # OpenCASCADE's own writer calls nameless shapes after itself.
+            if label and not label.startswith("Open CASCADE"):
+                groups.setdefault(label, []).append(entity[1])
+        for label, tags in groups.items():
+            gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, tags), label)

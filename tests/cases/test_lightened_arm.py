@@ -1,0 +1,118 @@
+"""An arm whose links come from STEP files with lightening holes."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from checkpoints import CASES, check_motion
+
+from ffrobot.fe_models.modal_body_file import read_modal_body
+
+DENSITY, WIDTHS = 2700.0, {"upper_arm": 0.012, "forearm": 0.008}
+# make_parts.py: lengths, heights at root and tip in m, numbers of holes.
+MEASURES = {"upper_arm": (0.5, 0.060, 0.044, 7), "forearm": (0.4, 0.044, 0.030, 6)}
+
+
+@pytest.fixture(scope="module")
+def arm(solved):
+    return solved("lightened_arm")
+
+
+def plate(name):
+    """Area in m² and first moment about the root in m³ of a link's plate, holes taken out."""
+    length, root, tip, count = MEASURES[name]
+    x = length / (count + 1) * np.arange(1, count + 1)
+    holes = np.pi * (0.3 * (root + (tip - root) * x / length)) ** 2
+    area = length * (root + tip) / 2 - holes.sum()
+    return area, length**2 * (root / 2 + (tip - root) / 3) - holes @ x
+
+
+@pytest.fixture(scope="module")
+def bodies(ffrobot, case_copy_of_module):
+    folder = case_copy_of_module("lightened_arm").parent
+    for name in MEASURES:
+        done = ffrobot("link", folder / f"{name}.toml")
+        assert done.returncode == 0, done.stderr
+    return {name: read_modal_body(folder / f"{name}.h5") for name in MEASURES}
+
+
+@pytest.mark.parametrize("name", MEASURES)
+def test_mass_is_that_of_the_drawing(bodies, name):
+    """Plane areas in closed form; twelve quadratic elements around leave 2e-4 of a round hole's area out."""
+    area, first = plate(name)
+    mass = DENSITY * WIDTHS[name] * area
+    assert bodies[name].mass == pytest.approx(mass, rel=1e-4)
+    np.testing.assert_allclose(
+        bodies[name].first_moment, [DENSITY * WIDTHS[name] * first, 0, 0], rtol=0, atol=1e-4 * mass * 0.5
+    )
+
+
+@pytest.mark.parametrize("name", MEASURES)
+def test_only_in_plane_bending_is_kept(bodies, name):
+    body = bodies[name]
+    assert body.family == ("in-plane-bending",) * 4
+    motion = np.abs(body.stations.translation).max(axis=0)  # (3, modes)
+    assert np.all(motion[2] < 1e-3 * motion[1])
+
+
+def test_the_script_draws_the_parts(tmp_path):
+    """make_parts.py makes the STEP files that stand beside it, but for the time that OpenCASCADE writes into them."""
+    for script in CASES.glob("lightened_arm/make_parts.py"):
+        copy = tmp_path / script.name
+        copy.write_text(script.read_text(encoding="utf-8"), encoding="utf-8")
+        subprocess.run([sys.executable, copy], check=True, capture_output=True)
+    for name in MEASURES:
+        here, there = (folder / f"{name}.step" for folder in (tmp_path, CASES / "lightened_arm"))
+        lines = [path.read_text(encoding="utf-8").split("ENDSEC;", 1)[1] for path in (here, there)]
+        assert lines[0] == lines[1]
+
+
+def test_the_load_keeps_to_its_line(arm):
+    """Inverse dynamics: the tip is on the straight line from (0.45, 0.20) to (0.65, 0.45) m, and at rest at its end."""
+    group = arm.file["inverse"]
+    tip = group["points/forearm.tip/position"][()]
+    along = (tip - [0.45, 0.20]) @ [0.25, -0.20]
+    assert np.abs(along).max() < 1e-12
+    np.testing.assert_allclose(tip[group["time"][()] >= 0.5], np.tile([0.65, 0.45], (201, 1)), rtol=0, atol=1e-12)
+
+
+def test_force_on_the_path_holds_the_weight_at_rest(arm, bodies):
+    """Statics at the end of inverse dynamics: the tip's force and the joints' reactions carry all weights.
+
+    Without patches or motors among the constraints, the path's force −λ_s alone holds the arm up; the motors' moments
+    that are reported are its equivalent: about the shoulder, the moment of that force.
+    """
+    group = arm.file["inverse"]
+    force, tip = group["trajectories/tip/force"][-1], group["points/forearm.tip/position"][-1]
+    turning = 9.81 * 1.0 * tip[0]
+    for name, body in bodies.items():
+        angle = group[f"bodies/{name}/angle"][-1]
+        x, y, _ = body.first_moment
+        lever = body.mass * group[f"bodies/{name}/position"][-1, 0] + x * np.cos(angle) - y * np.sin(angle)
+        turning += 9.81 * lever
+    # To 1e-5: deflections shift the weights a little.
+    assert tip[0] * force[1] - tip[1] * force[0] == pytest.approx(turning, rel=1e-5)
+    assert group["joints/shoulder/moment"][-1] == pytest.approx(turning, rel=1e-5)
+
+
+def test_stress_is_that_of_bending_beside_a_hole(arm):
+    """Motors alone, at rest: the forearm bends under the load; beside a hole the net section carries more.
+
+    Nominal stress M (h/2) / I of the net section at the hole where it is largest, times 1 to 1.5: the edge of a hole in
+    bending is no sharp notch (Peterson's Stress Concentration Factors, section 4.6: K_tn about 1 for d/h = 0.6).
+    """
+    group = arm.file["motors_alone"]
+    angle = group["bodies/forearm/angle"][-1]
+    length, root, tip, count = MEASURES["forearm"]
+    x = length / (count + 1) * np.arange(1, count + 1)
+    height = root + (tip - root) * x / length
+    moment = 1.0 * 9.81 * np.cos(angle) * (length - x)
+    nominal = moment * height / 2 / (WIDTHS["forearm"] * height**3 * (1 - 0.6**3) / 12)
+    found = group["stress/forearm/surface/von_mises_max"][-1]
+    assert nominal.max() < found < 2 * nominal.max()
+
+
+def test_layout(arm):
+    for analysis in ("inverse", "motors_alone"):
+        check_motion(arm.file[analysis], 701, {"upper_arm": 4, "forearm": 4}, {})

@@ -1,0 +1,92 @@
+"""Stresses from the link file to the results: a cantilever that sags under its own weight."""
+
+import h5py
+import numpy as np
+import pytest
+
+LINK = """
+name = "arm"
+[material]
+youngs_modulus = 2.0e11
+poissons_ratio = 0.3
+density = 7800.0
+[geometry]
+kind = "beam"
+length = 2.0
+section = { shape = "rectangle", height = 0.04, width = 0.02 }
+[mesh]
+elements = 30
+[reference]
+condition = "cantilever"
+[modes]
+count = 25
+family = "in-plane-bending"
+[stress]
+points = { root_top = [0.0, 0.02, 0.0], middle = [1.0, -0.02, 0.0], axis = [0.0, 0.0, 0.0] }
+[[interface]]
+name = "tip"
+mass = 3.0
+"""
+
+SCENE = """
+name = "sag"
+gravity = [0.0, -9.81]
+[[body]]
+name = "arm"
+link = "arm.toml"
+[[joint]]
+name = "wall"
+type = "weld"
+between = ["ground", "arm.root"]
+[[analysis]]
+name = "rest"
+kind = "static"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "arm.toml").write_text(LINK)
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return tmp_path
+
+
+def test_a_cantilever_under_its_weight_and_a_mass(folder, ffrobot):
+    """M(x) = ρA g (L − x)²/2 + m g (L − x), pulling the upper side; V(0) = ρA g L + m g. 25 modes leave 0.2 %."""
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    weight, load, resistance = 7800.0 * 0.04 * 0.02 * 9.81, 3.0 * 9.81, 0.02 * 0.04**2 / 6
+    moments = [weight * (2.0 - x) ** 2 / 2 + load * (2.0 - x) for x in (0.0, 1.0)]
+    with h5py.File(folder / "scene.results.h5") as file:
+        points = file["rest/stress/arm/points"]
+        assert points["root_top/stress"].shape == (1, 6)
+        assert points["root_top/stress"][0, 0] == pytest.approx(moments[0] / resistance, rel=2e-3)
+        assert points["middle/stress"][0, 0] == pytest.approx(-moments[1] / resistance, rel=2e-3)
+        assert points["middle/von_mises"][0] == pytest.approx(moments[1] / resistance, rel=2e-3)
+        tau = 1.5 * (weight * 2.0 + load) / (0.04 * 0.02)
+        np.testing.assert_allclose(points["axis/stress"][0], [0, 0, 0, 0, 0, -tau], rtol=0.1, atol=1.0)
+        assert "surface" not in file["rest/stress/arm"]
+    table = done.stdout[done.stdout.index("stress in") :].splitlines()
+    assert table[1].split()[:2] == ["rest", "arm"]
+    assert float(table[1].split()[2]) == pytest.approx(moments[0] / resistance / 1e6, rel=2e-3)
+    assert "root_top" in table[1]
+
+
+def test_info_names_the_points(folder, ffrobot):
+    assert ffrobot("link", "arm.toml", cwd=folder).returncode == 0
+    told = ffrobot("info", "arm.h5", cwd=folder).stdout
+    assert "modal stresses at root_top, (0, 0.02, 0) m" in told
+
+
+def test_a_point_outside_the_section_is_refused(folder, refused):
+    (folder / "arm.toml").write_text(LINK.replace("[1.0, -0.02, 0.0]", "[1.0, -0.03, 0.0]"))
+    assert "arm.toml: stress.points.middle: expected y, z within the section" in refused(folder, "link", "arm.toml")
+
+
+def test_without_stress_points_nothing_is_said(folder, ffrobot):
+    (folder / "arm.toml").write_text(LINK.replace("[stress]\npoints", "[stress]\n# points"))
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "stress" not in done.stdout
+    with h5py.File(folder / "scene.results.h5") as file:
+        assert "stress" not in file["rest"]

@@ -1,0 +1,104 @@
+"""Solid links for the tests, and what is known of them without the program's own eigensolver."""
+
+import numpy as np
+from scipy.linalg import eigh
+
+from ffrobot.fe_models.elasticity import material_map, solid_model, stiffness_matrix
+from ffrobot.fe_models.link_file import read_link
+from ffrobot.fe_models.solid_link import solid_modal_body
+from ffrobot.mesh.solid_mesh import solid_mesh
+
+SOLID = """
+name = "link1"
+
+[material]
+youngs_modulus = {E}
+poissons_ratio = 0.3
+density = {rho}
+
+[geometry]
+kind = "solid"
+length = {length}
+section = {{ shape = "rectangle", height = {height}, width = {width} }}
+
+[mesh]
+cell = "{cell}"
+order = {order}
+divisions = {divisions}
+
+[reference]
+condition = "{condition}"
+{coupling}
+
+[modes]
+count = {count}
+family = "{family}"
+{more}
+"""
+
+
+def write_solid(
+    folder,
+    E=2.068427e11,
+    rho=7850.0,
+    length=1.0,
+    height=0.015,
+    width=0.025,
+    cell="tetrahedron",
+    order=3,
+    divisions=(36, 1, 1),
+    condition="simply-supported",
+    coupling=None,
+    count=10,
+    family="in-plane-bending",
+    more="",
+):
+    """Write a link file, the paper's link as a solid unless told otherwise, and return its path."""
+    values = locals() | {"coupling": f'coupling = "{coupling}"' if coupling else "", "divisions": list(divisions)}
+    path = folder / "link1.toml"
+    path.write_text(SOLID.format(**values))
+    return path
+
+
+def body_of(path):
+    return solid_modal_body(read_link(path), path, "", lambda _: None)
+
+
+def model_of(path):
+    """The free solid and its mesh."""
+    link = read_link(path)
+    solid = solid_mesh(link.geometry, link.mesh, link.interface, link.surface_patch, path)
+    return solid_model(solid.mesh, link.mesh.order, material_map(solid.mesh, link.material)), solid
+
+
+def dense(model):
+    """K and M of the free solid."""
+    K = stiffness_matrix(model)
+    K.setOption(K.Option.IGNORE_LOWER_TRIANGULAR, False)
+    indptr, columns, values = K.convert("aij").getValuesCSR()
+    upper = np.zeros((3 * model.owned, 3 * model.owned))
+    np.add.at(upper, (np.repeat(np.arange(len(indptr) - 1), np.diff(indptr)), columns), values)
+    return np.triu(upper) + np.triu(upper, 1).T, np.kron(model.mass.csr.toarray(), np.eye(3))
+
+
+def elastic_frequencies(K, M):
+    """ω of a free body but for its six rigid motions, ascending."""
+    return np.sqrt(eigh(K, M, eigvals_only=True)[6:])
+
+
+def frame_and_modes(body, keep=slice(None)):
+    """K and M in the coordinates (translation, rotation, p) of small motions, from the invariants alone."""
+    n = body.mode_count
+    eps = np.array([[[(a - b) * (b - c) * (c - a) / 2 for c in range(3)] for b in range(3)] for a in range(3)])
+    M = np.zeros((6 + n, 6 + n))
+    M[:3, :3] = body.mass * np.eye(3)
+    M[:3, 3:6] = np.einsum("kal,l->ka", eps, body.first_moment)  # e_k · (e_a × s0)
+    M[3:6, 3:6] = np.trace(body.second_moment) * np.eye(3) - body.second_moment
+    M[:3, 6:] = body.S_bar
+    M[3:6, 6:] = np.einsum("akl,kln->an", eps, body.I_bar)
+    M[6:, 6:] = body.modal_mass
+    M = np.triu(M) + np.triu(M, 1).T
+    K = np.zeros_like(M)
+    K[6:, 6:] = body.stiffness
+    rows = np.r_[np.arange(6), 6 + np.arange(n)[keep]]
+    return K[np.ix_(rows, rows)], M[np.ix_(rows, rows)]

@@ -1,0 +1,169 @@
+"""Masses on interfaces: closed forms, a cloud of material points, and the same mass as a payload of stage 2."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from ffrobot.fe_models.invariants import Invariants
+from ffrobot.fe_models.link import make_link
+from ffrobot.fe_models.lumped_masses import Lump, with_lumped_loads, with_lumped_masses
+from ffrobot.fe_models.modal_body import Interface
+from ffrobot.mbs.planar_body import from_modal_body, with_payload
+
+EI, RHO_A, L = 2.068427e11 * 0.025 * 0.015**3 / 12, 7850.0 * 0.015 * 0.025, 1.0
+
+
+def attached(name="tip", mass=0.0, inertia=0.0, position=None):
+    place = "" if position is None else f"position = {position}\n"
+    return f'[[interface]]\nname = "{name}"\n{place}mass = {mass}\ninertia = [0.0, 0.0, {inertia}]\n'
+
+
+@pytest.fixture
+def body(link_file):
+    return lambda **keys: make_link(link_file(**keys), force=True).body
+
+
+def characteristic(beta, mass, inertia):
+    """Of a cantilever with v = a (cosh − cos) + b (sinh − sin): EI v'' = ω²J v', EI v''' = −ω²m v at its tip."""
+    C, c, S, s = np.cosh(beta), np.cos(beta), np.sinh(beta), np.sin(beta)
+    omega2 = EI / RHO_A * beta**4
+    moment = [EI * beta**2 * (C + c) - omega2 * inertia * beta * (S + s)]
+    moment.append(EI * beta**2 * (S + s) - omega2 * inertia * beta * (C - c))
+    shear = [EI * beta**3 * (S - s) + omega2 * mass * (C - c), EI * beta**3 * (C + c) + omega2 * mass * (S - s)]
+    return moment[0] * shear[1] - moment[1] * shear[0]
+
+
+@pytest.mark.parametrize(("mass", "inertia"), [(0.5, 0.0), (5.0, 0.0), (0.5, 0.02), (0.0, 0.02)])
+def test_frequencies_of_a_cantilever_with_tip_mass(body, mass, inertia):
+    betas = np.linspace(0.3, 9.0, 400)
+    values = [characteristic(beta, mass, inertia) for beta in betas]
+    roots = [
+        brentq(characteristic, a, b, args=(mass, inertia), xtol=1e-14)
+        for a, b, left, right in zip(betas, betas[1:], values, values[1:], strict=False)
+        if left * right < 0
+    ]
+    expected = np.array(roots[:3]) ** 2 * np.sqrt(EI / RHO_A) / (2 * np.pi)
+    found = body(condition="cantilever", count=3, elements=40, more=attached(mass=mass, inertia=inertia)).frequency
+    np.testing.assert_allclose(found, expected, rtol=2e-6)
+
+
+def test_mass_inside_an_element_converges_as_fast_as_without(body):
+    """An element ends at the mass, or else the jump of moment there would cost the order of the elements."""
+    more = attached("hub", mass=1.0, inertia=1e-3, position=0.525)
+    exact = body(elements=160, count=4, more=more).frequency[3]
+    errors = [body(elements=n, count=4, more=more).frequency[3] / exact - 1 for n in (10, 20)]
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] > 10
+
+
+def cloud(lump):
+    """Six material points with the mass, the center and the E of a lump: masses and offsets (6, 3)."""
+    reach = np.sqrt(3 * np.diag(lump.spread) / lump.mass)
+    return np.full(6, lump.mass / 6), np.vstack([np.diag(reach), -np.diag(reach)])
+
+
+@pytest.fixture
+def lump():
+    rng = np.random.default_rng(3)
+    at = Interface(rng.normal(size=3), rng.normal(size=(3, 4)), rng.normal(size=(3, 4)))
+    return Lump("grip", at, 2.0, np.array([0.3, 0.4, 0.6]))
+
+
+def test_integrals_are_those_of_material_points(lump):
+    zeros = Invariants(
+        0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 4)), np.zeros((3, 3, 4)), np.zeros((3, 3, 4, 4))
+    )
+    found = with_lumped_masses(zeros, [lump])
+    masses, offsets = cloud(lump)
+    x = lump.at.position + offsets
+    Phi = [lump.at.translation + np.cross(lump.at.rotation.T, offset).T for offset in offsets]
+    assert found.mass == pytest.approx(masses.sum())
+    np.testing.assert_allclose(found.first_moment, masses @ x, atol=1e-14)
+    np.testing.assert_allclose(found.second_moment, np.einsum("i,ik,il->kl", masses, x, x), atol=1e-14)
+    np.testing.assert_allclose(found.S_bar, np.einsum("i,ikn->kn", masses, Phi), atol=1e-14)
+    np.testing.assert_allclose(found.I_bar, np.einsum("i,ik,iln->kln", masses, x, Phi), atol=1e-13)
+    np.testing.assert_allclose(found.S_bar_kl, np.einsum("i,ikm,iln->klmn", masses, Phi, Phi), atol=1e-13)
+
+
+def test_inertia_loads_are_those_of_material_points(lump):
+    """Force and moment for a, α, ω: recovered one by one from unit loads whose "geometric stiffness" is 0 or 1."""
+    products = ("xx", "yy", "zz", "xy", "xz", "yz")
+    motions = [*(f"{kind}_{k}" for kind in "tr" for k in "xyz"), *(f"omega_{kl}" for kl in products)]
+    loads = [f"{kind}/grip/{k}" for kind in ("force", "moment") for k in "xyz"]
+    found = {}
+    for unit in loads:
+        table = {name: np.zeros((1, 1)) for name in [*motions, *loads]}
+        total = with_lumped_loads(table | {unit: np.ones((1, 1))}, [lump])
+        found[unit] = np.array([total[motion][0, 0] for motion in motions])
+    a, alpha, omega = np.array([0.3, -0.2, 0.5]), np.array([1.0, 0.7, -0.4]), np.array([0.6, -1.1, 0.9])
+    sizes = np.concatenate([a, alpha, omega**2, [omega[0] * omega[1], omega[0] * omega[2], omega[1] * omega[2]]])
+    masses, offsets = cloud(lump)
+    forces = [
+        -m * (a + np.cross(alpha, x) + np.cross(omega, np.cross(omega, x)))
+        for m, x in zip(masses, lump.at.position + offsets, strict=True)
+    ]
+    expected = np.concatenate([np.sum(forces, axis=0), np.cross(offsets, forces).sum(axis=0)])
+    np.testing.assert_allclose([found[load] @ sizes for load in loads], expected, atol=1e-13)
+
+
+def test_centrifugal_force_of_a_mass_stiffens_the_link_up_to_it(body):
+    loaded = body(condition="cantilever", count=3, more=attached("grip", mass=0.7, position=0.6))
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    expected = np.zeros((3, 3))
+    for start in np.arange(20) * 0.05:
+        for x, w in zip(start + 0.025 * (1 + nodes), 0.025 * weights, strict=True):
+            slope = loaded.interpolate(x).rotation[2]
+            N = RHO_A * (L**2 - x**2) / 2 + (0.7 * 0.6 if x < 0.6 else 0.0)
+            expected += w * N * np.outer(slope, slope)
+    np.testing.assert_allclose(loaded.geometric_stiffness["omega_zz"], expected, rtol=1e-9)
+    np.testing.assert_allclose(loaded.geometric_stiffness["omega_yy"], expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "position"), [("tip", None), ("grip", 0.4)])
+@pytest.mark.parametrize("inertia", [0.0, 0.01])
+def test_same_as_a_payload_of_stage_2(body, name, position, inertia):
+    """With all 40 modes of 20 elements both span the same motions; the modes differ in sign at most."""
+    bare = body(count=40, more=attached("grip", position=0.4))
+    loaded = from_modal_body("link", body(count=40, more=attached(name, 0.8, inertia, position)))
+    payload = with_payload(from_modal_body("link", bare), name, 0.8, inertia)
+    low = slice(0, 10)
+    np.testing.assert_allclose(loaded.stiffness[low], payload.stiffness[low], rtol=1e-8)
+    for scalar in ("mass", "inertia"):
+        assert getattr(loaded, scalar) == pytest.approx(getattr(payload, scalar), rel=1e-12)
+    np.testing.assert_allclose(loaded.first_moment, payload.first_moment, rtol=1e-12)
+    tips = loaded.points["tip"].rotation[low], payload.points["tip"].rotation[low]
+    sign = np.sign(tips[0] * tips[1])
+    for array in ("S_bar", "h", "j"):
+        left, right = getattr(loaded, array)[..., low], getattr(payload, array)[..., low]
+        np.testing.assert_allclose(left, right * sign, rtol=1e-6, atol=1e-8)
+    m_xy = payload.m_xy
+    if inertia:  # the file's m_xy holds all rotary inertia, as in solids: m_ff is its sum with S̄_33
+        rotation = payload.points[name].rotation
+        m_xy = m_xy + inertia * np.outer(rotation, rotation)
+    expected = m_xy[low, low] * np.outer(sign, sign)
+    np.testing.assert_allclose(loaded.m_xy[low, low], expected, atol=1e-7)
+
+
+def test_hub_on_the_root_of_a_cantilever_only_adds_mass(body):
+    bare = body(condition="cantilever", count=3)
+    loaded = body(condition="cantilever", count=3, more=attached("root", mass=2.0, inertia=0.1))
+    np.testing.assert_array_equal(loaded.frequency, bare.frequency)
+    assert loaded.mass == pytest.approx(bare.mass + 2.0)
+    assert loaded.second_moment[0, 0] + loaded.second_moment[1, 1] == pytest.approx(
+        bare.second_moment[0, 0] + bare.second_moment[1, 1] + 0.1
+    )
+
+
+def test_all_families_and_theories_keep_the_identities(body):
+    """`ModalBody` checks m_ff = I and S̄_11 + S̄_22 + S̄_33 = m_ff to 1e-8 when it is made."""
+    more = '[[interface]]\nname = "tip"\nmass = 0.5\ninertia = [0.002, 0.003, 0.004]\n'
+    for theory in ("euler-bernoulli", "timoshenko"):
+        loaded = body(family="all", count=12, more=f'[model]\ntheory = "{theory}"\n{more}')
+        assert loaded.mass == pytest.approx(RHO_A * L + 0.5)
+        assert {"torsion", "out-of-plane-bending"} <= set(loaded.family)
+
+
+def test_massless_interface_changes_nothing(body):
+    bare, more = body(count=3), body(count=3, more=attached("grip", position=0.525))
+    np.testing.assert_array_equal(bare.frequency, more.frequency)
+    assert bare.mass == pytest.approx(more.mass, rel=1e-14)

@@ -1,0 +1,99 @@
+"""Stresses and attached masses of a solid link, from its file on, against the same link as a beam."""
+
+import numpy as np
+import pytest
+
+from ffrobot.errors import InputError
+from ffrobot.fe_models.link import make_link
+
+LINK = """
+name = "arm"
+[material]
+youngs_modulus = 2.0e11
+poissons_ratio = 0.3
+density = 7800.0
+[geometry]
+length = 1.0
+section = { shape = "rectangle", height = 0.03, width = 0.02 }
+KIND
+[reference]
+condition = "simply-supported"
+[modes]
+count = 3
+family = "in-plane-bending"
+[[interface]]
+name = "tip"
+mass = 0.7
+inertia = [2e-3, 1e-3, 3e-3]
+[[interface]]
+name = "hub"
+position = 0.4
+mass = 0.3
+[stress]
+points = { POINTS }
+SURFACE
+"""
+BEAM = 'kind = "beam"\n[mesh]\nelements = 40\n[model]\ntheory = "timoshenko"'
+SOLID = 'kind = "solid"\n[mesh]\nsize = 0.025'
+POINTS = "top = [0.3, 0.015, 0.0], edge = [0.62, -0.015, 0.01], axis = [0.2, 0.0, 0.0]"
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arm")
+
+    def compute(kind, points=POINTS, surface=""):
+        path = folder / "arm.toml"
+        path.write_text(LINK.replace("KIND", kind).replace("POINTS", points).replace("SURFACE", surface))
+        return make_link(path, force=True).body
+
+    return compute
+
+
+@pytest.fixture(scope="module")
+def pair(body):
+    return body(BEAM), body(SOLID, surface="surface = true")
+
+
+def test_masses_are_those_of_the_beam(pair):
+    beam, solid = pair
+    assert solid.mass == pytest.approx(7800.0 * 0.03 * 0.02 + 1.0, rel=1e-10)
+    np.testing.assert_allclose(solid.frequency, beam.frequency, rtol=2e-3)
+    np.testing.assert_allclose(solid.second_moment, beam.second_moment, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(solid.S_bar[1], beam.S_bar[1], rtol=2e-3, atol=2e-3)
+    # The tension of a solid works on the axial strain of bending too, which beams leave out: N ∫(w'² + θ'² I/A), that
+    # is (kπ)² h²/12L² more, 0.7 % in mode 3.
+    for load in ("omega_zz", "t_x", "force/tip/x"):
+        scale = np.abs(beam.geometric_stiffness[load]).max()
+        np.testing.assert_allclose(
+            solid.geometric_stiffness[load], beam.geometric_stiffness[load], atol=1e-2 * scale, err_msg=load
+        )
+
+
+@pytest.mark.parametrize("name", ["top", "edge"])
+def test_bending_stress_is_that_of_the_beam(pair, name):
+    beam, solid = (body.stress[name].stress for body in pair)
+    scale = np.abs(beam[0]).max()
+    np.testing.assert_allclose(solid[0], beam[0], atol=1e-2 * scale)
+    np.testing.assert_allclose(solid[1:], 0.0, atol=2e-2 * scale)
+
+
+def test_shear_stress_on_the_axis_is_that_of_the_beam(pair):
+    beam, solid = (body.stress["axis"].stress for body in pair)
+    np.testing.assert_allclose(solid[5], beam[5], rtol=0.1)
+
+
+def test_surface_holds_what_the_points_on_it_have(pair):
+    solid = pair[1]
+    assert solid.surface_stress.shape == (len(solid.mesh.points), 6, 3)
+    edge = solid.stress["edge"]
+    near = np.argsort(np.linalg.norm(solid.mesh.points - edge.position, axis=1))[:4]
+    scale = np.abs(edge.stress).max()
+    np.testing.assert_allclose(solid.surface_stress[near, 0].mean(axis=0), edge.stress[0], atol=0.1 * scale)
+
+
+def test_point_outside_the_solid(body):
+    with pytest.raises(
+        InputError, match=r"arm\.toml: stress\.points\.off: expected a point of the part, found .* m from"
+    ):
+        body(SOLID, points="off = [0.5, 0.02, 0.0]")

@@ -1,0 +1,259 @@
+"""Strains, stresses and surface patches of solids: fields known exactly, on boxes; patches bend them as beam theory."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem, mesh
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ffrobot.errors import InputError, SolveError
+from ffrobot.fe_models.constitutive import stiffness
+from ffrobot.fe_models.link_records import Material
+from ffrobot.fe_models.strains import locate, pulled_back
+from ffrobot.fe_models.stress import point_stresses, surface_stresses
+from ffrobot.fe_models.surface_patches import outlined_patches
+from ffrobot.mesh.compat import create_solid_mesh, lagrange_space
+from ffrobot.mesh.records import SurfacePatches
+
+E, NU = 2.0e11, 0.3
+C = stiffness(Material(youngs_modulus=E, poissons_ratio=NU, density=7850.0))
+PATH = Path("link.toml")
+L, H, B = 1.0, 0.2, 0.1
+CELLS = {"tetrahedron": mesh.CellType.tetrahedron, "hexahedron": mesh.CellType.hexahedron}
+
+
+def box(cell, divisions=(6, 2, 2), skew=0.0):
+    """L × H × B about the x axis; `skew` moves inner nodes, by fractions of a cell."""
+    corners = [[0, -H / 2, -B / 2], [L, H / 2, B / 2]]
+    domain = mesh.create_box(MPI.COMM_WORLD, corners, divisions, CELLS[cell])
+    x = domain.geometry.x
+    bubble = x[:, 0] * (L - x[:, 0]) * (H**2 / 4 - x[:, 1] ** 2) * (B**2 / 4 - x[:, 2] ** 2)
+    bubble /= L**2 * H**2 * B**2 / 64
+    x += skew * bubble[:, None] * np.array([L / divisions[0], H / divisions[1], B / divisions[2]])
+    return domain
+
+
+def field(space, function):
+    u = fem.Function(space)
+    u.interpolate(function)
+    return u.x.array.reshape(-1, 1).copy()
+
+
+def bending(x):
+    """Pure bending of curvature 1: σ_xx = −E y, all else zero (Timoshenko & Goodier, §102)."""
+    return np.stack([-x[0] * x[1], (x[0] ** 2 + NU * (x[1] ** 2 - x[2] ** 2)) / 2, NU * x[1] * x[2]])
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_linear_displacements_strain_uniformly(cell, order):
+    gradient = np.arange(1.0, 10.0).reshape(3, 3)
+    space = lagrange_space(box(cell, skew=0.2), order, vector=True)
+    modes = field(space, lambda x: gradient @ x)
+    # A corner, an edge, inside, a face, and a node between cells.
+    points = {"a": (0, H / 2, B / 2), "b": (0.4, H / 2, B / 2), "c": (0.31, 0.02, 0.01), "d": (L, 0.03, 0.02)}
+    points["e"] = tuple(space.mesh.geometry.x[len(space.mesh.geometry.x) // 2])
+    strain = [1, 5, 9, 6 + 8, 3 + 7, 2 + 4]
+    for name, point in point_stresses(space, C, modes, points, PATH).items():
+        np.testing.assert_allclose(point.position, points[name])
+        np.testing.assert_allclose(point.strain[:, 0], strain, rtol=1e-10)
+        np.testing.assert_allclose(point.stress[:, 0], C @ strain, rtol=1e-10)
+    surface = surface_stresses(space, C, modes, np.array(list(points.values())))
+    np.testing.assert_allclose(surface[:, :, 0], np.tile(C @ strain, (5, 1)), rtol=1e-10)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_pure_bending(cell):
+    space = lagrange_space(box(cell), 2, vector=True)
+    points = {"top": (0.5, H / 2, 0.0), "inside": (0.37, 0.03, -0.02), "end": (0.0, -H / 2, B / 2)}
+    found = point_stresses(space, C, field(space, bending), points, PATH)
+    for name, (_, y, _) in points.items():
+        np.testing.assert_allclose(found[name].stress[:, 0], [-E * y, 0, 0, 0, 0, 0], atol=1e-8 * E)
+
+
+def test_two_materials_and_their_border():
+    """Softer by ten beyond x = ½: a strain common to both; the border takes the mean."""
+    space = lagrange_space(box("hexahedron"), 1, vector=True)
+    domain = space.mesh
+    cells = domain.topology.index_map(3).size_local
+    middles = domain.geometry.x[domain.geometry.dofmap.array.reshape(-1, 8)].mean(axis=1)
+    by_cell = np.where(middles[:, 0, None, None] < 0.5, C, C / 10)
+    assert by_cell.shape == (cells, 6, 6)
+    points = {"stiff": (0.2, 0, 0), "soft": (0.8, 0, 0), "border": (0.5, 0.01, 0.01)}
+    found = point_stresses(space, by_cell, field(space, lambda x: x * [[1.0], [0.0], [0.0]]), points, PATH)
+    for name, factor in (("stiff", 1.0), ("soft", 0.1), ("border", 0.55)):
+        np.testing.assert_allclose(found[name].stress[:, 0], factor * C[:, 0], atol=1e-9 * E)
+        assert found[name].strain[0, 0] == pytest.approx(1.0)
+
+
+def test_point_outside_the_part():
+    space = lagrange_space(box("tetrahedron"), 1, vector=True)
+    modes = field(space, lambda x: x)
+    with pytest.raises(
+        InputError, match=r"link\.toml: stress\.points\.a: expected a point of the part, found .*, 0\.1 m"
+    ):
+        point_stresses(space, C, modes, {"in": (0.5, 0, 0), "a": (1.1, 0.0, 0.0)}, PATH)
+    with pytest.raises(ValueError, match="1 of 2 points are not on the mesh"):
+        surface_stresses(space, C, modes, np.array([[0.5, 0, 0], [1.1, 0, 0]]))
+
+
+@pytest.fixture
+def curved():
+    """One tetrahedron of degree 2 with bulging edges; nodes in gmsh's order: corners, edges 01 12 02 03 23 13."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    edges = [(corners[a] + corners[b]) / 2 for a, b in ((0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3))]
+    points = np.vstack([corners, 1.1 * np.array(edges)])
+    return create_solid_mesh(MPI.COMM_SELF, "tetrahedron", 2, np.arange(10)[None], points)
+
+
+def test_curved_cells_are_inverted(curved):
+    space = lagrange_space(curved, 2, vector=True)
+    x = field(space, lambda x: x).reshape(-1, 3)
+    reference = np.random.default_rng(1).dirichlet(np.ones(4), size=50)[:, :3]
+    values = space.sub(0).element.basix_element.tabulate(0, reference)[0, :, :, 0]
+    points = values @ x[space.dofmap.cell_dofs(0)]
+    np.testing.assert_allclose(pulled_back(curved, np.zeros(50, dtype=int), points), reference, atol=1e-10)
+    assert set(locate(curved, points, 1e-6)[0]) == set(range(50))
+
+
+def test_point_next_to_a_curved_face(curved):
+    """A point of the true face may be off that of the mesh: up to 2 % of a cell it counts, with the strain there."""
+    space = lagrange_space(curved, 2, vector=True)
+    modes = field(space, lambda x: x)
+    inside = np.array([0.4, 0.4, 0.4])  # the middle of the bulging face lies at 0.377
+    face = np.full(3, (-1 / 9 + 8 / 9 * 0.55) * 1.0)
+    found = point_stresses(space, C, modes, {"near": tuple(1.01 * face)}, PATH)["near"]
+    np.testing.assert_allclose(found.strain[:3, 0], 1.0, rtol=1e-9)
+    assert not len(locate(curved, 1.01 * face[None], 1e-6)[0])
+    with pytest.raises(InputError, match="expected a point of the part"):
+        point_stresses(space, C, modes, {"off": tuple(1.1 * inside)}, PATH)
+
+
+def test_two_processes_give_the_same(tmp_path):
+    """Each cell's strains are summed by the process that owns it: nothing depends on how the mesh is shared out."""
+    script = """
+import sys
+import numpy as np
+from mpi4py import MPI
+sys.path.insert(0, {folder!r})
+from test_solid_stress import C, PATH, L, H, B, bending, box, field, lagrange_space, patch_tags
+from ffrobot.fe_models.stress import point_stresses
+from ffrobot.fe_models.surface_patches import outlined_patches
+space = lagrange_space(box("tetrahedron", (8, 2, 2)), 1, vector=True)
+modes = field(space, bending)
+points = {{"a": (0.5, H / 2, 0.0), "b": (0.33, 0.01, 0.02), "c": (L, 0.0, 0.0)}}
+strain = [p.strain[:, 0] for p in point_stresses(space, C, modes, points, PATH).values()]
+tags, faces, record = patch_tags(space.mesh)
+patches = outlined_patches(space, tags, faces, record, L, modes, PATH)
+if MPI.COMM_WORLD.rank == 0:
+    np.save({output!r}, np.concatenate([*strain, patches.top.ravel(), patches.bottom.ravel()]))
+"""
+    # This process has started MPI itself, which leaves its mark in the environment.
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    results = []
+    for count in (1, 2):
+        output = str(tmp_path / f"{count}.npy")
+        text = script.format(folder=str(Path(__file__).parent), output=output)
+        command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(count), sys.executable, "-c", text]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
+        assert done.returncode == 0, done.stderr
+        results.append(np.load(output))
+    assert np.abs(results[0]).max() > 0.05
+    np.testing.assert_allclose(results[1], results[0], rtol=0, atol=1e-12)
+
+
+def patch_tags(domain):
+    """One patch on each face, from x = ¼ to ½ and over the whole width."""
+    tags, faces = [], {}
+    for tag, (side, y) in enumerate((("top", H / 2), ("bottom", -H / 2)), 1):
+
+        def on_patch(x, y=y):
+            return np.isclose(x[1], y) & (x[0] > 0.25 - 1e-9) & (x[0] < 0.5 + 1e-9)
+
+        facets = mesh.locate_entities_boundary(domain, 2, on_patch)
+        tags.append(np.stack([facets, np.full(len(facets), tag)]))
+        faces[f"patch/0/{side}"] = tag
+    facets, values = np.concatenate(tags, axis=1)
+    order = np.argsort(facets)
+    record = SurfacePatches(centers=(0.375,), length=0.25, width=B)
+    return mesh.meshtags(domain, 2, facets[order].astype(np.int32), values[order].astype(np.int32)), faces, record
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_patch_in_pure_bending(cell):
+    """ε_xx = −y: ∫ over the upper patch is −H/2 times its area."""
+    space = lagrange_space(box(cell, (8, 2, 2)), 2, vector=True)
+    tags, faces, record = patch_tags(space.mesh)
+    found = outlined_patches(space, tags, faces, record, L, field(space, bending), PATH)
+    np.testing.assert_allclose(found.edges, [[0.25, 0.5]])
+    assert found.width == B
+    np.testing.assert_allclose(found.top, -H / 2 * 0.25 * B, rtol=1e-10)
+    np.testing.assert_allclose(found.bottom, H / 2 * 0.25 * B, rtol=1e-10)
+
+
+def test_patch_on_one_face():
+    space = lagrange_space(box("tetrahedron", (8, 2, 2)), 1, vector=True)
+    tags, faces, record = patch_tags(space.mesh)
+    top = record.model_copy(update={"faces": "top"})
+    found = outlined_patches(space, tags, faces, top, L, field(space, bending), PATH)
+    assert found.top.shape == (1, 1)
+    assert found.bottom is None
+
+
+def test_facets_that_do_not_follow_the_outline():
+    space = lagrange_space(box("tetrahedron", (8, 2, 2)), 1, vector=True)
+    tags, faces, record = patch_tags(space.mesh)
+    longer = record.model_copy(update={"length": 0.26})
+    with pytest.raises(
+        SolveError, match=r"does not follow the outline of patch 1 on the top face: .* 0\.025 m2, .* 0\.026 m2"
+    ):
+        outlined_patches(space, tags, faces, longer, L, field(space, bending), PATH)
+
+
+@pytest.mark.parametrize("sides", [("top", "bottom"), ("top",)])
+def test_patches_bend_a_cantilever_as_beam_theory(sides):
+    """w'(L) = M ℓ/EI beyond the patch with M = N B H/2, uniaxial: an isotropic N would give (1 − ν) of it only.
+
+    Every degree of freedom serves as a mode, so that what `outlined_patches` returns is the load vector.
+    """
+    domain = box("hexahedron", (16, 2, 2))
+    space = lagrange_space(domain, 2, vector=True)
+    tags, faces, record = patch_tags(domain)
+    size = space.dofmap.index_map.size_local * 3
+    found = outlined_patches(space, tags, faces, record, L, np.eye(size), PATH)
+    load = sum({"top": -1.0, "bottom": 1.0}[side] * getattr(found, side)[0] for side in sides) / len(sides)
+    u = static(space, load)
+    section = np.isclose(space.tabulate_dof_coordinates()[:, 0], L)
+    y, u_x = space.tabulate_dof_coordinates()[section, 1], u.reshape(-1, 3)[section, 0]
+    slope = -np.polyfit(y, u_x, 1)[0]
+    expected = (B * H / 2) * 0.25 / (E * B * H**3 / 12)
+    assert slope == pytest.approx(expected, rel=5e-3)
+
+
+def static(space, load):
+    """Displacements of the box, clamped at x = 0, under nodal loads."""
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    mu, lambda_ = E / 2 / (1 + NU), E * NU / (1 + NU) / (1 - 2 * NU)
+    strain = ufl.sym(ufl.grad(u))
+    sigma = 2 * mu * strain + lambda_ * ufl.tr(strain) * ufl.Identity(3)
+    root = fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[0], 0.0))
+    K = fem.petsc.assemble_matrix(
+        fem.form(ufl.inner(sigma, ufl.sym(ufl.grad(v))) * ufl.dx), bcs=[fem.dirichletbc(np.zeros(3), root, space)]
+    )
+    K.assemble()
+    f = load.reshape(-1, 3).copy()
+    f[root] = 0.0
+    x, b = K.createVecs()
+    b.array[:] = f.ravel()
+    solver = PETSc.KSP().create(MPI.COMM_SELF)
+    solver.setOperators(K)
+    solver.setType(PETSc.KSP.Type.PREONLY)
+    solver.getPC().setType(PETSc.PC.Type.LU)
+    solver.solve(b, x)
+    return x.array.copy()

@@ -1,0 +1,140 @@
+"""Pictures of modal bodies: of a beam from stage 1, and of surfaces made up of triangles and quadrilaterals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ffrobot.cli import cli
+from ffrobot.errors import InputError
+from ffrobot.fe_models.link import make_link
+from ffrobot.fe_models.modal_body import PictureMesh
+from ffrobot.fe_models.modal_body_file import write_modal_body
+from ffrobot.figures import plot_file, plot_modal_body
+from ffrobot.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
+
+LINK = """
+name = "arm"
+[material]
+youngs_modulus = 2.0e11
+poissons_ratio = 0.3
+density = 7800.0
+[geometry]
+kind = "beam"
+length = 1.0
+section = { shape = "rectangle", height = 0.1, width = 0.05 }
+[mesh]
+elements = 10
+[reference]
+condition = "cantilever"
+[modes]
+count = 8
+"""
+
+# Faces of a unit cube, their corners in order around each.
+CUBE = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]])
+CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+
+
+@pytest.fixture(scope="module")
+def beam(tmp_path_factory):
+    path = tmp_path_factory.mktemp("link") / "arm.toml"
+    path.write_text(LINK)
+    return make_link(path).body
+
+
+@pytest.fixture(params=["triangles", "quadrilaterals"])
+def solid(beam, request):
+    """A box of the beam's size whose eight corners move as its sections do."""
+    cells = CUBE if request.param == "quadrilaterals" else np.concatenate([CUBE[:, [0, 1, 2]], CUBE[:, [0, 2, 3]]])
+    points = (CORNERS - [0, 0.5, 0.5]) * [1.0, 0.1, 0.05]
+    at = [beam.interpolate(x) for x in points[:, 0]]
+    shapes = np.array([a.translation + np.cross(a.rotation.T, [0, *x[1:]]).T for a, x in zip(at, points, strict=True)])
+    return replace(beam, kind="solid", mesh=PictureMesh(points, cells, shapes))
+
+
+def titles(figure):
+    return [axes.get_title(loc="left") for axes in figure.axes]
+
+
+def test_modes_say_frequency_and_family(beam):
+    found = titles(draw_modes(beam))
+    assert len(found) == 6
+    for k, title in enumerate(found):
+        assert title == f"{k + 1}: {beam.frequency[k]:.5g} Hz, {beam.family[k]}"
+
+
+def test_a_mode_that_does_not_move_the_axis_says_so(beam):
+    figure = draw_modes(beam)
+    texts = {axes.get_title(loc="left"): [text.get_text() for text in axes.texts] for axes in figure.axes}
+    twisting = [title for title in texts if "torsion" in title]
+    assert twisting
+    for title, words in texts.items():
+        assert ("the axis does not move" in words) == (title in twisting)
+
+
+def test_modes_of_a_solid_are_drawn_over_its_outline(solid):
+    figure = draw_modes(solid)
+    for axes in figure.axes:
+        outline, surface = axes.collections
+        assert len(outline.get_segments()) == 12  # a box has twelve edges; diagonals of its faces are none
+        assert len(surface.get_paths()) == len(solid.mesh.cells)
+        assert surface.get_zorder() > outline.get_zorder()
+
+
+def test_mesh_shows_cells_and_interfaces(solid, beam):
+    axes = draw_mesh(solid).axes
+    assert len(axes) == 1  # no cell but the end face is whole within a close-up
+    quadrilaterals = solid.mesh.cells.shape[1] == 4
+    sides = 12 if quadrilaterals else 18  # the diagonals, too, are sides of triangles
+    lines = [path for path in axes[0].collections[0].get_paths() if len(np.unique(path.vertices, axis=0)) == 2]
+    assert len(axes[0].collections[0].get_paths()) - len(lines) == len(solid.mesh.cells)
+    assert len({tuple(path.vertices.mean(axis=0).round(9)) for path in lines}) == sides
+    assert {"root", "tip"} <= {line.get_label() for line in axes[0].lines}
+    assert len(draw_mesh(beam).axes[0].collections[0].get_segments()) == 10
+
+
+def test_mesh_with_edges_of_its_own_shows_no_others(solid):
+    """Two edges of elements, of which the other lines only divide the faces; one that is no side of a cell is left."""
+    edges = np.array([[0, 1], [4, 0], [0, 7]])
+    figure = draw_mesh(replace(solid, mesh=replace(solid.mesh, edges=edges)))
+    paths = figure.axes[0].collections[0].get_paths()
+    assert sum(len(np.unique(path.vertices, axis=0)) == 2 for path in paths) == 2
+
+
+def test_fold_of_a_roof_and_border_of_an_open_surface():
+    """Two triangles that meet at 90° share a fold; all else is border. Flat, the diagonal goes."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    cells = np.array([[0, 1, 2], [1, 3, 2]])
+    edges = {(0, 1), (0, 2), (1, 3), (2, 3)}
+    assert set(map(tuple, _outline(points, cells))) == edges
+    points[3, 2] = 5.0
+    assert set(map(tuple, _outline(points, cells))) == edges | {(1, 2)}
+    assert 0.8 < FOLD < 0.9
+
+
+def test_command_tells_modal_bodies_from_results(solid, tmp_path, capsys):
+    path = tmp_path / "arm.h5"
+    write_modal_body(path, solid)
+    cli(["plot", str(path)], standalone_mode=False)
+    folder = tmp_path / "arm.figures"
+    written = [folder / f"{name}.{kind}" for name in ("mesh", "modes") for kind in ("png", "pdf")]
+    assert capsys.readouterr().out.split() == [str(p) for p in written]
+    assert all(p.stat().st_size > 2000 for p in written)
+
+
+def test_same_body_gives_the_same_files(beam, tmp_path):
+    path = tmp_path / "arm.h5"
+    write_modal_body(path, beam)
+    first, second = (plot_modal_body(path, tmp_path / name) for name in ("first", "second"))
+    assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
+
+
+def test_what_is_refused(beam, tmp_path):
+    path = tmp_path / "arm.h5"
+    write_modal_body(path, beam)
+    with pytest.raises(InputError, match="expected a folder, found a file"):
+        plot_file(path, path)
+    path.write_bytes(path.read_bytes()[:4000])
+    with pytest.raises(InputError, match=r"arm\.h5: expected a results file, found not a readable"):
+        plot_file(path, tmp_path / "figures")

@@ -1,0 +1,70 @@
+"""Stress histories: von Mises by its textbook formula, the surface against a loop over outputs and points."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ffrobot.fe_models.modal_body import StressPoint
+from ffrobot.mbs import stress
+from ffrobot.mbs.stress import body_stress, von_mises
+
+
+def textbook(s):
+    """Timoshenko, Strength of Materials II, §82."""
+    xx, yy, zz, yz, xz, xy = s
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return np.sqrt(normal / 2 + 3 * (yz**2 + xz**2 + xy**2))
+
+
+def test_von_mises():
+    samples = np.random.default_rng(0).normal(size=(50, 6))
+    np.testing.assert_allclose(von_mises(samples), [textbook(s) for s in samples], rtol=1e-13)
+    np.testing.assert_allclose(von_mises(np.array([5.0, 5, 5, 0, 0, 0])), 0.0, atol=1e-14)
+    assert von_mises(np.array([7.0, 0, 0, 0, 0, 0])) == pytest.approx(7.0)
+    assert von_mises(np.array([0, 0, 0, 0, 2.0, 0])) == pytest.approx(2 * np.sqrt(3))
+
+
+def part(points=(), surface=0, modes=4):
+    """What stresses need of a modal body, with random modal stresses."""
+    rng = np.random.default_rng(5)
+    named = {
+        name: StressPoint(rng.normal(size=3), rng.normal(size=(6, modes)), rng.normal(size=(6, modes)))
+        for name in points
+    }
+    return SimpleNamespace(
+        stress=named,
+        surface_stress=rng.normal(size=(surface, 6, modes)) if surface else None,
+        mesh=SimpleNamespace(points=rng.normal(size=(surface, 3))),
+    )
+
+
+P = np.random.default_rng(2).normal(size=(23, 4))
+
+
+def test_points():
+    body = part(["a", "b"])
+    found = body_stress(body, P)
+    assert found.surface is None
+    for name, point in found.points.items():
+        for t in range(len(P)):
+            expected = body.stress[name].stress @ P[t]
+            np.testing.assert_allclose(point.stress[t], expected, rtol=1e-13)
+            assert point.von_mises[t] == pytest.approx(textbook(expected))
+    value, k, name = found.largest()
+    assert value == max(found.points[n].von_mises.max() for n in ("a", "b")) == found.points[name].von_mises[k]
+
+
+@pytest.mark.parametrize("chunk", [1.0, 1e3, 1e9])
+def test_surface_whatever_the_chunks(chunk, monkeypatch):
+    monkeypatch.setattr(stress, "CHUNK_BYTES", chunk)
+    body = part(surface=31)
+    surface = body_stress(body, P).surface
+    for t in range(len(P)):
+        everywhere = [textbook(modal @ P[t]) for modal in body.surface_stress]
+        assert surface.von_mises_max[t] == pytest.approx(max(everywhere))
+        np.testing.assert_array_equal(surface.position_of_max[t], body.mesh.points[np.argmax(everywhere)])
+
+
+def test_nothing_asked_for_is_nothing_computed():
+    assert body_stress(part(), P) is None

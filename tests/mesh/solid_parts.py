@@ -1,0 +1,26 @@
+"""Sections, and what is integrated over parts to compare with the drawing."""
+
+import basix
+import numpy as np
+
+from ffrobot.mesh.jacobian import jacobians, shape_functions
+from ffrobot.mesh.part_mesh import facet_geometry
+from ffrobot.mesh.records import RectangleSection
+
+
+def rectangle(height=0.015, width=0.025, **more):
+    return RectangleSection(shape="rectangle", height=height, width=width, **more)
+
+
+def integrate(part, function=lambda x: 1.0):
+    """∫ function dV over a part, function of points (c, q, 3), by basix's rule on curved cells."""
+    X, weights = basix.make_quadrature(getattr(basix.CellType, part.cell), 6)
+    nodes = part.points[part.cells]
+    scale = np.abs(np.linalg.det(jacobians(nodes, part.cell, part.degree, X)))
+    points = np.einsum("qv,cvi->cqi", shape_functions(part.cell, part.degree, X), nodes)
+    return float(np.sum(function(points) * scale * weights))
+
+
+def face_area(part, name):
+    _, _, area = facet_geometry(part.points, part.facets[part.facet_tag == part.faces[name]])
+    return float(area.sum())

@@ -1,0 +1,117 @@
+"""Unsound meshes are refused, with where and how many."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from solid_parts import integrate
+
+from ffrobot.errors import InputError
+from ffrobot.mesh.checks import check_connected, check_quality, check_shape, oriented, straightened
+from ffrobot.mesh.jacobian import jacobians, reference_nodes, shape_functions
+from ffrobot.mesh.structured import structured_box
+
+SECTION = (0.015, 0.025)
+
+
+@pytest.fixture(params=["tetrahedron", "hexahedron"])
+def box(request):
+    return structured_box(1.0, SECTION, SECTION, (10, 3, 3), request.param)
+
+
+def test_a_sound_box_passes(box, solid):
+    check_shape(box, solid(), "here")
+    check_connected(box, "here")
+    check_quality(box, "here")
+
+
+def test_left_handed_cells_are_mirrored(box):
+    mirrored = box.moved(box.points * [1, 1, -1])
+    with pytest.raises(InputError, match="inverted"):
+        check_quality(mirrored, "here")
+    mended = oriented(mirrored)
+    check_quality(mended, "here")
+    assert integrate(mended) == pytest.approx(0.015 * 0.025)
+
+
+def test_inverted_elements_are_told(box):
+    points = box.points.copy()
+    inner = np.argmin(np.linalg.norm(points - [0.5, 0.0025, 0.0042], axis=1))
+    points[inner] += [0.0, 0.012, 0.0]
+    with pytest.raises(InputError, match=r"here: expected .*, found \d+ inverted elements of \d+, e.g. at \(0\.[45]"):
+        check_quality(box.moved(points), "here")
+
+
+def test_flat_elements_are_told():
+    box = structured_box(1.0, SECTION, SECTION, (10, 1, 1), "tetrahedron")
+    cells = np.concatenate([box.cells, [[0, 1, 4, 5]]])
+    points = box.points.copy()
+    flat = replace(box, cells=cells, cell_tag=np.zeros(len(cells), dtype=np.int32))
+    x = points[[0, 1, 4, 5]]
+    assert abs(np.linalg.det(x[1:] - x[0])) < 1e-12
+    with pytest.raises(InputError, match=r"found 1 flat elements \(slivers\) of 61, e.g. at \(0.05"):
+        check_quality(flat, "here")
+
+
+def test_a_plane_mesh_has_no_elements_across_the_thickness(box, solid):
+    with pytest.raises(InputError, match="zero elements along z"):
+        check_shape(box.moved(box.points * [1, 1, 0]), solid(), "here")
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit", "says"),
+    [
+        (1000, "m", 'found 1000 m along x: looks like millimetres: geometry.unit = "mm"'),
+        (39.37, "m", 'looks like inches: geometry.unit = "in"'),
+        (0.001, "mm", 'looks like metres: geometry.unit = "m"'),
+        (7.0, "m", "found 7 m along x$"),
+    ],
+)
+def test_unit_slips_are_told(box, solid, scale, unit, says):
+    with pytest.raises(InputError, match=rf"here: expected a part 1 m long, .*{says}"):
+        check_shape(box.moved(box.points * scale), solid(unit=unit), "here")
+
+
+def test_parts_that_meet_without_sharing_nodes_are_told(box):
+    half = len(box.cells) // 2
+    cells = box.cells.copy()
+    cells[half:] += len(box.points)
+    apart = replace(box, cells=cells, points=np.concatenate([box.points, box.points]))
+    with pytest.raises(InputError, match=rf"found 2: {half} elements around \(0.25.*share their nodes"):
+        check_connected(apart, "here")
+
+
+def test_parts_that_meet_in_an_edge_only_are_told():
+    box = structured_box(1.0, (1.0, 1.0), (1.0, 1.0), (2, 2, 1), "hexahedron")
+    two = replace(box, cells=box.cells[[0, 3]], cell_tag=np.zeros(2, dtype=np.int32))
+    with pytest.raises(InputError, match="found 2: 1 elements"):
+        check_connected(two, "here")
+
+
+@pytest.mark.parametrize(("cell", "degree"), [(c, d) for c in ("tetrahedron", "hexahedron") for d in (1, 2)])
+def test_shape_functions_are_one_at_their_node_and_sum_to_one(cell, degree):
+    nodes = reference_nodes(cell, degree)
+    np.testing.assert_allclose(shape_functions(cell, degree, nodes), np.eye(len(nodes)), atol=1e-12)
+    X = np.random.default_rng(2).random((5, 3)) / 3
+    np.testing.assert_allclose(shape_functions(cell, degree, X).sum(axis=1), 1, atol=1e-12)
+    h = 1e-6
+    moved = nodes[None] + 0.02 * np.random.default_rng(3).random((1, len(nodes), 3))
+    J = jacobians(moved, cell, degree, X)
+    for d in range(3):
+        ahead, behind = (shape_functions(cell, degree, X + s * h * np.eye(3)[d]) @ moved[0] for s in (1, -1))
+        np.testing.assert_allclose(J[0, :, :, d], (ahead - behind) / (2 * h), atol=1e-8)
+
+
+def test_cells_that_a_curved_edge_turns_over_are_straightened_as_little_as_needed():
+    points = reference_nodes("tetrahedron", 2).copy()
+    points[4, 2] += 0.6  # the edge 0–1 bulges through the cell
+    points[5] += 0.01
+    box = structured_box(1.0, (1, 1), (1, 1), (1, 1, 1), "tetrahedron")
+    cell = replace(
+        box, points=points, cells=np.arange(10).reshape(1, 10), degree=2, cell_tag=np.zeros(1, dtype=np.int32)
+    )
+    with pytest.raises(InputError, match="1 inverted"):
+        check_quality(cell, "here")
+    mended = straightened(cell)
+    check_quality(mended, "here")
+    assert 0.05 < mended.points[4, 2] < 0.6

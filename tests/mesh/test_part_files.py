@@ -1,0 +1,290 @@
+"""Parts from files: STEP and meshes of several formats become the part that they describe, or a clear error."""
+
+import gmsh
+import meshio
+import numpy as np
+import pytest
+from solid_parts import face_area, integrate
+
+from ffrobot.errors import InputError
+from ffrobot.mesh.gmsh_session import gmsh_session
+from ffrobot.mesh.records import InterfaceRecord
+from ffrobot.mesh.structured import structured_box
+
+VOLUME = 0.015 * 0.025
+
+
+def bar(occ, begin=0, end=1000):
+    """A bar of the paper's section, in millimetres."""
+    occ.addBox(begin, -7.5, -12.5, end - begin, 15, 25)
+
+
+def test_step_in_millimetres(solid, mesh_part, step_file):
+    part = mesh_part(solid(file=step_file(bar), unit="mm"))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    np.testing.assert_allclose(part.points.min(axis=0), [0, -0.0075, -0.0125], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("declared", "length", "unit"),
+    [("SI_UNIT($,.METRE.)", 1.0, "m"), ("SI_UNIT(.CENTI.,.METRE.)", 1000.0, "mm"), ("inch", 1000 / 25.4, "in")],
+)
+def test_the_unit_is_that_of_the_numbers_in_the_file(solid, mesh_part, step_file, declared, length, unit):
+    """OpenCASCADE would convert what the file declares to millimetres."""
+    scale = length / 1000
+    path = step_file(lambda occ: occ.addBox(0, -7.5 * scale, -12.5 * scale, length, 15 * scale, 25 * scale))
+    text = path.read_text()
+    assert "SI_UNIT(.MILLI.,.METRE.)" in text
+    if declared == "inch":
+        number = 900_000
+        unit_text = (
+            f"#{number} = ( CONVERSION_BASED_UNIT('INCH',#{number + 1}) LENGTH_UNIT() NAMED_UNIT(#{number + 2}) );\n"
+        )
+        unit_text += f"#{number + 1} = LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#{number + 3});\n"
+        unit_text += f"#{number + 2} = DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);\n"
+        unit_text += f"#{number + 3} = ( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) );\n"
+        start = text.index("( LENGTH_UNIT() NAMED_UNIT(*)")
+        old = text[text.rindex("#", 0, start) : start].split()[0]
+        text = text.replace(f"({old},", f"(#{number},").replace("ENDSEC;\nEND-ISO", unit_text + "ENDSEC;\nEND-ISO")
+    else:
+        text = text.replace("SI_UNIT(.MILLI.,.METRE.)", declared)
+    path.write_text(text)
+    assert integrate(mesh_part(solid(file=path, unit=unit))) == pytest.approx(VOLUME, rel=1e-6)
+
+
+def test_a_part_is_put_into_the_frame_of_the_link(solid, mesh_part, step_file):
+    """Drawn upright along −z, its top at (10, 20, 30); the link's y is the drawing's −x."""
+    path = step_file(lambda occ: occ.addBox(10 - 7.5, 20 - 12.5, 30 - 1000, 15, 25, 1000))
+    placed = solid(file=path, unit="mm", origin=(10.0, 20.0, 30.0), x_axis=(0.0, 0.0, -2.0), y_axis=(-1.0, 0.0, 0.3))
+    part = mesh_part(placed)
+    np.testing.assert_allclose(part.points.min(axis=0), [0, -0.0075, -0.0125], atol=1e-9)
+    np.testing.assert_allclose(part.points.max(axis=0), [1, 0.0075, 0.0125], atol=1e-9)
+
+
+def test_volumes_that_touch_become_one_part(solid, mesh_part, step_file):
+    def halves(occ):
+        bar(occ, 0, 400)
+        bar(occ, 400, 1000)
+
+    assert integrate(mesh_part(solid(file=step_file(halves), unit="mm"))) == pytest.approx(VOLUME, rel=1e-9)
+
+
+def test_labels_of_a_step_file_name_regions(solid, mesh_part, tmp_path):
+    path = tmp_path / "named.step"
+    with gmsh_session():
+        bar(gmsh.model.occ, 0, 400)
+        bar(gmsh.model.occ, 400, 1000)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(path))
+    text = path.read_text()
+    names = sorted({line.split("'")[1] for line in text.splitlines() if "= PRODUCT(" in line})
+    for old, new in zip(names[-2:], ("arm", "hub"), strict=True):
+        text = text.replace(f"'{old}'", f"'{new}'")
+    path.write_text(text)
+    part = mesh_part(solid(file=path, unit="mm"))
+    assert set(part.regions) == {"arm", "hub"}
+    assert set(np.unique(part.cell_tag)) == set(part.regions.values())
+
+
+def test_an_open_step_surface_is_refused(solid, mesh_part, step_file):
+    def opened(occ):
+        bar(occ)
+        occ.remove([(3, 1)])
+        occ.remove([(2, 1)])
+
+    with pytest.raises(InputError, match=r"geometry.file: part.step: expected a closed volume, found 5 faces that"):
+        mesh_part(solid(file=step_file(opened), unit="mm"))
+
+
+@pytest.mark.parametrize("ending", ["step", "msh", "inp", "bdf", "vtk", "vtu"])
+@pytest.mark.parametrize("content", ["", "no mesh\n", "*NODE\n1, 0., 0.\n", "ISO-10303-21;\nHEADER;\n"])
+def test_corrupt_files_are_refused(solid, mesh_part, tmp_path, ending, content, capfd):
+    path = tmp_path / f"part.{ending}"
+    path.write_text(content)
+    with pytest.raises(InputError, match=rf"link.toml: geometry.file: part.{ending}: expected .*, found "):
+        mesh_part(solid(file=path))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_cut_off_files_are_refused(solid, mesh_part, step_file, tmp_path):
+    for name, text in {
+        "half.step": step_file(bar).read_text()[:3000],
+        "half.msh": write_mesh(tmp_path / "whole.msh").read_text()[:8000],
+    }.items():
+        (tmp_path / name).write_text(text)
+        with pytest.raises(InputError, match=rf"geometry.file: {name}: expected .*, found "):
+            mesh_part(solid(file=tmp_path / name, unit="mm"))
+
+
+def test_parts_apart_are_refused(solid, mesh_part, step_file):
+    def apart(occ):
+        bar(occ, 0, 490)
+        bar(occ, 500, 1000)
+
+    with pytest.raises(InputError, match=r"expected one connected part, found 2: \d+ elements around \(0.24"):
+        mesh_part(solid(file=step_file(apart), unit="mm"))
+
+
+@pytest.mark.parametrize(("unit", "says"), [("m", "1000 m along x: looks like millimetres"), ("in", "25.4 m along x")])
+def test_a_unit_slip_is_told(solid, mesh_part, step_file, unit, says):
+    with pytest.raises(InputError, match=rf"expected a part 1 m long, found {says}.*geometry.unit = \"mm\""):
+        mesh_part(solid(file=step_file(bar), unit=unit))
+
+
+def write_mesh(path, order=1, hexahedra=False, version=4.1):
+    """Two halves of a bar in millimetres with the groups "arm", "hub", "left" (x = 0) and "joint" (in the middle)."""
+    with gmsh_session():
+        model = gmsh.model
+        bar(model.occ, 0, 400)
+        bar(model.occ, 400, 1000)
+        model.occ.fragment([(3, 1)], [(3, 2)])
+        model.occ.synchronize()
+        for name, (_, tag) in zip(("arm", "hub"), model.getEntities(3), strict=True):
+            model.setPhysicalName(3, model.addPhysicalGroup(3, [tag]), name)
+        for name, x in (("left", 0), ("joint", 400)):
+            faces = [tag for _, tag in model.getEntities(2) if abs(model.occ.getCenterOfMass(2, tag)[0] - x) < 1e-6]
+            model.setPhysicalName(2, model.addPhysicalGroup(2, faces), name)
+        if hexahedra:
+            for _, tag in model.getEntities(1):
+                model.mesh.setTransfiniteCurve(tag, 4)
+            for _, tag in model.getEntities(2):
+                model.mesh.setTransfiniteSurface(tag)
+                model.mesh.setRecombine(2, tag)
+            for _, tag in model.getEntities(3):
+                model.mesh.setTransfiniteVolume(tag)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 25)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1 if order == 20 else 0)
+        model.mesh.generate(3)
+        model.mesh.setOrder(2 if order == 20 else order)
+        gmsh.write(str(path))
+    return path
+
+
+@pytest.mark.parametrize("hexahedra", [False, True])
+@pytest.mark.parametrize("order", [1, 2, 20])
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_gmsh_meshes_keep_their_groups(solid, mesh_part, tmp_path, hexahedra, order, version):
+    path = write_mesh(tmp_path / "part.msh", order, hexahedra, version)
+    part = mesh_part(solid(file=path, unit="mm"), (InterfaceRecord(name="root", group="left"),))
+    assert part.cell == ("hexahedron" if hexahedra else "tetrahedron")
+    assert part.degree == 1  # straight: the nodes on edges are not needed
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    hub = part.points[part.corners[part.cell_tag == part.regions["hub"]]]
+    assert hub[..., 0].min() == pytest.approx(0.4)
+    assert face_area(part, "root") == pytest.approx(VOLUME, rel=1e-9)
+
+
+def test_a_group_inside_the_part_is_no_face(solid, mesh_part, tmp_path):
+    path = write_mesh(tmp_path / "part.msh")
+    with pytest.raises(InputError, match=r"interface.group of hub: expected a face on the boundary .* not connected"):
+        mesh_part(solid(file=path, unit="mm"), (InterfaceRecord(name="hub", group="joint"),))
+
+
+def test_a_missing_group_is_told_with_those_there(solid, mesh_part, tmp_path):
+    path = write_mesh(tmp_path / "part.msh")
+    with pytest.raises(
+        InputError, match=r'groups of faces or nodes "joint", "left", found "lift" \(did you mean "left"'
+    ):
+        mesh_part(solid(file=path, unit="mm"), (InterfaceRecord(name="hub", group="lift"),))
+
+
+@pytest.mark.parametrize("ending", ["inp", "bdf", "vtk", "vtu", "med", "xdmf"])
+@pytest.mark.parametrize("kind", ["tetra", "tetra10", "hexahedron"])
+def test_foreign_meshes(solid, mesh_part, tmp_path, ending, kind):
+    if (ending, kind) == ("bdf", "tetra10"):
+        pytest.skip("meshio 5.0 cannot write it")
+    box = structured_box(
+        1.0, (0.015, 0.025), (0.015, 0.025), (8, 2, 2), "tetrahedron" if "tetra" in kind else "hexahedron"
+    )
+    points, cells = box.points, box.cells
+    if kind == "tetra10":
+        points, cells = with_mid_sides(box)
+    meshio.Mesh(points, [(kind, cells)]).write(tmp_path / f"part.{ending}")
+    part = mesh_part(solid(file=tmp_path / f"part.{ending}"))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
+    assert face_area(part, "tip") == pytest.approx(VOLUME, rel=1e-6)
+
+
+def with_mid_sides(box, bend=0.0):
+    """The tetrahedra of `box` with 10 nodes, as meshio numbers them; `bend` makes its upper edge a parabola."""
+    edges = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
+    pairs = np.sort(box.cells[:, edges].reshape(-1, 2), axis=1)
+    unique, number = np.unique(pairs, axis=0, return_inverse=True)
+    points = np.concatenate([box.points, box.points[unique].mean(axis=1)])
+    points[:, 1] *= 1 + bend * points[:, 0] ** 2
+    return points, np.concatenate([box.cells, len(box.points) + number.reshape(-1, 6)], axis=1)
+
+
+@pytest.mark.parametrize("ending", ["inp", "vtu"])
+def test_curved_tetrahedra_are_kept(solid, mesh_part, tmp_path, ending):
+    box = structured_box(1.0, (0.015, 0.025), (0.015, 0.025), (8, 1, 1), "tetrahedron")
+    points, cells = with_mid_sides(box, bend=0.3)
+    meshio.Mesh(points, [("tetra10", cells)]).write(tmp_path / f"part.{ending}")
+    part = mesh_part(solid(file=tmp_path / f"part.{ending}"))
+    assert part.degree == 2
+    # Upper and lower face are parabolas, up to what quadratic cells make of y z-independent: ∫ 1 + 0.3 x² dx = 1.1.
+    assert integrate(part) == pytest.approx(1.1 * VOLUME, rel=1e-6)
+
+
+ABAQUS = """*HEADING
+two cubes in a row
+*NODE, NSET=ALL
+{nodes}
+*ELEMENT, TYPE=C3D8, ELSET=ARM
+1, {first}
+*ELEMENT, TYPE=C3D8{second_set}
+2, {second}
+*NSET, NSET=LEFT
+{left}
+*ELSET, ELSET=HUB
+2
+"""
+
+
+@pytest.mark.parametrize("second_set", ["", ", ELSET=OTHER", ", ELSET=ARM"])
+def test_abaqus_sets_name_regions_and_faces(solid, mesh_part, tmp_path, second_set):
+    box = structured_box(1.0, (0.2, 0.2), (0.2, 0.2), (2, 1, 1), "hexahedron")
+    nodes = "\n".join(f"{k + 1}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(box.points))
+    first, second = (", ".join(str(node + 1) for node in cell) for cell in box.cells)
+    left = ", ".join(str(k + 1) for k in np.flatnonzero(box.points[:, 0] == 0))
+    text = ABAQUS.format(nodes=nodes, first=first, second=second, second_set=second_set, left=left)
+    (tmp_path / "part.inp").write_text(text)
+    part = mesh_part(solid(file=tmp_path / "part.inp"), (InterfaceRecord(name="root", group="LEFT"),))
+    named = {name: part.points[part.corners[part.cell_tag == tag]][..., 0].max() for name, tag in part.regions.items()}
+    assert named["ARM"] == pytest.approx(0.5)
+    assert face_area(part, "root") == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "says"),
+    [
+        ([("triangle", [[0, 1, 2]])], "expected a mesh of volume elements, found none: 1 triangles or quadrilaterals"),
+        ([("wedge", [[0, 1, 2, 3, 4, 5]])], "found unsupported elements: 1 wedge"),
+        (
+            [("tetra", [[0, 1, 2, 3]]), ("hexahedron", [[0, 1, 2, 3, 4, 5, 6, 7]])],
+            "found a mixture: 1 tetra, 1 hexahedron",
+        ),
+    ],
+)
+def test_other_elements_are_refused(solid, mesh_part, tmp_path, blocks, says):
+    points = np.random.default_rng(1).random((8, 3))
+    meshio.Mesh(points, [(kind, np.array(cells)) for kind, cells in blocks]).write(tmp_path / "part.vtk")
+    with pytest.raises(InputError, match=says):
+        mesh_part(solid(file=tmp_path / "part.vtk"))
+
+
+def test_curved_hexahedra_of_20_nodes_are_refused(solid, mesh_part, tmp_path):
+    path = write_mesh(tmp_path / "part.msh", 20, hexahedra=True)
+    mesh = meshio.read(path)
+    bent = mesh.points * [1, 1, 1]
+    bent[:, 1] *= 1 + 1e-6 * bent[:, 0] ** 2
+    cells = np.concatenate([block.data for block in mesh.cells if block.type == "hexahedron20"])
+    meshio.Mesh(bent, [("hexahedron20", cells)]).write(tmp_path / "bent.vtu")
+    with pytest.raises(InputError, match="found hexahedra of 20 nodes"):
+        mesh_part(solid(file=tmp_path / "bent.vtu", unit="mm"))
+
+
+def test_keys_that_a_ready_mesh_leaves_no_use_for_are_refused(solid, mesh_part, tmp_path):
+    with pytest.raises(InputError, match=r"mesh.size: expected none, since part.msh is a mesh, found 0.1"):
+        mesh_part(solid(file=write_mesh(tmp_path / "part.msh"), unit="mm"), size=0.1)

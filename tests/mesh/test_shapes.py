@@ -1,0 +1,117 @@
+"""Shapes drawn out along x: their volume and moments are those of the drawing, in the link's frame."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+from solid_parts import face_area, integrate, rectangle
+
+from ffrobot.errors import InputError
+from ffrobot.mesh.records import CircleSection, Hole, SurfacePatches, TubeSection
+
+CELLS = ("tetrahedron", "hexahedron")
+TAPER = {"section": rectangle(0.03, 0.05), "tip_section": rectangle(0.015, 0.025)}
+
+
+@pytest.mark.parametrize("mesh", [{}, {"cell": "hexahedron"}, {"divisions": (7, 2, 3)}, {"size": 0.02}])
+def test_a_box_has_its_mass_and_inertia(solid, mesh_part, mesh):
+    part = mesh_part(solid(), **mesh)
+    height, width, volume = 0.015, 0.025, 0.015 * 0.025
+    assert integrate(part) == pytest.approx(volume, rel=1e-12)
+    for axis, moment in ((0, 1 / 3), (1, height**2 / 12), (2, width**2 / 12)):
+        assert integrate(part, lambda x, axis=axis: x[..., axis] ** 2) == pytest.approx(volume * moment, rel=1e-12)
+    assert face_area(part, "root") == pytest.approx(volume, rel=1e-12)
+    assert face_area(part, "tip") == pytest.approx(volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_tapered_box_has_its_volume(solid, mesh_part, cell):
+    part = mesh_part(solid(**TAPER), cell=cell)
+    # Prismatoid: L/6 (A_root + 4 A_mid + A_tip).
+    assert integrate(part) == pytest.approx((0.03 * 0.05 + 4 * 0.0225 * 0.0375 + 0.015 * 0.025) / 6, rel=1e-12)
+
+
+def test_a_hollow_box_has_its_volume(solid, mesh_part):
+    part = mesh_part(solid(section=rectangle(0.03, 0.05, wall=0.005)))
+    assert integrate(part) == pytest.approx(0.03 * 0.05 - 0.02 * 0.04, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("section", "area", "error"),
+    [
+        (CircleSection(shape="circle", diameter=0.025), np.pi * 0.025**2 / 4, 1e-3),
+        (TubeSection(shape="tube", outer=0.05, inner=0.03), np.pi * (0.05**2 - 0.03**2) / 4, 1e-3),
+    ],
+)
+def test_round_sections_are_met_by_curved_cells(solid, mesh_part, section, area, error):
+    part = mesh_part(solid(section=section))
+    assert part.degree == 2
+    assert integrate(part) == pytest.approx(area, rel=error)
+    # With straight edges, 8 around, 10 % would be missing: they are chords.
+    assert face_area(part, "root") < (1 - 5 * error) * area
+
+
+def test_holes_are_cut_out(solid, mesh_part):
+    holes = tuple(Hole(position=x, diameter=0.04, offset=0.002) for x in (0.2, 0.5, 0.8))
+    part = mesh_part(solid(section=rectangle(0.06, 0.01), hole=holes))
+    assert integrate(part) == pytest.approx(0.06 * 0.01 - 3 * np.pi * 0.02**2 * 0.01, rel=1e-4)
+    # What is missing in the middle of the section moves the center: −A_hole · offset.
+    first = integrate(part, lambda x: x[..., 1])
+    assert first == pytest.approx(-3 * np.pi * 0.02**2 * 0.01 * 0.002, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("hole", "key"),
+    [({"position": 0.99, "diameter": 0.03}, "position"), ({"position": 0.5, "diameter": 0.03}, "diameter")],
+)
+def test_holes_that_leave_the_part_are_refused(solid, mesh_part, hole, key):
+    with pytest.raises(InputError, match=rf"link.toml: geometry.hole.{key}: expected holes within .*, found "):
+        mesh_part(solid(section=rectangle(0.02, 0.01), hole=(Hole(**hole),)))
+
+
+def test_a_finer_size_makes_more_cells(solid, mesh_part):
+    counts = [len(mesh_part(solid(), size=size).cells) for size in (0.02, 0.01, 0.005)]
+    assert counts[0] < counts[1] / 2 < counts[2] / 4
+
+
+def test_divisions_are_counted(solid, mesh_part):
+    assert len(mesh_part(solid(), divisions=(10, 2, 3), cell="hexahedron").cells) == 60
+    assert len(mesh_part(solid(), divisions=(10, 2, 3)).cells) == 360
+
+
+def test_the_same_drawing_gives_the_same_mesh(solid, mesh_part):
+    tube = solid(section=TubeSection(shape="tube", outer=0.05, inner=0.03))
+    first, second = mesh_part(tube, size=0.02), mesh_part(tube, size=0.02)
+    np.testing.assert_array_equal(first.points, second.points)
+    np.testing.assert_array_equal(first.cells, second.cells)
+
+
+@pytest.mark.parametrize("faces", ["top", "bottom", "both"])
+def test_patches_lie_on_whole_facets(solid, mesh_part, faces):
+    patches = SurfacePatches(count=4, length=0.05, width=0.02, faces=faces)
+    part = mesh_part(solid(), patches=patches)
+    sides = ("top", "bottom") if faces == "both" else (faces,)
+    assert set(part.faces) == {"root", "tip", *(f"patch/{k}/{side}" for k in range(4) for side in sides)}
+    for side in sides:
+        for k, (begin, end) in enumerate(patches.edges(1.0)):
+            corners = part.points[part.facets[part.facet_tag == part.faces[f"patch/{k}/{side}"]]].reshape(-1, 3)
+            assert face_area(part, f"patch/{k}/{side}") == pytest.approx(0.05 * 0.02, rel=1e-9)
+            np.testing.assert_allclose(corners.min(axis=0)[[0, 2]], [begin, -0.01], atol=1e-12)
+            np.testing.assert_allclose(corners.max(axis=0)[[0, 2]], [end, 0.01], atol=1e-12)
+            np.testing.assert_allclose(corners[:, 1], 0.0075 if side == "top" else -0.0075, atol=1e-12)
+
+
+def test_patches_side_by_side_over_the_full_width(solid, mesh_part):
+    part = mesh_part(solid(), patches=SurfacePatches(count=10, length=0.1, width=0.025))
+    assert sum(face_area(part, name) for name in part.faces if name.endswith("top")) == pytest.approx(0.025, rel=1e-9)
+
+
+def test_gmsh_says_nothing_and_leaves_interrupts_alone(solid, mesh_part, capfd):
+    before = signal.getsignal(signal.SIGINT)
+    said = []
+    mesh_part(solid(hole=(Hole(position=0.5, diameter=0.005),)), said=said)
+    os.write(1, b"heard")
+    assert capfd.readouterr() == ("heard", "")
+    assert signal.getsignal(signal.SIGINT) is before
+    assert said == ["meshing"]

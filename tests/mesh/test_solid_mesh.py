@@ -1,0 +1,147 @@
+"""The distributed mesh: regions, faces and surface are the part's, whatever the number of processes."""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from solid_parts import rectangle
+
+from ffrobot.errors import InputError
+from ffrobot.mesh.compat import coordinate_element, geometry_nodes
+from ffrobot.mesh.records import CircleSection, InterfaceRecord, SolidMeshRecord, SurfacePatches
+from ffrobot.mesh.solid_mesh import distributed, solid_mesh
+from ffrobot.mesh.structured import structured_box
+
+LINK = Path("link.toml")
+
+
+def total(form):
+    return fem.assemble_scalar(fem.form(form))
+
+
+@pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
+def test_faces_and_volume_by_dolfinx(solid, cell):
+    grip = InterfaceRecord(name="grip", position=(0.5, 0.0, 0.0125), normal=(0.0, 0.0, 1.0))
+    body = solid_mesh(solid(), SolidMeshRecord(cell=cell), (grip,), None, LINK)
+    ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
+    one = fem.Constant(body.mesh, 1.0)
+    x = ufl.SpatialCoordinate(body.mesh)
+    assert total(one * ufl.dx(body.mesh)) == pytest.approx(0.000375)
+    for name, area, first in (("root", 0.000375, 0.0), ("tip", 0.000375, 1.0), ("grip", 0.015, 0.5)):
+        assert total(one * ds(body.faces[name])) == pytest.approx(area)
+        assert total(x[0] * ds(body.faces[name])) == pytest.approx(area * first, abs=1e-12)
+
+
+def test_patches_by_dolfinx(solid):
+    body = solid_mesh(solid(), SolidMeshRecord(), (), SurfacePatches(count=2, length=0.05, width=0.02), LINK)
+    ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
+    x = ufl.SpatialCoordinate(body.mesh)
+    assert total(x[0] * ds(body.faces["patch/1/bottom"])) == pytest.approx(0.75 * 0.05 * 0.02)
+
+
+def test_regions_by_dolfinx():
+    box = structured_box(1.0, (0.1, 0.1), (0.1, 0.1), (10, 2, 2), "tetrahedron")
+    tags = np.where(box.points[box.corners, 0].mean(axis=1) > 0.7, 3, 0).astype(np.int32)
+    body = distributed(replace(box, cell_tag=tags, regions={"hub": 3}))
+    dx = ufl.Measure("dx", domain=body.mesh, subdomain_data=body.cell_tags)
+    x = ufl.SpatialCoordinate(body.mesh)
+    assert total(x[0] * dx(body.regions["hub"])) == pytest.approx(0.01 * 0.3 * 0.85)
+
+
+def test_curved_cells_by_dolfinx(solid):
+    body = solid_mesh(solid(section=CircleSection(shape="circle", diameter=0.1)), SolidMeshRecord(), (), None, LINK)
+    x = ufl.SpatialCoordinate(body.mesh)
+    volume = np.pi * 0.05**2
+    assert total(fem.Constant(body.mesh, 1.0) * ufl.dx(body.mesh)) == pytest.approx(volume, rel=1e-3)
+    assert total(x[1] ** 2 * ufl.dx(body.mesh)) == pytest.approx(volume * 0.05**2 / 4, rel=3e-3)
+
+
+@pytest.mark.parametrize("mesh", [{}, {"cell": "hexahedron"}, {"divisions": (60, 6, 6)}])
+def test_the_surface_is_closed_and_faces_outward(solid, mesh):
+    surface = solid_mesh(solid(), SolidMeshRecord(**mesh), (), None, LINK).surface
+    corners = surface.points[surface.triangles]
+    vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(2 * (0.025 + 0.015) + 2 * 0.000375)
+    assert np.einsum("ti,ti->", vectors, corners.mean(axis=1)) / 3 == pytest.approx(0.000375)
+    edges = np.concatenate([surface.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    _, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    assert np.all(count == 2)
+
+
+def test_surface_points_are_where_their_cells_say(solid):
+    body = solid_mesh(solid(section=CircleSection(shape="circle", diameter=0.1)), SolidMeshRecord(), (), None, LINK)
+    surface = body.surface
+    np.testing.assert_array_equal(np.sort(surface.rows), np.arange(len(surface.points)))
+    nodes = body.mesh.geometry.x[geometry_nodes(body.mesh)[surface.cells]]
+    values = coordinate_element(body.mesh).tabulate(0, surface.X)[0, ..., 0]
+    found = np.einsum("kv,kvi->ki", values, nodes)
+    np.testing.assert_allclose(found, surface.points[surface.rows], atol=1e-14)
+
+
+def test_errors_reach_the_caller(solid):
+    lost = InterfaceRecord(name="a", position=(0.5, 1.0, 0.0), normal=(0.0, 1.0, 0.0))
+    with pytest.raises(InputError, match=r"link.toml: interface.position of a"):
+        solid_mesh(solid(section=rectangle()), SolidMeshRecord(), (lost,), None, LINK)
+
+
+PARALLEL = """
+import sys, numpy as np, ufl
+from pathlib import Path
+from dolfinx import fem
+from mpi4py import MPI
+from ffrobot.errors import InputError
+from ffrobot.mesh.compat import coordinate_element, geometry_nodes
+from ffrobot.mesh.records import *
+from ffrobot.mesh.slices import section_quadrature
+from ffrobot.mesh.solid_mesh import solid_mesh
+
+comm = MPI.COMM_WORLD
+geometry = SolidGeometry(kind="solid", length=1.0, section=RectangleSection(shape="rectangle", height=0.06, width=0.02),
+                         hole=(Hole(position=0.5, diameter=0.04),))
+grip = InterfaceRecord(name="grip", position=(0.5, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+lost = InterfaceRecord(name="lost", position=(0.5, 9.0, 0.0), normal=(0.0, 0.0, 1.0))
+try:
+    solid_mesh(geometry, SolidMeshRecord(), (lost,), None, Path("link.toml"), comm)
+    raised = False
+except InputError:
+    raised = True
+body = solid_mesh(geometry, SolidMeshRecord(), (grip,), SurfacePatches(count=2, length=0.05, width=0.02),
+                  Path("link.toml"), comm)
+ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
+x = ufl.SpatialCoordinate(body.mesh)
+def total(form):
+    return comm.allreduce(fem.assemble_scalar(fem.form(form)))
+numbers = [total(x[0] * ds(tag)) for tag in body.faces.values()]
+numbers += [total(x[0] * ufl.dx(body.mesh)), body.size, len(body.surface.points), len(body.surface.triangles)]
+numbers += list((body.surface.points * np.arange(len(body.surface.points))[:, None]).sum(axis=0))
+numbers.append((body.surface.triangles * np.arange(len(body.surface.triangles))[:, None]).sum())
+numbers.append(comm.allreduce(len(body.surface.rows)) - len(body.surface.points))
+for at in (0.0, 0.3, 0.49, 0.5, 1.0):
+    section = section_quadrature(body.mesh, at, 4)
+    numbers += [comm.allreduce(v) for v in (section.weights.sum(), section.weights @ section.points[:, 1] ** 2)]
+    numbers.append(comm.allreduce(section.y_range[1], MPI.MAX))
+raised = comm.allreduce(int(raised))
+if comm.rank == 0:
+    np.savetxt(sys.argv[1], numbers)
+    assert raised == comm.size
+"""
+
+
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun here")
+def test_two_processes_see_what_one_sees(tmp_path):
+    (tmp_path / "run.py").write_text(PARALLEL)
+    environment = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    results = []
+    for count in (1, 2):
+        command = ["mpirun", "--oversubscribe", "-n", str(count), sys.executable, "run.py", f"{count}.txt"]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+        results.append(np.loadtxt(tmp_path / f"{count}.txt"))
+    np.testing.assert_allclose(results[1], results[0], rtol=1e-10, atol=1e-14)
