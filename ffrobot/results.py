@@ -44,10 +44,12 @@ def results_image(solution: Solution) -> bytes:
         file.attrs["name"] = solution.scene.name
         file.attrs["scene"] = solution.scene.text
         file.attrs["skipped"] = list(solution.skipped)
+        file.attrs["geometric_stiffening"] = solution.stiffened
         file.attrs["modal_bodies"] = json.dumps(_modal_files(solution))
         for name, outcome in solution.outcomes.items():
             group = file.create_group(name)
             _write_attributes(group, outcome)
+            group.attrs["stiffening_effect"] = solution.stiffening_effects[name]
             _write_motion(group, outcome)
             _write_forces(group, outcome)
             for body_name, voltages in solution.voltages.get(name, {}).items():
@@ -82,7 +84,9 @@ def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
     analysis = outcome.analysis
     group.attrs["kind"] = analysis.kind
-    group.attrs["integrator"] = analysis.integrator if analysis.kind in ("pcid", "forward") else "none"
+    integrated = analysis.kind in ("pcid", "forward")
+    group.attrs["integrator"] = outcome.integrator.name if integrated else "none"
+    group.attrs["integrator_reason"] = outcome.integrator.reason if integrated else ""
     group.attrs["tolerance"] = analysis.tolerance
     group.attrs["actuation"] = analysis.actuation or ""
     group.attrs["apply"] = analysis.apply or ""

@@ -24,6 +24,7 @@ from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.fcid import run_fcid
+from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.observation import body_motion
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
@@ -75,6 +76,8 @@ class Solution:
         feasibility: by analysis.
         stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
+        stiffened: whether geometric stiffening is in the equations.
+        stiffening_effects: by analysis, the largest relative change of a mode's stiffness by the loads of the run.
         skipped: what the scene did not need, one line each.
     """
 
@@ -92,6 +95,8 @@ class Solution:
     stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
+    stiffened: bool = False
+    stiffening_effects: dict[str, float] = field(default_factory=dict)
 
 
 def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
@@ -104,16 +109,30 @@ def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     watcher = watcher or Watcher()
     solution = prepare(scene, watcher)
     with Interruption() as interruption:
-        for analysis in solution.scene.analysis:
-            started = time.perf_counter()
-            outcome = _run(solution, analysis, watcher, interruption)
-            solution.outcomes[analysis.name] = outcome
-            _allocate(solution, outcome)
-            solution.stresses[analysis.name] = _stresses(solution, outcome)
-            solution.seconds[analysis.name] = time.perf_counter() - started
-            if outcome.status != "completed":
-                break
+        if not _run_all(solution, watcher, interruption):
+            solution = _assembled(solution.scene, solution.bodies, solution.structure, solution.seconds, stiffened=True)
+            _run_all(solution, watcher, interruption)
     return solution
+
+
+def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> bool:
+    """Run the analyses; False where `geometric_stiffening = "auto"` asks for all of them again, stiffened."""
+    stiffening = {name: body.planar.stiffening for name, body in solution.bodies.items()}
+    for analysis in solution.scene.analysis:
+        started = time.perf_counter()
+        outcome = _run(solution, analysis, watcher, interruption)
+        effect = estimated_effect(outcome, stiffening)
+        automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
+        if automatic and effect > NOTABLE and outcome.status != "interrupted":
+            return False
+        solution.stiffening_effects[analysis.name] = effect
+        solution.outcomes[analysis.name] = outcome
+        _allocate(solution, outcome)
+        solution.stresses[analysis.name] = _stresses(solution, outcome)
+        solution.seconds[analysis.name] = time.perf_counter() - started
+        if outcome.status != "completed":
+            break
+    return True
 
 
 def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
@@ -123,8 +142,20 @@ def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
     bodies = {body.name: loaded for body, loaded in zip(scene.body, _load_bodies(scene, watcher), strict=True)}
-    loaded = time.perf_counter()
+    seconds = {"links and files": time.perf_counter() - began}
     structure = _add_patches(scene, bodies)
+    return _assembled(scene, bodies, structure, seconds, stiffened=scene.geometric_stiffening is True)
+
+
+def _assembled(
+    scene: Scene,
+    bodies: Mapping[str, LoadedBody],
+    structure: Mapping[str, StructureEffect],
+    seconds: dict[str, float],
+    stiffened: bool,
+) -> Solution:
+    """The equations of a scene, with or without geometric stiffening."""
+    _check_stiffening(scene, bodies, stiffened)
     patches = {
         layout.body: patch_array(scene.path, layout, modal, bodies[layout.body].planar)
         for layout in scene.pzt
@@ -137,12 +168,26 @@ def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
         layout.body: point_set(scene.path, layout, bodies[layout.body].modal, bodies[layout.body].planar)
         for layout in scene.actuation_points
     }
-    for name, chosen in points.items():
-        bodies[name] = replace(bodies[name], planar=with_points(bodies[name].planar, chosen))
-    model = build_model(scene, [body.planar for body in bodies.values()], _voltage_loads(scene, patches))
-    solution = Solution(scene, model, bodies, patches, points, structure, skipped=tuple(_skipped(scene, bodies)))
-    solution.seconds["links and files"] = loaded - began
-    return solution
+    bodies = {
+        name: replace(body, planar=with_points(body.planar, points[name])) if name in points else body
+        for name, body in bodies.items()
+    }
+    planar = [body.planar if stiffened else replace(body.planar, stiffening=None) for body in bodies.values()]
+    model = build_model(scene, planar, _voltage_loads(scene, patches))
+    skipped = tuple(_skipped(scene, bodies))
+    return Solution(
+        scene, model, bodies, patches, points, structure, seconds=seconds, skipped=skipped, stiffened=stiffened
+    )
+
+
+def _check_stiffening(scene: Scene, bodies: Mapping[str, LoadedBody], stiffened: bool) -> None:
+    """Raise `InputError` for a stiffened body whose file does not say how."""
+    for name, body in bodies.items():
+        if stiffened and body.modal is not None and body.planar.stiffening is None:
+            raise InputError(
+                f"{scene.path}: geometric_stiffening: expected modal bodies with geometric stiffness, found none in"
+                f' that of "{name}"'
+            )
 
 
 def _allocate(solution: Solution, outcome: Outcome) -> None:

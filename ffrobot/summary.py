@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from .mbs.analyses import Outcome
+from .mbs.geometric_stiffening import NOTABLE
 from .solution import Solution
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
@@ -35,6 +36,10 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
         console.print()
         console.print(_stresses(solution))
     notes = Table.grid(padding=(0, 2))
+    for name, outcome in solution.outcomes.items():
+        if outcome.analysis.kind in ("pcid", "forward") and outcome.analysis.integrator == "auto":
+            notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
+    notes.add_row(*_stiffening(solution))
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
         notes.add_row("skipped", "; ".join(solution.skipped))
@@ -43,14 +48,26 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     console.print(f"results    {path}", soft_wrap=True)
 
 
+def _stiffening(solution: Solution) -> tuple[str, str]:
+    """What loads along the links do to their stiffness, and whether the equations know."""
+    effect = max(solution.stiffening_effects.values(), default=0.0)
+    changes = f"loads change a mode's stiffness by up to {100 * effect:.2g} %"
+    if solution.stiffened:
+        return "stiffening", f"geometric stiffening is on: {changes}"
+    if effect > NOTABLE:
+        return "warning", f"geometric stiffening is off, and {changes}: consider geometric_stiffening = true"
+    return "stiffening", f"geometric stiffening is off: {changes}"
+
+
 def _analyses(solution: Solution) -> Table:
-    table = _table("analysis", "kind", "t (s)", "steps", "error aim", "constraints", "wall (s)")
+    table = _table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
         analysis, reached = outcome.analysis, outcome.time[-1]
         integrated = analysis.kind in ("pcid", "forward")
         table.add_row(
             name,
             analysis.kind,
+            outcome.integrator.name if integrated else "",
             f"{reached:g}" if outcome.status == "completed" else f"{reached:g} of {analysis.end:g}",
             f"{outcome.steps}" if integrated else "",
             f"{analysis.tolerance:.0e}" if integrated else "",
@@ -99,7 +116,7 @@ def _table(*headers: str) -> Table:
     """Columns of text without lines: the first ones left, numbers right; names fold where they must."""
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for k, header in enumerate(headers):
-        if k < 2:
+        if k < 2 or header == "integrator":
             table.add_column(header, overflow="fold")
         else:
             table.add_column(header, justify="right", no_wrap=True)

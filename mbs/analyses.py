@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import SolveError
 from . import _core
 from .initial_state import State, check_reach, undeformed_state
+from .integrators import METHODS, Choice, choose_integrator
 from .model import ZERO, Array, Assembly, Model
 from .scene_records import Analysis
 from .statics import static_equilibrium
@@ -24,12 +25,15 @@ _STATUS = {
     _core.IntegrationStatus.step_underflow: "step underflow",
     _core.IntegrationStatus.too_many_steps: "too many steps",
     _core.IntegrationStatus.interrupted: "interrupted",
+    _core.IntegrationStatus.diverged: "diverged",
 }
 _ADVICE = {
     "step underflow": "no step is small enough there: the motion turns singular (a stretched arm, a jump in a"
     " trajectory) or the load grows without bound",
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
     "interrupted": "stopped on request",
+    "diverged": "a link is bent by as much as it is long, which small deformations do not describe: loads beyond"
+    " buckling, a spin that needs geometric_stiffening = true, or an arm without motors that falls apart",
 }
 
 
@@ -52,6 +56,7 @@ class Outcome:
     rejected: int
     evaluations: int
     wall_seconds: float
+    integrator: Choice
     recording: _core.Recording | None = field(default=None, repr=False)
     shape: list[list[_core.TimeFunction]] | None = field(default=None, repr=False)  # prescribed p(t), FCID only
     shape_force: Array | None = None  # (T, modes of all bodies) −λ_p, the forces that hold the shape; FCID only
@@ -104,7 +109,7 @@ def run_forward(
     assembly = Assembly(model, model.joints, [*((row, ZERO) for row in rows), *model.loads])
     steering = _core.Actuation(actuation_source(source), actuators)
     start = State(source.q[0].copy(), source.v[0].copy())  # bodies and their order are the same
-    return _integrate(assembly, analysis, start, steering, None, None, progress)
+    return _integrate(assembly, analysis, start, steering, None, None, progress, source.integrator)
 
 
 def run_static(model: Model, analysis: Analysis) -> Outcome:
@@ -143,16 +148,19 @@ def _integrate(
     resolver: _core.ActuationResolver | None,
     recording: _core.Recording | None,
     progress: Progress,
+    replayed: Choice | None = None,
 ) -> Outcome:
     began = time.perf_counter()
+    integrator = choose_integrator(assembly, analysis, start, replayed)
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, steering, analysis.times.tolist(), start.q, start.v,
-        analysis.tolerance, analysis.max_steps, resolver, progress, recording,
+        analysis.tolerance, analysis.max_steps, METHODS[integrator.name], analysis.spectral_radius, resolver, progress,
+        recording,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     reached = len(run.q)
     return Outcome(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers,
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
-        _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, recording,
+        _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, integrator, recording,
     )  # fmt: skip

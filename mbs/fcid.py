@@ -14,6 +14,7 @@ from . import _core
 from ._core import TimeFunction
 from .analyses import Outcome, resolver_of
 from .initial_state import check_reach, undeformed_state
+from .integrators import NOT_INTEGRATED
 from .model import ZERO, Array, Assembly, Model
 from .planar_body import PlanarBody
 from .scene_records import Analysis
@@ -57,7 +58,7 @@ def run_fcid(model: Model, analysis: Analysis) -> Outcome:
     return Outcome(
         analysis, assembly, analysis.times, run.q, run.v, run.a, run.multipliers,
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
-        "completed", 0, 0, 0, seconds, shape_force=run.shape_force, shape=shape,
+        "completed", 0, 0, 0, seconds, NOT_INTEGRATED, shape_force=run.shape_force, shape=shape,
     )  # fmt: skip
 
 

@@ -116,6 +116,12 @@ def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
                 f'{scene.path}: {key}: expected a point of "{body}" ({quoted(known)}), found "{reference}"'
                 + did_you_mean(point, known)
             )
+        stiffening = bodies[body].stiffening
+        if stiffening is not None and point not in stiffening.K_points:
+            raise InputError(
+                f"{scene.path}: {key}: expected, with geometric_stiffening, a point whose loads' geometric stiffness is"
+                f' in the modal body file ({quoted(stiffening.K_points)}), found "{reference}"'
+            )
 
 
 class Assembly:
@@ -140,7 +146,7 @@ class Assembly:
         self.motor_rows = [self._core_row(row) for row in motors]
         self.system = _core.System(np.array(model.scene.gravity))
         for body, markers in zip(model.bodies, self._markers, strict=True):
-            self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers]))
+            self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))
         for constraint, row in zip(self.constraints, constraint_rows, strict=True):
             self.system.add_constraint(row, constraint.target)
         for row, size in drive_rows:
@@ -172,6 +178,31 @@ class Assembly:
         keys = [(c.is_trajectory, c.owner, c.row.carries_moment) for c in self.constraints]
         numbers = {key: i for i, key in enumerate(dict.fromkeys(keys))}
         return [numbers[key] for key in keys]
+
+    def constraint_wrenches(self, q: Array, lambda_: Array) -> dict[str, dict[str, Array]]:
+        """Force (global axes) and moment (T, 3) of the constraints on every point of every body; multipliers (T, m).
+
+        Moments of slides about their markers are left out.
+        """
+        wrenches: dict[str, dict[str, Array]] = {}
+        for constraint, multiplier in zip(self.constraints, lambda_.T, strict=True):
+            row = constraint.row
+            for end, sign in ((row.b, -1.0), (row.a, 1.0)):
+                if end.body is None or end.point == FRAME:
+                    continue
+                wrench = wrenches.setdefault(end.body, {}).setdefault(end.point, np.zeros((len(lambda_), 3)))
+                if row.kind == _core.RowKind.slide:
+                    wrench[:, :2] += (sign * multiplier)[:, None] * self._slide_direction(row, q)
+                else:
+                    column = (_core.RowKind.x, _core.RowKind.y, _core.RowKind.angle).index(row.kind)
+                    wrench[:, column] += sign * multiplier
+        return wrenches
+
+    def _slide_direction(self, row: Row, q: Array) -> Array:
+        """The direction (T, 2) of a slide in global axes; the rotation of its section is small against the frame's."""
+        theta = q[:, self.first[self.index[row.a.body]] + 2] if row.a.body is not None else np.zeros(len(q))
+        x, y = row.direction
+        return np.column_stack([np.cos(theta) * x - np.sin(theta) * y, np.sin(theta) * x + np.cos(theta) * y])
 
     def _core_row(self, row: Row) -> _core.Row:
         return _core.Row(row.kind, self._marker(row.a), self._marker(row.b), np.array(row.direction), row.offset)

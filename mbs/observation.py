@@ -8,6 +8,7 @@ import numpy as np
 
 from . import _core
 from .analyses import Outcome
+from .geometric_stiffening import second_order_displacement
 from .model import Array, Constraint
 from .planar_body import PlanarBody
 from .rows import End
@@ -51,12 +52,12 @@ def body_motion(outcome: Outcome, body: PlanarBody) -> BodyMotion:
 
 
 def point_motion(outcome: Outcome, reference: str) -> PointMotion:
-    """Motion of "BODY.POINT": r = R + A (x + Φ p)."""
+    """Motion of "BODY.POINT": r = R + A (x + Φ p), and what geometric stiffening takes off Φp where it is on."""
     name, label = split_point(reference)
     body = outcome.assembly.model.body(name)
     point = body.points[label]
     q = outcome.q[:, outcome.coordinates(name)]
-    deflection = q[:, 3:] @ point.translation.T
+    deflection = q[:, 3:] @ point.translation.T + second_order_displacement(body.stiffening, label, q[:, 3:])
     return PointMotion(q[:, :2] + rotated(q[:, 2], point.position + deflection), deflection)
 
 

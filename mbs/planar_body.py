@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fe_models.modal_body import ModalBody
+from . import geometric_stiffening
+from .geometric_stiffening import GeometricStiffening
 from .scene_records import RigidBody
 
 Array = NDArray[np.float64]
@@ -52,6 +54,7 @@ class PlanarBody:
     points: Mapping[str, PlanarPoint]
     modal_transform: Array
     length: float | None
+    stiffening: GeometricStiffening | None = None  # left out of the equations where None
 
     @property
     def n_modes(self) -> int:
@@ -60,7 +63,10 @@ class PlanarBody:
 
 
 def from_modal_body(name: str, body: ModalBody) -> PlanarBody:
-    """The planar part of a modal body: modes without motion in the plane are left out, their p stay zero."""
+    """The planar part of a modal body: modes without motion in the plane are left out, their p stay zero.
+
+    Geometric stiffness comes along where the file has it; who wants equations without it puts None in its place.
+    """
     m_xy = body.S_bar_kl[0, 0] + body.S_bar_kl[1, 1]
     in_plane = np.flatnonzero(np.diag(m_xy) > NEGLIGIBLE)
     block = np.ix_(in_plane, in_plane)
@@ -89,6 +95,7 @@ def from_modal_body(name: str, body: ModalBody) -> PlanarBody:
         ),
         modal_transform=np.eye(len(omega))[:, in_plane],
         length=body.length,
+        stiffening=geometric_stiffening.from_modal_body(body, in_plane),
     )
     return _diagonalised(planar, body.stiffness[block], np.eye(len(in_plane)))
 
@@ -121,7 +128,9 @@ def from_rigid_body(name: str, body: RigidBody) -> PlanarBody:
 
 def with_payload(body: PlanarBody, point: str, mass: float, inertia: float) -> PlanarBody:
     """The body with a point mass (kg) and moment of inertia (kg·m²) on one of its points, modes made anew."""
-    return with_masses(body, [body.points[point]], np.array([mass]), np.array([inertia]))
+    at = body.points[point]
+    stiffening = body.stiffening and body.stiffening.with_payload(point, at.position, mass, inertia)
+    return with_masses(replace(body, stiffening=stiffening), [at], np.array([mass]), np.array([inertia]))
 
 
 def with_masses(
@@ -130,7 +139,8 @@ def with_masses(
     """The body with point masses (kg) and moments of inertia (kg·m²) at points of it, and more stiffness (n, n).
 
     Masses are summed into every invariant as more material points (integrals become sums); the modal mass
-    I + Σ m ΦᵀΦ + I_p φᵀφ is brought back to the identity by a small eigenproblem.
+    I + Σ m ΦᵀΦ + I_p φᵀφ is brought back to the identity by a small eigenproblem. Geometric stiffening is left to the
+    caller: what it has to be depends on how the body takes the loads of their inertia.
     """
     x, y = np.array([at.position for at in points]).T
     Phi_x, Phi_y = np.array([at.translation for at in points]).transpose(1, 0, 2)
@@ -178,10 +188,11 @@ def _diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:
             }
         ),
         modal_transform=body.modal_transform @ T,
+        stiffening=body.stiffening and body.stiffening.transformed(T),
     )
 
 
-def core_arguments(body: PlanarBody, markers: list[PlanarPoint]) -> dict[str, Any]:
+def core_arguments(body: PlanarBody, markers: list[PlanarPoint], names: list[str]) -> dict[str, Any]:
     """Arguments of `_core.System.add_body`; terms that vanish are passed as empty arrays, which the core skips."""
     n = body.n_modes
     size = np.sqrt(body.mass) * max((float(np.linalg.norm(m.position)) for m in markers), default=0.0)
@@ -198,6 +209,7 @@ def core_arguments(body: PlanarBody, markers: list[PlanarPoint]) -> dict[str, An
         "S_tilde": _unless_negligible(body.S_tilde, 1.0),
         "m_xy": np.zeros((0, 0)) if np.abs(body.m_xy - np.eye(n)).max(initial=0.0) < NEGLIGIBLE else body.m_xy,
         "marker_positions": [m.position for m in markers],
+        **geometric_stiffening.core_arguments(body.stiffening, names),
     }
 
 

@@ -104,6 +104,7 @@ def _problems(scene: SceneKeys) -> Iterator[str]:
     yield from _body_problems(scene)
     yield from _joint_references(scene)
     yield from _pzt_problems(scene)
+    yield from _stiffening_problems(scene)
     for k, analysis in enumerate(scene.analysis):
         for problem in _analysis_problems(scene, analysis, scene.analysis[:k]):
             yield f'analysis "{analysis.name}": {problem}'
@@ -194,6 +195,20 @@ def _pzt_problems(scene: SceneKeys) -> Iterator[str]:
             )
 
 
+def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
+    """What acts between the interfaces of a link: modal body files hold no geometric stiffness of such loads."""
+    if scene.geometric_stiffening is False:
+        return
+    for points in scene.actuation_points:
+        yield f'geometric_stiffening: expected false beside [[actuation_points]], found those of "{points.body}"'
+    for layout in scene.pzt:
+        if "mass" in layout.structural:
+            yield (
+                'geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link'
+                f' between its interfaces, found those of "{layout.body}"'
+            )
+
+
 def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Analysis, ...]) -> Iterator[str]:
     if analysis.kind in ("pcid", "fcid") and not scene.trajectory:
         yield f'kind: expected at least one [[trajectory]] for "{analysis.kind}", found none'
@@ -208,6 +223,11 @@ def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Anal
         return
     if source.kind not in ("pcid", "fcid"):
         yield f'actuation: expected an analysis of kind "pcid" or "fcid", found "{source.name}" of kind "{source.kind}"'
+    elif source.kind == "pcid" and source.integrator == "generalized-alpha":
+        yield (
+            f"actuation: expected an analysis whose steps can be made again to replay it (any integrator but"
+            f' "generalized-alpha"), found "{source.name}" with that'
+        )
     elif analysis.end > source.end:
         yield f'end: expected at most {source.end:g}, where "{source.name}" ends, found {analysis.end:g}'
     if analysis.apply == "joints+pzt" and not scene.pzt:

@@ -337,6 +337,9 @@ class Analysis(Record):
     over the times of their actuation, which `load_scene` fills in. `shape` of FCID says which p(t) is prescribed,
     `modal` gives it: expressions for the first modes of a body, as its modal file numbers them; all others are 0.
     `limits` keeps the actuators of a forward run within their limits.
+
+    `integrator`: see `integrators.choose_integrator` for "auto"; `spectral_radius` is what a step of generalized-alpha
+    leaves of vibrations far above one over its size.
     """
 
     name: Name
@@ -349,7 +352,8 @@ class Analysis(Record):
     limits: bool = False
     shape: Literal["zero", "static", "given"] | None = None
     modal: dict[Name, tuple[Expression, ...]] | None = None
-    integrator: Literal["dop853"] = "dop853"
+    integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
+    spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8  # of generalized-alpha at infinite frequency
     max_steps: Annotated[int, Field(gt=0)] = 5_000_000
 
     @model_validator(mode="after")
@@ -369,6 +373,11 @@ class Analysis(Record):
             )
         if self.actuation is not None and self.kind != "forward":
             raise ValueError(f'expected the key "actuation" only in kind = "forward", found kind = "{self.kind}"')
+        if "spectral_radius" in self.model_fields_set and self.integrator != "generalized-alpha":
+            raise ValueError(
+                'expected the key "spectral_radius" only with integrator = "generalized-alpha", found integrator ='
+                f' "{self.integrator}"'
+            )
         if self.shape is not None and self.kind != "fcid":
             raise ValueError(f'expected the key "shape" only in kind = "fcid", found kind = "{self.kind}"')
         if self.shape is None and self.kind == "fcid":
@@ -408,12 +417,16 @@ def check_steps(end: float, step: float) -> None:
 
 
 class SceneKeys(Record):
-    """Everything a scene file may contain; lists of tables keep the singular name they have in the file."""
+    """Everything a scene file may contain; lists of tables keep the singular name they have in the file.
+
+    `geometric_stiffening` "auto": where the loads of a run change the stiffness of a mode by more than 1 %.
+    """
 
     name: Annotated[str, Field(min_length=1)]
     space: Literal["planar", "spatial"] = "planar"
     gravity: Vector2
     motors: Literal["section", "frame"] = "section"
+    geometric_stiffening: bool | Literal["auto"] = False
     body: Annotated[tuple[Body, ...], NotEmpty]
     joint: tuple[Joint, ...] = ()
     trajectory: tuple[Trajectory, ...] = ()

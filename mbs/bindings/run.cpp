@@ -17,21 +17,25 @@ namespace {
 
 // States (2 steps + 1, 2 coordinates) of equal steps: where they end and, by dense output, in their middle.
 RowMajorMatrix fixed_steps(const System &system, double end, int steps, const Eigen::VectorXd &q,
-                           const Eigen::VectorXd &v) {
+                           const Eigen::VectorXd &v, MethodKind kind, double spectral_radius) {
+  constexpr double newton_tolerance = 1e-8;
   ConstrainedMotion motion(system, {}, {}, nullptr);
-  Dop853 method(motion.size());
+  const auto made = make_method({kind, spectral_radius}, motion);
+  Method &method = *made;
   Eigen::VectorXd y(motion.size()), middle(motion.size());
   y << q, v;
   RowMajorMatrix states(2 * steps + 1, y.size());
   states.row(0) = y;
   const double h = end / steps;
   motion.slope(0, y.data(), method.first_slope());
+  motion.accepted(0, y.data(), method.first_slope());
   for (int i = 0; i < steps; ++i) {
-    method.step(motion, i * h, y.data(), h);
-    motion.correct((i + 1) * h, method.end());
+    if (!method.step(i * h, y.data(), h, newton_tolerance) || !method.correct((i + 1) * h))
+      throw std::runtime_error("the equations of step " + std::to_string(i) + " could not be solved");
     motion.slope((i + 1) * h, method.end(), method.last_slope());
-    method.prepare_dense(motion, i * h, y.data(), h);
+    method.prepare_dense(i * h, y.data(), h);
     method.interpolate((i + 0.5) * h, middle.data());
+    method.accept(h);
     y = Eigen::Map<const Eigen::VectorXd>(method.end(), y.size());
     std::copy_n(method.last_slope(), y.size(), method.first_slope());
     states.row(2 * i + 1) = middle;
@@ -47,7 +51,14 @@ void bind_run(nb::module_ &m) {
       .value("completed", IntegrationStatus::completed)
       .value("step_underflow", IntegrationStatus::step_underflow)
       .value("too_many_steps", IntegrationStatus::too_many_steps)
-      .value("interrupted", IntegrationStatus::interrupted);
+      .value("interrupted", IntegrationStatus::interrupted)
+      .value("diverged", IntegrationStatus::diverged);
+
+  nb::enum_<MethodKind>(m, "MethodKind", "The integrators.")
+      .value("dopri5", MethodKind::dopri5)
+      .value("dop853", MethodKind::dop853)
+      .value("radau", MethodKind::radau)
+      .value("generalized_alpha", MethodKind::generalized_alpha);
 
   nb::class_<Recording>(m, "Recording", "The accepted steps of a run, from which its dense output can be made again.")
       .def(nb::init<>())
@@ -74,20 +85,21 @@ void bind_run(nb::module_ &m) {
       "run",
       [](const System &system, std::vector<int> group, std::vector<bool> moment, Steering *steering,
          const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double tolerance,
-         unsigned long max_steps, ActuationResolver *resolver, const std::function<bool(double)> &carry_on,
-         Recording *recording) {
+         unsigned long max_steps, MethodKind method, double spectral_radius, ActuationResolver *resolver,
+         const std::function<bool(double)> &carry_on, Recording *recording) {
         const nb::gil_scoped_release unlocked;
         ConstrainedMotion motion(system, std::move(group), std::move(moment), steering);
         const auto ask = [&](double t) {
           const nb::gil_scoped_acquire locked;
           return carry_on(t);
         };
-        return run(motion, times, q, v, {tolerance, max_steps}, steering, resolver, ask, recording);
+        return run(motion, times, q, v, {tolerance, max_steps, {method, spectral_radius}}, steering, resolver, ask,
+                   recording);
       },
       "system"_a, "group"_a, "moment"_a, "steering"_a.none(), "times"_a, "q"_a, "v"_a, "tolerance"_a, "max_steps"_a,
-      "resolver"_a.none(), "carry_on"_a, "recording"_a.none(),
+      "method"_a, "spectral_radius"_a, "resolver"_a.none(), "carry_on"_a, "recording"_a.none(),
       "Integrates the motion from (q, v) and reports it at `times`.");
 
-  m.def("fixed_steps", &fixed_steps, "system"_a, "end"_a, "steps"_a, "q"_a, "v"_a,
+  m.def("fixed_steps", &fixed_steps, "system"_a, "end"_a, "steps"_a, "q"_a, "v"_a, "method"_a, "spectral_radius"_a,
         "States after equal steps and in their middle (2 steps + 1, 2 coordinates), for convergence studies.");
 }

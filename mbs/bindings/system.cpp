@@ -1,4 +1,5 @@
 #include "core/system.h"
+#include "core/motion.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
@@ -27,7 +28,8 @@ void check_size(const char *name, Eigen::Index got, Eigen::Index expected) {
 
 PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
                      const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
-                     const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions) {
+                     const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions,
+                     const std::vector<MatrixXd> &second_order, const MatrixXd &K_omega) {
   const auto n = stiffness.size();
   check_size("W rows", W.rows(), 3 + 3 * static_cast<Eigen::Index>(marker_positions.size()));
   check_size("W columns", W.cols(), n);
@@ -35,7 +37,14 @@ PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, 
        {std::pair("damping", damping.rows()), {"j", j.size()}, {"S_tilde", S_tilde.rows()}, {"m_xy", m_xy.rows()}})
     if (size)
       check_size(name, size, n);
-  return {mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions, {}};
+  PlanarBody body{mass,    inertia, first_moment,     stiffness, damping, W,      j,
+                  S_tilde, m_xy,    marker_positions, {},        {},      K_omega};
+  for (std::size_t row = 0; row < second_order.size(); ++row)
+    if (second_order[row].size()) {
+      check_size("second_order", second_order[row].rows(), n);
+      body.second_order.push_back({static_cast<Eigen::Index>(row), second_order[row]});
+    }
+  return body;
 }
 
 // (a, lambda) at one state
@@ -58,6 +67,21 @@ std::tuple<VectorXd, VectorXd, MatrixXd> constraints(const System &system, doubl
   VectorXd value(m), rate(m);
   constraint_residuals(system, t, q.data(), v.data(), w, value.data(), rate.data());
   return {value, rate, constraint_jacobian(system, w)};
+}
+
+// x of N x + C_q^T nu = r, C_q x = c (iteration_matrix.h)
+VectorXd newton_step(const System &system, double t, const VectorXd &q, const VectorXd &v, double damping_factor,
+                     double stiffness_factor, const VectorXd &r, const VectorXd &c) {
+  VectorXd x(system.coordinates), y(2 * system.coordinates), slope(y.size());
+  y << q, v;
+  check_size("y", y.size(), slope.size());
+  check_size("r", r.size(), x.size());
+  check_size("c", c.size(), static_cast<Eigen::Index>(system.constraints.size()));
+  ConstrainedMotion motion(system, {}, {}, nullptr);
+  motion.slope(t, y.data(), slope.data());
+  motion.factorise(damping_factor, stiffness_factor);
+  motion.solve(r.data(), c.data(), x.data());
+  return x;
 }
 
 VectorXd force_at_rest(const System &system, double t, const VectorXd &q) {
@@ -129,12 +153,13 @@ void bind_system(nb::module_ &m) {
           "add_body",
           [](System &s, double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
              const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
-             const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions) {
-            s.bodies.push_back(
-                make_body(mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions));
+             const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions,
+             const std::vector<MatrixXd> &second_order, const MatrixXd &K_omega) {
+            s.bodies.push_back(make_body(mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy,
+                                         marker_positions, second_order, K_omega));
           },
           "mass"_a, "inertia"_a, "first_moment"_a, "stiffness"_a, "damping"_a, "W"_a, "j"_a, "S_tilde"_a, "m_xy"_a,
-          "marker_positions"_a)
+          "marker_positions"_a, "second_order"_a, "K_omega"_a)
       .def(
           "add_constraint", [](System &s, const Row &row, const TimeFunction &f) { s.constraints.push_back({row, f}); },
           "row"_a, "target"_a)
@@ -155,6 +180,8 @@ void bind_system(nb::module_ &m) {
       .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q.")
       .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, coordinates).")
       .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces of gravity, elasticity and drives.")
+      .def("newton_step", &newton_step, "t"_a, "q"_a, "v"_a, "damping_factor"_a, "stiffness_factor"_a, "r"_a, "c"_a,
+           "x of (M + damping_factor D + stiffness_factor K) x + C_q^T nu = r, C_q x = c; r on modes alone.")
       .def("energies", &energies, "q"_a, "v"_a, "Kinetic, strain, gravitational energy and dissipated power (T, 4).");
 
   m.def(

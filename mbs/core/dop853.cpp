@@ -1,62 +1,30 @@
 #include "core/dop853.h"
 
+#include "core/explicit_stages.h"
+
 #include <cmath>
-#include <utility>
 
 namespace ffrobot {
 
-namespace tableau = dop853_tableau;
 using Eigen::Index;
+using Tableau = Dop853Tableau;
 
-namespace {
+Dop853::Dop853(OdeSystem &system)
+    : system_(system), n_(system.size()), K_(Eigen::MatrixXd::Zero(n_, Tableau::dense_stages)), stage_(n_), end_(n_),
+      start_(n_), F_(n_, Tableau::dense_order) {}
 
-// sum of coefficient[j] * K_j[i] over the nonzero coefficients, all of them known to the compiler
-template <const auto &Coefficients, std::size_t... j>
-double combine(const double *K, Index n, Index i, std::index_sequence<j...>) {
-  const auto term = [&]<std::size_t J>() {
-    if constexpr (Coefficients[J] != 0)
-      return Coefficients[J] * K[static_cast<Index>(J) * n + i];
-    else
-      return 0.0;
-  };
-  return (term.template operator()<j>() + ...);
-}
-
-template <const auto &Coefficients, int Count>
-void advance(const double *K, Index n, double h, const double *y, double *__restrict out) {
-  for (Index i = 0; i < n; ++i)
-    out[i] = y[i] + h * combine<Coefficients>(K, n, i, std::make_index_sequence<Count>());
-}
-
-template <int Stage>
-void run_stage(OdeSystem &system, double t, const double *y, double h, Eigen::MatrixXd &K, Eigen::VectorXd &stage) {
-  static constexpr auto &row = tableau::a[Stage];
-  advance<row, Stage>(K.data(), K.rows(), h, y, stage.data());
-  system.slope(t + tableau::c[Stage] * h, stage.data(), K.col(Stage).data());
-}
-
-template <int First, std::size_t... i>
-void run_stages(OdeSystem &system, double t, const double *y, double h, Eigen::MatrixXd &K, Eigen::VectorXd &stage,
-                std::index_sequence<i...>) {
-  (run_stage<First + static_cast<int>(i)>(system, t, y, h, K, stage), ...);
-}
-
-} // namespace
-
-Dop853::Dop853(Index size)
-    : n_(size), K_(Eigen::MatrixXd::Zero(size, tableau::dense_stages)), stage_(size), end_(size), start_(size),
-      F_(size, tableau::dense_order) {}
-
-void Dop853::step(OdeSystem &system, double t, const double *y, double h) {
-  run_stages<1>(system, t, y, h, K_, stage_, std::make_index_sequence<tableau::stages - 1>());
-  advance<tableau::b, tableau::stages>(K_.data(), n_, h, y, end_.data());
+bool Dop853::step(double t, const double *y, double h, double) {
+  run_stages<Tableau, 1, Tableau::stages - 1>(system_, t, y, h, K_, stage_);
+  advance<Tableau::b, Tableau::stages>(K_.data(), n_, h, y, end_.data());
+  return true;
 }
 
 double Dop853::estimate(double h, Eigen::VectorXd &error) {
+  constexpr auto all = std::make_index_sequence<Tableau::stages + 1>();
   double square5 = 0, square3 = 0;
   for (Index i = 0; i < n_; ++i) {
-    const double e5 = combine<tableau::e5>(K_.data(), n_, i, std::make_index_sequence<tableau::stages + 1>());
-    const double e3 = combine<tableau::e3>(K_.data(), n_, i, std::make_index_sequence<tableau::stages + 1>());
+    const double e5 = combine<Tableau::e5>(K_.data(), n_, i, all);
+    const double e3 = combine<Tableau::e3>(K_.data(), n_, i, all);
     error[i] = h * e5;
     square5 += e5 * e5;
     square3 += e3 * e3;
@@ -65,27 +33,26 @@ double Dop853::estimate(double h, Eigen::VectorXd &error) {
   return denominator > 0 ? std::sqrt(square5 / denominator) : (denominator == 0 ? 1.0 : NAN);
 }
 
-void Dop853::prepare_dense(OdeSystem &system, double t, const double *y, double h) {
-  run_stages<tableau::stages + 1>(system, t, y, h, K_, stage_,
-                                  std::make_index_sequence<tableau::dense_stages - tableau::stages - 1>());
+void Dop853::prepare_dense(double t, const double *y, double h) {
+  run_stages<Tableau, Tableau::stages + 1, Tableau::dense_stages - 1>(system_, t, y, h, K_, stage_);
   t0_ = t;
   h_ = h;
   start_ = Eigen::Map<const Eigen::VectorXd>(y, n_);
   F_.col(0) = end_ - start_;
   F_.col(1) = h * K_.col(0) - F_.col(0);
-  F_.col(2) = 2 * F_.col(0) - h * (K_.col(tableau::stages) + K_.col(0));
+  F_.col(2) = 2 * F_.col(0) - h * (K_.col(Tableau::stages) + K_.col(0));
   for (Index row = 0; row < 4; ++row) {
     F_.col(3 + row).setZero();
-    for (Index j = 0; j < tableau::dense_stages; ++j)
-      F_.col(3 + row) += (h * tableau::d[row][j]) * K_.col(j);
+    for (Index j = 0; j < Tableau::dense_stages; ++j)
+      F_.col(3 + row) += (h * Tableau::d[row][j]) * K_.col(j);
   }
 }
 
 void Dop853::interpolate(double t, double *y) const {
   const double x = (t - t0_) / h_;
   Eigen::Map<Eigen::VectorXd> out(y, n_);
-  out = x * F_.col(tableau::dense_order - 1);
-  for (int i = tableau::dense_order - 2; i >= 0; --i)
+  out = x * F_.col(Tableau::dense_order - 1);
+  for (int i = Tableau::dense_order - 2; i >= 0; --i)
     out = (i % 2 == 0 ? x : 1 - x) * (out + F_.col(i));
   out += start_;
 }

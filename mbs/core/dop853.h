@@ -1,35 +1,35 @@
-// One step of DOP853 (Hairer, Norsett, Wanner 1993): order 8, error estimate of orders 5 and 3, dense output of
-// order 7.
+// DOP853 (Hairer, Norsett, Wanner 1993): order 8, error estimate of orders 5 and 3, dense output of order 7.
 #pragma once
 
 #include "core/dop853_tableau.h"
-#include "core/ode.h"
+#include "core/method.h"
 
-#include <Eigen/Core>
+#include <cmath>
 
 namespace ffrobot {
 
-class Dop853 {
+class Dop853 final : public Method {
 public:
-  static constexpr int error_order = 8; // the combined estimate shrinks as h^8
+  explicit Dop853(OdeSystem &system);
 
-  explicit Dop853(Eigen::Index size);
+  bool step(double t, const double *y, double h, double tolerance) override;
+  bool correct(double t) override { return system_.correct(t, end_.data()); }
 
-  // From (t, y) with slope K.col(0) already in place; the result, before any correction, is in end().
-  void step(OdeSystem &system, double t, const double *y, double h);
+  // Estimate of order 5, and the factor that the estimate of order 3 brings it down by: together they shrink as h^8.
+  double estimate(double h, Eigen::VectorXd &error) override;
+  double error_order() const override { return 8; }
+  double share(double fraction) const override { return std::sqrt(fraction) / 8; }
 
-  double *end() { return end_.data(); }
-  double *first_slope() { return K_.data(); }
-  double *last_slope() { return K_.col(dop853_tableau::stages).data(); } // slope at end(), set by the caller
+  bool lands_on_outputs() const override { return false; }
+  void prepare_dense(double t, const double *y, double h) override; // three more slopes
+  void interpolate(double t, double *y) const override;
 
-  // Error estimate of order 5, and the factor that the estimate of order 3 brings it down by; needs last_slope().
-  double estimate(double h, Eigen::VectorXd &error);
-
-  // Coefficients for interpolate() within the step just made; three more slopes.
-  void prepare_dense(OdeSystem &system, double t, const double *y, double h);
-  void interpolate(double t, double *y) const;
+  double *end() override { return end_.data(); }
+  double *first_slope() override { return K_.data(); }
+  double *last_slope() override { return K_.col(Dop853Tableau::stages).data(); }
 
 private:
+  OdeSystem &system_;
   Eigen::Index n_;
   Eigen::MatrixXd K_; // slopes, (n, dense_stages)
   Eigen::VectorXd stage_, end_, start_;

@@ -1,4 +1,5 @@
-// LDL^T of a symmetric positive definite matrix stored by row envelopes (lower triangle, from the first nonzero).
+// LDL^T of a symmetric matrix with nonzero pivots (positive definite, say) stored by row envelopes (lower triangle,
+// from the first nonzero).
 #pragma once
 
 #include <Eigen/Core>
@@ -6,7 +7,8 @@
 
 namespace ffrobot {
 
-class EnvelopeMatrix {
+// Scalar: double, or complex for a matrix that is symmetric (not Hermitian).
+template <class Scalar> class EnvelopeMatrix {
 public:
   EnvelopeMatrix() = default;
 
@@ -15,18 +17,18 @@ public:
 
   Eigen::Index size() const { return static_cast<Eigen::Index>(first_.size()); }
   void set_zero();
-  double *entry(Eigen::Index row, Eigen::Index column) { // column >= first[row]
+  Scalar *entry(Eigen::Index row, Eigen::Index column) { // column >= first[row]
     return rows_.data() + start_[static_cast<std::size_t>(row)] + column;
   }
 
   void factorise();            // in place; unpivoted
-  void solve(double *x) const; // after factorise; x: right-hand side in, solution out
+  void solve(Scalar *x) const; // after factorise; x: right-hand side in, solution out
 
 private:
   std::vector<Eigen::Index> first_;
   std::vector<Eigen::Index> start_; // rows_[start_[i] + j] is entry (i, j)
-  std::vector<double> rows_;
-  std::vector<double> inverse_; // 1 / D
+  std::vector<Scalar> rows_;
+  std::vector<Scalar> inverse_; // 1 / D
 };
 
 } // namespace ffrobot

@@ -1,7 +1,8 @@
-// Adaptive integration with output at given times, written against OdeSystem only.
+// Adaptive integration with output at given times, written against the system and the method only by what ode.h and
+// method.h say.
 #pragma once
 
-#include "core/dop853.h"
+#include "core/method.h"
 #include "core/ode.h"
 
 #include <functional>
@@ -13,6 +14,8 @@ namespace ffrobot {
 struct Recording {
   std::vector<double> times;
   std::vector<double> states; // one after the other
+  MethodChoice method;
+  double tolerance = 0;
 };
 
 enum class IntegrationStatus {
@@ -20,6 +23,7 @@ enum class IntegrationStatus {
   step_underflow, // no step size meets the tolerance
   too_many_steps,
   interrupted, // by the caller
+  diverged,    // beyond what the equations describe
 };
 
 struct IntegrationReport {
@@ -32,11 +36,12 @@ struct IntegrationReport {
 struct IntegrationControls {
   double tolerance = 1e-6;
   unsigned long max_steps = 0; // 0: no limit
+  MethodChoice method;
 };
 
 // Integrates y from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
 // carry_on(t) is asked about every thousand steps. y ends at the last accepted step.
-IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
+IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls,
                             const std::function<void(std::size_t, double, const double *)> &output,
                             const std::function<bool(double)> &carry_on, Recording *recording);

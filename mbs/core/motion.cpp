@@ -15,11 +15,19 @@ ConstrainedMotion::ConstrainedMotion(const System &system, std::vector<int> grou
       body_peaks_(system.bodies.size()), lambda_(workspace_.lambda), shifted_(2 * system.coordinates),
       shifted_slope_(2 * system.coordinates) {
   const int groups = group_.empty() ? 0 : *std::max_element(group_.begin(), group_.end()) + 1;
-  multiplier_peaks_.assign(static_cast<std::size_t>(groups), 0.0);
+  multiplier_peaks_ = group_now_ = group_error_ = Eigen::VectorXd::Zero(groups);
   group_is_moment_.assign(static_cast<std::size_t>(groups), false);
   for (std::size_t r = 0; r < group_.size(); ++r)
     group_is_moment_[static_cast<std::size_t>(group_[r])] = moment[r];
-  for (const auto &body : system.bodies) {
+  stiffness_ = damping_ = Eigen::VectorXd::Zero(system.coordinates);
+  for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+    const PlanarBody &body = system.bodies[b];
+    const Index first = system.first_coordinate[b] + 3;
+    stiffness_.segment(first, body.modes()) = body.stiffness;
+    if (body.damping.cols() == 1)
+      damping_.segment(first, body.modes()) = body.damping;
+    else if (body.damping.cols() > 1)
+      damping_.segment(first, body.modes()) = body.damping.diagonal();
     for (const auto &position : body.marker_positions)
       length_ = std::max(length_, position.norm());
     frequency_.push_back(body.stiffness.cwiseSqrt());
@@ -40,7 +48,7 @@ bool ConstrainedMotion::correct(double t, double *y) {
   return project(system_, t, y, y + system_.coordinates, workspace_) < 1e-11;
 }
 
-double ConstrainedMotion::error_size(double t, const double *y, const double *e) {
+double ConstrainedMotion::state_size(const double *y, const double *e) const {
   const Index n = system_.coordinates;
   double size = 0;
   for (std::size_t b = 0; b < system_.bodies.size(); ++b) {
@@ -50,13 +58,44 @@ double ConstrainedMotion::error_size(double t, const double *y, const double *e)
     size = std::max({size, std::hypot(d[0], d[1]) / length_, std::abs(d[2]),
                      std::hypot(d_dot[0], d_dot[1]) / peak.velocity, std::abs(d_dot[2]) / peak.angular_velocity});
     if (modes > 0) {
-      // A robot at rest under gravity: p_dot starts from nothing, with the rounding of K p integrated over a period.
-      const double rounding =
-          32 * std::numeric_limits<double>::epsilon() * frequency_[b].cwiseProduct(VectorMap(y + i + 3, modes)).norm();
-      size = std::max({size, VectorMap(d + 3, modes).norm() / peak.modal,
-                       (VectorMap(d_dot + 3, modes).norm() - rounding) / peak.modal_velocity});
+      // Velocities of the modes as what they are of the body's, and as the deflections that they turn into. A robot at
+      // rest under gravity: p_dot starts from nothing, with the rounding of K p integrated over a period.
+      const VectorMap p(y + i + 3, modes), e_p(d + 3, modes), e_p_dot(d_dot + 3, modes);
+      const double rounding = 32 * std::numeric_limits<double>::epsilon() * frequency_[b].cwiseProduct(p).norm();
+      size = std::max({size, e_p.norm() / peak.modal, e_p_dot.cwiseQuotient(frequency_[b]).norm() / peak.modal,
+                       (e_p_dot.norm() - rounding) / peak.modal_velocity});
     }
+    if (!(size < std::numeric_limits<double>::infinity()))
+      return NAN;
   }
+  return size;
+}
+
+double ConstrainedMotion::change_size(const double *y, const double *change, double rate) const {
+  const Index n = system_.coordinates;
+  double size = state_size(y, change);
+  for (std::size_t b = 0; b < system_.bodies.size(); ++b) {
+    const double *d = change + n + system_.first_coordinate[b];
+    const BodyPeaks &peak = body_peaks_[b];
+    const double accelerations =
+        std::max({std::hypot(d[0], d[1]) / peak.acceleration, std::abs(d[2]) / peak.angular_acceleration,
+                  VectorMap(d + 3, system_.bodies[b].modes()).norm() / peak.modal_acceleration});
+    size = rate * accelerations <= size ? size : rate * accelerations; // keeps NaN
+  }
+  return size;
+}
+
+// The size of each force or moment that the multipliers are components of.
+void ConstrainedMotion::measure_groups(const Eigen::VectorXd &lambda, Eigen::VectorXd &size) const {
+  size.setZero();
+  for (std::size_t r = 0; r < group_.size(); ++r)
+    size[group_[r]] += std::pow(lambda[static_cast<Index>(r)], 2);
+  size = size.cwiseSqrt();
+}
+
+double ConstrainedMotion::error_size(double t, const double *y, const double *e) {
+  const Index n = system_.coordinates;
+  double size = state_size(y, e);
   // Forces amplify errors of the state (stiffness times the error of a fast mode): measure what e does to them.
   lambda_ = workspace_.lambda;
   has_lambda_ = true;
@@ -64,22 +103,20 @@ double ConstrainedMotion::error_size(double t, const double *y, const double *e)
     return size;
   shifted_ = VectorMap(y, 2 * n) + VectorMap(e, 2 * n);
   slope(t, shifted_.data(), shifted_slope_.data());
-  double largest = 0;
-  for (std::size_t g = 0; g < multiplier_peaks_.size(); ++g)
-    largest = std::max(largest, multiplier_peaks_[g] / (group_is_moment_[g] ? length_ : 1.0));
-  for (std::size_t g = 0; g < multiplier_peaks_.size(); ++g) {
-    double error = 0, now = 0;
-    for (std::size_t r = 0; r < group_.size(); ++r)
-      if (group_[r] == static_cast<int>(g)) {
-        const auto i = static_cast<Index>(r);
-        error += std::pow(workspace_.lambda[i] - lambda_[i], 2);
-        now += lambda_[i] * lambda_[i];
-      }
-    const double floor = 1e-3 * largest * (group_is_moment_[g] ? length_ : 1.0);
-    const double scale = std::max({multiplier_peaks_[g], std::sqrt(now), floor});
-    if (error > 0)
-      size = std::max(size, std::sqrt(error) / scale);
-    else if (!(error == 0))
+  const auto length_of = [&](std::size_t g) { return group_is_moment_[g] ? length_ : 1.0; };
+  double largest = 0; // or what little would move the bodies, where nothing has happened yet
+  for (std::size_t b = 0; b < system_.bodies.size(); ++b)
+    largest += system_.bodies[b].mass * body_peaks_[b].acceleration;
+  for (std::size_t g = 0; g < group_is_moment_.size(); ++g)
+    largest = std::max(largest, multiplier_peaks_[static_cast<Index>(g)] / length_of(g));
+  measure_groups(lambda_, group_now_);
+  measure_groups(workspace_.lambda - lambda_, group_error_);
+  for (std::size_t g = 0; g < group_is_moment_.size(); ++g) {
+    const auto i = static_cast<Index>(g);
+    const double scale = std::max({multiplier_peaks_[i], group_now_[i], 1e-3 * largest * length_of(g)});
+    if (group_error_[i] > 0)
+      size = std::max(size, group_error_[i] / scale);
+    else if (!(group_error_[i] == 0))
       return NAN;
   }
   return size;
@@ -104,23 +141,50 @@ void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
     // floors: a hundredth of a length (a radian) per second; the vibration that the accelerations would start
     raise(peak.velocity, std::max(std::hypot(v[0], v[1]), 0.01 * length_));
     raise(peak.angular_velocity, std::max(std::abs(v[2]), 0.01));
+    raise(peak.acceleration, std::max({std::hypot(a[0], a[1]), system_.gravity.norm(), 0.01 * length_}));
+    raise(peak.angular_acceleration, std::max(std::abs(a[2]), peak.acceleration / length_));
+    peak.modal_acceleration = std::max(peak.modal_acceleration, std::sqrt(system_.bodies[b].mass) * peak.acceleration);
     if (modes > 0) {
       const auto &omega = frequency_[b];
       const VectorMap p(y + i + 3, modes), p_dot(v + 3, modes), p_ddot(a + 3, modes);
+      // where nothing has happened yet: a thousandth of what the acceleration would do to the softest mode
+      const double force = std::sqrt(system_.bodies[b].mass) * peak.acceleration;
       applied_ = applied_modal_force(b).cwiseQuotient(omega); // may hold the links straight: p stays zero then
-      raise(peak.modal, std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
-                                  applied_.cwiseQuotient(omega).norm(), 1e-12}));
-      raise(peak.modal_velocity, std::max({p_dot.norm(), p_ddot.cwiseQuotient(omega).norm(), applied_.norm(), 1e-12}));
+      raise(peak.modal,
+            std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
+                      applied_.cwiseQuotient(omega).norm(), 1e-3 * force / std::pow(omega.minCoeff(), 2), 1e-12}));
+      raise(peak.modal_velocity, std::max({p_dot.norm(), p_ddot.cwiseQuotient(omega).norm(), applied_.norm(), 1e-12,
+                                           std::sqrt(system_.bodies[b].mass) * peak.velocity}));
     }
   }
-  const Eigen::VectorXd &lambda = has_lambda_ ? lambda_ : workspace_.lambda;
-  for (std::size_t g = 0; g < multiplier_peaks_.size(); ++g) {
-    double square = 0;
-    for (std::size_t r = 0; r < group_.size(); ++r)
-      if (group_[r] == static_cast<int>(g))
-        square += std::pow(lambda[static_cast<Index>(r)], 2);
-    raise(multiplier_peaks_[g], std::sqrt(square));
+  measure_groups(has_lambda_ ? lambda_ : workspace_.lambda, group_now_);
+  multiplier_peaks_ = multiplier_peaks_.cwiseMax(group_now_);
+}
+
+void ConstrainedMotion::factorise(double damping_factor, double stiffness_factor) {
+  if (!real_)
+    real_ = std::make_unique<IterationMatrix<double>>(system_);
+  real_->factorise(workspace_, damping_, damping_factor, stiffness_, stiffness_factor);
+}
+
+void ConstrainedMotion::factorise(Complex damping_factor, Complex stiffness_factor) {
+  if (!complex_)
+    complex_ = std::make_unique<IterationMatrix<Complex>>(system_);
+  complex_->factorise(workspace_, damping_, damping_factor, stiffness_, stiffness_factor);
+}
+
+void ConstrainedMotion::constraint_values(double t, const double *y, double *value, double *rate) {
+  constraint_residuals(system_, t, y, y + system_.coordinates, workspace_, value, rate);
+}
+
+// Small deformations end long before the mean square of a body's deflection, p^T p / m, is that of its radius.
+bool ConstrainedMotion::is_sensible(const double *y) const {
+  for (std::size_t b = 0; b < system_.bodies.size(); ++b) {
+    const PlanarBody &body = system_.bodies[b];
+    if (!(VectorMap(y + system_.first_coordinate[b] + 3, body.modes()).squaredNorm() <= body.inertia))
+      return false;
   }
+  return true;
 }
 
 double ConstrainedMotion::initial_step() const {

@@ -1,5 +1,6 @@
 #include "core/planar_body.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ffrobot {
@@ -29,7 +30,7 @@ template <int Rows>
 void project_fixed(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
   using Sum = Eigen::Array<double, Rows, 1>;
   Sum Wp = Sum::Zero(), Wp_dot = Sum::Zero(), Wk = Sum::Zero();
-  const double *column = s.W.data();
+  const double *column = s.W_active.data();
   const double *stiffness = body.stiffness.data();
   const double *damping = body.damping.cols() == 1 ? body.damping.data() : nullptr;
   for (Index i = 0; i < body.modes(); ++i, column += Rows) {
@@ -41,13 +42,19 @@ void project_fixed(const PlanarBody &body, const double *p, const double *p_dot,
     Wp_dot += w * p_dot[i];
     Wk += w * k;
   }
-  s.Wp = Wp;
-  s.Wp_dot = Wp_dot;
-  s.Wk = Wk;
+  for (std::size_t i = 0; i < s.active.size(); ++i) {
+    const auto k = static_cast<Index>(i), row = s.active[i];
+    s.Wp[row] = Wp[k];
+    s.Wp_dot[row] = Wp_dot[k];
+    s.Wk[row] = Wk[k];
+  }
 }
 
 void project(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
-  switch (s.padded_rows) {
+  switch (s.W_active.rows()) {
+  case 0:
+    s.Wk.setZero();
+    return;
   case 4:
     return project_fixed<4>(body, p, p_dot, s);
   case 8:
@@ -65,13 +72,46 @@ void project(const PlanarBody &body, const double *p, const double *p_dot, Plana
     s.Wk += s.W.col(i) * (body.stiffness[i] * p[i] + (body.damping.cols() == 1 ? body.damping(i, 0) * p_dot[i] : 0.0));
 }
 
+void update_gram(Index row, PlanarBodyState &s) {
+  s.W_transposed.col(row) = s.W.row(row).transpose();
+  const auto k = std::find(s.active.begin(), s.active.end(), row) - s.active.begin();
+  s.W_active.row(k) = s.W.row(row);
+  s.W_active_transposed.col(k) = s.W.row(row).transpose();
+  s.G.row(row).noalias() = s.W.row(row) * s.W_transposed;
+  s.G.col(row) = s.G.row(row).transpose();
+}
+
 // m_thetaf = h + p^T S_tilde replaces the row h of W where S_tilde is not zero.
 void update_rotation_row(const PlanarBody &body, const double *p, PlanarBodyState &s) {
+  s.W.row(2).noalias() = body.W.row(2) + VectorMap(p, body.modes()).transpose() * body.S_tilde;
+  update_gram(2, s);
+}
+
+// L D L^T of the 3 x 3 mass matrix of the frame, p eliminated. Its translational block m I - S_bar S_bar^T is constant
+// without geometric stiffening.
+void factorise_translation(double mass, PlanarBodyState &s) {
+  s.D_inverse[0] = 1 / (mass - s.G(0, 0));
+  s.L[0] = -s.G(1, 0) * s.D_inverse[0];
+  s.D_inverse[1] = 1 / (mass - s.G(1, 1) + s.L[0] * s.G(1, 0));
+}
+
+// W(p) = W - (K p)^T; after update_rotation_row, which writes row 2 anew.
+void update_second_order(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
   const Index n = body.modes();
-  s.W.row(2).noalias() = body.W.row(2) + VectorMap(p, n).transpose() * body.S_tilde;
-  s.W_transposed.col(2) = s.W.row(2).transpose();
-  s.G.row(2).noalias() = s.W.row(2) * s.W.transpose();
-  s.G.col(2) = s.G.row(2).transpose();
+  const VectorMap p_(p, n), p_dot_(p_dot, n);
+  s.displacement.setZero();
+  for (const auto &[row, K] : body.second_order) {
+    s.curvature.noalias() = K * p_;
+    if (row != 2 || body.S_tilde.size() == 0)
+      s.W.row(row) = body.W.row(row);
+    s.W.row(row) -= s.curvature.transpose();
+    s.displacement[row] = 0.5 * s.curvature.dot(p_); // what W(p) p has too little
+    s.curvature.noalias() = K * p_dot_;
+    s.convective[row] = s.curvature.dot(p_dot_);
+  }
+  for (const auto &second : body.second_order)
+    update_gram(second.row, s);
+  factorise_translation(body.mass, s);
 }
 
 // Modal forces that the common case (mass-orthonormal planar modes, diagonal damping, no modal load) has not.
@@ -101,6 +141,10 @@ bool collect_extra(const PlanarBody &body, const double *p, const double *p_dot,
     s.extra.noalias() += theta_dot_squared * (body.m_xy * VectorMap(p, n));
     s.extra -= theta_dot_squared * VectorMap(p, n);
   }
+  if (body.K_omega.size()) {
+    start();
+    s.extra.noalias() -= theta_dot_squared * (body.K_omega * VectorMap(p, n));
+  }
   if (body.damping.cols() > 1) {
     start();
     s.extra.noalias() -= body.damping * VectorMap(p_dot, n);
@@ -108,13 +152,6 @@ bool collect_extra(const PlanarBody &body, const double *p, const double *p_dot,
   if (any)
     s.W_extra.noalias() = s.W * s.extra;
   return any;
-}
-
-// L D L^T of the 3 x 3 mass matrix of the frame, p eliminated. Its translational block m I - S_bar S_bar^T is constant.
-void factorise_translation(double mass, PlanarBodyState &s) {
-  s.D_inverse[0] = 1 / (mass - s.G(0, 0));
-  s.L[0] = -s.G(1, 0) * s.D_inverse[0];
-  s.D_inverse[1] = 1 / (mass - s.G(1, 1) + s.L[0] * s.G(1, 0));
 }
 
 void factorise_rotation(const Vector2d &coupling, double inertia, PlanarBodyState &s) {
@@ -182,13 +219,15 @@ void add_mobility(const PlanarBody &body, Index k, Index l, PlanarBodyState &s) 
 }
 
 // out += W^T z over the rows that carry anything
-void accumulate_rows(const PlanarBodyState &s, const Eigen::VectorXd &z, Index rows, Index n, double *out) {
-  Index i = 0;
-  for (; i + 2 < rows; i += 3) {
-    const double *w0 = s.W_transposed.data() + i * n, *w1 = w0 + n, *w2 = w1 + n;
-    const double z0 = z[i], z1 = z[i + 1], z2 = z[i + 2];
+void accumulate_rows(const PlanarBodyState &s, const Eigen::VectorXd &z, Index n, double *out) {
+  const std::size_t count = s.active.size();
+  const auto factor = [&](std::size_t i) { return i < count ? z[s.active[i]] : 0.0; };
+  for (std::size_t i = 0; i < count; i += register_width) {
+    const double *w0 = s.W_active_transposed.data() + static_cast<Index>(i) * n, *w1 = w0 + n, *w2 = w1 + n,
+                 *w3 = w2 + n;
+    const double z0 = factor(i), z1 = factor(i + 1), z2 = factor(i + 2), z3 = factor(i + 3);
     for (Index k = 0; k < n; ++k)
-      out[k] += z0 * w0[k] + z1 * w1[k] + z2 * w2[k];
+      out[k] += z0 * w0[k] + z1 * w1[k] + z2 * w2[k] + z3 * w3[k];
   }
 }
 
@@ -201,9 +240,20 @@ PlanarBodyState::PlanarBodyState(const PlanarBody &body) : markers(static_cast<s
   W.topRows(rows) = body.W;
   W_transposed = W.transpose();
   G = W * W_transposed;
-  for (auto *v : {&Wp, &Wp_dot, &Wk, &W_extra, &z, &z_response})
+  for (Index row = 0; row < rows; ++row) {
+    const bool moves = std::any_of(body.second_order.begin(), body.second_order.end(),
+                                   [&](const SecondOrder &second) { return second.row == row; });
+    if (moves || (row == 2 && body.S_tilde.size()) || !body.W.row(row).isZero(0))
+      active.push_back(row);
+  }
+  const auto count = static_cast<Index>(active.size());
+  W_active = Eigen::MatrixXd::Zero((count + register_width - 1) / register_width * register_width, n);
+  for (Index i = 0; i < count; ++i)
+    W_active.row(i) = W.row(active[static_cast<std::size_t>(i)]);
+  W_active_transposed = W_active.transpose();
+  for (auto *v : {&Wp, &Wp_dot, &Wk, &W_extra, &z, &z_response, &displacement, &convective})
     *v = Eigen::VectorXd::Zero(padded_rows);
-  extra = modal_load = Eigen::VectorXd::Zero(n);
+  extra = modal_load = curvature = Eigen::VectorXd::Zero(n);
   wrench = free_acceleration = Eigen::Matrix3Xd::Zero(3, body.markers());
   Z_transposed = Eigen::Matrix3Xd::Zero(3, 3 * body.markers());
   mobility = Eigen::MatrixXd::Zero(3 * body.markers(), 3 * body.markers());
@@ -216,11 +266,17 @@ void kinematics(const PlanarBody &body, const double *q, const double *v, Planar
   s.theta_dot = v[2];
   if (body.S_tilde.size())
     update_rotation_row(body, q + 3, s);
+  if (!body.second_order.empty())
+    update_second_order(body, q + 3, v + 3, s);
   project(body, q + 3, v + 3, s);
+  if (body.second_order.empty())
+    s.displacement = s.Wp;
+  else
+    s.displacement += s.Wp;
   const Vector2d R(q[0], q[1]), R_dot(v[0], v[1]);
   for (std::size_t k = 0; k < s.markers.size(); ++k) {
     auto &m = s.markers[k];
-    const double *u = s.Wp.data() + 3 + 3 * k, *u_dot = s.Wp_dot.data() + 3 + 3 * k;
+    const double *u = s.displacement.data() + 3 + 3 * k, *u_dot = s.Wp_dot.data() + 3 + 3 * k;
     const Vector2d arm = body.marker_positions[k] + Vector2d(u[0], u[1]);
     m.arm = rotate(s, arm);
     m.position = R + m.arm;
@@ -239,6 +295,10 @@ Vector3d frame_force(const PlanarBody &body, const double *p, const double *p_do
   Vector3d Q;
   Q.head<2>() = body.mass * g + theta_dot * theta_dot * moment - 2 * theta_dot * perpendicular(s.Wp_dot.head<2>());
   Q[2] = -2 * theta_dot * weighted(body, p, p_dot) + perpendicular(moment).dot(g);
+  if (!body.second_order.empty())
+    Q += s.convective.head<3>();
+  if (body.K_omega.size())
+    Q[2] += 2 * theta_dot * VectorMap(p, body.modes()).dot(body.K_omega * VectorMap(p_dot, body.modes()));
   if (body.j.size())
     Q[2] -= 2 * theta_dot * body.j.dot(VectorMap(p_dot, body.modes()));
   return Q;
@@ -266,6 +326,8 @@ void eliminate_marker(const PlanarBody &body, Index k, const Eigen::VectorXd &WQ
   B(1, 2) += arm.x();
   B(2, 2) += 1;
   Vector3d a = B * s.free_frame + WQ.segment<3>(row);
+  if (!body.second_order.empty())
+    a -= s.convective.segment<3>(row);
   a.head<2>() += -s.theta_dot * s.theta_dot * arm + 2 * s.theta_dot * perpendicular(s.Wp_dot.segment<2>(row));
   const Vector2d a_global = rotate(s, a.head<2>());
   s.free_acceleration.col(k) << a_global, a[2];
@@ -284,7 +346,7 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
                  PlanarBodyState &s) {
   const double *p = q + 3, *p_dot = v + 3;
   const Vector2d g = rotate_back(s, gravity);
-  const Vector2d moment = body.first_moment + s.Wp.head<2>(); // s = s0 + S_bar p
+  const Vector2d moment = s.moment = body.first_moment + s.displacement.head<2>();
   Vector3d Q = frame_force(body, p, p_dot, g, moment, s);
 
   // Known part of the modal forces: Q_f = theta_dot^2 p - K p - D p_dot + W^T z + extra
@@ -303,10 +365,12 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
 
   // The frame after elimination of p
   const Vector2d coupling = perpendicular(moment) - s.G.col(2).head<2>();
-  double inertia = body.inertia + weighted(body, p, p) - s.G(2, 2);
+  s.inertia = body.inertia + weighted(body, p, p);
   if (body.j.size())
-    inertia += 2 * body.j.dot(VectorMap(p, body.modes()));
-  factorise_rotation(coupling, inertia, s);
+    s.inertia += 2 * body.j.dot(VectorMap(p, body.modes()));
+  if (body.K_omega.size())
+    s.inertia -= VectorMap(p, body.modes()).dot(body.K_omega * VectorMap(p, body.modes()));
+  factorise_rotation(coupling, s.inertia - s.G(2, 2), s);
   s.free_frame = backward(s.L, forward(s.L, Q - WQ.head<3>()).cwiseProduct(s.D_inverse));
 
   for (Index k = 0; k < body.markers(); ++k)
@@ -338,7 +402,7 @@ Vector3d frame_response(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, 
 
 void accelerations(const PlanarBody &body, const double *q, const double *v, const Eigen::Matrix3Xd &constraint_wrench,
                    PlanarBodyState &s, double *a) {
-  const Index n = body.modes(), rows = body.W.rows();
+  const Index n = body.modes();
   const Vector3d x = s.free_frame + frame_response(body, constraint_wrench, s, s.z_response);
   s.z_response += s.z;
   s.z_response.head<3>() -= s.free_frame;
@@ -354,20 +418,19 @@ void accelerations(const PlanarBody &body, const double *q, const double *v, con
   if (body.damping.cols() == 1)
     for (Index i = 0; i < n; ++i)
       p_ddot[i] -= body.damping(i, 0) * p_dot[i];
-  accumulate_rows(s, s.z_response, rows, n, p_ddot);
+  accumulate_rows(s, s.z_response, n, p_ddot);
 }
 
 Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, Index k, const double *q,
                              const double *a, double &size) {
   const Index row = 3 + 3 * k;
-  const Vector3d Phi_p_ddot = body.W.middleRows<3>(row) * VectorMap(a + 3, body.modes());
+  const Vector3d Phi_p_ddot = s.W.middleRows<3>(row) * VectorMap(a + 3, body.modes()) - s.convective.segment<3>(row);
   const Vector2d &arm = s.markers[static_cast<std::size_t>(k)].arm;
   const Vector2d elastic = rotate(s, Phi_p_ddot.head<2>());
   const Vector2d coriolis = rotate(s, 2 * s.theta_dot * perpendicular(s.Wp_dot.segment<2>(row)));
   const Vector2d frame = Vector2d(a[0], a[1]), turn = a[2] * perpendicular(arm);
   const Vector2d centripetal = -s.theta_dot * s.theta_dot * arm;
-  const Vector3d elastic_force =
-      body.W.middleRows<3>(row) * body.stiffness.cwiseProduct(VectorMap(q + 3, body.modes()));
+  const Vector3d elastic_force = s.W.middleRows<3>(row) * body.stiffness.cwiseProduct(VectorMap(q + 3, body.modes()));
   size = elastic_force.norm() + frame.norm() + turn.norm() + centripetal.norm() + coriolis.norm() + elastic.norm() +
          std::abs(a[2]) + std::abs(Phi_p_ddot[2]);
   Vector3d acceleration;
@@ -382,26 +445,26 @@ void respond(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, PlanarBodyS
   dq[1] = dR.y();
   dq[2] = x[2];
   std::fill(dq + 3, dq + 3 + body.modes(), 0.0);
-  accumulate_rows(s, s.z_response, body.W.rows(), body.modes(), dq + 3);
+  accumulate_rows(s, s.z_response, body.modes(), dq + 3);
 }
 
 void add_modal_force(const PlanarBody &body, const PlanarBodyState &s, const Eigen::Matrix3Xd &wrench,
                      Eigen::Ref<Eigen::VectorXd> modal_force) {
   for (Index k = 0; k < body.markers(); ++k) {
     const Vector2d f = rotate_back(s, wrench.col(k).head<2>());
-    modal_force += body.W.middleRows<3>(3 + 3 * k).transpose() * Vector3d(f.x(), f.y(), wrench(2, k));
+    modal_force += s.W.middleRows<3>(3 + 3 * k).transpose() * Vector3d(f.x(), f.y(), wrench(2, k));
   }
 }
 
 void static_force(const PlanarBody &body, const double *q, const Vector2d &gravity, PlanarBodyState &s, double *Q) {
   const Index n = body.modes();
   const Vector2d g = rotate_back(s, gravity);
-  const Vector2d moment = body.first_moment + s.Wp.head<2>();
+  const Vector2d moment = body.first_moment + s.displacement.head<2>();
   Q[0] = body.mass * gravity.x();
   Q[1] = body.mass * gravity.y();
   Q[2] = perpendicular(moment).dot(g);
   Eigen::Map<Eigen::VectorXd> Q_f(Q + 3, n);
-  Q_f = -body.stiffness.cwiseProduct(VectorMap(q + 3, n)) + body.W.topRows<2>().transpose() * g;
+  Q_f = -body.stiffness.cwiseProduct(VectorMap(q + 3, n)) + s.W.topRows<2>().transpose() * g;
   if (s.has_modal_load)
     Q_f += s.modal_load;
   if (s.has_wrench) {
@@ -420,17 +483,24 @@ Energy energy(const PlanarBody &body, const double *q, const double *v, const Ve
   const double c = std::cos(q[2]), s = std::sin(q[2]), theta_dot = v[2];
   const auto to_body = [&](const Vector2d &u) { return Vector2d(c * u.x() + s * u.y(), -s * u.x() + c * u.y()); };
   const Vector2d R_dot = to_body({v[0], v[1]});
-  const Vector2d moment = body.first_moment + body.W.topRows<2>() * p;
-  const Vector2d S_p_dot = body.W.topRows<2>() * p_dot;
+  Vector2d moment = body.first_moment + body.W.topRows<2>() * p;
+  Vector3d rates = body.W.topRows<3>() * p_dot; // (S_bar, m_thetaf) p_dot
   double inertia = body.inertia + weighted(body, q + 3, q + 3);
   if (body.j.size())
     inertia += 2 * body.j.dot(p);
-  double coupling = body.W.row(2).dot(p_dot); // m_thetaf p_dot
   if (body.S_tilde.size())
-    coupling += p.dot(body.S_tilde * p_dot);
+    rates[2] += p.dot(body.S_tilde * p_dot);
+  if (body.K_omega.size())
+    inertia -= p.dot(body.K_omega * p);
+  for (const auto &[row, K] : body.second_order) {
+    if (row < 2)
+      moment[row] -= 0.5 * p.dot(K * p);
+    if (row < 3)
+      rates[row] -= p.dot(K * p_dot);
+  }
   Energy e;
   e.kinetic = 0.5 * (body.mass * R_dot.squaredNorm() + inertia * theta_dot * theta_dot + p_dot.squaredNorm()) +
-              theta_dot * R_dot.dot(perpendicular(moment)) + R_dot.dot(S_p_dot) + theta_dot * coupling;
+              theta_dot * R_dot.dot(perpendicular(moment)) + R_dot.dot(rates.head<2>()) + theta_dot * rates[2];
   e.strain = 0.5 * p.dot(body.stiffness.cwiseProduct(p));
   e.gravitational = -(body.mass * gravity.dot(Vector2d(q[0], q[1])) + to_body(gravity).dot(moment));
   if (body.damping.cols() == 1)

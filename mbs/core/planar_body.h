@@ -10,6 +10,13 @@
 
 namespace ffrobot {
 
+// A second-order displacement: row r of W p has -1/2 p^T K p besides, K (n, n) the geometric stiffness of a unit load
+// along that row.
+struct SecondOrder {
+  Eigen::Index row;
+  Eigen::MatrixXd K;
+};
+
 // Constants of one body. Formulas: Shabana, Dynamics of Multibody Systems, ch. 5; symbols as there.
 //
 // The p-block of the mass matrix is the identity (mass-orthonormal modes), so p is eliminated exactly:
@@ -28,6 +35,10 @@ struct PlanarBody {
   Eigen::MatrixXd m_xy;                          // (n, n) S_bar_11 + S_bar_22; empty where it is the identity
   std::vector<Eigen::Vector2d> marker_positions; // undeformed, body frame
   std::vector<int> marker_rows;                  // 3, or 2 where no constraint asks for the marker's rotation
+  // Geometric stiffening. With W(p) = W - (K p)^T in place of W, and m_thetatheta less p^T K_omega p, every term that
+  // follows from the kinetic energy and virtual work stays consistent. Both empty where it is left out.
+  std::vector<SecondOrder> second_order;
+  Eigen::MatrixXd K_omega; // (n, n) of unit theta_dot^2
 
   Eigen::Index modes() const { return W.cols(); }
   Eigen::Index markers() const { return static_cast<Eigen::Index>(marker_positions.size()); }
@@ -61,12 +72,18 @@ struct PlanarBodyState {
   Eigen::MatrixXd mobility;           // (3 markers, 3 markers), global
 
   // internals of the elimination
-  Eigen::Index padded_rows;       // rows of W, padded for vector registers
-  Eigen::MatrixXd W;              // (padded_rows, n)
+  Eigen::Index padded_rows;         // rows of W, padded for vector registers
+  Eigen::MatrixXd W;                // (padded_rows, n)
+  std::vector<Eigen::Index> active; // rows of W that carry anything; products with W need only these
+  Eigen::MatrixXd W_active;         // (active, padded for vector registers; n)
+  Eigen::MatrixXd W_active_transposed;
   Eigen::MatrixXd W_transposed;   // (n, padded_rows)
   Eigen::MatrixXd G;              // (padded_rows, padded_rows)
-  Eigen::VectorXd Wp, Wp_dot, Wk; // W p, W p_dot, W (K p + D p_dot)
+  Eigen::VectorXd Wp, Wp_dot, Wk; // W p, W p_dot, W (K p + D p_dot), W as it is at p
+  Eigen::VectorXd displacement;   // W p, its second-order part right
+  Eigen::VectorXd convective;     // p_dot^T K p_dot, by rows of W; zero without geometric stiffening
   Eigen::VectorXd extra, W_extra; // modal forces outside the common fast path, and W times them
+  Eigen::VectorXd curvature;      // (n) K p of a second-order displacement
   Eigen::VectorXd z;              // multipliers of the rows of W in p_ddot
   Eigen::VectorXd z_response;
   Eigen::Matrix3Xd Z_transposed; // (3, 3 markers) L^-1 B^T: B marker acceleration per (a, alpha) with p eliminated,
@@ -74,6 +91,8 @@ struct PlanarBodyState {
   Eigen::Vector3d L;             // (L_10, L_20, L_21)
   Eigen::Vector3d D_inverse;
   Eigen::Vector3d free_frame; // free (a, alpha) of the body frame, body axes
+  Eigen::Vector2d moment;     // s0 + S_bar p
+  double inertia = 0;         // m_thetatheta
 };
 
 // Positions and velocities of the markers for q = (R, theta, p), v = its rates.

@@ -27,7 +27,7 @@ RecordedMotion::RecordedMotion(const System &system, const Recording &recording)
     : motion_(system, {}, {}, nullptr), recording_(recording) {
   constexpr int remembered = 4;
   for (int i = 0; i < remembered; ++i)
-    cache_.emplace_back(motion_.size());
+    cache_.push_back({static_cast<std::size_t>(-1), make_method(recording.method, motion_)});
 }
 
 void RecordedMotion::state(double t, double *y) {
@@ -46,13 +46,15 @@ void RecordedMotion::state(double t, double *y) {
     const Index n = motion_.size();
     const double *start = recording_.states.data() + static_cast<std::size_t>(n) * hint_;
     const double t0 = times[hint_], h = times[hint_ + 1] - t0;
-    motion_.slope(t0, start, found->method.first_slope());
-    found->method.step(motion_, t0, start, h);
-    std::copy_n(start + n, n, found->method.end());
-    motion_.slope(t0 + h, start + n, found->method.last_slope());
-    found->method.prepare_dense(motion_, t0, start, h);
+    Method &method = *found->method;
+    motion_.slope(t0, start, method.first_slope());
+    motion_.accepted(t0, start, method.first_slope()); // peaks, which iterations measure themselves by
+    method.step(t0, start, h, 1e-3 * recording_.tolerance);
+    std::copy_n(start + n, n, method.end());
+    motion_.slope(t0 + h, start + n, method.last_slope());
+    method.prepare_dense(t0, start, h);
   }
-  found->method.interpolate(t, y);
+  found->method->interpolate(t, y);
 }
 
 RecordedActuation::RecordedActuation(const System &system, const Recording &recording, std::vector<bool> is_trajectory,

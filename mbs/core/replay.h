@@ -2,9 +2,9 @@
 #pragma once
 
 #include "core/actuation.h"
-#include "core/dop853.h"
 #include "core/fcid.h"
 #include "core/integrate.h"
+#include "core/method.h"
 #include "core/motion.h"
 
 #include <optional>
@@ -40,7 +40,7 @@ private:
   std::vector<Eigen::VectorXd> modal_force_, modal_zero_;
 };
 
-// The state of a recorded run at any time, by making the step around it again (order 7, like its outputs).
+// The state of a recorded run at any time, by making the step around it again.
 class RecordedMotion {
 public:
   RecordedMotion(const System &system, const Recording &recording);
@@ -49,9 +49,8 @@ public:
 
 private:
   struct Interval {
-    explicit Interval(Eigen::Index size) : method(size) {}
     std::size_t index = static_cast<std::size_t>(-1);
-    Dop853 method;
+    std::unique_ptr<Method> method;
   };
 
   ConstrainedMotion motion_;

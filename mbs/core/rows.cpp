@@ -60,7 +60,7 @@ void jacobian(const Row &row, const RowMotion &motion, const std::vector<PlanarB
     g[2] += arm.x() * coefficient[1] - arm.y() * coefficient[0] + coefficient[2];
     const Vector3d body_axes(state.cosine * coefficient[0] + state.sine * coefficient[1],
                              -state.sine * coefficient[0] + state.cosine * coefficient[1], coefficient[2]);
-    g.tail(bodies[b].modes()) += bodies[b].W.middleRows<3>(3 + 3 * m.marker).transpose() * body_axes;
+    g.tail(bodies[b].modes()) += state.W.middleRows<3>(3 + 3 * m.marker).transpose() * body_axes;
   };
   add(row.a, motion.coefficient_a);
   add(row.b, motion.coefficient_b);

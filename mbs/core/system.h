@@ -63,7 +63,7 @@ struct Workspace {
   std::vector<double> external_drive;          // added to the drives' own sizes; set by whoever steers the system
   std::vector<Eigen::VectorXd> external_modal; // likewise, modal forces of each body
   bool has_external_modal = false;
-  EnvelopeMatrix schur; // C M^-1 C^T, factorised
+  EnvelopeMatrix<double> schur; // C M^-1 C^T, factorised
   Eigen::VectorXd lambda;
   std::vector<Eigen::Matrix3Xd> wrench;    // of the constraints, on the markers of each body
   Eigen::VectorXd correction, value, rate; // of projections

@@ -6,13 +6,14 @@ import numpy as np
 from mechanisms import make_model, revolute
 from numpy.polynomial import Legendre, Polynomial
 
+from ffrobot.mbs.geometric_stiffening import GeometricStiffening
 from ffrobot.mbs.planar_body import PlanarBody, PlanarPoint
 
 CLAMPED = Polynomial([0, 0, 1])  # ξ²: deflection and slope vanish at the root
 SUPPORTED = Polynomial([0, 1, -1])  # ξ (1 − ξ): deflection vanishes at both ends
 
 
-def ritz_link(name, condition, length=1.0, mass=1.0, EI=30.0, modes=3, damping_ratio=0.0, extra=3):
+def ritz_link(name, condition, length=1.0, mass=1.0, EI=30.0, modes=3, damping_ratio=0.0, extra=3, stiffening=False):
     """An Euler–Bernoulli beam in `modes` + `extra` polynomials; bending rigidity EI in N·m²."""
     factor = {"cantilever": CLAMPED, "simply-supported": SUPPORTED}[condition]
     basis = [factor * Legendre.basis(k, [0, 1]).convert(kind=Polynomial) for k in range(modes + extra)]
@@ -32,7 +33,27 @@ def ritz_link(name, condition, length=1.0, mass=1.0, EI=30.0, modes=3, damping_r
         slope = np.array([f.deriv()(at) for f in basis]) @ T / length
         return PlanarPoint(np.array([at * length, 0.0]), np.array([np.zeros(n), bend]), slope)
 
+    w_1 = np.array([f.deriv()(xi) for f in basis]).T @ T / length
+
+    def stiffness_of(force):  # ∫N w'w' dx for N by ξ
+        return length / mass * w_1.T @ ((weight * force)[:, None] * w_1)
+
+    def point_stiffness(at):  # of a force at ξ = at
+        nodes, weights = np.polynomial.legendre.leggauss(modes + extra + 4)
+        slopes = np.array([f.deriv()((nodes + 1) / 2 * at) for f in basis]).T @ T / length
+        return length * at / 2 * slopes.T @ (weights[:, None] * slopes)
+
     zero = np.zeros((n, n))
+    axial = GeometricStiffening(
+        K_omega=stiffness_of(mass * length * (1 - xi**2) / 2),
+        K_s=np.array([stiffness_of(mass * (1 - xi)), zero]),
+        K_h=zero,
+        K_points={
+            "root": np.zeros((3, n, n)),
+            "mid": np.array([point_stiffness(0.5), zero, zero]),
+            "tip": np.array([stiffness_of(np.ones_like(xi)), zero, zero]),
+        },
+    )
     return PlanarBody(
         name=name,
         mass=mass,
@@ -48,6 +69,7 @@ def ritz_link(name, condition, length=1.0, mass=1.0, EI=30.0, modes=3, damping_r
         points=MappingProxyType({"root": point(0.0), "mid": point(0.5), "tip": point(1.0)}),
         modal_transform=np.eye(n),
         length=length,
+        stiffening=axial if stiffening else None,
     )
 
 

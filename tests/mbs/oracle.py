@@ -17,18 +17,41 @@ def rotation_derivative(theta):
     return np.array([[-np.sin(theta), -np.cos(theta)], [np.cos(theta), -np.sin(theta)]])
 
 
+def frame_stiffness(body):
+    """K of θ̇² (n, n), of forces ρ along x and y (2, n, n), of ρ times the arm (n, n): zero where left out."""
+    n = body.n_modes
+    if body.stiffening is None:
+        return np.zeros((n, n)), np.zeros((2, n, n)), np.zeros((n, n))
+    return body.stiffening.K_omega, body.stiffening.K_s, body.stiffening.K_h
+
+
+def point_stiffness(body, label):
+    """K (3, n, n) of forces along x and y and of a moment at a point."""
+    n = body.n_modes
+    if body.stiffening is None or not label:
+        return np.zeros((3, n, n))
+    return body.stiffening.K_points[label]
+
+
+def first_moment(body, p):
+    """s = ∫ρ (x + Φp − ½ pᵀK p) and its derivative with respect to p."""
+    _, K_s, _ = frame_stiffness(body)
+    return body.first_moment + body.S_bar @ p - 0.5 * p @ K_s @ p, body.S_bar - K_s @ p
+
+
 def mass_matrix(body, q):
     """M (3 + n, 3 + n) of one body."""
     theta, p = q[2], q[3:]
     A, A_theta = rotation(theta), rotation_derivative(theta)
-    s = body.first_moment + body.S_bar @ p
+    s, s_p = first_moment(body, p)
+    K_omega, _, K_h = frame_stiffness(body)
     M = np.zeros((len(q), len(q)))
     M[:2, :2] = body.mass * np.eye(2)
     M[:2, 2] = M[2, :2] = A_theta @ s
-    M[:2, 3:] = A @ body.S_bar
+    M[:2, 3:] = A @ s_p
     M[3:, :2] = M[:2, 3:].T
-    M[2, 2] = body.inertia + 2 * body.j @ p + p @ body.m_xy @ p
-    M[2, 3:] = M[3:, 2] = body.h + p @ body.S_tilde
+    M[2, 2] = body.inertia + 2 * body.j @ p + p @ (body.m_xy - K_omega) @ p
+    M[2, 3:] = M[3:, 2] = body.h + p @ body.S_tilde - K_h @ p
     M[3:, 3:] = np.eye(len(p))
     return M
 
@@ -37,18 +60,19 @@ def quadratic_velocity_forces(body, q, v):
     """Q_v: the Coriolis and centrifugal forces."""
     theta, p, theta_dot, p_dot = q[2], q[3:], v[2], v[3:]
     A, A_theta = rotation(theta), rotation_derivative(theta)
-    s = body.first_moment + body.S_bar @ p
-    Q_R = theta_dot**2 * A @ s - 2 * theta_dot * A_theta @ body.S_bar @ p_dot
-    Q_theta = -2 * theta_dot * (body.j + p @ body.m_xy) @ p_dot
-    Q_f = theta_dot**2 * (body.j + body.m_xy @ p) + 2 * theta_dot * body.S_tilde @ p_dot
+    s, s_p = first_moment(body, p)
+    K_omega, K_s, K_h = frame_stiffness(body)
+    Q_R = theta_dot**2 * A @ s - 2 * theta_dot * A_theta @ s_p @ p_dot + A @ (p_dot @ K_s @ p_dot)
+    Q_theta = -2 * theta_dot * (body.j + p @ (body.m_xy - K_omega)) @ p_dot + p_dot @ K_h @ p_dot
+    Q_f = theta_dot**2 * (body.j + (body.m_xy - K_omega) @ p) + 2 * theta_dot * body.S_tilde @ p_dot
     return np.concatenate([Q_R, [Q_theta], Q_f])
 
 
 def gravity_forces(body, q, g):
     theta, p = q[2], q[3:]
-    s = body.first_moment + body.S_bar @ p
+    s, s_p = first_moment(body, p)
     Q_theta = rotation_derivative(theta) @ s @ g
-    return np.concatenate([body.mass * g, [Q_theta], body.S_bar.T @ rotation(theta).T @ g])
+    return np.concatenate([body.mass * g, [Q_theta], s_p.T @ rotation(theta).T @ g])
 
 
 def elastic_forces(body, q, v):
@@ -124,11 +148,13 @@ class Mechanism:
         else:
             x, Phi, phi = np.zeros(2), np.zeros((2, body.n_modes)), np.zeros(body.n_modes)
         A, A_theta = rotation(theta), rotation_derivative(theta)
-        u = x + Phi @ p
-        L[:2, i] = np.column_stack([np.eye(2), A_theta @ u, A @ Phi])
-        L[2, i] = np.concatenate([[0, 0, 1], phi])
-        convective = -(theta_dot**2) * A @ u + 2 * theta_dot * A_theta @ Phi @ p_dot
-        return Marker(np.array([*(R + A @ u), theta + phi @ p]), L @ v, L, np.array([*convective, 0.0]))
+        K = point_stiffness(body, end.point)
+        u, Phi_p, phi_p = x + Phi @ p - 0.5 * p @ K[:2] @ p, Phi - K[:2] @ p, phi - K[2] @ p
+        L[:2, i] = np.column_stack([np.eye(2), A_theta @ u, A @ Phi_p])
+        L[2, i] = np.concatenate([[0, 0, 1], phi_p])
+        convective = -(theta_dot**2) * A @ u + 2 * theta_dot * A_theta @ Phi_p @ p_dot - A @ (p_dot @ K[:2] @ p_dot)
+        angle = theta + phi @ p - 0.5 * p @ K[2] @ p
+        return Marker(np.array([*(R + A @ u), angle]), L @ v, L, np.array([*convective, -p_dot @ K[2] @ p_dot]))
 
     def row(self, row, q, v):
         a, b = self.marker(row.a, q, v), self.marker(row.b, q, v)
@@ -171,7 +197,7 @@ class Mechanism:
             (R, theta, p), p_dot = np.split(q[self.columns[body.name]], [2, 3]), v[self.columns[body.name]][3:]
             strain += 0.5 * p @ (body.stiffness * p)
             dissipated += p_dot @ body.damping @ p_dot
-            s = body.first_moment + body.S_bar @ p
+            s, _ = first_moment(body, p)
             gravitational -= (body.mass * R + rotation(theta[0]) @ s) @ self.gravity
         return np.array([kinetic, strain, gravitational, dissipated])
 

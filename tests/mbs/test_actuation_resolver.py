@@ -10,6 +10,7 @@ from ffrobot.errors import InputError
 from ffrobot.mbs import _core
 from ffrobot.mbs.initial_state import undeformed_state
 
+DOP853 = _core.MethodKind.dop853
 OPEN = ["chain of 2", "chain of 3", "chain of 6", "backwards", "mixed", "mixed backwards", "tree", "loaded"]
 CLOSED = ["four-bar", "slider-crank"]
 
@@ -23,7 +24,8 @@ def resolved(assembly, seed=0):
         q[first + 3 : first + 3 + body.n_modes] = 0.05 * rng.standard_normal(body.n_modes)
     resolver = _core.ActuationResolver(assembly.system, assembly.is_trajectory, assembly.motor_rows)
     run = _core.run(
-        assembly.system, assembly.groups, assembly.moments, None, [0.0, 1e-6], q, v, 1e-6, 1, resolver, always, None
+        assembly.system, assembly.groups, assembly.moments, None, [0.0, 1e-6], q, v, 1e-6, 1, DOP853, 0.8,
+        resolver, always, None,
     )  # fmt: skip
     assert run.residual[0].max() < 1e-12
     return run.q[0], run.v[0], run.multipliers[0], run.tau[0], run.F_p[0]

@@ -95,6 +95,16 @@ def test_outputs_between_those_of_the_inverse_run_are_as_good(model):
     assert departure(reference, outcome).max() < 1e-7
 
 
+@pytest.mark.parametrize("integrator", ["dopri5", "radau"])
+def test_recordings_of_other_integrators_are_replayed(model, integrator):
+    inverse = run_pcid(model, pcid(tolerance=1e-5, integrator=integrator), True, always)
+    analysis = forward(tolerance=1e-5, actuation="inverse", apply="joints+pzt")
+    outcome = run_forward(model, analysis, inverse, FULL, always)
+    assert outcome.status == "completed"
+    assert outcome.integrator.name == integrator
+    assert departure(inverse, outcome).max() < 1e-5
+
+
 @pytest.mark.parametrize("shape", ["zero", "static"])
 def test_forward_run_under_fcid_keeps_path_and_shape(model, shape):
     """Links that ring in PCID keep a shape that is prescribed: straight, or sagging."""

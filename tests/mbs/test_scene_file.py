@@ -219,7 +219,10 @@ MISTAKES = [
     ("end = 1.0", "", 'analysis "inverse": expected the key "end" in kind = "pcid", found none', ""),
     ("end = 1.0", "end = -1.0", 'analysis "inverse": end: expected a number greater than 0, found -1.0', ""),
     ("end = 1.0", "end = 1.0\ntolerance = 0", 'analysis "inverse": tolerance: expected a number of at least 1e-10', "found 0"),
-    ("end = 1.0", 'end = 1.0\nintegrator = "dop"', 'analysis "inverse": integrator: expected "dop853", found "dop"', ""),
+    ("end = 1.0", 'end = 1.0\nintegrator = "dop"', 'analysis "inverse": integrator: expected "auto", "dopri5", "dop853",', '"dop"'),
+    ("end = 1.0", "end = 1.0\nspectral_radius = 0.5", 'analysis "inverse": expected the key "spectral_radius" only with', ""),
+    ("end = 1.0", "end = 1.0\nspectral_radius = 2", 'analysis "inverse": spectral_radius: expected a number of at most 1', ""),
+    ("end = 1.0", 'end = 1.0\nintegrator = "generalized-alpha"', 'analysis "forward": actuation: expected an analysis', "again"),
     ("end = 1.0", 'end = 1.0\nshape = "zero"', 'analysis "inverse": expected the key "shape" only in kind = "fcid"', "found"),
     ('kind = "pcid"', 'kind = "fcid"', 'analysis "inverse": expected the key "shape" in kind = "fcid"', "found none"),
     ('kind = "pcid"', 'kind = "pcd"', 'analysis "inverse": kind: expected "pcid", "fcid", "forward" or "static"', '"pcid"?'),
@@ -254,6 +257,29 @@ def test_pcid_needs_a_trajectory(folder):
     start, rest = SCENE.split("[[trajectory]]")
     with pytest.raises(InputError, match=r"kind: expected at least one \[\[trajectory\]\]"):
         load(folder, start + "[[pzt]]" + rest.split("[[pzt]]")[1])
+
+
+@pytest.mark.parametrize("value", ["true", '"auto"'])
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (
+            "[[payload]]",
+            '[[actuation_points]]\nbody = "link1"\ntransverse = [0.5]\n[[payload]]',
+            r"expected false beside \[\[actuation_points\]\]",
+        ),
+        (
+            "count = 2",
+            'count = 2\ndensity = 7500\nstructural = ["mass"]',
+            r'expected no patches with structural = \["mass"',
+        ),
+    ],
+)
+def test_stiffening_knows_no_loads_between_interfaces(folder, value, old, new, says):
+    text = SCENE.replace(old, new, 1)
+    load(folder, text)
+    with pytest.raises(InputError, match="geometric_stiffening: " + says):
+        load(folder, f"geometric_stiffening = {value}\n{text}")
 
 
 def test_actuation_comes_from_pcid(folder):

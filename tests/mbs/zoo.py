@@ -1,9 +1,12 @@
 """Mechanisms of random bodies with every kind of joint, trajectory and load, on the ground's either side."""
 
+from dataclasses import replace
+
 import numpy as np
 from material_points import random_cloud
 from mechanisms import make_model, revolute
 
+from ffrobot.mbs.geometric_stiffening import GeometricStiffening
 from ffrobot.mbs.model import ModalLoad
 from ffrobot.mbs.planar_body import with_payload
 from ffrobot.mbs.time_functions import parse_expression
@@ -122,6 +125,33 @@ def loaded(rng, **keys):
     return make_model(bodies, patches, joint=serial_joints(2), **(tables | keys))
 
 
+def stiffened(rng, **keys):
+    """A chain of three bodies whose modes stiffen under every kind of load, with a payload and loads."""
+    bodies = [replace(body, stiffening=random_stiffening(rng, body)) for body in clouds(rng, 3)]
+    bodies[1] = with_payload(bodies[1], "tip", mass=0.6, inertia=0.02)
+    angles = {f"b{k}": 1.2 * (-0.6) ** (k - 1) for k in range(1, 4)}
+    tables = {"trajectory": [tip_path("b3")], "load": LOADS, "initial": {"angles": angles}}
+    return make_model(bodies, joint=serial_joints(3), **(tables | keys))
+
+
+def stiffened_and_driven(rng, **keys):
+    """The same with as many trajectories as degrees of freedom."""
+    turn = {"name": "turn", "angle": "b3", "value": "0.4+0.2*t"}
+    return stiffened(rng, **({"trajectory": [tip_path("b3"), turn]} | keys))
+
+
+def random_stiffening(rng, body, size=0.05):
+    """Symmetric matrices for every unit load."""
+
+    def symmetric(*shape):
+        K = size * rng.standard_normal((*shape, body.n_modes, body.n_modes))
+        return K + K.swapaxes(-1, -2)
+
+    return GeometricStiffening(
+        symmetric(), symmetric(2), symmetric(), {label: symmetric(3) for label in (*body.points,)}
+    )
+
+
 def free_flying(rng, **keys):
     """Two bodies that nothing holds, one joint between them."""
     return make_model(clouds(rng, 2), joint=[revolute("j1", "b1.tip", "b2.root")], **keys)
@@ -137,6 +167,8 @@ ALL = {
     "tree": tree,
     "loaded": loaded,
     "loaded, frame motors": lambda rng, **keys: loaded(rng, motors="frame", **keys),
+    "stiffened": stiffened,
+    "stiffened, driven": stiffened_and_driven,
     "free-flying": free_flying,
 }
 

@@ -1,0 +1,43 @@
+// Step control by the digital filter H211b, b = 8 (G. Soderlind, ACM Trans. Math. Softw. 29, 2003): the elementary
+// controller rejects every third step where fast vibration makes the error scatter.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace ffrobot {
+
+class StepControl {
+public:
+  // order: the error shrinks as step^order
+  explicit StepControl(double order) : order_(order) {}
+
+  // Size of the next step; error relative to the largest one allowed.
+  double after_accepted(double step, double error) {
+    constexpr double b = 8;
+    const double exponent = 1 / (b * order_);
+    error = std::max(error, 1e-12);
+    double factor = std::pow(target / error, exponent);
+    factor *= previous_step_ > 0
+                  ? std::pow(target / previous_error_, exponent) * std::pow(step / previous_step_, -1 / b)
+                  : factor;
+    previous_step_ = step;
+    previous_error_ = error;
+    return step * (1 + std::atan(factor - 1));
+  }
+
+  double after_rejected(double step, double error) const {
+    constexpr double smallest_factor = 0.2, largest_factor = 0.9;
+    if (!std::isfinite(error))
+      return step * smallest_factor;
+    return step * std::clamp(std::pow(target / error, 1 / order_), smallest_factor, largest_factor);
+  }
+
+private:
+  static constexpr double target = 0.25; // of the largest error allowed: leaves room for its scatter
+
+  double order_;
+  double previous_step_ = 0, previous_error_ = 1;
+};
+
+} // namespace ffrobot

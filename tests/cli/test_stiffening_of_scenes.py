@@ -1,0 +1,135 @@
+"""The key `geometric_stiffening` of a scene, from link files to results: formulation.md, sections 4 and 11."""
+
+import h5py
+import numpy as np
+import pytest
+
+from ffrobot.fe_models.modal_body_file import read_modal_body
+from ffrobot.mbs.planar_body import from_modal_body
+
+# E A = 5.03e6 N, E I = 566.6 N·m², ρ A = 0.2019 kg/m
+LINK = """
+name = "beam"
+material = { youngs_modulus = 6.895e10, poissons_ratio = 0.3, density = 2767.67 }
+geometry = { kind = "beam", length = 8.0, section = { shape = "rectangle", height = 0.036766, width = 0.001984 } }
+mesh = { elements = 20 }
+reference = { condition = "cantilever" }
+modes = { count = 6, family = "in-plane-bending" }
+damping = { ratio = 0.0 }
+"""
+SCENE = """
+name = "spin_up"
+space = "planar"
+gravity = [0.0, 0.0]
+KEY
+
+[[body]]
+name = "beam"
+link = "beam.toml"
+
+[[joint]]
+name = "hub"
+type = "revolute"
+between = ["ground", "beam.root"]
+
+[[trajectory]]
+name = "spin"
+joint = "hub"
+value = "where(t < 15, 4/15*(t**2/2 + (15/(2*pi))**2*(cos(2*pi*t/15) - 1)), 4*(t - 7.5))"
+
+[[analysis]]
+name = "inverse"
+kind = "pcid"
+end = 20.0
+output_step = 0.01
+tolerance = 1e-5
+"""
+
+
+@pytest.fixture
+def spin_up(tmp_path, ffrobot):
+    """Run the scene with a line of its own; returns the finished process and the results file."""
+    (tmp_path / "beam.toml").write_text(LINK, encoding="utf-8")
+
+    def run(key):
+        scene = tmp_path / "scene.toml"
+        scene.write_text(SCENE.replace("KEY", key), encoding="utf-8")
+        done = ffrobot("solve", scene)
+        results = scene.with_suffix(".results.h5")
+        return done, h5py.File(results) if results.exists() else None
+
+    return run
+
+
+@pytest.mark.parametrize("key", ["geometric_stiffening = true", 'geometric_stiffening = "auto"'])
+def test_spin_up_with_it(spin_up, key):
+    """The tip lags by at most 0.535 m, at 6.77 s, and settles."""
+    done, file = spin_up(key)
+    assert done.returncode == 0, done.stderr
+    assert "geometric stiffening is on" in done.stdout
+    time, lag = file["inverse/time"][()], -file["inverse/points/beam.tip/deflection"][:, 1]
+    assert lag.max() == pytest.approx(0.535, rel=0.01)
+    assert time[lag.argmax()] == pytest.approx(6.77, abs=0.05)
+    assert np.abs(lag[time > 15]).max() < 0.02
+    assert file.attrs["geometric_stiffening"]
+    assert file["inverse"].attrs["stiffening_effect"] > 1
+
+
+@pytest.mark.parametrize("key", ["", "geometric_stiffening = false"])
+def test_spin_up_without_it(spin_up, key):
+    done, file = spin_up(key)
+    assert done.returncode == 1
+    assert "diverged" in done.stderr
+    assert "geometric_stiffening = true" in done.stderr
+    assert "warning" in done.stdout
+    assert file["inverse"].attrs["status"] == "diverged"
+    assert 7 < file["inverse/time"][-1] < 15
+
+
+def test_a_wrong_value_is_named(spin_up):
+    done, _ = spin_up('geometric_stiffening = "yes"')
+    assert done.returncode == 2
+    assert "geometric_stiffening: expected" in done.stderr
+
+
+def test_points_without_it_are_named(spin_up, tmp_path):
+    done, _ = spin_up('geometric_stiffening = true\n[[load]]\npoint = "beam.mid"\ny = 1.0')
+    assert done.returncode == 2
+    assert "load: point: expected, with geometric_stiffening, a point" in done.stderr
+    assert '"beam.mid"' in done.stderr
+
+
+def test_loads_of_the_file_have_their_signs(spin_up, tmp_path, ffrobot):
+    """Euler's and the own-weight buckling load from the modal body file: π²/4 and 7.837 EI/L² (Timoshenko, Gere)."""
+    (tmp_path / "beam.toml").write_text(LINK, encoding="utf-8")
+    assert ffrobot("link", tmp_path / "beam.toml").returncode == 0
+    body = from_modal_body("beam", read_modal_body(tmp_path / "beam.h5"))
+    K, stiffening = np.diag(body.stiffness), body.stiffening
+    EI, L = 6.895e10 * 0.001984 * 0.036766**3 / 12, 8.0
+
+    def critical(K_load):
+        L_inverse = np.linalg.inv(np.linalg.cholesky(K_load))  # fails unless it stiffens
+        return np.linalg.eigvalsh(L_inverse @ K @ L_inverse.T)[0]
+
+    assert critical(stiffening.K_points["tip"][0]) == pytest.approx(np.pi**2 / 4 * EI / L**2, rel=1e-3)
+    assert body.mass * critical(stiffening.K_s[0]) == pytest.approx(7.8373 * EI / L**2, rel=1e-3)
+    assert stiffening.K_omega[0, 0] == pytest.approx(1.193, abs=1e-3)  # Southwell
+
+
+def test_two_link_case_moves_by_some_percent(ffrobot, case_copy):
+    """Its tip force by about 2 % in the mean within 0.2 s (formulation.md, section 4); the summary warns without it."""
+    forces = {}
+    for key in ("false", "true"):
+        scene = case_copy("two_link")
+        text = scene.read_text(encoding="utf-8").split("# The same moments")[0]
+        text = text.replace("end = 1.0", "end = 0.2").replace("tolerance = 1e-7", "tolerance = 1e-5")
+        text = text.replace('motors = "section"', f'motors = "section"\ngeometric_stiffening = {key}')
+        scene.write_text(text, encoding="utf-8")
+        done = ffrobot("solve", scene)
+        assert done.returncode == 0, done.stderr
+        assert ("warning" in done.stdout) == (key == "false")
+        with h5py.File(scene.with_suffix(".results.h5")) as file:
+            forces[key] = file["inverse/trajectories/tip/force"][()]
+        scene.parent.rename(scene.parent.with_name(f"two_link_{key}"))
+    difference = np.linalg.norm(forces["true"] - forces["false"], axis=1).mean()
+    assert difference / np.linalg.norm(forces["false"], axis=1).mean() == pytest.approx(0.02, abs=0.005)

@@ -1,0 +1,98 @@
+"""`integrator = "auto"`: what it looks at, and what it chooses."""
+
+import numpy as np
+import pytest
+import zoo
+from links import ANGLES, arm, arm_links
+from mechanisms import always, assemble, forward, oracle_of, pcid
+
+from ffrobot.mbs.analyses import run_forward, run_pcid
+from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.vibration import mass_matrix, vibrations
+
+AT_REST = {"angles": ANGLES, "state": "static"}
+
+
+def chosen(model, **keys):
+    return run_pcid(model, pcid(**keys), False, always).integrator
+
+
+def test_mass_matrix_is_the_oracle_s():
+    assembly = assemble(zoo.build("chain of 3"))
+    oracle, q = oracle_of(assembly), np.random.default_rng(0).standard_normal(assembly.system.coordinates)
+    for body in oracle.bodies:
+        i = oracle.columns[body.name]
+        np.testing.assert_allclose(mass_matrix(body, q[i]), oracle.mass_matrix(q)[i, i], atol=1e-14)
+
+
+def test_vibrations_solve_the_linearised_equations():
+    assembly = assemble(arm())
+    state = undeformed_state(assembly)
+    modes, oracle = vibrations(assembly, state), oracle_of(assembly)
+    M, (_, _, C_q) = oracle.mass_matrix(state.q), oracle.constraint_values(0.0, state.q, state.v)
+    K = np.concatenate([[0, 0, 0, *body.stiffness] for body in oracle.bodies])
+    terms = K[:, None] * modes.shape
+    np.testing.assert_allclose(C_q @ modes.shape, 0, atol=1e-12)
+    np.testing.assert_allclose(modes.shape.T @ M @ modes.shape, np.eye(len(modes.frequency)), atol=1e-9)
+    residual = M @ modes.shape * modes.frequency**2 - terms - C_q.T @ modes.force
+    assert np.abs(residual).max() < 1e-9 * np.abs(terms).max()
+    assert len(modes.frequency) == 6  # three modes a link; the path leaves the frames no freedom
+
+
+def test_vibrations_show_in_the_motion():
+    """A little of one mode as the initial deflection comes back after its period."""
+    assembly = assemble(
+        arm(gravity=(0.0, 0.0), trajectory=[{"name": "tip", "point": "link2.tip", "x": "1.2", "y": "1.4"}])
+    )
+    rest = undeformed_state(assembly)
+    modes = vibrations(assembly, rest)
+    q = rest.q + 1e-7 * modes.shape[:, 0]
+    a, _ = assembly.system.evaluate(0.0, q, rest.v)
+    np.testing.assert_allclose(a, -(modes.frequency[0] ** 2) * (q - rest.q), atol=1e-3 * np.abs(a).max())
+
+
+def test_what_rings_is_resolved_explicitly():
+    choice = chosen(arm(), tolerance=1e-6)
+    assert choice.name == "dop853"
+    assert "ringing above the tolerance up to" in choice.reason
+
+
+def test_stiff_links_that_do_not_ring_are_integrated_implicitly():
+    links = arm_links(EI=300.0, modes=12, extra=2)
+    choice = chosen(arm(links, initial=AT_REST), tolerance=1e-3)
+    assert choice.name == "radau"
+    assert "ringing above the tolerance up to no frequency" in choice.reason
+
+
+def test_damping_lets_steps_grow():
+    """The same ringing start: with strong damping it is over soon."""
+    undamped, damped = (arm_links(EI=300.0, modes=8, extra=2, damping_ratio=ratio) for ratio in (0.0, 0.3))
+    assert chosen(arm(undamped), tolerance=1e-3).name == "dop853"
+    assert chosen(arm(damped), tolerance=1e-3).name == "radau"
+
+
+def test_replay_uses_the_integrator_it_replays():
+    model = arm(initial=AT_REST)
+    inverse = run_pcid(model, pcid(tolerance=1e-4, integrator="radau"), True, always)
+    analysis = forward(tolerance=1e-4, actuation="inverse", apply="trajectory")
+    outcome = run_forward(model, analysis, inverse, {}, always)
+    assert outcome.integrator.name == "radau"
+    assert np.abs(outcome.q - inverse.q).max() < 1e-4
+
+
+def test_a_choice_of_the_scene_is_kept():
+    for name in ("dopri5", "dop853", "radau", "generalized-alpha"):
+        choice = chosen(arm(initial=AT_REST), tolerance=1e-2, integrator=name)
+        assert (choice.name, choice.reason) == (name, "asked for")
+
+
+@pytest.mark.parametrize("name", ["four-bar", "slider-crank", "tree", "mixed"])
+@pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
+def test_implicit_integrators_agree_with_dop853_on_every_kind_of_joint(name, integrator):
+    model = zoo.build(name, analysis=(pcid(),))
+    keys = {"end": 0.05, "output_step": 0.01}
+    exact = run_pcid(model, pcid(tolerance=1e-9, integrator="dop853", **keys), False, always)
+    outcome = run_pcid(model, pcid(tolerance=1e-3, integrator=integrator, **keys), False, always)
+    assert outcome.status == "completed"
+    peak = np.abs(exact.lambda_).max()
+    assert np.abs(outcome.lambda_ - exact.lambda_).max() < 1e-3 * peak
