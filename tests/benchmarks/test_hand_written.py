@@ -19,7 +19,7 @@ from ffrobot.mbs.analyses import run_pcid
 from ffrobot.mbs.initial_state import undeformed_state
 from ffrobot.mbs.model import Assembly
 from ffrobot.mbs.scene_records import Analysis
-from ffrobot.solve import prepare
+from ffrobot.solution import prepare
 
 ROOT = Path(__file__).parents[2]
 SOURCE = Path(__file__).parent / "hand_written" / "two_link.cpp"
