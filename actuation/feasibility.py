@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..mbs.analyses import Outcome
 from ..mbs.joint_space import motor_rates
-from ..mbs.scene_records import Joint
+from ..mbs.mechanism_records import Joint
 from .patches import PatchArray
 from .voltages import Voltages, voltage_gain
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fe_models.modal_body import Interface, ModalBody
+from ..mbs.actuator_records import PztLayout
 from ..mbs.planar_body import PlanarBody, PlanarPoint, with_masses
-from ..mbs.scene_records import PztLayout
 from .patches import patch_edges, section_height
 
 Array = NDArray[np.float64]

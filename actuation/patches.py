@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..fe_models.modal_body import ModalBody
+from ..mbs.actuator_records import PztLayout
 from ..mbs.planar_body import PlanarBody
-from ..mbs.scene_records import PztLayout
 
 Array = NDArray[np.float64]
 

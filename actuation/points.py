@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..fe_models.modal_body import ModalBody
 from ..mbs import _core
+from ..mbs.actuator_records import ActuationPoints
 from ..mbs.analyses import Outcome
 from ..mbs.planar_body import PlanarBody, PlanarPoint
-from ..mbs.scene_records import ActuationPoints
 from ..mbs.steering import PointActuator
 
 Array = NDArray[np.float64]

@@ -23,13 +23,15 @@ from .fe_models.modal_body import ModalBody
 from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
+from .mbs.analysis_records import Analysis
 from .mbs.fcid import run_fcid
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.observation import body_motion
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
+from .mbs.record_types import split_point
 from .mbs.scene_file import load_scene
-from .mbs.scene_records import Analysis, Scene, split_point
+from .mbs.scene_records import Scene
 from .mbs.steering import Equipment
 from .mbs.stress import BodyStress, body_stress
 from .validation import did_you_mean, quoted

@@ -10,10 +10,10 @@ import numpy as np
 
 from ..errors import SolveError
 from . import _core
+from .analysis_records import Analysis
 from .initial_state import State, check_reach, undeformed_state
 from .integrators import METHODS, Choice, choose_integrator
 from .model import ZERO, Array, Assembly, Model
-from .scene_records import Analysis
 from .statics import static_equilibrium
 from .steering import Equipment, actuation_source, applied_actuators
 

@@ -13,11 +13,11 @@ from ..errors import InputError, SolveError
 from . import _core
 from ._core import TimeFunction
 from .analyses import Outcome, resolver_of
+from .analysis_records import Analysis
 from .initial_state import check_reach, undeformed_state
 from .integrators import NOT_INTEGRATED
 from .model import ZERO, Array, Assembly, Model
 from .planar_body import PlanarBody
-from .scene_records import Analysis
 
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
 DEGREE = 5  # of that spline: accelerations are cubic between nodes

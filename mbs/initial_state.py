@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .mechanism_records import Joint
 from .model import Array, Assembly, Constraint
+from .record_types import GROUND, split_point
 from .rows import End
-from .scene_records import GROUND, Joint, split_point
 
 TOLERANCE = 1e-13  # of constraints at the start, m and rad
 SINGULAR = 1e-6  # ratio of singular values below which a configuration counts as singular

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import _core
+from .analysis_records import Analysis
 from .initial_state import State
 from .model import Array, Assembly
-from .scene_records import Analysis
 from .vibration import ringing, vibrations
 
 METHODS = {

@@ -13,8 +13,9 @@ from ..validation import did_you_mean, quoted
 from . import _core
 from ._core import TimeFunction
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
+from .record_types import GROUND, split_point
 from .rows import FRAME, End, Row, joint_coordinate, joint_rows, motor_joints, trajectory_rows
-from .scene_records import GROUND, Scene, split_point
+from .scene_records import Scene
 
 Array = NDArray[np.float64]
 ZERO = _core.TimeFunction.constant(0.0)

@@ -11,8 +11,8 @@ from .analyses import Outcome
 from .geometric_stiffening import second_order_displacement
 from .model import Array, Constraint
 from .planar_body import PlanarBody
+from .record_types import split_point
 from .rows import End
-from .scene_records import split_point
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..fe_models.modal_body import ModalBody
 from . import geometric_stiffening
 from .geometric_stiffening import GeometricStiffening
-from .scene_records import RigidBody
+from .mechanism_records import RigidBody
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import _core
-from .scene_records import GROUND, Joint, Scene, Trajectory, split_point
+from .mechanism_records import Joint, Trajectory
+from .record_types import GROUND, split_point
+from .scene_records import Scene
 
 FRAME = ""  # instead of a point's name: the frame of the body itself
 

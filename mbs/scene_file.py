@@ -13,7 +13,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..validation import did_you_mean, load_toml, quoted, validate
-from .scene_records import GROUND, Analysis, Load, Scene, SceneKeys, Trajectory
+from .analysis_records import Analysis
+from .mechanism_records import Load, Trajectory
+from .record_types import GROUND
+from .scene_records import Scene, SceneKeys
 from .time_functions import check_domain
 
 MADE_IN_PYTHON = "<scene made in Python>"

@@ -11,9 +11,9 @@ import numpy as np
 from ..errors import InputError
 from ..validation import quoted
 from . import _core
+from .analysis_records import Analysis
 from .model import Array, Model
 from .rows import End, Row
-from .scene_records import Analysis
 
 if TYPE_CHECKING:
     from .analyses import Outcome

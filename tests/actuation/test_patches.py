@@ -11,8 +11,8 @@ from ffrobot.actuation.patches import check_reach, patch_array
 from ffrobot.actuation.voltages import solve_voltages
 from ffrobot.errors import InputError
 from ffrobot.fe_models.modal_body import OutlinedPatches
+from ffrobot.mbs.actuator_records import PztLayout
 from ffrobot.mbs.planar_body import from_modal_body, with_payload
-from ffrobot.mbs.scene_records import PztLayout
 
 EI = 2.068427e11 * 0.025 * 0.015**3 / 12
 C = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2  # Shaban 2022, Eq. 14

@@ -8,8 +8,9 @@ import pytest
 
 from ffrobot.actuation.points import point_set, with_points
 from ffrobot.errors import InputError
+from ffrobot.mbs.actuator_records import ActuationPoints
+from ffrobot.mbs.mechanism_records import RigidBody
 from ffrobot.mbs.planar_body import from_modal_body, from_rigid_body, with_payload
-from ffrobot.mbs.scene_records import ActuationPoints, RigidBody
 
 SCENE = Path("scene.toml")
 

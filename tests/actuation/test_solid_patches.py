@@ -7,8 +7,8 @@ import pytest
 
 from ffrobot.actuation.patches import patch_array
 from ffrobot.fe_models.link import cached_modal_body
+from ffrobot.mbs.actuator_records import PztLayout
 from ffrobot.mbs.planar_body import from_modal_body
-from ffrobot.mbs.scene_records import PztLayout
 
 LINK = """
 name = "link"

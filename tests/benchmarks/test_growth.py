@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from ffrobot.mbs import _core
+from ffrobot.mbs.analysis_records import Analysis
 from ffrobot.mbs.model import Assembly, build_model
 from ffrobot.mbs.planar_body import PlanarBody, PlanarPoint
-from ffrobot.mbs.scene_records import Analysis, Scene
+from ffrobot.mbs.scene_records import Scene
 
 MASS, LENGTH, STIFFNESS = 1.0, 1.0, 100.0  # kg, m, EI in N·m²
 MODES, LINKS = (2, 5, 10, 20, 50, 100, 200), (2, 5, 10, 20, 50)

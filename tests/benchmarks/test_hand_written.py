@@ -16,9 +16,9 @@ import pytest
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import run_pcid
+from ffrobot.mbs.analysis_records import Analysis
 from ffrobot.mbs.initial_state import undeformed_state
 from ffrobot.mbs.model import Assembly
-from ffrobot.mbs.scene_records import Analysis
 from ffrobot.solution import prepare
 
 ROOT = Path(__file__).parents[2]

@@ -26,9 +26,9 @@ import pytest
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import initial_state, run_pcid
+from ffrobot.mbs.analysis_records import Analysis
 from ffrobot.mbs.fcid import run_fcid
 from ffrobot.mbs.model import Assembly
-from ffrobot.mbs.scene_records import Analysis
 from ffrobot.solution import prepare
 
 INVERSE = '\n[[analysis]]\nname = "inverse"\nkind = "pcid"\nend = 1.0\noutput_step = 0.001\ntolerance = 1e-6\n'

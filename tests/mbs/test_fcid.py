@@ -10,9 +10,9 @@ from mechanisms import assemble, make_model, oracle_of, pcid, relative, revolute
 from ffrobot.errors import InputError, SolveError
 from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import Outcome, run_pcid
+from ffrobot.mbs.analysis_records import Analysis
 from ffrobot.mbs.fcid import run_fcid, spline
 from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.scene_records import Analysis
 from ffrobot.mbs.time_functions import parse_expression
 
 OPEN = ["chain of 2", "backwards", "mixed", "mixed backwards", "tree", "loaded", "stiffened, driven"]

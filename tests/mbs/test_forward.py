@@ -8,9 +8,9 @@ from scipy.optimize import lsq_linear
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis_records import Analysis
 from ffrobot.mbs.fcid import run_fcid
 from ffrobot.mbs.observation import point_motion
-from ffrobot.mbs.scene_records import Analysis
 from ffrobot.mbs.steering import Equipment
 
 N = 3  # modes of a link

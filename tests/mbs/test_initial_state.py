@@ -8,10 +8,10 @@ from test_rigid_limit import slider_crank
 
 from ffrobot.errors import InputError, SolveError
 from ffrobot.mbs.analyses import initial_state, run_pcid, run_static
+from ffrobot.mbs.analysis_records import Analysis
 from ffrobot.mbs.initial_state import undeformed_state
 from ffrobot.mbs.model import build_model
 from ffrobot.mbs.observation import point_motion
-from ffrobot.mbs.scene_records import Analysis
 
 HOLD = {"name": "tip", "point": "link2.tip", "x": repr(float(TIP[0])), "y": repr(float(TIP[1]))}
 

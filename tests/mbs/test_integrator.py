@@ -7,8 +7,8 @@ from mechanisms import always, assemble, pcid, relative
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import run_pcid
+from ffrobot.mbs.analysis_records import TIGHTEST_TOLERANCE
 from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.scene_records import TIGHTEST_TOLERANCE
 from ffrobot.mbs.statics import static_equilibrium
 
 REPORTED = ("q", "v", "lambda_", "tau", "F_p")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ffrobot.errors import InputError
+from ffrobot.mbs.record_types import split_point
 from ffrobot.mbs.scene_file import load_scene
-from ffrobot.mbs.scene_records import split_point
 
 SCENE = """
 name = "two_link"

@@ -1,0 +1,101 @@
+"""The analyses of a scene file, key by key. Times in s."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from ..validation import Record
+from .record_types import Expression, Name, Positive
+
+MAX_OUTPUTS = 10_000_000
+TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
+
+
+class Analysis(Record):
+    """One run, with outputs at 0, output_step, …, end (s).
+
+    Both are 0 where the file does not give them: in static analyses (t = 0 only), and in forward analyses that take
+    over the times of their actuation, which `load_scene` fills in. `shape` of FCID says which p(t) is prescribed,
+    `modal` gives it: expressions for the first modes of a body, as its modal file numbers them; all others are 0.
+    `limits` keeps the actuators of a forward run within their limits.
+
+    `integrator`: see `integrators.choose_integrator` for "auto"; `spectral_radius` is what a step of generalized-alpha
+    leaves of vibrations far above one over its size.
+    """
+
+    name: Name
+    kind: Literal["pcid", "fcid", "forward", "static"]
+    end: Positive = 0.0
+    output_step: Positive = 0.0
+    tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
+    actuation: str | None = None
+    apply: Literal["joints", "joints+pzt", "trajectory", "points"] | None = None
+    limits: bool = False
+    shape: Literal["zero", "static", "given"] | None = None
+    modal: dict[Name, tuple[Expression, ...]] | None = None
+    integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
+    spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8  # of generalized-alpha at infinite frequency
+    max_steps: Annotated[int, Field(gt=0)] = 5_000_000
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Analysis:
+        for key in ("end", "output_step"):
+            given = key in self.model_fields_set
+            if self.kind == "static" and given:
+                raise ValueError(f'expected no key "{key}" in kind = "static", found {getattr(self, key):g}')
+            if self.kind != "static" and self.actuation is None and not given:
+                raise ValueError(f'expected the key "{key}" in kind = "{self.kind}", found none')
+        if self.end and self.output_step:
+            check_steps(self.end, self.output_step)
+        if (self.actuation is None) != (self.apply is None):
+            raise ValueError(
+                'expected the keys "actuation" and "apply" together, found only '
+                + ('"apply"' if self.actuation is None else '"actuation"')
+            )
+        if self.actuation is not None and self.kind != "forward":
+            raise ValueError(f'expected the key "actuation" only in kind = "forward", found kind = "{self.kind}"')
+        if "spectral_radius" in self.model_fields_set and self.integrator != "generalized-alpha":
+            raise ValueError(
+                'expected the key "spectral_radius" only with integrator = "generalized-alpha", found integrator ='
+                f' "{self.integrator}"'
+            )
+        if self.shape is not None and self.kind != "fcid":
+            raise ValueError(f'expected the key "shape" only in kind = "fcid", found kind = "{self.kind}"')
+        if self.shape is None and self.kind == "fcid":
+            raise ValueError('expected the key "shape" in kind = "fcid", found none')
+        if self.modal is not None and self.shape != "given":
+            raise ValueError(f'expected the key "modal" only in shape = "given", found shape = "{self.shape}"')
+        if self.modal is None and self.shape == "given":
+            raise ValueError('expected the key "modal" in shape = "given", found none')
+        if self.limits and self.apply not in ("joints", "joints+pzt"):
+            raise ValueError(
+                f'expected limits = true only beside apply = "joints" or "joints+pzt", found apply = "{self.apply}"'
+            )
+        return self
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Output times (T,), in s: exact multiples of the output step, ending exactly at `end`."""
+        if not (self.end and self.output_step):
+            return np.zeros(1)
+        times = np.arange(round(self.end / self.output_step) + 1) * self.output_step
+        times[-1] = self.end
+        return times
+
+
+def check_steps(end: float, step: float) -> None:
+    """Raise `ValueError` unless the outputs 0, step, 2 step, … end exactly at `end`."""
+    ratio = end / step
+    if ratio > MAX_OUTPUTS:
+        raise ValueError(f"expected at most {MAX_OUTPUTS} outputs, found output_step = {step:g} up to end = {end:g}")
+    count = round(ratio)
+    # 0.1/0.001 is not whole in binary; anything beyond rounding is meant otherwise.
+    if count < 1 or abs(ratio - count) > 1e-9 * ratio:
+        near = end / max(1, count)
+        raise ValueError(
+            f"expected an output_step that divides end = {end:g} into equal steps, found {step:g} (such as {near:.9g})"
+        )

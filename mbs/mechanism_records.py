@@ -1,0 +1,175 @@
+"""Bodies, joints, trajectories and loads of a scene file, key by key. SI units; angles in rad; planar (x, y)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from ..validation import InputFile, Record, quoted
+from ._core import TimeFunction
+from .record_types import (
+    GROUND,
+    Expression,
+    Name,
+    PointReference,
+    Positive,
+    Side,
+    Vector2,
+    WaypointTable,
+    one_of,
+    only,
+    present,
+    split_point,
+)
+
+
+class RigidBody(Record):
+    """Mass (kg), moment of inertia about the center (kg·m²), center and named points (m) in the body frame."""
+
+    mass: Positive
+    inertia: float
+    center: Vector2
+    points: dict[Name, Vector2] = Field(default_factory=dict)
+
+    @field_validator("inertia")
+    @classmethod
+    def _inertia_is_positive(cls, inertia: float) -> float:
+        if not inertia > 0.0:
+            raise ValueError(
+                f"expected a moment of inertia greater than 0, found {inertia:g}: without it the body's rotation has no"
+                " equation of motion (a point mass is a [[payload]])"
+            )
+        return inertia
+
+
+class Body(Record):
+    """A link file (stage 1 runs when needed), a modal body file, or a rigid body."""
+
+    name: Name
+    link: InputFile | None = None
+    modal: InputFile | None = None
+    rigid: RigidBody | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Body:
+        one_of(self, ("link", "modal", "rigid"))
+        return self
+
+
+class Joint(Record):
+    """A joint between two points, or a point and the ground.
+
+    `at` (m) is where it sits on the ground; `axis` the direction of a prismatic joint in the frame of the first body;
+    `motor` None leaves it to the default: driven in open chains. Limits of the motor: N·m, rad/s, W (N, m/s where
+    prismatic).
+    """
+
+    name: Name
+    type: Literal["revolute", "prismatic", "weld"]
+    between: tuple[Side, Side]
+    at: Vector2 = (0.0, 0.0)
+    axis: Vector2 | None = None
+    motor: bool | None = None
+    moment_limit: Positive | None = None
+    speed_limit: Positive | None = None
+    power_limit: Positive | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Joint:
+        points = [side for side in self.between if side != GROUND]
+        if not points:
+            raise ValueError('expected at most one "ground" in between, found two')
+        bodies = [split_point(point)[0] for point in points]
+        if len(points) == 2 and bodies[0] == bodies[1]:
+            raise ValueError(f'expected two bodies in between, found "{bodies[0]}" twice')
+        if len(points) == 2 and "at" in self.model_fields_set:
+            raise ValueError('expected the key "at" only in joints to "ground", found it between two bodies')
+        if self.type == "prismatic" and (self.axis is None or not any(self.axis)):
+            raise ValueError(
+                "expected an axis that is not zero in a prismatic joint, found "
+                + ("none" if self.axis is None else f"{list(self.axis)}")
+            )
+        if self.type != "prismatic" and self.axis is not None:
+            raise ValueError(f'expected the key "axis" only in prismatic joints, found it in a {self.type} joint')
+        if self.type == "weld" and self.motor:
+            raise ValueError("expected no motor in a weld, which cannot move, found motor = true")
+        return self
+
+
+class Payload(Record):
+    """A mass (kg) on a point, with its moment of inertia about that point (kg·m²)."""
+
+    point: PointReference
+    mass: Positive
+    inertia: Annotated[float, Field(ge=0.0)] = 0.0
+
+
+class Trajectory(Record):
+    """Motion that is specified (C_s): of a point (m, global axes), a joint coordinate, or an angle (rad).
+
+    `angle` is a body (its frame) or BODY.POINT (the section there).
+    """
+
+    name: Name
+    point: PointReference | None = None
+    joint: str | None = None
+    angle: str | None = None
+    x: Expression | None = None
+    y: Expression | None = None
+    value: Expression | None = None
+    waypoints: WaypointTable | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Trajectory:
+        subject = one_of(self, ("point", "joint", "angle"))
+        allowed = ("x", "y") if subject == "point" else ("value",)
+        found = only(self, subject, (*allowed, "waypoints"), ("x", "y", "value", "waypoints"))
+        if self.waypoints is None:
+            return self
+        if len(found) > 1:
+            raise ValueError(f"expected either waypoints or expressions, found {quoted(found)}")
+        if not set(self.components) <= set(allowed):
+            columns = ",".join(("t", *self.components))
+            raise ValueError(f'expected waypoints with the header t,{",".join(allowed)}, found "{columns}"')
+        return self
+
+    @property
+    def components(self) -> dict[str, TimeFunction]:
+        """The specified functions of time by component: "x" and/or "y", or "value"."""
+        if self.waypoints is not None:
+            return self.waypoints.components
+        return present(x=self.x, y=self.y, value=self.value)
+
+
+class Load(Record):
+    """A given load: force (N, global axes) and moment (N·m) at a point, moment of a joint, or voltages (V)."""
+
+    point: PointReference | None = None
+    joint: str | None = None
+    pzt: str | None = None
+    x: Expression | None = None
+    y: Expression | None = None
+    moment: Expression | None = None
+    voltage: tuple[Expression, ...] | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Load:
+        subject = one_of(self, ("point", "joint", "pzt"))
+        allowed = {"point": ("x", "y", "moment"), "joint": ("moment",), "pzt": ("voltage",)}[subject]
+        only(self, subject, allowed, ("x", "y", "moment", "voltage"))
+        return self
+
+    @property
+    def components(self) -> dict[str, TimeFunction]:
+        """The given functions of time by component: "x", "y", "moment", or "voltage[k]"."""
+        voltages = {f"voltage[{k}]": function for k, function in enumerate(self.voltage or ())}
+        return present(x=self.x, y=self.y, moment=self.moment) | voltages
+
+
+class Initial(Record):
+    """State at t = 0; `angles` (rad) and `rates` (rad/s) of body frames are guesses that the constraints correct."""
+
+    state: Literal["undeformed", "static"] = "undeformed"
+    angles: dict[str, float] = Field(default_factory=dict)
+    rates: dict[str, float] = Field(default_factory=dict)
