@@ -18,9 +18,8 @@ class DrawnMode(NamedTuple):
     size: Floats
 
 
-def drawn_mode(mesh: PictureMesh, mode: int, length: float) -> DrawnMode:
-    """Mode `mode` (from 0) scaled to the same largest displacement as every other; zero where no point moves."""
-    shape = mesh.mode_shapes[:, :, mode]
+def drawn_mode(shape: Floats, length: float) -> DrawnMode:
+    """A mode (p, 3) of a body of `length` scaled to the same largest displacement as every other; zero stays zero."""
     size = np.linalg.norm(shape, axis=1)
     largest = float(size.max()) or 1.0
     return DrawnMode(AMPLITUDE * length / largest * shape, size / largest)

@@ -5,13 +5,10 @@ from __future__ import annotations
 from io import BytesIO
 from pathlib import Path
 
-import h5py
 from matplotlib.figure import Figure
 
-from ..errors import InputError
-from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
-from ..fe_models.modal_body_file import read_modal_body
-from ..files import write_atomically
+from ..fe_models.modal_body_file import is_modal_body_file, read_modal_body
+from ..files import check_folder, write_atomically
 from ..results_file import Results
 from .body_shape import draw_mesh, draw_modes
 from .configurations import draw_configurations
@@ -29,12 +26,7 @@ METADATA = {"png": {"Software": None}, "pdf": {"CreationDate": None, "Producer":
 
 def plot_file(path: Path, folder: Path) -> list[Path]:
     """Draw the figures of a results file or of a modal body file, whichever it is, into `folder`: see the two."""
-    try:
-        with h5py.File(path, "r") as file:
-            is_body = file.attrs.get("format") == MODAL_FORMAT
-    except OSError:
-        is_body = False
-    return plot_modal_body(path, folder) if is_body else plot_results(path, folder)
+    return plot_modal_body(path, folder) if is_modal_body_file(path) else plot_results(path, folder)
 
 
 def plot_modal_body(path: Path, folder: Path) -> list[Path]:
@@ -42,7 +34,7 @@ def plot_modal_body(path: Path, folder: Path) -> list[Path]:
 
     Returns the files written, a PNG and a PDF of each. Raises `InputError` where the file cannot be read.
     """
-    _check_folder(folder)
+    check_folder(folder)
     body = read_modal_body(path)
     with style():
         return [
@@ -58,7 +50,7 @@ def plot_results(results_path: Path, folder: Path) -> list[Path]:
     Returns the files written, a PNG and a PDF of each figure. Raises `InputError` where the results or `figures.toml`
     cannot be read, or name what is not there.
     """
-    _check_folder(folder)
+    check_folder(folder)
     figure_file = results_path.parent / "figures.toml"
     written: list[Path] = []
     with Results(results_path) as results, style():
@@ -77,11 +69,6 @@ def draw(record: FigureRecord, results: Results) -> Figure:
     if record.y_range is not None:
         axes.set_ylim(*record.y_range)
     return picture
-
-
-def _check_folder(folder: Path) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: output: expected a folder, found a file")
 
 
 def _write(picture: Figure, folder: Path, name: str) -> list[Path]:

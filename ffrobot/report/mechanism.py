@@ -1,4 +1,4 @@
-"""The mechanism in motion: what the page needs to draw every body at any output, as deformed as asked for (`motion`)."""
+"""The mechanism in motion: what the page needs to draw every body at any output, as deformed as asked."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 from ..errors import InputError
 from ..figures.palette import COLORS
 from ..motion import GROUND, BodyMotion, Indices, body_motion, hanging, ordered_bodies, visible_exaggeration
+from ..outline import Outline, body_outline, points_outline
 from .charts import encoded, plain
-from .outline import Outline, body_outline, points_outline
 from .runs import Run, Target, targets
 
 MAX_FRAMES = 2000
