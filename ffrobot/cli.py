@@ -110,11 +110,15 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
 @cli.command()
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
-def plot(file: Path, output: Path | None) -> None:
-    """Draw the figures of a results file, or mesh and modes of a modal body file, as PNG and PDF."""
+@click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several [png,pdf].")
+def plot(file: Path, output: Path | None, formats: str) -> None:
+    """Draw the figures of a results file, or mesh and modes of a modal body file.
+
+    Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn.
+    """
     from .figures.plot import plot_file
 
-    for path in plot_file(file, output or file.with_suffix(".figures")):
+    for path in plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(",")):
         click.echo(path)
 
 
