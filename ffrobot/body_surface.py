@@ -59,4 +59,5 @@ def _tube(rings: int, q: int) -> Integers:
     after = (corner + 1) % q
     sides = np.stack([ring + corner, ring + after, ring + q + after, ring + q + corner], axis=2).reshape(-1, 4)
     fan = np.array([[0, j, j + 1, j + 2] for j in range(1, q - 1, 2)])
-    return np.concatenate([fan[:, ::-1], sides, (rings - 1) * q + fan]).astype(np.int64)
+    cells: Integers = np.concatenate([fan[:, ::-1], sides, (rings - 1) * q + fan]).astype(np.int64)
+    return cells
