@@ -12,6 +12,7 @@ from types import FrameType
 import click
 
 from .errors import FfrobotError
+from .logs import LOGGER, logging_options
 from .parallel import end_all, is_first, on_first
 
 FILE = click.Path(path_type=Path)
@@ -33,6 +34,7 @@ def cli() -> None:
 @click.argument("link_file", metavar="LINK.toml", type=FILE)
 @click.option("-o", "--output", metavar="BODY.h5", type=FILE, help="Where to write [LINK.h5 beside the input].")
 @click.option("--force", is_flag=True, help="Compute even if the file is up to date.")
+@logging_options
 def link(link_file: Path, output: Path | None, force: bool) -> None:
     """Compute the modal body file of one link (stage 1).
 
@@ -62,6 +64,7 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     type=FILE,
     help="Where to write [SCENE.results.h5 beside the input].",
 )
+@logging_options
 def solve(scene_file: Path, output: Path | None) -> None:
     """Run the analyses of a scene (stage 2).
 
@@ -142,6 +145,7 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 @click.option("--retry", is_flag=True, help="Run again what failed before.")
 @click.option("--keep/--no-keep", default=True, show_default=True, help="Whether results files of the runs stay.")
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder of the sweep [SCENE.sweep beside the input].")
+@logging_options
 def sweep(
     scene_file: Path,
     vary: tuple[str, ...],
@@ -217,9 +221,11 @@ def main() -> None:
             click.echo("ffrobot: stopped", err=True)
             sys.exit(130)
         if not isinstance(error, FfrobotError):
+            LOGGER.error("failed", exc_info=True)
             traceback.print_exc()
             end_all()
             sys.exit(1)
         if is_first():
+            LOGGER.error("%s", error)
             click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)
