@@ -62,7 +62,9 @@ function drawModes() {
   };
   const shape = {
     type: "mesh3d", ...faces, ...modeShape(), colorscale: "Viridis", cmin: 0, cmax: 1, flatshading: true,
-    lighting: { ambient: 0.9, diffuse: 0.2, specular: 0 }, hoverinfo: "x+y+z",
+    // Small triangles are no degenerate ones: their normals count.
+    lighting: { ambient: 0.6, diffuse: 0.6, specular: 0.1, facenormalsepsilon: 0, vertexnormalsepsilon: 0 },
+    hoverinfo: "x+y+z",
     colorbar: { title: { text: "size" }, thickness: 12, len: 0.7 },
   };
   const layout = { margin: { l: 0, r: 0, t: 10, b: 0 }, font: { size: 11 }, scene: modeAxes(link) };
