@@ -134,7 +134,7 @@ def plot(file: Path, output: Path | None, formats: str) -> None:
 @click.option("--scale", metavar="S", type=float, help="Of deflections in the picture [as large as can be seen].")
 @click.option("--pictures/--no-pictures", default=None, help="PNG pictures too [where PyVista can draw].")
 def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN401 (the fields of Options)
-    """Write links and motions in space: VTKHDF files for ParaView (5.12 and later), pictures by PyVista.
+    """Write links and motions in space: VTKHDF and XDMF files for ParaView, pictures by PyVista.
 
     Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies.
     """

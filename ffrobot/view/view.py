@@ -19,6 +19,7 @@ from ..validation import did_you_mean
 from .grids import modes_grid, results_grid
 from .pictures import Picture, draw_pictures
 from .vtkhdf import Grid, vtkhdf_image
+from .xdmf import xdmf_text
 
 FRAMES = 201  # of an animation, unless asked for otherwise
 
@@ -51,7 +52,9 @@ class Viewed:
 
 
 def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewed:
-    """Write grids (.vtkhdf) and pictures (.png) of a modal body file or of a results file into `folder`.
+    """Write grids and pictures (.png) of a modal body file or of a results file into `folder`.
+
+    Grids are .vtkhdf files, each with an .xdmf for programs that cannot read those.
 
     Raises `InputError` where the file cannot be read or has no such analysis, `SolveError` where a file cannot be
     written, or pictures that are asked for cannot be drawn: grids are written all the same.
@@ -64,7 +67,9 @@ def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewe
     for name, grid, picture in views:
         paths.append(folder / f"{name}.vtkhdf")
         write_atomically(paths[-1], vtkhdf_image(grid), "grid", make_folder=True)
-        pictures.append(replace(picture, grid=str(paths[-1]), path=f"{name}.png"))
+        paths.append(folder / f"{name}.xdmf")
+        write_atomically(paths[-1], xdmf_text(grid, paths[-2].name), "index of the grid")
+        pictures.append(replace(picture, grid=str(paths[-2]), path=f"{name}.png"))
     if options.pictures is not False:
         try:
             paths += _draw(pictures, folder)

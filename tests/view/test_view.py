@@ -47,7 +47,7 @@ def two_link_grids(two_link, tmp_path_factory):
     folder = tmp_path_factory.mktemp("view")
     options = Options(analysis="joints_only", frames=5, pictures=False)
     viewed = view_file(two_link.folder / "scene.results.h5", folder, options)
-    assert viewed.paths == [folder / "joints_only.vtkhdf"]
+    assert viewed.paths == [folder / "joints_only.vtkhdf", folder / "joints_only.xdmf"]
     return viewed.paths[0]
 
 
@@ -95,7 +95,7 @@ def test_exaggeration_keeps_joints_shut(read, two_link, two_link_grids):
 
 def test_solid_deforms_with_its_modes_and_carries_its_stress(read, solid_arm, tmp_path):
     path = solid_arm / "scene.results.h5"
-    (grid,) = view_file(path, tmp_path, GRIDS).paths
+    grid, _ = view_file(path, tmp_path, GRIDS).paths
     with Results(path) as results:
         body, p = results.modal_body("arm"), results["inverse/bodies/arm/modal"]
         R, theta = results["inverse/bodies/arm/position"], results["inverse/bodies/arm/angle"]
@@ -112,12 +112,38 @@ def test_solid_deforms_with_its_modes_and_carries_its_stress(read, solid_arm, tm
 
 def test_closed_loop_with_rigid_bodies(read, slider_crank, tmp_path):
     """Crank and slider have no surface: a line, and a point that is where the slider is."""
-    grid, _ = view_file(slider_crank.folder / "scene.results.h5", tmp_path, GRIDS).paths
+    grid, *_ = view_file(slider_crank.folder / "scene.results.h5", tmp_path, GRIDS).paths
     time, data, points, _, cells = read(grid)[-1]
     kinds = [data.GetCellType(i) for i in range(data.GetNumberOfCells())]
     assert {kind for kind, body in zip(kinds, cells["body"], strict=True) if body == 1} == {9}  # quadrilaterals
     assert kinds[-1] == 1  # a vertex
     np.testing.assert_allclose(points[-1, 0], 0.35 - 0.12 * np.sin(100 * time), rtol=0, atol=1e-6)  # scene.toml
+
+
+def corners(grid):
+    cells = [grid.GetCell(i) for i in range(grid.GetNumberOfCells())]
+    return [[cell.GetPointId(c) for c in range(cell.GetNumberOfPoints())] for cell in cells]
+
+
+def test_xdmf_says_the_same(read, slider_crank, tmp_path):
+    """Read by VTK's reader of XDMF 2, as in ParaView before 5.12: lines, quadrilaterals and a point, at every step."""
+    xdmf = pytest.importorskip("vtkmodules.vtkIOXdmf2")
+    numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
+    options = Options(analysis="inverse", frames=3, pictures=False)
+    grid, index = view_file(slider_crank.folder / "scene.results.h5", tmp_path, options).paths
+    reader = xdmf.vtkXdmfReader()
+    reader.SetFileName(str(index))
+    reader.UpdateInformation()
+    for time, expected, points, data, cells in read(grid):
+        reader.UpdateTimeStep(time)
+        found = reader.GetOutputDataObject(0)
+        kinds = [[g.GetCellType(i) for i in range(g.GetNumberOfCells())] for g in (found, expected)]
+        assert [{2: 1, 4: 3}.get(kind, kind) for kind in kinds[0]] == kinds[1]  # XDMF has points and lines as "poly"
+        np.testing.assert_array_equal(numpy_support.vtk_to_numpy(found.GetPoints().GetData()), points)
+        moved = numpy_support.vtk_to_numpy(found.GetPointData().GetArray("exaggeration"))
+        np.testing.assert_array_equal(moved, data["exaggeration"])
+        np.testing.assert_array_equal(numpy_support.vtk_to_numpy(found.GetCellData().GetArray("body")), cells["body"])
+        assert corners(found) == corners(expected)
 
 
 def test_modal_body_has_its_modes_as_vectors(read, solid_arm, tmp_path):
@@ -146,8 +172,8 @@ def test_body_without_its_file_is_drawn_through_its_points(read, two_link, tmp_p
 
 
 def test_same_results_give_the_same_file(solid_arm, tmp_path):
-    first, second = (view_file(solid_arm / "scene.results.h5", tmp_path / name, GRIDS).paths[0] for name in "ab")
-    assert first.read_bytes() == second.read_bytes()
+    first, second = (view_file(solid_arm / "scene.results.h5", tmp_path / name, GRIDS).paths for name in "ab")
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +189,9 @@ def test_picture_shows_the_arm_exaggerated(solid_arm, tmp_path, capsys):
     """In colour as exaggerated, in grey outline as it was: 1 mm of 400 mm, 60 times, is far to be seen at the tip."""
     arguments = ["view", solid_arm / "scene.results.h5", "-o", tmp_path, "--scale", 60, "--pictures"]
     cli([str(argument) for argument in arguments], standalone_mode=False)
-    assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in ("inverse.vtkhdf", "inverse.png")]
+    assert capsys.readouterr().out.split() == [
+        str(tmp_path / name) for name in ("inverse.vtkhdf", "inverse.xdmf", "inverse.png")
+    ]
     image = np.asarray(Image.open(tmp_path / "inverse.png").convert("RGB"), dtype=int)[30:700, 200:]
     spread = np.ptp(image, axis=2)
     colored, grey = spread > 40, (spread < 10) & (image[..., 0] > 80) & (image[..., 0] < 220)
@@ -182,11 +210,11 @@ def test_machine_without_opengl_gets_grids_and_a_clear_message(solid_arm, tmp_pa
         pytest.skip("OSMesa is installed here")
     path = solid_arm / "scene.results.h5"
     viewed = view_file(path, tmp_path / "a")
-    assert [p.name for p in viewed.paths] == ["inverse.vtkhdf"]
+    assert [p.name for p in viewed.paths] == ["inverse.vtkhdf", "inverse.xdmf"]
     assert "expected OpenGL through EGL" in viewed.notes[0]
     with pytest.raises(SolveError, match="PyVista cannot draw on this machine"):
         view_file(path, tmp_path / "b", Options(pictures=True))
-    assert [p.name for p in (tmp_path / "b").iterdir()] == ["inverse.vtkhdf"]
+    assert {p.name for p in (tmp_path / "b").iterdir()} == {"inverse.vtkhdf", "inverse.xdmf"}
 
 
 def test_what_is_refused(solid_arm, tmp_path):
