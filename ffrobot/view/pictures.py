@@ -135,7 +135,7 @@ def _read(path: str, step: int) -> Any:  # noqa: ANN401
 
 def _add(plotter: Any, grid: Any, scalars: str, bar: dict[str, Any] | None) -> None:  # noqa: ANN401
     plotter.add_mesh(
-        grid, scalars=scalars, cmap=COLORS, clim=[0.0, float(grid[scalars].max()) or 1.0], line_width=10, point_size=30,
+        grid, scalars=scalars, cmap=COLORS, clim=[0.0, float(grid[scalars].max()) or 1.0], line_width=10, point_size=60,
         render_points_as_spheres=True, show_scalar_bar=bar is not None, scalar_bar_args=bar,
     )  # fmt: skip
 
