@@ -237,6 +237,7 @@ def main() -> None:
         stopped = True
         signal.default_int_handler(number, frame)
 
+    LOGGER.propagate = False  # libraries give the root logger handlers of their own
     signal.signal(signal.SIGINT, stop)
     try:
         cli(standalone_mode=False)
