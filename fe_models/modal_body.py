@@ -225,9 +225,8 @@ class ModalBody:
 def _through(stations: Stations, members: Integers, x: float) -> Interface:
     """The polynomial through the stations `members`, at x (Lagrange)."""
     nodes = stations.position[members, 0]
-    weights = np.array(
-        [np.prod((x - np.delete(nodes, i)) / (node - np.delete(nodes, i))) for i, node in enumerate(nodes)]
-    )
+    others = ~np.eye(len(nodes), dtype=bool)
+    weights = np.prod((x - nodes) / (nodes[:, None] - nodes + ~others), axis=1, where=others)
     return Interface(
         weights @ stations.position[members],
         np.einsum("i,ikn->kn", weights, stations.translation[members]),

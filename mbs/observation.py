@@ -17,7 +17,7 @@ from .rows import End
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """Motion of a body's frame and modes, one row per output; p in the coordinates of the modal body file."""
+    """Motion of a body's frame and modes, one row per output; p as `stored_coordinates` says."""
 
     position: Array  # (T, 2) R, m
     angle: Array  # (T,) θ, rad
@@ -47,8 +47,22 @@ class JointForces:
 def body_motion(outcome: Outcome, body: PlanarBody) -> BodyMotion:
     """Motion of `body` in an analysis."""
     columns = outcome.coordinates(body.name)
-    q, v, T = outcome.q[:, columns], outcome.v[:, columns], body.modal_transform
+    q, v = outcome.q[:, columns], outcome.v[:, columns]
+    T = body.modal_transform if stored_coordinates(body) is None else np.eye(body.n_modes)
     return BodyMotion(q[:, :2], q[:, 2], q[:, 3:] @ T.T, v[:, 3:] @ T.T, v[:, :2], v[:, 2])
+
+
+def stored_coordinates(body: PlanarBody) -> Array | None:
+    """What results give of p: where the equations have fewer coordinates than the modal body file has modes, these
+    coordinates, and this matrix (n_file, n) makes p of the file of them; None where they give p of the file itself.
+    """
+    n_file, n = body.modal_transform.shape
+    return body.modal_transform if n < n_file else None
+
+
+def modes_of_file(outcome: Outcome, body: PlanarBody) -> Array:
+    """p (T, n_file) in the modes of the modal body file."""
+    return np.asarray(outcome.q[:, outcome.coordinates(body.name)][:, 3:] @ body.modal_transform.T)
 
 
 def point_motion(outcome: Outcome, reference: str) -> PointMotion:

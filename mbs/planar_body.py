@@ -55,11 +55,30 @@ class PlanarBody:
     modal_transform: Array
     length: float | None
     stiffening: GeometricStiffening | None = None  # left out of the equations where None
+    reduction: Reduction | None = None  # where it has fewer modes than move in the plane
 
     @property
     def n_modes(self) -> int:
         """Number n of modal coordinates in the equations."""
         return len(self.stiffness)
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """How a body came by fewer modes: see `fewer_modes.with_fewer_modes`.
+
+    Attributes:
+        whole: the body with all n modes that move in the plane.
+        lowest: how many of these it kept; the other coordinates stand for the rest.
+        T: (n, m) coordinates of `whole` from the m that it has, TᵀT = 1.
+        lift: (n, m) modal forces on all modes from those on the m coordinates, Tᵀ lift = 1: exact for forces that come
+            from loads at the loaded points.
+    """
+
+    whole: PlanarBody
+    lowest: int
+    T: Array
+    lift: Array
 
 
 def from_modal_body(name: str, body: ModalBody) -> PlanarBody:
@@ -171,7 +190,11 @@ def _diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:
         return body
     L_inverse = np.linalg.inv(np.linalg.cholesky(m_ff))
     stiffness, vectors = np.linalg.eigh(L_inverse @ K_ff @ L_inverse.T)
-    T = L_inverse.T @ vectors
+    return transformed(body, L_inverse.T @ vectors, stiffness)
+
+
+def transformed(body: PlanarBody, T: Array, stiffness: Array) -> PlanarBody:
+    """The body in coordinates p' with p = T p', T (n, m), in which m_ff is the identity and K_ff diag(stiffness)."""
     return replace(
         body,
         stiffness=stiffness,

@@ -106,7 +106,7 @@ def _motion(run: Run, name: str, frames: Indices, notes: list[str]) -> BodyMotio
     outline = points_outline(names, at, deflection)
     if name in results.modal_files:
         try:
-            outline = body_outline(results.modal_body(name), results[f"{group}/modal"][frames])
+            outline = body_outline(results.modal_body(name), results.modal(run.analysis, name)[frames])
         except InputError as error:
             notes.append(f"{name} is drawn through its points only: {error}")
     return BodyMotion(name, position, angle, outline, tuple(labels), at, deflection)
