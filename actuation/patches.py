@@ -36,8 +36,8 @@ class PatchArray:
         limit: (k,) largest voltages, V; infinite where the scene gives none.
         W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
         frequency: (n,) of the modes, Hz.
-        whole: the same patches on the body with all its modes, where the `PlanarBody` has fewer and they reach all.
-        lift: (n_whole, n) its modal forces from those of the `PlanarBody`; None like `whole`.
+        of_all_modes: where the `PlanarBody` has fewer than move in the plane, and the patches reach all: the same patches
+            on all modes, and (n_all, n) the modal forces on these from those on the `PlanarBody`.
     """
 
     layout: PztLayout
@@ -49,8 +49,7 @@ class PatchArray:
     limit: Array
     W_sqrt: Array
     frequency: Array
-    whole: PatchArray | None = None
-    lift: Array | None = None
+    of_all_modes: tuple[PatchArray, Array] | None = None
 
     @property
     def body(self) -> str:
@@ -133,8 +132,7 @@ def _on_fewer_modes(whole: PatchArray, planar: PlanarBody) -> PatchArray:
         Phi_V=T.T @ whole.Phi_V,
         W_sqrt=whole.W_sqrt @ lift,
         frequency=np.sqrt(planar.stiffness) / (2 * np.pi),
-        whole=whole if reaches_all else None,
-        lift=lift if reaches_all else None,
+        of_all_modes=(whole, lift) if reaches_all else None,
     )
 
 

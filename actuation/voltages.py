@@ -50,8 +50,9 @@ def voltage_gain(patches: PatchArray) -> Array:
 
     Of many that do, the smallest relative to `voltage_scale`; where modes are left out, those that serve them too.
     """
-    if patches.whole is not None:
-        return np.asarray(voltage_gain(patches.whole) @ patches.lift)
+    if patches.of_all_modes is not None:
+        on_all, lift = patches.of_all_modes
+        return np.asarray(voltage_gain(on_all) @ lift)
     n, k = patches.Phi_V.shape
     if k == n and not patches.unreached_modes.size:
         return np.linalg.inv(patches.Phi_V)

@@ -17,11 +17,13 @@ from ..errors import InputError
 from ..mesh.interval import graded_nodes, interval_mesh, with_points
 from .beam import R_X, U_X, FamilyModel, family_model
 from .beam_stress import beam_stresses
+from .damping import damping_ratio
 from .eigen import lowest_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
-from .link_records import FAMILIES, BeamLink, Family, Link
+from .link_records import FAMILIES, BeamLink, Family
 from .lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
+from .stages import modes_hash
 
 # Elements are not cut closer to their ends than this fraction of their length.
 SLIVER = 0.01
@@ -84,6 +86,7 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         stress=beam_stresses(link, kept, omega**2, attached),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         input_hash=input_hash,
+        modes_hash=modes_hash(link),
         ffrobot_version=__version__,
     )
 
@@ -197,11 +200,3 @@ def _heights(link: BeamLink, x: Floats) -> Floats:
     """(k,) height of the section from each station on; at the tip, of the last section."""
     heights = np.array([section.height for section in link.sections])
     return heights[np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")]
-
-
-def damping_ratio(link: Link, omega: Floats) -> Floats:
-    """(n,) ζ as given, or of Rayleigh damping D = aM + bK: ζ = a/(2ω) + bω/2."""
-    if link.damping.rayleigh is not None:
-        a, b = link.damping.rayleigh
-        return a / (2 * omega) + b * omega / 2
-    return np.broadcast_to(np.asarray(link.damping.ratio or 0.0, dtype=np.float64), omega.shape).copy()

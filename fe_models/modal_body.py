@@ -152,6 +152,7 @@ class ModalBody:
         surface_stress: (p, 6, n) stress at the points of `mesh`, as in `StressPoint`; None where not asked for.
         surface_patches: modal forces of patches outlined in the mesh; None where there are none.
         input_hash: of the link file's content.
+        modes_hash: of that part of it on which the modes depend; empty where not known.
         ffrobot_version: that made it.
 
     Raises:
@@ -181,6 +182,7 @@ class ModalBody:
     surface_stress: Floats | None = None
     surface_patches: OutlinedPatches | None = None
     input_hash: str = ""
+    modes_hash: str = ""
     ffrobot_version: str = ""
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""`modes = "auto"`: how many modes of the links a scene needs for its tolerance, found by solving it with more and more.
+"""`modes = "auto"`: how many modes of the links a scene needs for its tolerance; it is solved with more and more.
 
 The first solves are cheap: few modes leave out the high frequencies, which hold the steps down.
 """

@@ -130,7 +130,7 @@ class Results:
         raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with, found {found}')
 
     def modal(self, analysis: str, body: str) -> Array:
-        """p (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""
+        """P (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""
         group = f"{analysis}/bodies/{body}"
         p, transform = self[f"{group}/modal"], f"{group}/modal_transform"
         return p @ self[transform].T if self.has(transform) else p

@@ -35,6 +35,7 @@ from .mbs.scene_records import Scene
 from .mbs.steering import Equipment
 from .mbs.stress import BodyStress, body_stress
 from .mode_choice import ErrorEstimate, ModeChoice, levels, reported
+from .skipped import skipped as skipped_lines
 from .validation import did_you_mean, quoted
 
 Array = NDArray[np.float64]
@@ -59,6 +60,7 @@ class LoadedBody:
     modal: ModalBody | None
     path: Path | None
     computed: bool = False
+    reused: str = ""
 
     @property
     def file_hash(self) -> str:
@@ -142,7 +144,9 @@ def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Inter
             break
         k = len(every) - 1 if completed and estimate.is_hopeless(tolerances, more - 1) else k + 1
     errors = estimate.errors if more else {name: dict.fromkeys(of, 0.0) for name, of in estimate.errors.items()}
-    highest = [max(float(np.sqrt(b.stiffness.max(initial=0.0))) for b in level.values()) for level in (every[k], every[-1])]
+    highest = [
+        max(float(np.sqrt(b.stiffness.max(initial=0.0))) for b in level.values()) for level in (every[k], every[-1])
+    ]
     choice = ModeChoice(errors, estimate.differences, tried, last - began, (highest[0], highest[1]))
     return replace(solution, mode_choice=choice)
 
@@ -239,7 +243,7 @@ def _assembled(
     }
     planar = [body.planar if stiffened else replace(body.planar, stiffening=None) for body in bodies.values()]
     model = build_model(scene, planar, _voltage_loads(scene, patches))
-    skipped = tuple(_skipped(scene, bodies))
+    skipped = tuple(skipped_lines(scene, bodies))
     return Solution(
         scene, model, bodies, patches, points, structure, seconds=seconds, skipped=skipped, stiffened=stiffened
     )
@@ -322,7 +326,7 @@ def _load_bodies(scene: Scene, watcher: Watcher) -> list[LoadedBody]:
             assert body.link is not None
             outcome = cached_modal_body(body.link, watcher.stage)
             planar = from_modal_body(body.name, outcome.body)
-            loaded.append(LoadedBody(planar, outcome.body, outcome.path, outcome.computed))
+            loaded.append(LoadedBody(planar, outcome.body, outcome.path, outcome.computed, outcome.reused))
     return [_with_payloads(scene, body) for body in loaded]
 
 
@@ -338,7 +342,7 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
                 f' "{payload.point}"{did_you_mean(point, planar.points)}'
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
-    return LoadedBody(planar, body.modal, body.path, body.computed)
+    return replace(body, planar=planar)
 
 
 def _add_patches(scene: Scene, bodies: dict[str, LoadedBody]) -> dict[str, StructureEffect]:
@@ -370,16 +374,3 @@ def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> list[Moda
         if load.pzt is not None
         for k, function in enumerate(load.components.values())
     ]
-
-
-def _skipped(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[str]:
-    lines = [f"{name}: stage 1, up to date" for name, b in bodies.items() if b.modal is not None and not b.computed]
-    for name, body in bodies.items():
-        if body.modal is None:
-            continue
-        idle = body.modal.mode_count - body.planar.n_modes
-        if idle:
-            lines.append(f"{name}: {idle} of {body.modal.mode_count} modes, which do not move in the plane")
-    if not any(np.any(body.planar.damping) for body in bodies.values()):
-        lines.append("damping, which is zero")
-    return lines

@@ -61,7 +61,9 @@ def _modes(solution: Solution, choice: ModeChoice) -> str:
             found = ", ".join(f"{kind} {error:.0e}" for kind, error in errors.items() if error)
             lines.append(f"{name}: error of leaving out the others, estimated: {found}")
         else:
-            lines.append(f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}")
+            lines.append(
+                f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
+            )
     tried = ", ".join(map(str, choice.tried))
     lines.append(
         f"solved with {tried} modal coordinates, {choice.seconds:.2f} s before the last; the highest frequency is"

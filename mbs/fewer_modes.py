@@ -21,8 +21,8 @@ DEPENDENT = 1e-8  # static shapes below this fraction of the first one, in energ
 def with_fewer_modes(body: PlanarBody, lowest: int, loaded: Sequence[str]) -> PlanarBody:
     """The body with its `lowest` modes and, for each load at a point of `loaded`, the static response of the others.
 
-    A unit load b (modal forces Bᵀ) bends the discarded modes d by Ω_d⁻² B_dᵀ. These shapes, made orthonormal in mass and
-    uncoupled, are further modes: the flexibility B K⁻¹ Bᵀ stays exact. The same body comes back where nothing is saved.
+    A unit load (modal forces Bᵀ) bends the discarded modes d by Ω_d⁻² B_dᵀ. These shapes, made orthonormal in mass and
+    uncoupled, are further modes: the flexibility B K⁻¹ Bᵀ stays exact. The body comes back where nothing is saved.
     """
     B_T = interface_loads(body, loaded)
     static, squares = _static_modes(body.stiffness[lowest:], B_T[lowest:])
@@ -62,7 +62,7 @@ def interface_loads(body: PlanarBody, loaded: Sequence[str]) -> Array:
 
 
 def _static_modes(squares: Array, B_T: Array) -> tuple[Array, Array]:
-    """(n_d, r) combinations of modes of stiffness `squares` that carry the loads, mass-orthonormal; their ω², ascending."""
+    """(n_d, r) mass-orthonormal combinations of modes of stiffness `squares` that carry the loads, and their ω²."""
     omega = np.sqrt(squares)[:, None]
     left, sizes, _ = np.linalg.svd(B_T / omega, full_matrices=False)
     V = left[:, sizes > DEPENDENT * sizes.max(initial=0.0)] / omega  # orthonormal in energy

@@ -53,15 +53,16 @@ def body_motion(outcome: Outcome, body: PlanarBody) -> BodyMotion:
 
 
 def stored_coordinates(body: PlanarBody) -> Array | None:
-    """What results give of p: where the equations have fewer coordinates than the modal body file has modes, these
-    coordinates, and this matrix (n_file, n) makes p of the file of them; None where they give p of the file itself.
+    """What makes p of the modal body file (n_file, n) of the coordinates that results give; None where they give p.
+
+    They give the coordinates of the equations where these are fewer than the modes of the file.
     """
     n_file, n = body.modal_transform.shape
     return body.modal_transform if n < n_file else None
 
 
 def modes_of_file(outcome: Outcome, body: PlanarBody) -> Array:
-    """p (T, n_file) in the modes of the modal body file."""
+    """P (T, n_file) in the modes of the modal body file."""
     return np.asarray(outcome.q[:, outcome.coordinates(body.name)][:, 3:] @ body.modal_transform.T)
 
 
