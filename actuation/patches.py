@@ -36,7 +36,7 @@ class PatchArray:
         limit: (k,) largest voltages, V; infinite where the scene gives none.
         W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
         frequency: (n,) of the modes, Hz.
-        of_all_modes: where the `PlanarBody` has fewer than move in the plane, and the patches reach all: the same patches
+        of_all_modes: where the `PlanarBody` has not all modes, but the patches reach all: the same patches
             on all modes, and (n_all, n) the modal forces on these from those on the `PlanarBody`.
     """
 

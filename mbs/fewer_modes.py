@@ -15,6 +15,7 @@ from .planar_body import Array, PlanarBody, Reduction, transformed
 from .record_types import GROUND, split_point
 from .scene_records import SceneKeys
 
+IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is rounding
 DEPENDENT = 1e-8  # static shapes below this fraction of the first one, in energy, say nothing new
 
 
@@ -24,6 +25,8 @@ def with_fewer_modes(body: PlanarBody, lowest: int, loaded: Sequence[str]) -> Pl
     A unit load (modal forces Bᵀ) bends the discarded modes d by Ω_d⁻² B_dᵀ. These shapes, made orthonormal in mass and
     uncoupled, are further modes: the flexibility B K⁻¹ Bᵀ stays exact. The body comes back where nothing is saved.
     """
+    if lowest >= body.n_modes:
+        return body
     B_T = interface_loads(body, loaded)
     static, squares = _static_modes(body.stiffness[lowest:], B_T[lowest:])
     if lowest + len(squares) >= body.n_modes:
@@ -53,12 +56,18 @@ def loaded_points(scene: SceneKeys, body: str) -> list[str]:
 
 
 def interface_loads(body: PlanarBody, loaded: Sequence[str]) -> Array:
-    """Bᵀ (n, 3 points): modal forces of forces along x and y and a moment at each point, each of size 1 or 0."""
+    """Bᵀ (n, loads): modal forces of forces along x and y and a moment at each point, scaled to size 1.
+
+    Left out are loads under which nothing moves: forces on a support, along a link without axial modes.
+    """
     rows = [np.zeros((0, body.n_modes))]
-    rows += [np.vstack([at.translation, at.rotation]) for label, at in body.points.items() if label in loaded]
+    for label, at in body.points.items():
+        if label in loaded:
+            rows.append(np.sqrt(body.mass) * np.vstack([at.translation, (body.length or 1.0) * at.rotation]))
     B = np.vstack(rows)
     size = np.linalg.norm(B, axis=1)
-    return np.asarray((B[size > 0.0] / size[size > 0.0, None]).T)
+    moving = size > IMMOBILE
+    return np.asarray((B[moving] / size[moving, None]).T)
 
 
 def _static_modes(squares: Array, B_T: Array) -> tuple[Array, Array]:
