@@ -79,7 +79,7 @@ def test_errors_that_shrink_by_a_constant_ratio_are_found_exactly():
 
 
 def test_what_forces_and_voltages_do_forwards_with_fewer_modes():
-    """The arm that carries out its own inverse dynamics moves as that said: voltages serve the modes left out as well."""
+    """The arm that carries out its own inverse dynamics moves as that said; voltages serve modes left out too."""
     run = {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints+pzt"}
     solution = solve(scene(modes=3, forward=[run], end=0.2, tolerance=1e-7))
     assert all(array.of_all_modes is not None for array in solution.patches.values())
