@@ -122,13 +122,14 @@ def reported(solution: Solution, analysis: str) -> Reported:
     points = [f"{body.name}.{point}" for body in bodies if body.n_modes for point in body.points]
     held = {c.owner for c in outcome.assembly.constraints if c.is_trajectory}
     joints = {joint.name: joint_forces(outcome, joint.name) for joint in scene.joint}
-    return {
+    found: dict[str, dict[str, Array]] = {
         "deflections": {point: point_motion(outcome, point).deflection for point in points},
         "forces": {f"trajectory {name}": trajectory_force(outcome, name) for name in held}
         | {f"joint {name}": of.reaction for name, of in joints.items()},
         "motors": {name: of.motor for name, of in joints.items() if of.motor is not None},
         "voltages": {body: of.required for body, of in solution.voltages.get(analysis, {}).items()},
     }
+    return {kind: quantities for kind, quantities in found.items() if quantities}
 
 
 def levels(scene: Scene, bodies: Mapping[str, PlanarBody]) -> list[dict[str, PlanarBody]]:

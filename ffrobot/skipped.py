@@ -18,13 +18,11 @@ if TYPE_CHECKING:
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
 
+_TERMS = {"D_ff": "damping", "S_tilde": "S̃", "j": "j"}
+
 
 def skipped(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
     """One line for each thing left out."""
-    yield "coordinates out of the plane"
-    rigid = [name for name, body in bodies.items() if body.modal is None]
-    if rigid:
-        yield f"modal coordinates of {', '.join(rigid)}, rigid"
     for name, body in bodies.items():
         if body.modal is None:
             continue
@@ -33,10 +31,16 @@ def skipped(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
         elif body.reused:
             yield f"{name}: {_STAGE_1[body.reused]}"
         yield from _modes(name, body.planar, body.modal)
-    for term in ("D_ff", "S_tilde", "j"):
+    flexible = [name for name, body in bodies.items() if body.modal is not None]
+    rigid = [name for name in bodies if name not in flexible]
+    if rigid:
+        yield f"modal coordinates of {', '.join(rigid)}, rigid"
+    yield "coordinates out of the plane"
+    for term, symbol in _TERMS.items():
         of = [name for name, body in bodies.items() if term in vanishing_terms(body.planar)]
         if of:
-            yield f"{term} of {', '.join(of)}, zero"
+            whose = "" if of == flexible else f" of {', '.join(of)}"
+            yield f"{symbol}{whose}, which is zero"
     algebraic = [analysis.name for analysis in scene.analysis if analysis.kind in ("fcid", "static")]
     if algebraic:
         yield f"integration of {', '.join(algebraic)}, algebraic"
@@ -51,4 +55,4 @@ def _modes(name: str, planar: PlanarBody, modal: ModalBody) -> Iterator[str]:
         named = ", ".join(f"{count} {family}" for family, count in families.items())
         yield f"{name}: {idle.size} of {modal.mode_count} modes, which do not move in the plane ({named})"
     if planar.reduction is not None:
-        yield f"{name}: all but {modes_kept(planar)}"
+        yield f"{name}: all modes but {modes_kept(planar)}"

@@ -65,6 +65,10 @@ def _modes(solution: Solution, choice: ModeChoice) -> str:
                 f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
             )
     tried = ", ".join(map(str, choice.tried))
+    fewer = {body.name: body.reduction.lowest for body in solution.model.bodies if body.reduction is not None}
+    if fewer:
+        keys = ", ".join(f"modes = {lowest} for {name}" for name, lowest in fewer.items())
+        lines.append(f"the same without search: {keys}")
     lines.append(
         f"solved with {tried} modal coordinates, {choice.seconds:.2f} s before the last; the highest frequency is"
         f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"

@@ -43,7 +43,8 @@ def modes_kept(body: PlanarBody) -> str:
     if body.reduction is None:
         return f"all {body.n_modes} modes"
     lowest, static = body.reduction.lowest, body.n_modes - body.reduction.lowest
-    return f"{lowest} modes and {static} static shapes for the other {body.reduction.whole.n_modes - lowest}"
+    shapes = f" and {static} static shapes for the others" if static else ""
+    return f"{lowest} of {body.reduction.whole.n_modes} modes{shapes}"
 
 
 def loaded_points(scene: SceneKeys, body: str) -> list[str]:

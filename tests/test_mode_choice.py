@@ -101,19 +101,19 @@ def test_results_say_what_their_modal_coordinates_are(reduced, tmp_path):
         assert body["modal"].shape == (1001, 5)
         assert body["modal_transform"].shape == (10, 5)
         assert "modal_transform" in body.attrs["modal_coordinates"]
-        assert body.attrs["modes_kept"] == "3 modes and 2 static shapes for the other 7"
+        assert body.attrs["modes_kept"] == "3 of 10 modes and 2 static shapes for the others"
         assert 0.0 < file["inverse"].attrs["mode_error_forces"] < 3e-3
     with Results(path) as results:
         p, modal = results.modal("inverse", "link2"), results.modal_body("link2")
         deflection = results["inverse/points/link2.tip/deflection"]
         np.testing.assert_allclose(p @ modal.interfaces["tip"].translation[:2].T, deflection, atol=1e-15)
-        assert any("3 modes and 2 static shapes" in line for line in results.skipped)
+        assert any("3 of 10 modes and 2 static shapes" in line for line in results.skipped)
 
 
 def test_the_summary_tells_the_number_the_estimate_and_what_is_saved(reduced, tmp_path, capsys):
     print_summary(reduced, tmp_path / "x.h5", reduced.seconds, summary_console())
     printed = " ".join(capsys.readouterr().out.split())
-    assert "link1: 3 modes and 2 static shapes for the other 7; link2: 3 modes" in printed
+    assert "link1: 3 of 10 modes and 2 static shapes for the others; link2: 3 of 10 modes" in printed
     assert "inverse: error of leaving out the others, estimated: deflections" in printed
     assert "solved with 6, 8, 10 modal coordinates" in printed
     assert "the highest frequency is 8.82e+03 of 2.2e+04 rad/s" in printed

@@ -101,11 +101,11 @@ def test_terms_that_vanish_are_not_multiplied(folder):
     bending, both = (prepare(arm(folder, link)) for link in ("bending", "all"))
     n = both.model.bodies[1].n_modes
     of_bending, of_both = (core_arguments(solution.model.bodies[1], [], []) for solution in (bending, both))
-    for term, shape in (("S_tilde", (n, n)), ("j", (n,))):
+    for term, symbol, shape in (("S_tilde", "S̃", (n, n)), ("j", "j", (n,))):
         assert of_bending[term].size == 0
         assert of_both[term].shape == shape
-        assert f"{term} of arm, zero" in bending.skipped
-        assert f"{term} of arm, zero" not in both.skipped
+        assert f"{symbol}, which is zero" in bending.skipped
+        assert f"{symbol}, which is zero" not in both.skipped
     assert of_bending["damping"].size == of_bending["m_xy"].size == 0
     assert vanishing_terms(bending.model.bodies[0]) == ()
 
