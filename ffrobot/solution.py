@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -39,6 +40,8 @@ from .skipped import skipped as skipped_lines
 from .validation import did_you_mean, quoted
 
 Array = NDArray[np.float64]
+
+logger = logging.getLogger(__name__)
 
 
 class Watcher:
@@ -188,6 +191,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
                 for body, array in solution.patches.items()
             }
         solution.seconds[analysis.name] = time.perf_counter() - started
+        _log(outcome)
         if outcome.status != "completed":
             break
     return True
@@ -200,6 +204,14 @@ def _evaluate(solution: Solution) -> None:
         _judge_actuation(solution, outcome)
         solution.stresses[name] = _stresses(solution, outcome)
         solution.seconds[name] += time.perf_counter() - started
+
+
+def _log(outcome: Outcome) -> None:
+    logger.info(
+        'analysis "%s": %s at t = %g s, %d steps, %d rejected, %d evaluations, %.3f s; integrator %s: %s',
+        outcome.analysis.name, outcome.status, outcome.time[-1], outcome.steps, outcome.rejected, outcome.evaluations,
+        outcome.wall_seconds, outcome.integrator.name, outcome.integrator.reason,
+    )  # fmt: skip
 
 
 def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
