@@ -145,8 +145,10 @@ def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Inter
         more = len(every) - 1 - k
         if not more or interruption.requested or (completed and estimate.meets(tolerances)):
             break
-        k = len(every) - 1 if completed and estimate.is_hopeless(tolerances, more - 1) else k + 1
-    errors = estimate.errors if more else {name: dict.fromkeys(of, 0.0) for name, of in estimate.errors.items()}
+        k = len(every) - 1 if not completed or estimate.is_hopeless(tolerances, more - 1) else k + 1
+    errors = estimate.errors if completed else {}
+    if not more:
+        errors = {name: dict.fromkeys(of, 0.0) for name, of in errors.items()}
     highest = [
         max(float(np.sqrt(b.stiffness.max(initial=0.0))) for b in level.values()) for level in (every[k], every[-1])
     ]
