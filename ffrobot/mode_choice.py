@@ -115,6 +115,20 @@ def difference(now: Reported, before: Reported) -> dict[str, float]:
     return found
 
 
+def error_tolerances(scene: Scene) -> dict[str, float]:
+    """What the error of each analysis may be; algebraic ones that do not say follow the tightest that is integrated."""
+    integrated = [analysis.tolerance for analysis in scene.analysis if analysis.kind in ("pcid", "forward")]
+    tightest = min(integrated, default=None)
+    return {
+        analysis.name: tightest
+        if tightest is not None
+        and analysis.kind not in ("pcid", "forward")
+        and "tolerance" not in analysis.model_fields_set
+        else analysis.tolerance
+        for analysis in scene.analysis
+    }
+
+
 def reported(solution: Solution, analysis: str) -> Reported:
     """Everything of an analysis whose error counts."""
     outcome = solution.outcomes[analysis]

@@ -35,7 +35,7 @@ from .mbs.scene_file import load_scene
 from .mbs.scene_records import Scene
 from .mbs.steering import Equipment
 from .mbs.stress import BodyStress, body_stress
-from .mode_choice import ErrorEstimate, ModeChoice, levels, reported
+from .mode_choice import ErrorEstimate, ModeChoice, error_tolerances, levels, reported
 from .skipped import skipped as skipped_lines
 from .validation import did_you_mean, quoted
 
@@ -132,7 +132,7 @@ def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
 def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
     """The scene solved with as many modes as its tolerances need: see `mode_choice`."""
     began = time.perf_counter()
-    tolerances = {analysis.name: analysis.tolerance for analysis in solution.scene.analysis}
+    tolerances = error_tolerances(solution.scene)
     every = levels(solution.scene, _whole(solution.bodies))
     estimate, tried, k = ErrorEstimate(), [], 0
     while True:
