@@ -11,7 +11,9 @@ from rich.console import Console
 from rich.table import Table
 
 from .mbs.analyses import Outcome
+from .mbs.fewer_modes import modes_kept
 from .mbs.geometric_stiffening import NOTABLE
+from .mode_choice import ModeChoice
 from .solution import Solution
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
@@ -39,6 +41,8 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     for name, outcome in solution.outcomes.items():
         if outcome.analysis.kind in ("pcid", "forward") and outcome.analysis.integrator == "auto":
             notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
+    if solution.mode_choice is not None:
+        notes.add_row("modes", _modes(solution, solution.mode_choice))
     notes.add_row(*_stiffening(solution))
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
@@ -46,6 +50,30 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     console.print()
     console.print(notes)
     console.print(f"results    {path}", soft_wrap=True)
+
+
+def _modes(solution: Solution, choice: ModeChoice) -> str:
+    """How many modes were enough, and what leaving out the others costs and saves."""
+    kept = [f"{body.name}: {modes_kept(body)}" for body in solution.model.bodies if body.n_modes]
+    lines = ["; ".join(kept)]
+    for name, errors in choice.errors.items():
+        if any(errors.values()):
+            found = ", ".join(f"{kind} {error:.0e}" for kind, error in errors.items() if error)
+            lines.append(f"{name}: error of leaving out the others, estimated: {found}")
+        else:
+            lines.append(
+                f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
+            )
+    tried = ", ".join(map(str, choice.tried))
+    fewer = {body.name: body.reduction.lowest for body in solution.model.bodies if body.reduction is not None}
+    if fewer:
+        keys = ", ".join(f"modes = {lowest} for {name}" for name, lowest in fewer.items())
+        lines.append(f"the same without search: {keys}")
+    lines.append(
+        f"solved with {tried} modal coordinates, {choice.seconds:.2f} s before the last; the highest frequency is"
+        f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
+    )
+    return "\n".join(lines)
 
 
 def _stiffening(solution: Solution) -> tuple[str, str]:
