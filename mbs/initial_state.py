@@ -14,11 +14,11 @@ from .model import Array, Assembly, Constraint
 from .record_types import GROUND, split_point
 from .rows import End
 
-TOLERANCE = 1e-13  # of constraints at the start, m and rad
+TOLERANCE = 1e-13  # of constraints at the start, relative to the size of the robot
 SINGULAR = 1e-6  # ratio of singular values below which a configuration counts as singular
 REDUNDANT = 1e-10  # likewise for rows that repeat each other in every configuration
 MOST_ITERATIONS = 50
-LARGEST_TURN = 0.5  # rad (and m per metre) a Newton step may move: keeps to the branch of the guess
+LARGEST_TURN = 0.5  # rad (and sizes of the robot) a Newton step may move: keeps to the branch of the guess
 REACH_CHECKS = 200
 
 
@@ -47,11 +47,29 @@ def undeformed_state(assembly: Assembly) -> State:
             f" {_names(assembly.constraints)} in every direction, found a singular one (an arm stretched or folded?):"
             " bend it, or move the start of the trajectory"
         )
-    _, rate, C_q = assembly.system.constraints(0.0, q, guess.v)
-    r = assembly.rigid_coordinates
-    v = guess.v.copy()
-    v[r] -= np.linalg.lstsq(C_q[:, r], rate, rcond=None)[0]
+    return with_rates(assembly, q, guess.v)
+
+
+def with_rates(assembly: Assembly, q: Array, v: Array) -> State:
+    """The state at q with (Ṙ, θ̇) moved onto Ċ = 0 by the least change, ṗ kept."""
+    _, rate, _ = assembly.system.constraints(0.0, q, v)
+    v = v.copy()
+    v[assembly.rigid_coordinates] -= _least_step(assembly, 0.0, q, rate)
     return State(q, v)
+
+
+def _frame_gradients(assembly: Assembly, t: float, q: Array) -> Array:
+    """∂C/∂(R, θ) with rows and columns relative to their natural sizes: the same in all units."""
+    _, _, C_q = assembly.system.constraints(t, q, np.zeros_like(q))
+    r = assembly.rigid_coordinates
+    return C_q[:, r] * assembly.sizes[r] / assembly.row_sizes[:, None]
+
+
+def _least_step(assembly: Assembly, t: float, q: Array, residual: Array) -> Array:
+    """The smallest change of (R, θ) that takes `residual` off C (or, as a rate, off Ċ)."""
+    J = _frame_gradients(assembly, t, q)
+    step: Array = np.linalg.lstsq(J, residual / assembly.row_sizes, rcond=None)[0]
+    return step * assembly.sizes[assembly.rigid_coordinates]
 
 
 def check_reach(assembly: Assembly, start: State, times: Array) -> None:
@@ -72,24 +90,24 @@ def check_reach(assembly: Assembly, start: State, times: Array) -> None:
 def _newton(assembly: Assembly, t: float, q: Array) -> Array | None:
     """(R, θ) moved onto C(q, t) = 0 by steps of least size, p kept; None where that does not converge."""
     q, r = q.copy(), assembly.rigid_coordinates
-    rest = np.zeros_like(q)
+    rest, sizes, row_sizes = np.zeros_like(q), assembly.sizes, assembly.row_sizes
     for _ in range(MOST_ITERATIONS):
-        C, _, C_q = assembly.system.constraints(t, q, rest)
-        size = 1.0 + np.abs(q).max(initial=0.0)
-        if np.abs(C).max(initial=0.0) <= TOLERANCE * size:
+        C, _, _ = assembly.system.constraints(t, q, rest)
+        size = 1.0 + np.abs(q / sizes).max(initial=0.0)
+        left = np.abs(C / row_sizes).max(initial=0.0)
+        if left <= TOLERANCE * size:
             return q
-        step = np.linalg.lstsq(C_q[:, r], C, rcond=None)[0]
-        largest = np.abs(step).max()
-        if not np.isfinite(largest):
+        if not np.isfinite(left):
             return None
+        step = _least_step(assembly, t, q, C)
+        largest = np.abs(step / sizes[r]).max()
         q[r] -= step * min(1.0, LARGEST_TURN * size / largest) if largest else step
-    return q if np.abs(C).max() <= 1e3 * TOLERANCE * size else None
+    return q if left <= 1e3 * TOLERANCE * size else None
 
 
 def _is_singular(assembly: Assembly, t: float, q: Array) -> bool:
     """Whether the mechanism with rigid links has lost a direction that its constraints need."""
-    _, _, C_q = assembly.system.constraints(t, q, np.zeros_like(q))
-    J = C_q[:, assembly.rigid_coordinates]
+    J = _frame_gradients(assembly, t, q)
     if not len(J) or len(J) > J.shape[1]:
         return False
     values = np.linalg.svd(J, compute_uv=False)
@@ -100,10 +118,11 @@ def _check_redundancy(assembly: Assembly, q: Array) -> None:
     """Rows that depend on each other in a configuration chosen at random depend on each other in all."""
     if not assembly.constraints:
         return
-    shift = np.random.default_rng(0).uniform(-0.3, 0.3, len(q))
+    shift = np.random.default_rng(0).uniform(-0.3, 0.3, len(q)) * assembly.sizes
     for position in assembly.first:  # deformations stay small
         shift[position + 3 :] *= 1e-3
     _, _, C_q = assembly.system.constraints(0.0, q + shift, np.zeros_like(q))
+    C_q *= assembly.sizes
     left, values, _ = np.linalg.svd(C_q / np.linalg.norm(C_q, axis=1, keepdims=True))
     rank = int(np.count_nonzero(values > REDUNDANT * values[0]))
     if rank == len(assembly.constraints):

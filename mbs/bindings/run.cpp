@@ -27,6 +27,7 @@ RowMajorMatrix fixed_steps(const System &system, double end, int steps, const Ei
   RowMajorMatrix states(2 * steps + 1, y.size());
   states.row(0) = y;
   const double h = end / steps;
+  motion.plan(end);
   motion.slope(0, y.data(), method.first_slope());
   motion.accepted(0, y.data(), method.first_slope());
   for (int i = 0; i < steps; ++i) {
