@@ -70,6 +70,7 @@ void bind_run(nb::module_ &m) {
   nb::class_<Run>(m, "Run", "Outputs of an analysis, one row per output time reached, and how it went.")
       .def_prop_ro("status", [](const Run &r) { return r.report.status; })
       .def_prop_ro("time_reached", [](const Run &r) { return r.report.time; })
+      .def_prop_ro("last", [](const Run &r) -> const Eigen::VectorXd & { return r.last; })
       .def_prop_ro("steps", [](const Run &r) { return r.report.steps; })
       .def_prop_ro("rejected", [](const Run &r) { return r.report.rejected; })
       .def_prop_ro("evaluations", [](const Run &r) { return r.report.evaluations; })

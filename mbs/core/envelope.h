@@ -3,6 +3,9 @@
 #pragma once
 
 #include <Eigen/Core>
+
+#include <algorithm>
+#include <concepts>
 #include <vector>
 
 namespace ffrobot {
@@ -19,6 +22,13 @@ public:
   void set_zero();
   Scalar *entry(Eigen::Index row, Eigen::Index column) { // column >= first[row]
     return rows_.data() + start_[static_cast<std::size_t>(row)] + column;
+  }
+
+  // Of the last factorisation: as many as the matrix has negative eigenvalues.
+  Eigen::Index negative_pivots() const
+    requires std::floating_point<Scalar>
+  {
+    return std::count_if(inverse_.begin(), inverse_.end(), [](Scalar pivot) { return pivot < 0; });
   }
 
   void factorise();            // in place; unpivoted

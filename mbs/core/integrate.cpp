@@ -11,6 +11,10 @@ namespace {
 
 constexpr unsigned long steps_between_questions = 1000;
 
+// A step size that collapses never quite reaches rounding where noise feeds its estimates. A run that would take this
+// many times the steps it is allowed, at the pace of its last thousand, is not worth going on with.
+constexpr double hopeless = 100;
+
 // Size of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
 double next_step(double h, double left, bool lands) {
   if (h >= left)
@@ -31,7 +35,7 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
   Eigen::VectorXd error(system.size()), y_output(system.size());
   const double end = times.back(), duration = end - times.front();
   IntegrationReport report;
-  double t = times.front();
+  double t = times.front(), t_asked = t;
   double h = std::min(system.initial_step(), end - t);
   const auto record = [&] {
     if (recording) {
@@ -53,12 +57,18 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       report.status = IntegrationStatus::too_many_steps;
       break;
     }
-    if ((report.steps + report.rejected) % steps_between_questions == 0 && !carry_on(t)) {
-      report.status = IntegrationStatus::interrupted;
-      break;
-    }
     const double left = end - t;
-    if (h < 1e-13 * std::max(std::abs(t), left)) {
+    bool collapsed = h < 1e-13 * std::max(std::abs(t), left);
+    if (const auto taken = report.steps + report.rejected; taken % steps_between_questions == 0) {
+      if (!carry_on(t)) {
+        report.status = IntegrationStatus::interrupted;
+        break;
+      }
+      const double most = hopeless * static_cast<double>(controls.max_steps) / steps_between_questions;
+      collapsed = collapsed || (taken > 0 && controls.max_steps && left > most * (t - t_asked));
+      t_asked = t;
+    }
+    if (collapsed) {
       report.status = IntegrationStatus::step_underflow;
       break;
     }

@@ -64,6 +64,7 @@ private:
   std::unique_ptr<IterationMatrix<Complex>> complex_;
 
   double state_size(const double *y, const double *e) const; // error_size without multipliers
+  bool has_inertia() const;
   void measure_groups(const Eigen::VectorXd &lambda, Eigen::VectorXd &size) const;
 
   // peaks so far

@@ -77,6 +77,7 @@ Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen
       motion, times, y, controls, [&](std::size_t i, double t, const double *state) { evaluate(i, t, state); },
       carry_on, recording);
   result.outputs = evaluate.take(result.report.outputs);
+  result.last = y;
   return result;
 }
 
