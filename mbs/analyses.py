@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import SolveError
 from . import _core
 from .analysis_records import Analysis
-from .diagnosis import find_cause
+from .diagnosis import find_cause, lost_inertia
 from .initial_state import State, check_reach, undeformed_state
 from .integrators import METHODS, Choice, choose_integrator
 from .model import ZERO, Array, Assembly, Model
@@ -156,6 +156,8 @@ def _integrate(
     progress: Progress,
     replayed: Choice | None = None,
 ) -> Outcome:
+    if len(analysis.times) > 1 and (cause := lost_inertia(assembly, start.q)):
+        raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
     integrator = choose_integrator(assembly, analysis, start, replayed)
     run = _core.run(

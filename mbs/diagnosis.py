@@ -6,6 +6,7 @@ import numpy as np
 
 from .initial_state import State, frame_gradients
 from .model import Array, Assembly
+from .smoothness import JUMP
 from .vibration import system_mass_matrix
 
 NEARLY_SINGULAR = 1e-3  # ratio of singular values of C_q; a motion that only comes near it has no trouble there
@@ -20,8 +21,9 @@ def find_cause(assembly: Assembly, t: float, state: State) -> str:
     """
     return (
         _not_a_number(assembly, t, state)
-        or _no_inertia(assembly, state.q)
+        or lost_inertia(assembly, state.q)
         or _bent(assembly, state.q)
+        or _load_jumps(assembly, t)
         or _singular(assembly, t, state.q)
     )
 
@@ -35,8 +37,11 @@ def _not_a_number(assembly: Assembly, t: float, state: State) -> str:
     return ""
 
 
-def _no_inertia(assembly: Assembly, q: Array) -> str:
-    """Whether a motion that the constraints allow has no kinetic energy left, and whose."""
+def lost_inertia(assembly: Assembly, q: Array) -> str:
+    """A sentence where a motion that the constraints allow has no kinetic energy left; empty otherwise.
+
+    m_θθ − pᵀK_ω p has to stay above what the modes take of it, hhᵀ: n modes of a cantilever leave about 1/n³ of J.
+    """
     stiffened = [body for body in assembly.model.bodies if body.stiffening is not None and body.n_modes]
     if not stiffened:
         return ""
@@ -55,8 +60,23 @@ def _no_inertia(assembly: Assembly, q: Array) -> str:
     return (
         f"geometric stiffening has taken away all inertia that the modes of {names} leave (least eigenvalue of the mass"
         f" matrix {least:.2g}, straight {at_first:.2g}): its second-order terms end here; use fewer modes,"
-        " a shorter link (two in its place), or geometric_stiffening = false"
+        " links divided in two, or geometric_stiffening = false"
     )
+
+
+def _load_jumps(assembly: Assembly, t: float) -> str:
+    """Whether a load jumps there: its size just after t is not what its value and slope just before t make of it."""
+    dt = 1e-9 * max(t, 1e-9)
+    loads = [(row.label, size) for row, size in assembly.model.loads]
+    loads += [(f'load of the patches of "{load.body}"', load.size) for load in assembly.model.modal_loads]
+    for label, size in loads:
+        before, after = (size(s) for s in (t - dt, t + dt))
+        if not np.isfinite(after).all():
+            return f"{label} has no finite value, slope or curvature after that time"
+        change = after[0] - before[0] - dt * (before[1] + after[1])
+        if abs(change) > JUMP * max(abs(before[0]), abs(after[0])):
+            return f"{label} jumps from {before[0]:.6g} to {after[0]:.6g} there: round it off, or loosen the tolerance"
+    return ""
 
 
 def _bent(assembly: Assembly, q: Array) -> str:
