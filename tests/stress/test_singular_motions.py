@@ -58,11 +58,11 @@ def test_slider_through_dead_centre(speed, flexible, record):
     """Exactly at one of the times that are looked at, and between them."""
     model = slider_crank(through_dead_centre(speed), flexible=flexible)
     message = refused(lambda: inverse(model), 'trajectory "slider"', SINGULAR, "drive a joint instead")
-    assert time_in(message) == pytest.approx(0.9 / speed, abs=1e-6)
+    assert time_in(message) == pytest.approx(0.9 / speed, abs=3e-6)
     record(
         GROUP,
         "slider-crank driven at the slider through a dead centre, rod rigid or flexible",
-        "refused before the run, its time to 1e-6 s",
+        "refused before the run, its time to 3e-6 s",
         "input error: trajectory, time, “… (stretched, folded, at a dead centre) …”",
     )
 
