@@ -167,8 +167,8 @@ def _integrate(
     )  # fmt: skip
     seconds = time.perf_counter() - began
     reached, status = len(run.q), _STATUS[run.status]
-    last = State(*np.split(run.last, 2))
-    cause = find_cause(assembly, run.time_reached, last) if status in ("step underflow", "too many steps", "diverged") else ""
+    failed = status not in ("completed", "interrupted")
+    cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2))) if failed else ""
     return Outcome(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers,
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,

@@ -110,7 +110,7 @@ def _singular(assembly: Assembly, t: float, q: Array) -> str:
     weights = np.abs(left[:, -1])
     involved = dict.fromkeys(c.row.label for c, w in zip(assembly.constraints, weights, strict=True) if w > 0.1)
     return (
-        f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; {'; '.join(involved)}): an arm"
-        " stretched or folded, or a mechanism at a dead centre, where no finite force on the driven point says which way"
-        " to go on; keep clear of it, or drive a joint instead"
+        f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; {'; '.join(involved)}):"
+        " an arm stretched or folded, or a mechanism at a dead centre, where no finite force on the driven point says"
+        " which way to go on; keep clear of it, or drive a joint instead"
     )

@@ -59,7 +59,8 @@ def frame_gradients(assembly: Assembly, t: float, q: Array) -> Array:
     """∂C/∂(R, θ) with rows and columns relative to their natural sizes: the same in all units."""
     _, _, C_q = assembly.system.constraints(t, q, np.zeros_like(q))
     r = assembly.rigid_coordinates
-    return C_q[:, r] * assembly.sizes[r] / assembly.row_sizes[:, None]
+    J: Array = C_q[:, r] * assembly.sizes[r] / assembly.row_sizes[:, None]
+    return J
 
 
 def _least_step(assembly: Assembly, t: float, q: Array, residual: Array) -> Array:
@@ -92,7 +93,7 @@ def check_reach(assembly: Assembly, start: State, times: Array) -> None:
 def _least_freedom(assembly: Assembly, passed: Sequence[tuple[float, Array, float]]) -> tuple[float, float]:
     """The freedom of constraints at the last of up to three configurations, or the least about the middle one; when.
 
-    Where it turns zero it is a kink |t − t*|, which three samples give away: beside a smooth minimum they hardly differ.
+    Where it turns zero it is a kink |t − t*|, which three samples give away: beside a smooth minimum they are alike.
     """
     t, _, freedom = passed[-1]
     if len(passed) < 3:
@@ -159,9 +160,9 @@ def _singular_start(assembly: Assembly, q: Array) -> str:
     beside = _newton(loop, 0.0, moved)
     if missing and beside is not None and _freedom_of_constraints(loop, 0.0, beside) < SINGULAR:
         return (
-            f"{path}: joint: expected joints that each take something away from the motion, found {missing} too many among"
-            f" {_names(loop.constraints)}: in this geometry (parallel cranks?) rigid links move all the same, and nothing"
-            " says how the force is shared; leave a joint out, or give the links modes"
+            f"{path}: joint: expected joints that each take something away from the motion, found {missing} too many"
+            f" among {_names(loop.constraints)}: in this geometry (parallel cranks?) rigid links move all the same, and"
+            " nothing says how the force is shared; leave a joint out, or give the links modes"
         )
     return (
         f"{path}: initial: expected a configuration in which the links can follow {names} in every direction, found a"
@@ -197,8 +198,8 @@ def _unreachable(assembly: Assembly, t: float, q: Array) -> str:
     how = (
         "cannot reach"
         if _newton(assembly, t, q) is None
-        else "reach only in a singular configuration (stretched, folded, at a dead centre), from which no force on it says"
-        " which way they go on: keep clear of it, or drive a joint instead"
+        else "reach only in a singular configuration (stretched, folded, at a dead centre), from which no force on it"
+        " says which way they go on: keep clear of it, or drive a joint instead"
     )
     if trajectories and _newton(_only_joints(assembly), t, q) is not None:
         return (

@@ -165,7 +165,7 @@ class Assembly:
 
     @property
     def sizes(self) -> Array:
-        """Natural size of each coordinate: a length for R, 1 rad for θ, √I for p (a link bent by as much as it is long).
+        """Natural size of each coordinate: a length for R, 1 rad for θ, √I for p (a link bent as much as it is long).
 
         What is small, or a step that is long, is judged by them: units of length and mass are the user's.
         """

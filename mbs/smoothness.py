@@ -28,9 +28,9 @@ def check_smooth(assembly: Assembly, end: float) -> None:
             if found is not None:
                 t, before, after = found
                 raise InputError(
-                    f"{assembly.model.scene.path}: {constraint.row.label}: expected a continuous {quantity}, found a jump"
-                    f" from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot follow; round"
-                    " it off (waypoints make a smooth curve)"
+                    f"{assembly.model.scene.path}: {constraint.row.label}: expected a continuous {quantity}, found a"
+                    f" jump from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot"
+                    " follow; round it off (waypoints make a smooth curve)"
                 )
 
 

@@ -16,8 +16,8 @@ constexpr unsigned long steps_between_questions = 1000;
 constexpr double hopeless = 100;
 
 // A load that jumps leaves an error in proportion to the step across it, more than that step's share of the tolerance
-// however short it is. Steps that have become so much shorter than those before may take from a reserve, all of which is
-// as much as the tolerance.
+// however short it is. Steps that have become so much shorter than those before may take from a reserve, all of which
+// is as much as the tolerance.
 constexpr double much_shorter = 1e-3, part_of_reserve = 0.25;
 
 // Size of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.

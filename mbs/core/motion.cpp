@@ -145,8 +145,7 @@ void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
     const double slow = 0.01 * rate_;
     raise(peak.velocity, std::max(std::hypot(v[0], v[1]), slow * length));
     raise(peak.angular_velocity, std::max(std::abs(v[2]), slow));
-    raise(peak.acceleration,
-          std::max({std::hypot(a[0], a[1]), system_.gravity.norm(), slow * rate_ * length}));
+    raise(peak.acceleration, std::max({std::hypot(a[0], a[1]), system_.gravity.norm(), slow * rate_ * length}));
     raise(peak.angular_acceleration, std::max(std::abs(a[2]), peak.acceleration / length));
     peak.modal_acceleration = std::max(peak.modal_acceleration, std::sqrt(system_.bodies[b].mass) * peak.acceleration);
     if (modes > 0) {
@@ -155,9 +154,8 @@ void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
       // where nothing has happened yet: a thousandth of what the acceleration would do to the softest mode
       const double force = std::sqrt(system_.bodies[b].mass) * peak.acceleration;
       applied_ = applied_modal_force(b).cwiseQuotient(omega); // may hold the links straight: p stays zero then
-      raise(peak.modal,
-            std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
-                      applied_.cwiseQuotient(omega).norm(), 1e-3 * force / std::pow(omega.minCoeff(), 2)}));
+      raise(peak.modal, std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
+                                  applied_.cwiseQuotient(omega).norm(), 1e-3 * force / std::pow(omega.minCoeff(), 2)}));
       raise(peak.modal_velocity, std::max({p_dot.norm(), p_ddot.cwiseQuotient(omega).norm(), applied_.norm(),
                                            std::sqrt(system_.bodies[b].mass) * peak.velocity}));
     }
@@ -183,8 +181,8 @@ void ConstrainedMotion::constraint_values(double t, const double *y, double *val
 }
 
 // Whether every motion that the constraints allow has positive kinetic energy, at the last evaluation. Geometric
-// stiffening takes p^T K_omega p off m_thetatheta: more, for a link bent far, than its modes leave. M has then a negative
-// pivot, and is still positive on C_q v = 0 just where C M^-1 C^T has as many (Sylvester's law of inertia).
+// stiffening takes p^T K_omega p off m_thetatheta: more, for a link bent far, than its modes leave. M has then a
+// negative pivot, and is still positive on C_q v = 0 just where C M^-1 C^T has as many (Sylvester's law of inertia).
 bool ConstrainedMotion::has_inertia() const {
   Index negative = 0;
   for (const auto &state : workspace_.bodies)

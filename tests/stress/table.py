@@ -1,4 +1,4 @@
-"""The table of what was tried, the limit found and how failure is reported: rows in a file, and the page made of them."""
+"""The table of what was tried, the limit found and how failure is reported: rows in a file, and the page of them."""
 
 import math
 from pathlib import Path
@@ -19,8 +19,8 @@ and compares; lengths in m, times in s. The page is written by the tests:
     pytest tests/stress --long --write-table   writes this page from what was found
 
 Units of length, mass and time are the user's: nothing is compared with a meter, a kilogram or a second. A run that does
-not reach its end keeps its results up to there; the attributes `status` and `cause` of the results file say how and why it
-ended, as does the message.
+not reach its end keeps its results up to there; the attributes `status` and `cause` of the results file say how and
+why it ended, as does the message.
 """
 
 
@@ -45,7 +45,9 @@ class Table:
         assert known is not None, f"not in {ROWS.name}: {tried}; pytest tests/stress --write-table"
         assert row | {"measured": {}} == known | {"measured": {}}
         for key, value in row["measured"].items():
-            assert same(value, known["measured"][key]), f"{tried}: {key}: {value}, in the table {known['measured'][key]}"
+            assert same(value, known["measured"][key]), (
+                f"{tried}: {key}: {value}, in the table {known['measured'][key]}"
+            )
 
 
 def same(one, other):
@@ -55,7 +57,9 @@ def same(one, other):
 
 
 def number(value):
-    return f"{value:.2g}" if 1e-3 <= abs(value) < 1e6 or value == 0 else f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")
+    if value == 0 or 1e-3 <= abs(value) < 1e6:
+        return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
+    return f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")
 
 
 def render(rows):

@@ -41,7 +41,9 @@ def test_200_modes(beams, record):
     record(GROUP, "100 and 200 modes a link, static start", "forces differ by {by}", by=difference)
 
 
-@pytest.mark.parametrize("contrast", [1e2, pytest.param(1e4, marks=pytest.mark.long), pytest.param(1e6, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "contrast", [1e2, pytest.param(1e4, marks=pytest.mark.long), pytest.param(1e6, marks=pytest.mark.long)]
+)
 def test_stiffness(contrast, record):
     links = [ritz_link("link1", "simply-supported", EI=120 * contrast), ritz_link("link2", "cantilever")]
     one, other = (forces(links, integrator=name, end=0.1, tolerance=1e-5) for name in ("dop853", "radau"))
@@ -88,4 +90,10 @@ def test_too_thin(beams, record):
     assert outcome.status == "diverged"
     assert '"link2" is bent by' in outcome.cause
     assert len(outcome.q) == len(outcome.time) > 10  # what there is up to then
-    record(GROUP, "links 1 m long and 0.001 m high", "ends at t = {t}", "diverged; “\"link2\" is bent by 103 % of its length …”", t=outcome.time_reached)
+    record(
+        GROUP,
+        "links 1 m long and 0.001 m high",
+        "ends at t = {t}",
+        'diverged; “"link2" is bent by 103 % of its length …”',
+        t=outcome.time_reached,
+    )

@@ -46,5 +46,5 @@ def test_ends_with_time_cause_and_results(ffrobot, tmp_path, record):
         "Rough inputs",
         "`ffrobot solve` of a scene whose load has a pole",
         "exit code 1, results up to the pole, their attributes `status` and `cause`",
-        "step underflow; “joint \"O\", angle jumps from … to … there …”",
+        'step underflow; “joint "O", angle jumps from … to … there …”',
     )

@@ -1,6 +1,5 @@
 """The same physics in other units gives the same numbers: no absolute tolerance hides in the code."""
 
-import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, quintic
 from mechanisms import relative

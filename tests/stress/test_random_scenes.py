@@ -51,7 +51,9 @@ def test_jacobians_are_derivatives(system):
     _, _, C_q = core.constraints(T, q, v)
     if not len(C_q):
         return
-    columns = [(core.constraints(T, q + h * e, v)[0] - core.constraints(T, q - h * e, v)[0]) / (2 * h) for e in np.eye(len(q))]
+    columns = [
+        (core.constraints(T, q + h * e, v)[0] - core.constraints(T, q - h * e, v)[0]) / (2 * h) for e in np.eye(len(q))
+    ]
     assert relative(np.array(columns).T, C_q) < 1e-8
 
 
@@ -86,7 +88,9 @@ def test_forward_follows_inverse(seed):
     """PCID → forward with all of the actuation: round trip, on arms of random links and ways."""
     rng = np.random.default_rng(seed)
     links = [
-        ritz_link(name, condition, rng.uniform(0.5, 2), rng.uniform(0.3, 3), 10 ** rng.uniform(1.5, 3), damping_ratio=0.01)
+        ritz_link(
+            name, condition, rng.uniform(0.5, 2), rng.uniform(0.3, 3), 10 ** rng.uniform(1.5, 3), damping_ratio=0.01
+        )
         for name, condition in (("link1", "simply-supported"), ("link2", "cantilever"))
     ]
     first, second = rng.uniform(-1, 1), rng.uniform(0.5, 2)
@@ -108,5 +112,3 @@ def test_they_are_in_the_table(record):
         f"{SCENES} random mechanisms of the zoo each: equations of motion, Jacobians, power; 6 arms: PCID → forward",
         "residuals below 1e-10, Jacobians against differences 1e-8, power 1e-5, round trip 1e-6",
     )
-
-

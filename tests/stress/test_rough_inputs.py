@@ -32,7 +32,9 @@ def moved(x):
 @pytest.mark.parametrize("kind", ["pcid", "fcid"])
 def test_jumps_are_refused(x, quantity, kind, record):
     run = inverse if kind == "pcid" else lambda model: run_fcid(model, zero_shape())
-    with pytest.raises(InputError, match=f'trajectory "tip", x: expected a continuous {quantity}, found a jump') as raised:
+    with pytest.raises(
+        InputError, match=f'trajectory "tip", x: expected a continuous {quantity}, found a jump'
+    ) as raised:
         run(moved(x))
     assert float(str(raised.value).split("t = ")[1].split(" s")[0]) == pytest.approx(0.5, abs=6e-4)
     record(
@@ -87,10 +89,12 @@ def test_load_that_jumps(tolerance, record):
 
 @pytest.mark.parametrize(
     ("moment", "says"),
-    [("1/(0.5-t)", ""), ("sqrt(0.5-t)", "joint \"O\", angle has no finite value"), ("exp(exp(20*t))", "")],
+    [("1/(0.5-t)", ""), ("sqrt(0.5-t)", 'joint "O", angle has no finite value'), ("exp(exp(20*t))", "")],
 )
 def test_load_that_ends(moment, says, record):
-    model = make_model([rod("a", 1, 1)], joint=[revolute("O", "ground", "a.root")], load=[{"joint": "O", "moment": moment}])
+    model = make_model(
+        [rod("a", 1, 1)], joint=[revolute("O", "ground", "a.root")], load=[{"joint": "O", "moment": moment}]
+    )
     outcome = free_run(model)
     assert outcome.status == "step underflow"
     assert says in outcome.cause
@@ -100,7 +104,7 @@ def test_load_that_ends(moment, says, record):
         GROUP,
         "a load that grows without bound, or has no value from some time on",
         "ends there",
-        "step underflow; “joint \"O\", angle has no finite value …” or the load's jump",
+        'step underflow; “joint "O", angle has no finite value …” or the load\'s jump',
     )
 
 

@@ -87,7 +87,12 @@ def test_free_through_dead_centres(record):
 def test_starts_at_dead_centre(record):
     path = {"name": "slider", "point": "slider.pin", "x": "0.7-0.1*t**2"}
     refused(lambda: inverse(slider_crank(path, angle=0.0)), "initial:", 'trajectory "slider"', "at a dead centre?")
-    record(GROUP, "slider-crank starts at a dead centre, driven at the slider", "refused", "input error: initial, trajectory")
+    record(
+        GROUP,
+        "slider-crank starts at a dead centre, driven at the slider",
+        "refused",
+        "input error: initial, trajectory",
+    )
 
 
 def test_parallelogram_turns_flat(record):
@@ -120,7 +125,9 @@ def test_parallelogram_falls_flat(record):
 
 
 def test_third_crank_of_rods(record):
-    refused(lambda: free_run(parallelogram(3, flexible=False)), "1 too many among", 'joint "mid foot"', "parallel cranks?")
+    refused(
+        lambda: free_run(parallelogram(3, flexible=False)), "1 too many among", 'joint "mid foot"', "parallel cranks?"
+    )
     record(
         GROUP,
         "parallelogram with a third crank, rigid links",
@@ -140,7 +147,7 @@ def test_welded_twice(record):
     welds = [{"name": name, "type": "weld", "between": ("link1.tip", "link2.root")} for name in ("W", "again")]
     model = make_model(arm_links(), joint=[revolute("O", "ground", "link1.root"), *welds])
     refused(lambda: free_run(model), "3 too many among", 'joint "W"', 'joint "again"')
-    record(GROUP, "two links welded twice", "refused", "input error: “3 too many among joint \"W\", x; …”")
+    record(GROUP, "two links welded twice", "refused", 'input error: “3 too many among joint "W", x; …”')
 
 
 def test_welded_at_both_ends(record):

@@ -1,13 +1,12 @@
-"""The same robots in other units: a body, and the two-link arm, measured in `length`s, `mass`es and `time`s of SI units."""
+"""The same robots in other units: a body, and the two-link arm, with what makes their numbers."""
 
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-import numpy as np
 from links import ANGLES, TIP, arm_links, quintic
 from mechanisms import make_model, revolute
 
-from ffrobot.mbs.planar_body import PlanarBody, PlanarPoint
+from ffrobot.mbs.planar_body import PlanarPoint
 
 
 @dataclass(frozen=True)
