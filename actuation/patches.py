@@ -241,7 +241,7 @@ def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
 def _pieces(key: str, body: ModalBody, number: int, start: float, end: float) -> tuple[Array, Array]:
     """The stretches (m + 1,) into which a change of the link's height along y cuts a patch, and the heights (m,)."""
     x = body.stations.position[:, 0]
-    slack = 1e-9 * body.length
+    slack = min(1e-9 * body.length, 0.25 * (end - start))
     covered = np.flatnonzero((x[1:] > start + slack) & (x[:-1] < end - slack))
     heights = body.stations.height[covered]
     jump = np.abs(np.diff(heights)) / np.maximum(heights[1:], heights[:-1])

@@ -95,7 +95,7 @@ def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
     group.attrs["tolerance"] = analysis.tolerance
     group.attrs["actuation"] = analysis.actuation or ""
     group.attrs["apply"] = analysis.apply or ""
-    for key in ("steps", "rejected", "evaluations", "wall_seconds", "status"):
+    for key in ("steps", "rejected", "evaluations", "wall_seconds", "status", "cause"):
         group.attrs[key] = getattr(outcome, key)
 
 

@@ -11,9 +11,11 @@ import numpy as np
 from ..errors import SolveError
 from . import _core
 from .analysis_records import Analysis
+from .diagnosis import find_cause, lost_inertia
 from .initial_state import State, check_reach, undeformed_state
 from .integrators import METHODS, Choice, choose_integrator
 from .model import ZERO, Array, Assembly, Model
+from .smoothness import check_smooth
 from .statics import static_equilibrium
 from .steering import Equipment, actuation_source, applied_actuators
 
@@ -28,8 +30,8 @@ _STATUS = {
     _core.IntegrationStatus.diverged: "diverged",
 }
 _ADVICE = {
-    "step underflow": "no step is small enough there: the motion turns singular (a stretched arm, a jump in a"
-    " trajectory) or the load grows without bound",
+    "step underflow": "no step is small enough there: the motion turns singular (a stretched arm, a jump in a load) or"
+    " the load grows without bound",
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
     "interrupted": "stopped on request",
     "diverged": "a link is bent by as much as it is long, which small deformations do not describe: loads beyond"
@@ -57,6 +59,8 @@ class Outcome:
     evaluations: int
     wall_seconds: float
     integrator: Choice
+    time_reached: float | None = None  # s, the last step's, where the run ended before its end
+    cause: str = ""  # what was found wrong there
     recording: _core.Recording | None = field(default=None, repr=False)
     shape: list[list[_core.TimeFunction]] | None = field(default=None, repr=False)  # prescribed p(t), FCID only
     shape_force: Array | None = None  # (T, modes of all bodies) −λ_p, the forces that hold the shape; FCID only
@@ -76,9 +80,10 @@ class Outcome:
     def check_completed(self) -> None:
         """Raise `SolveError` with advice unless the run reached its end."""
         if self.status != "completed":
+            reached = self.time[-1] if self.time_reached is None else self.time_reached
             raise SolveError(
-                f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {self.time[-1]:g} s'
-                f" ({self.status}): {_ADVICE[self.status]}"
+                f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
+                f" ({self.status}): {self.cause or _ADVICE[self.status]}"
             )
 
 
@@ -89,6 +94,7 @@ def run_pcid(model: Model, analysis: Analysis, keep_recording: bool, progress: P
     """
     assembly = Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
     start = initial_state(assembly)
+    check_smooth(assembly, analysis.end)
     check_reach(assembly, undeformed_state(assembly), analysis.times)
     recording = _core.Recording() if keep_recording else None
     return _integrate(assembly, analysis, start, None, resolver_of(assembly), recording, progress)
@@ -150,6 +156,8 @@ def _integrate(
     progress: Progress,
     replayed: Choice | None = None,
 ) -> Outcome:
+    if len(analysis.times) > 1 and (cause := lost_inertia(assembly, start.q)):
+        raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
     integrator = choose_integrator(assembly, analysis, start, replayed)
     run = _core.run(
@@ -158,9 +166,11 @@ def _integrate(
         recording,
     )  # fmt: skip
     seconds = time.perf_counter() - began
-    reached = len(run.q)
+    reached, status = len(run.q), _STATUS[run.status]
+    failed = status not in ("completed", "interrupted")
+    cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2))) if failed else ""
     return Outcome(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers,
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
-        _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, integrator, recording,
+        status, run.steps, run.rejected, run.evaluations, seconds, integrator, run.time_reached, cause, recording,
     )  # fmt: skip

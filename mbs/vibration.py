@@ -31,21 +31,23 @@ def mass_matrix(body: PlanarBody, q: Array) -> Array:
     theta, p = q[2], q[3:]
     c, s = np.cos(theta), np.sin(theta)
     A, A_theta = np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]])
+    s, s_p, inertia, h = body.first_moment + body.S_bar @ p, body.S_bar, body.m_xy, body.h + p @ body.S_tilde
+    if (K := body.stiffening) is not None:
+        s, s_p, inertia, h = s - 0.5 * p @ K.K_s @ p, s_p - K.K_s @ p, inertia - K.K_omega, h - K.K_h @ p
     M = np.eye(len(q))
     M[:2, :2] = body.mass * np.eye(2)
-    M[:2, 2] = M[2, :2] = A_theta @ (body.first_moment + body.S_bar @ p)
-    M[:2, 3:] = A @ body.S_bar
+    M[:2, 2] = M[2, :2] = A_theta @ s
+    M[:2, 3:] = A @ s_p
     M[3:, :2] = M[:2, 3:].T
-    M[2, 2] = body.inertia + 2 * body.j @ p + p @ body.m_xy @ p
-    M[2, 3:] = M[3:, 2] = body.h + p @ body.S_tilde
+    M[2, 2] = body.inertia + 2 * body.j @ p + p @ inertia @ p
+    M[2, 3:] = M[3:, 2] = h
     return M
 
 
 def vibrations(assembly: Assembly, state: State) -> Vibrations:
     """The constrained vibrations about `state`, with the stiffness of the links alone (no loads, no rotation)."""
     bodies = assembly.model.bodies
-    blocks = [state.q[first : first + 3 + body.n_modes] for first, body in zip(assembly.first, bodies, strict=True)]
-    M = _block_diagonal([mass_matrix(body, q) for body, q in zip(bodies, blocks, strict=True)])
+    M = system_mass_matrix(assembly, state.q)
     K = _stiffness(assembly)
     D = _block_diagonal([block for body in bodies for block in (np.zeros((3, 3)), body.damping)])
     _, _, C_q = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))
@@ -63,6 +65,12 @@ def vibrations(assembly: Assembly, state: State) -> Vibrations:
 def _stiffness(assembly: Assembly) -> Array:
     """Diagonal of K over all coordinates."""
     return np.concatenate([np.concatenate([np.zeros(3), body.stiffness]) for body in assembly.model.bodies])
+
+
+def system_mass_matrix(assembly: Assembly, q: Array) -> Array:
+    """M (coordinates, coordinates) of all bodies."""
+    blocks = zip(assembly.model.bodies, assembly.first, strict=True)
+    return _block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
 
 
 def _block_diagonal(blocks: list[Array]) -> Array:

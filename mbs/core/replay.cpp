@@ -25,6 +25,7 @@ void ActuationSource::resolve() {
 
 RecordedMotion::RecordedMotion(const System &system, const Recording &recording)
     : motion_(system, {}, {}, nullptr), recording_(recording) {
+  motion_.plan(recording.times.back() - recording.times.front());
   constexpr int remembered = 4;
   for (int i = 0; i < remembered; ++i)
     cache_.push_back({static_cast<std::size_t>(-1), make_method(recording.method, motion_)});
