@@ -82,6 +82,9 @@ void bind_time_function(nb::module_ &m) {
       .def_static("polynomial", &polynomial, "breaks"_a, "coefficients"_a,
                   "Breaks (k+1,) and coefficients (k, order), highest power first, in powers of t − left break.")
       .def(
+          "held", [](const TimeFunction &f, double begin, double end) -> TimeFunction { return Held(f, begin, end); },
+          "begin"_a, "end"_a, "The same between `begin` and `end`, and at rest with its values there outside.")
+      .def(
           "__call__",
           [](const TimeFunction &function, double t) {
             const Jet jet = function(t);

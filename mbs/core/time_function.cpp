@@ -277,6 +277,17 @@ Jet PiecewisePolynomial::operator()(double t) const {
   return result;
 }
 
+Held::Held(const TimeFunction &function, double begin, double end)
+    : function_(std::make_shared<const TimeFunction>(function)), begin_(begin), end_(end) {}
+
+Jet Held::operator()(double t) const {
+  if (t < begin_)
+    return {(*function_)(begin_).value, 0.0, 0.0};
+  if (t > end_)
+    return {(*function_)(end_).value, 0.0, 0.0};
+  return (*function_)(t);
+}
+
 Jet TimeFunction::operator()(double t) const {
   const Jet jet = std::visit([t](const auto &function) { return function(t); }, function_);
   return {finite_or_nan(jet.value), finite_or_nan(jet.rate), finite_or_nan(jet.acceleration)};

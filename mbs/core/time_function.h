@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <variant>
 #include <vector>
@@ -91,6 +92,20 @@ private:
   double margin_;
 };
 
+class TimeFunction;
+
+/// Another function on [begin, end], and its values there before and after: at rest.
+class Held {
+public:
+  Held(const TimeFunction &function, double begin, double end);
+
+  Jet operator()(double t) const;
+
+private:
+  std::shared_ptr<const TimeFunction> function_;
+  double begin_, end_;
+};
+
 /// Any prescribed function of time. Components that are not finite (domain error, overflow, out of range) are NaN:
 /// callers check.
 class TimeFunction {
@@ -98,11 +113,12 @@ public:
   TimeFunction(Constant function) : function_(function) {}
   TimeFunction(Expression function) : function_(std::move(function)) {}
   TimeFunction(PiecewisePolynomial function) : function_(std::move(function)) {}
+  TimeFunction(Held function) : function_(std::move(function)) {}
 
   Jet operator()(double t) const;
 
 private:
-  std::variant<Constant, Expression, PiecewisePolynomial> function_;
+  std::variant<Constant, Expression, PiecewisePolynomial, Held> function_;
 };
 
 } // namespace ffrobot
