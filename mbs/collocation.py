@@ -1,8 +1,8 @@
-"""Gauss collocation of second-order equations r(t, p, ṗ, p̈) = 0 between two boundary conditions.
+"""Collocation of second-order equations r(t, p, ṗ, p̈) = 0 between two boundary conditions.
 
-On each interval p̈ is a polynomial through its values K at the Gauss points; p and ṗ are its integrals, continuous at
-the breaks (Ascher, Christiansen and Russell 1981). The scheme is symmetric: it carries growing and decaying
-solutions alike, whatever the size of an interval (Ascher, Mattheij and Russell 1995, ch. 10).
+On each interval p̈ is a polynomial through its values K at a few points; p and ṗ are its integrals, continuous at the
+breaks (Ascher, Christiansen and Russell 1981). Gauss points carry growing and decaying solutions alike, whatever the
+size of an interval (Ascher, Mattheij and Russell 1995, ch. 10).
 """
 
 from __future__ import annotations
@@ -36,18 +36,21 @@ class Problem:
     """The equations, for N nodes at once: times (N,), p, ṗ, p̈ (N, n).
 
     residual(times, p, ṗ, p̈) gives r (N, n). derivatives(times) gives ∂r/∂p̈, ∂r/∂ṗ, ∂r/∂p, each (N, n, n): they only
-    set the pace of Newton's method. `scale` (n,) is about |ṗ|/|p|, 1/s.
+    set the pace of Newton's method. `scale` (n,) is about |ṗ|/|p|, 1/s, `size` a typical |scale · p|. All conditions at the
+    start make it an initial value problem; then intervals have to resolve vibrations, or those of varying equations
+    grow.
     """
 
     residual: Callable[[Array, Array, Array, Array], Array]
     derivatives: Callable[[Array], tuple[Array, Array, Array]]
     scale: Array
+    size: float
     start: Boundary
     end: Boundary
 
 
 class Scheme(NamedTuple):
-    """Gauss points c (s,) on [0, 1] and what integrals of the polynomial through values there are: once, twice."""
+    """Points c (s,) on [0, 1] and what integrals of the polynomial through values there are: once, twice."""
 
     c: Array
     to_powers: Array  # (s, s) values → coefficients of 1, ξ, ξ² …
@@ -58,7 +61,7 @@ class Scheme(NamedTuple):
 
 
 def gauss(stages: int = STAGES) -> Scheme:
-    """Collocation at the zeros of the Legendre polynomial of degree `stages` (Hairer, Nørsett and Wanner, II.7)."""
+    """Collocation at the zeros of the Legendre polynomial (Hairer, Nørsett and Wanner, II.7)."""
     c = (np.polynomial.legendre.leggauss(stages)[0] + 1) / 2
     m = np.arange(stages)
     to_powers = np.linalg.inv(c[:, None] ** m)
@@ -67,6 +70,9 @@ def gauss(stages: int = STAGES) -> Scheme:
         c, to_powers, c[:, None] ** (m + 1) * once @ to_powers, c[:, None] ** (m + 2) * twice @ to_powers,
         once @ to_powers, twice @ to_powers,
     )  # fmt: skip
+
+
+GAUSS = gauss()
 
 
 @dataclass(frozen=True)
@@ -80,48 +86,45 @@ class Found:
 
 def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Array, Array, Array]]) -> Found:
     """Solve on the given breaks (N+1,) from a guess of (p, ṗ, p̈) at any times."""
-    scheme, h = gauss(), np.diff(breaks)
-    times = breaks[:-1, None] + h[:, None] * scheme.c
+    h = np.diff(breaks)
+    times = breaks[:-1, None] + h[:, None] * GAUSS.c
     n = len(problem.scale)
-    linear = _LinearSystem(problem, scheme, breaks, [x.reshape(*times.shape, n, n) for x in _at(problem, times)])
+    derivatives = [x.reshape(*times.shape, n, n) for x in problem.derivatives(times.ravel())]
+    linear = _LinearSystem(problem, breaks, derivatives)
     p, v = guess(breaks)[:2]
     K = guess(times.ravel())[2].reshape(*times.shape, n)
     previous, converged, iteration = np.inf, False, 0
     while not converged and iteration < MOST_ITERATIONS:
         iteration += 1
-        stages = _stages(scheme, h, p, v, K)
+        stages = _stages(h, p, v, K)
         r = problem.residual(times.ravel(), *(x.reshape(-1, n) for x in (*stages, K))).reshape(K.shape)
         if not np.all(np.isfinite(r)):
             break
         p_step, v_step, K_step = linear.solve(r, p, v, K)
         p, v, K = p + p_step, v + v_step, K + K_step
-        peak = max(np.abs(problem.scale * (p - p[0])).max(), np.abs(v).max(), 1e-300)
+        peak = max(np.abs(problem.scale * p).max(), np.abs(v).max(), problem.size)
         size = max(np.abs(problem.scale * p_step).max(), np.abs(v_step).max()) / peak
         converged = size <= TOLERANCE or (size <= ROUNDING and size > 0.3 * previous)
         if not np.isfinite(size):
             break
         previous = size
-    return Found(_curve(scheme, breaks, p, v, K), bool(converged), iteration)
+    return Found(_curve(breaks, p, v, K), bool(converged), iteration)
 
 
-def _at(problem: Problem, times: Array) -> tuple[Array, Array, Array]:
-    return problem.derivatives(times.ravel())
-
-
-def _stages(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
+def _stages(h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
     """p and ṗ (N, s, n) at the Gauss points, from their values at the breaks and K (N, s, n)."""
     step = h[:, None, None]
-    once, twice = (np.einsum("ij,Njn->Nin", a, K) for a in (scheme.stage_once, scheme.stage_twice))
-    p_stages = p[:-1, None] + scheme.c[:, None] * step * v[:-1, None] + step**2 * twice
+    once, twice = (np.einsum("ij,Njn->Nin", a, K) for a in (GAUSS.stage_once, GAUSS.stage_twice))
+    p_stages = p[:-1, None] + GAUSS.c[:, None] * step * v[:-1, None] + step**2 * twice
     return p_stages, v[:-1, None] + step * once
 
 
-def _curve(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
+def _curve(breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
     """Coefficients in powers of t − left break, highest first."""
     from scipy.interpolate import PPoly
 
     h = np.diff(breaks)[:, None]
-    powers = np.einsum("mi,Nin->mNn", scheme.to_powers, K)
+    powers = np.einsum("mi,Nin->mNn", GAUSS.to_powers, K)
     integrated = [x / ((m + 1) * (m + 2) * h**m) for m, x in enumerate(powers)]
     return PPoly(np.array([*integrated[::-1], v[:-1], p[:-1]]), breaks)
 
@@ -129,19 +132,19 @@ def _curve(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly
 class _LinearSystem:
     """Newton's equations: stages eliminated interval by interval, then a banded system for the values at breaks."""
 
-    def __init__(self, problem: Problem, scheme: Scheme, breaks: Array, derivatives: list[Array]) -> None:
+    def __init__(self, problem: Problem, breaks: Array, derivatives: list[Array]) -> None:
         from scipy.linalg.lapack import dgbtrf
 
         M, D, K = derivatives
-        self.problem, self.scheme, self.h = problem, scheme, np.diff(breaks)
+        self.problem, self.h = problem, np.diff(breaks)
         N, s, n = M.shape[:3]
         h = self.h[:, None, None, None, None]
-        E = h * scheme.stage_once[:, None, :, None] * D[:, :, :, None] + h**2 * (
-            scheme.stage_twice[:, None, :, None] * K[:, :, :, None]
+        E = h * GAUSS.stage_once[:, None, :, None] * D[:, :, :, None] + h**2 * (
+            GAUSS.stage_twice[:, None, :, None] * K[:, :, :, None]
         )  # (N, s, n, s, n)
         for i in range(s):
             E[:, i, :, i] += M[:, i]
-        self.G = np.concatenate([K, D + scheme.c[:, None, None] * h[..., 0] * K], axis=3).reshape(N, s * n, 2 * n)
+        self.G = np.concatenate([K, D + GAUSS.c[:, None, None] * h[..., 0] * K], axis=3).reshape(N, s * n, 2 * n)
         self.E_inverse = np.linalg.inv(E.reshape(N, s * n, s * n))
         self.S = np.concatenate([problem.scale, np.ones(n)])
         response = -(self.E_inverse @ self.G).reshape(N, s, n, 2 * n)
@@ -157,7 +160,7 @@ class _LinearSystem:
     def _at_end(self, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
         """p and ṗ (N, n, …) at the ends of intervals for p, ṗ at their starts and K (N, s, n, …)."""
         h = self.h.reshape(-1, *(1 for _ in K.shape[2:]))
-        once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (self.scheme.end_once, self.scheme.end_twice))
+        once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (GAUSS.end_once, GAUSS.end_twice))
         return p + h * v + h**2 * twice, v + h * once
 
     def _banded(self, blocks: Array) -> Array:
