@@ -12,6 +12,9 @@ from rich.table import Table
 
 from .mbs.analyses import Outcome
 from .mbs.geometric_stiffening import NOTABLE
+from .mbs.motors_only import describe_zeros, is_minimum_phase, path_error
+from .mbs.stable_inversion import Inversion
+from .results import INTEGRATED
 from .solution import Solution
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
@@ -39,6 +42,8 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     for name, outcome in solution.outcomes.items():
         if outcome.analysis.kind in ("pcid", "forward") and outcome.analysis.integrator == "auto":
             notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
+        if outcome.inversion is not None:
+            notes.add_row("motors only", f"{name}: {_inversion(outcome, outcome.inversion)}")
     notes.add_row(*_stiffening(solution))
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
@@ -46,6 +51,21 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     console.print()
     console.print(notes)
     console.print(f"results    {path}", soft_wrap=True)
+
+
+def _inversion(outcome: Outcome, inversion: Inversion) -> str:
+    """What the zeros are, how the path was inverted, and what that leaves of it."""
+    linear, factor = inversion.linearisation, inversion.servo.factor
+    error = np.abs(path_error(inversion, outcome.time, outcome.q)).max()
+    left = f"largest error of the path {error:.2g}"
+    if is_minimum_phase(linear):
+        output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the deflections"
+        return f"{output}: minimum phase, integrated forward; {left}"
+    return (
+        f"not minimum phase, zeros at {describe_zeros(linear)} 1/s; stable inversion with"
+        f" {outcome.analysis.pre_actuation:.3g} s of pre- and {outcome.analysis.post_actuation:.3g} s of post-actuation"
+        f" (start off rest by {inversion.off_rest:.1g}); {left}"
+    )
 
 
 def _stiffening(solution: Solution) -> tuple[str, str]:
@@ -63,7 +83,7 @@ def _analyses(solution: Solution) -> Table:
     table = _table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
         analysis, reached = outcome.analysis, outcome.time[-1]
-        integrated = analysis.kind in ("pcid", "forward")
+        integrated = analysis.kind in INTEGRATED
         table.add_row(
             name,
             analysis.kind,

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, SolveError
 from . import _core
-from .fcid import Shape
+from ._core import TimeFunction
 from .initial_state import undeformed_state
 from .model import ZERO, Array, Assembly, Constraint, Model
+from .rows import Row
 
 MOST_ITERATIONS = 50
 TOLERANCE = 1e-12  # of an equilibrium's last Newton step
@@ -34,6 +35,7 @@ class Servo:
     driven: Assembly
     factor: float
     guess: Array  # coordinates (R, θ, p) that pick the branch
+    loads: tuple[tuple[Row, TimeFunction], ...]  # of the scene, held before and after the path as it is
 
     def core(self) -> _core.MotorsOnly:
         """The evaluator of r(t, p, ṗ, p̈)."""
@@ -47,7 +49,7 @@ class Servo:
         """What reads the motors' forces off the multipliers."""
         return _core.ActuationResolver(self.driven.system, self.driven.is_trajectory, self.driven.motor_rows)
 
-    def source(self, shape: Shape) -> _core.ActuationSource:
+    def source(self, shape: list[list[TimeFunction]]) -> _core.ActuationSource:
         """The motors' forces for p(t), at any time."""
         return _core.MotorsOnlyActuation(
             self.driven.system, self.core(), shape, self.driven.is_trajectory, self.resolver()
@@ -78,15 +80,10 @@ def make_servo(model: Model, end: float, factor: float) -> Servo:
     rows = list(model.motors.values())
     held = [Constraint(c.row, c.target.held(0.0, end), c.owner, c.component, True) for c in model.trajectories]
     motors = [Constraint(row, ZERO, motor_owner(name), "value", True) for name, row in model.motors.items()]
-    loads = held_loads(model, end)
+    loads = tuple((row, size.held(0.0, end)) for row, size in model.loads)
     path = Assembly(model, [*model.joints, *held], loads, rows)
     driven = Assembly(model, [*model.joints, *motors], loads, rows)
-    return Servo(path, driven, factor, undeformed_state(path).q)
-
-
-def held_loads(model: Model, end: float) -> list[tuple[_core.Row, _core.TimeFunction]]:
-    """The loads of the scene, held before 0 and after `end` as the path is."""
-    return [(row, size.held(0.0, end)) for row, size in model.loads]
+    return Servo(path, driven, factor, undeformed_state(path).q, loads)
 
 
 @dataclass(frozen=True)
