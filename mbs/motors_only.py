@@ -1,7 +1,8 @@
 """Inverse dynamics with motors only: the analysis `kind = "motors-only"`.
 
 `output = "tip"` follows the path exactly, by stable inversion with pre- and post-actuation where zeros lie in the right
-half plane. `output = "redefined"` follows it with a point nearer the joints, and reports what that leaves at the tip.
+half plane. `output = "redefined"` follows it with a point nearer the joints, and reports what that leaves at the tip: the part of
+the vibration that the output does not see.
 """
 
 from __future__ import annotations
@@ -9,12 +10,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from ..errors import InputError
 from .analyses import Outcome
 from .analysis_records import Analysis
+from .fcid import spline
 from .initial_state import check_reach, undeformed_state
 from .integrators import Choice
 from .model import Array, Model
@@ -65,16 +68,27 @@ def _output(model: Model, analysis: Analysis) -> tuple[Servo, Linearisation]:
                 f" since it is integrated forward, found {analysis.factor:g} with zeros in the right half plane:"
                 f' {describe_zeros(linear)}; use a smaller factor, leave it out, or use output = "tip"'
             )
-        return servo, linear
+        return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, linear)
     for k in range(round(1 / FACTOR_STEP) + 1):
         servo = make_servo(model, end, max(0.0, 1.0 - k * FACTOR_STEP))
         linear = linearise(servo, end)
         if is_minimum_phase(linear):
-            return servo, linear
+            return _with_expected_deflections(servo, linear)
     raise InputError(
         f'{model.scene.path}: analysis "{analysis.name}": output: expected a robot whose joint motion is minimum phase'
         f' for "redefined", found zeros in the right half plane even then: {describe_zeros(linear)}'
     )
+
+
+def _with_expected_deflections(servo: Servo, linear: Linearisation) -> tuple[Servo, Linearisation]:
+    """The part of the deflections that the output leaves out, replaced by what the path's loads bend without vibration.
+
+    A function of time alone: it changes the output's target, not its zeros.
+    """
+    sag = linearise(replace(servo, factor=1.0), float(linear.times[-1])).shape
+    offset = [f.held(0.0, linear.times[-1]) for f in spline(linear.times, (1 - servo.factor) * sag, at_rest=True)]
+    servo = replace(servo, offset=tuple(offset))
+    return servo, linearise(servo, float(linear.times[-1]))
 
 
 def is_minimum_phase(linear: Linearisation) -> bool:

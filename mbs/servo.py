@@ -28,7 +28,8 @@ SINGULAR = 1e-13  # of M of the internal dynamics, scaled
 class Servo:
     """The robot under its path, and under its motors; `factor` 1 takes the path's own points as output.
 
-    A smaller factor takes where they would be with the same motor coordinates and `factor` times the deflections.
+    A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p + `offset`,
+    which is what is expected of the rest.
     """
 
     path: Assembly
@@ -36,14 +37,16 @@ class Servo:
     factor: float
     guess: Array  # coordinates (R, θ, p) that pick the branch
     loads: tuple[tuple[Row, TimeFunction], ...]  # of the scene, held before and after the path as it is
+    offset: tuple[TimeFunction, ...] = ()  # one for each mode of all bodies, or none
 
     def core(self) -> _core.MotorsOnly:
         """The evaluator of r(t, p, ṗ, p̈)."""
         order = [c.owner for c in self.driven.constraints]
         numbers = [order.index(motor_owner(name)) for name in self.path.model.motors]
         return _core.MotorsOnly(
-            self.path.system, self.path.motor_rows, self.driven.system, numbers, self.factor, self.guess
-        )
+            self.path.system, self.path.motor_rows, self.driven.system, numbers, self.factor, list(self.offset),
+            self.guess,
+        )  # fmt: skip
 
     def resolver(self) -> _core.ActuationResolver:
         """What reads the motors' forces off the multipliers."""

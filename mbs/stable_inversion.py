@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 SAMPLES = 33  # of the linear dynamics along the path
 FIRST_INTERVALS = 24  # of each of: before, on and after the path
+SHAPE_ITERATIONS = 8  # of that shape, each a hundred times closer for links that are not very soft
 RESOLVED = 5.0  # largest interval times the fastest zero where it is integrated forward
 WINDOW = 32  # intervals integrated forward at once
 MOST_INTERVALS = 3000  # solved at once
@@ -83,11 +84,12 @@ class Inversion:
 
 
 def linearise(servo: Servo, end: float) -> Linearisation:
-    """About links that follow the loads of the undeformed robot on its path as springs would."""
+    """About links that follow their loads on the path as springs would: r(t, p, 0, 0) = 0."""
     core, times = servo.core(), np.linspace(0.0, end, SAMPLES)
-    rest = np.zeros((SAMPLES, len(servo.scale)))
-    first = linear_dynamics(core, times, rest, rest, rest)
-    p = -np.linalg.solve(first.K, core.residuals(times.tolist(), rest, rest, rest)[:, :, None])[:, :, 0]
+    p = rest = np.zeros((SAMPLES, len(servo.scale)))
+    K = linear_dynamics(core, times, rest, rest, rest).K
+    for _ in range(SHAPE_ITERATIONS):
+        p = p - np.linalg.solve(K, core.residuals(times.tolist(), p, rest, rest)[:, :, None])[:, :, 0]
     dynamics = linear_dynamics(core, times, p, rest, rest)
     return Linearisation(dynamics, p, zeros(dynamics, servo.scale))
 

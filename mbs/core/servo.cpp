@@ -8,10 +8,11 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 MotorsOnly::MotorsOnly(const System &path, std::vector<Row> motors, const System &driven,
-                       std::vector<std::size_t> motor_constraint, double factor, VectorXd guess)
+                       std::vector<std::size_t> motor_constraint, double factor, std::vector<TimeFunction> offset,
+                       VectorXd guess)
     : path_system_(path), driven_system_(driven), motors_(std::move(motors)),
-      motor_constraint_(std::move(motor_constraint)), factor_(factor), guess_(std::move(guess)), path_(path, guess_),
-      driven_(driven, guess_) {
+      motor_constraint_(std::move(motor_constraint)), factor_(factor), offset_(std::move(offset)), guess_(std::move(guess)),
+      path_(path, guess_), driven_(driven, guess_) {
   residual_ = p_ = p_dot_ = p_ddot_ =
       VectorXd::Zero(path.coordinates - static_cast<Index>(3 * path.bodies.size()));
 }
@@ -19,7 +20,17 @@ MotorsOnly::MotorsOnly(const System &path, std::vector<Row> motors, const System
 void MotorsOnly::restart() { path_.start_at(guess_); }
 
 bool MotorsOnly::solve(double t, const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
-  path_.set_shape(factor_ * p, factor_ * p_dot, factor_ * p_ddot);
+  output_p_ = factor_ * p;
+  output_p_dot_ = factor_ * p_dot;
+  output_p_ddot_ = factor_ * p_ddot;
+  for (std::size_t k = 0; k < offset_.size(); ++k) {
+    const Jet offset = offset_[k](t);
+    const auto i = static_cast<Index>(k);
+    output_p_[i] += offset.value;
+    output_p_dot_[i] += offset.rate;
+    output_p_ddot_[i] += offset.acceleration;
+  }
+  path_.set_shape(output_p_, output_p_dot_, output_p_ddot_);
   if (!path_.move(t))
     return false;
   const Workspace &w = path_.workspace();

@@ -7,8 +7,9 @@
 // r(t, p, p_dot, p_ddot), linear in p_ddot. r = 0 is the internal dynamics (Blajer and Kolodziejczyk 2004; Seifried
 // 2014, ch. 4).
 //
-// The output y_a is where the point would be with the same motor coordinates and the deflections times a factor a: the
-// point itself with a = 1, joint motion alone with a = 0 (Wang and Vidyasagar 1991; De Luca and Siciliano 1993).
+// The output y_a is where the point would be with the same motor coordinates and the deflections a p + offset(t): the
+// point itself with a = 1 and no offset, joint motion alone with a = 0 (Wang and Vidyasagar 1991; De Luca and Siciliano
+// 1993). The offset is (1 - a) times the deflections that are expected.
 #pragma once
 
 #include "core/fcid.h"
@@ -22,10 +23,11 @@ namespace ffrobot {
 class MotorsOnly {
 public:
   // path: under C_m and the specified trajectories; motors: their rows in it. driven: the same bodies under C_m and the
-  // motors' rows, motor i being constraint motor_constraint[i]. guess: coordinates the first position is found from.
-  // Both systems must outlive this.
+  // motors' rows, motor i being constraint motor_constraint[i]. offset: one function per mode of all bodies, or empty.
+  // guess: coordinates the first position is found from. Both systems must outlive this.
   MotorsOnly(const System &path, std::vector<Row> motors, const System &driven,
-             std::vector<std::size_t> motor_constraint, double factor, Eigen::VectorXd guess);
+             std::vector<std::size_t> motor_constraint, double factor, std::vector<TimeFunction> offset,
+             Eigen::VectorXd guess);
 
   Eigen::Index modes() const { return residual_.size(); }
 
@@ -42,7 +44,8 @@ private:
   std::vector<Row> motors_;
   std::vector<std::size_t> motor_constraint_;
   double factor_;
-  Eigen::VectorXd guess_, residual_, p_, p_dot_, p_ddot_;
+  std::vector<TimeFunction> offset_;
+  Eigen::VectorXd guess_, residual_, p_, p_dot_, p_ddot_, output_p_, output_p_dot_, output_p_ddot_;
   FullyConstrained path_, driven_;
 };
 
