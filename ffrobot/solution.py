@@ -25,9 +25,9 @@ from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.analysis_records import Analysis
 from .mbs.fcid import run_fcid
-from .mbs.motors_only import run_motors_only
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
+from .mbs.motors_only import run_motors_only
 from .mbs.observation import body_motion
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.record_types import split_point

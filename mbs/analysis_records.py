@@ -91,9 +91,7 @@ class Analysis(Record):
     def _check_motors_only(self) -> None:
         for key in ("output", "factor", "pre_actuation", "post_actuation"):
             if self.kind != "motors-only" and key in self.model_fields_set:
-                raise ValueError(
-                    f'expected the key "{key}" only in kind = "motors-only", found kind = "{self.kind}"'
-                )
+                raise ValueError(f'expected the key "{key}" only in kind = "motors-only", found kind = "{self.kind}"')
         if self.factor is not None and self.output != "redefined":
             raise ValueError(f'expected the key "factor" only with output = "redefined", found "{self.output}"')
 

@@ -36,8 +36,8 @@ class Problem:
     """The equations, for N nodes at once: times (N,), p, ṗ, p̈ (N, n).
 
     residual(times, p, ṗ, p̈) gives r (N, n). derivatives(times) gives ∂r/∂p̈, ∂r/∂ṗ, ∂r/∂p, each (N, n, n): they only
-    set the pace of Newton's method. `scale` (n,) is about |ṗ|/|p|, 1/s, `size` a typical |scale · p|. All conditions at the
-    start make it an initial value problem; then intervals have to resolve vibrations, or those of varying equations
+    set the pace of Newton's method. `scale` (n,) is about |ṗ|/|p|, 1/s, `size` a typical |scale · p|. All conditions at
+    the start make it an initial value problem; then intervals have to resolve vibrations, or those of varying equations
     grow.
     """
 
@@ -112,7 +112,7 @@ def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Ar
 
 
 def _stages(h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
-    """p and ṗ (N, s, n) at the Gauss points, from their values at the breaks and K (N, s, n)."""
+    """States p and ṗ (N, s, n) at the Gauss points, from their values at the breaks and K (N, s, n)."""
     step = h[:, None, None]
     once, twice = (np.einsum("ij,Njn->Nin", a, K) for a in (GAUSS.stage_once, GAUSS.stage_twice))
     p_stages = p[:-1, None] + GAUSS.c[:, None] * step * v[:-1, None] + step**2 * twice
@@ -158,7 +158,7 @@ class _LinearSystem:
         self.singular = info != 0
 
     def _at_end(self, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
-        """p and ṗ (N, n, …) at the ends of intervals for p, ṗ at their starts and K (N, s, n, …)."""
+        """States p and ṗ (N, n, …) at the ends of intervals for p, ṗ at their starts and K (N, s, n, …)."""
         h = self.h.reshape(-1, *(1 for _ in K.shape[2:]))
         once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (GAUSS.end_once, GAUSS.end_twice))
         return p + h * v + h**2 * twice, v + h * once

@@ -1,8 +1,8 @@
 """Inverse dynamics with motors only: the analysis `kind = "motors-only"`.
 
 `output = "tip"` follows the path exactly, by stable inversion with pre- and post-actuation where zeros lie in the right
-half plane. `output = "redefined"` follows it with a point nearer the joints, and reports what that leaves at the tip: the part of
-the vibration that the output does not see.
+half plane. `output = "redefined"` follows it with a point nearer the joints, and reports what that leaves at the tip:
+the part of the vibration that the output does not see.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def _check_relative_degree(servo: Servo, linear: Linearisation) -> None:
     if values[worst, -1] < SINGULAR * values[worst, 0]:
         raise InputError(
             f"{servo.path.model.scene.path}: expected motors that accelerate every component of the path, found at"
-            f" t = {linear.times[worst]:g} s a coupling that is singular: take another number of modes or another factor"
+            f" t = {linear.times[worst]:g} s a singular coupling: take another number of modes or another factor"
         )
 
 
@@ -134,7 +134,7 @@ def _check_rest(servo: Servo, analysis: Analysis, needs_future: bool) -> None:
 
 
 def _durations(analysis: Analysis, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
-    """Pre- and post-actuation (s): as given, or until motions of the zero dynamics have died out; whole output steps."""
+    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
     s = linear.zeros[[0, -1]]
     grow, decay = s.real[is_unstable(s)], -s.real[s.real < 0]
     pre = DECAY / grow.min() if needs_future else 0.0

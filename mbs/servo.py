@@ -1,7 +1,7 @@
 """A path as a servo constraint whose force enters through the joint motors alone: its equations and their zeros.
 
-With p(t) given all frames follow, and r(t, p, ṗ, p̈) = 0 is what is left: the internal dynamics (Blajer and Kolodziejczyk
-2004; Seifried 2014, ch. 4). It is the zero dynamics about a path that is held.
+With p(t) given all frames follow, and r(t, p, ṗ, p̈) = 0 is what is left: the internal dynamics (Blajer and
+Kolodziejczyk 2004; Seifried 2014, ch. 4). It is the zero dynamics about a path that is held.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ SINGULAR = 1e-13  # of M of the internal dynamics, scaled
 class Servo:
     """The robot under its path, and under its motors; `factor` 1 takes the path's own points as output.
 
-    A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p + `offset`,
-    which is what is expected of the rest.
+    A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p +
+    `offset`, which is what is expected of the rest.
     """
 
     path: Assembly
@@ -117,7 +117,7 @@ def linear_dynamics(core: _core.MotorsOnly, times: Array, p: Array, v: Array, a:
 
 
 def equilibrium(servo: Servo, core: _core.MotorsOnly, t: float) -> Array:
-    """p (n,) at rest under the path's position and the loads at time t. Raises `SolveError` where there is none."""
+    """Shape p (n,) at rest under the path's position and the loads at time t. Raises `SolveError` where there is none."""
     p = np.zeros((1, len(servo.scale)))
     rest = np.zeros_like(p)
     for _ in range(MOST_ITERATIONS):
