@@ -61,7 +61,8 @@ class Servo:
     @property
     def scale(self) -> Array:
         """Frequencies ω of all modes (n,), rad/s."""
-        return np.sqrt(np.concatenate([body.stiffness for body in self.path.model.bodies]))
+        omega: Array = np.sqrt(np.concatenate([body.stiffness for body in self.path.model.bodies]))
+        return omega
 
 
 def motor_owner(joint: str) -> str:
@@ -117,7 +118,7 @@ def linear_dynamics(core: _core.MotorsOnly, times: Array, p: Array, v: Array, a:
 
 
 def equilibrium(servo: Servo, core: _core.MotorsOnly, t: float) -> Array:
-    """Shape p (n,) at rest under the path's position and the loads at time t. Raises `SolveError` where there is none."""
+    """Shape p (n,) at rest under path and loads as at time t. Raises `SolveError` where there is none."""
     p = np.zeros((1, len(servo.scale)))
     rest = np.zeros_like(p)
     for _ in range(MOST_ITERATIONS):

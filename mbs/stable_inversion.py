@@ -184,7 +184,8 @@ class _Solver:
         """Largest |r| between the collocation points of each interval (N,)."""
         times = (curve.x[:-1, None] + np.diff(curve.x)[:, None] * PROBES).ravel()
         r = np.abs(self.problem.residual(times, *_states(curve)(times))).max(axis=1)
-        return np.nan_to_num(r, nan=np.inf).reshape(-1, len(PROBES)).max(axis=1)
+        largest: Array = np.nan_to_num(r, nan=np.inf).reshape(-1, len(PROBES)).max(axis=1)
+        return largest
 
 
 def _boundary(servo: Servo, core: _core.MotorsOnly, t: float, unstable: bool) -> Boundary:
@@ -205,7 +206,8 @@ def _breaks(pre: float, end: float, post: float, widest: float = np.inf) -> Arra
     """Even breaks before, on and after the path, whose ends are breaks; (N+1,)."""
     parts = [(-pre, 0.0), (0.0, end), (end, end + post)]
     pieces = [np.linspace(a, b, max(FIRST_INTERVALS, int((b - a) / widest)) + 1) for a, b in parts if b > a]
-    return np.unique(np.concatenate(pieces))
+    breaks: Array = np.unique(np.concatenate(pieces))
+    return breaks
 
 
 def _refined(breaks: Array, excess: Array) -> Array:

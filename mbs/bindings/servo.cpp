@@ -20,8 +20,8 @@ void bind_servo(nb::module_ &m) {
   nb::class_<MotorsOnly>(m, "MotorsOnly", "Inverse dynamics of a path with joint motors alone.")
       .def(nb::init<const System &, std::vector<Row>, const System &, std::vector<std::size_t>, double,
                     std::vector<TimeFunction>, Eigen::VectorXd>(),
-           "path"_a, "motors"_a, "driven"_a, "motor_constraint"_a, "factor"_a, "offset"_a, "guess"_a, nb::keep_alive<1, 2>(),
-           nb::keep_alive<1, 4>())
+           "path"_a, "motors"_a, "driven"_a, "motor_constraint"_a, "factor"_a, "offset"_a, "guess"_a,
+           nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>())
       .def("residuals", &servo_residuals, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a,
            "Modal forces r (N, n) that motors do not supply; NaN where no position is found.")
       .def("derivatives", &servo_derivatives, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a,

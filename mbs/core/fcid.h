@@ -73,7 +73,8 @@ struct FcidOutputs {
       residual;
 };
 
-// What is reported of `motion` at `times`; solve(t) makes it that of time t. resolver may be null; F_p then stays empty.
+// What is reported of `motion` at `times`; solve(t) makes it that of time t. resolver may be null; F_p then stays
+// empty.
 FcidOutputs collect(const FullyConstrained &motion, const std::vector<double> &times,
                     const std::function<bool(double)> &solve, ActuationResolver *resolver);
 

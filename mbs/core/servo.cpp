@@ -11,10 +11,9 @@ MotorsOnly::MotorsOnly(const System &path, std::vector<Row> motors, const System
                        std::vector<std::size_t> motor_constraint, double factor, std::vector<TimeFunction> offset,
                        VectorXd guess)
     : path_system_(path), driven_system_(driven), motors_(std::move(motors)),
-      motor_constraint_(std::move(motor_constraint)), factor_(factor), offset_(std::move(offset)), guess_(std::move(guess)),
-      path_(path, guess_), driven_(driven, guess_) {
-  residual_ = p_ = p_dot_ = p_ddot_ =
-      VectorXd::Zero(path.coordinates - static_cast<Index>(3 * path.bodies.size()));
+      motor_constraint_(std::move(motor_constraint)), factor_(factor), offset_(std::move(offset)),
+      guess_(std::move(guess)), path_(path, guess_), driven_(driven, guess_) {
+  residual_ = p_ = p_dot_ = p_ddot_ = VectorXd::Zero(path.coordinates - static_cast<Index>(3 * path.bodies.size()));
 }
 
 void MotorsOnly::restart() { path_.start_at(guess_); }
@@ -37,7 +36,8 @@ bool MotorsOnly::solve(double t, const VectorXd &p, const VectorXd &p_dot, const
   RowMotion motion;
   for (std::size_t i = 0; i < motors_.size(); ++i) {
     evaluate(motors_[i], w.bodies, motion);
-    const double acceleration = row_acceleration(path_system_, motors_[i], motion, path_.q().data(), path_.a().data(), w);
+    const double acceleration =
+        row_acceleration(path_system_, motors_[i], motion, path_.q().data(), path_.a().data(), w);
     driven_.set_target(t, motor_constraint_[i], {motion.value, motion.rate, acceleration});
   }
   driven_.start_at(path_.q()); // the very same frames where factor = 1
@@ -116,8 +116,7 @@ InternalDynamics servo_derivatives(MotorsOnly &servo, const std::vector<double> 
 FcidOutputs servo_outputs(MotorsOnly &servo, const std::vector<double> &times, const std::vector<ModalShape> &shape,
                           ActuationResolver &resolver) {
   servo.restart();
-  return collect(
-      servo.motion(), times, [&](double t) { return servo.solve(t, shape); }, &resolver);
+  return collect(servo.motion(), times, [&](double t) { return servo.solve(t, shape); }, &resolver);
 }
 
 MotorsOnlyActuation::MotorsOnlyActuation(const System &driven, MotorsOnly servo, std::vector<ModalShape> shape,

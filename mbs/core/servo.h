@@ -36,8 +36,8 @@ public:
   bool solve(double t, const std::vector<ModalShape> &shape);
   void restart(); // the next position is found from the guess
 
-  const Eigen::VectorXd &residual() const { return residual_; }  // r: modal forces that nobody supplies
-  const FullyConstrained &motion() const { return driven_; }     // of the robot; its lambda: nu and -tau
+  const Eigen::VectorXd &residual() const { return residual_; } // r: modal forces that nobody supplies
+  const FullyConstrained &motion() const { return driven_; }    // of the robot; its lambda: nu and -tau
 
 private:
   const System &path_system_, &driven_system_;
@@ -68,8 +68,8 @@ FcidOutputs servo_outputs(MotorsOnly &servo, const std::vector<double> &times, c
 // The motors' forces for p(t), solved anew at every time.
 class MotorsOnlyActuation final : public ActuationSource {
 public:
-  MotorsOnlyActuation(const System &driven, MotorsOnly servo, std::vector<ModalShape> shape,
-                      std::vector<bool> is_motor, ActuationResolver resolver);
+  MotorsOnlyActuation(const System &driven, MotorsOnly servo, std::vector<ModalShape> shape, std::vector<bool> is_motor,
+                      ActuationResolver resolver);
 
   void evaluate(double t) override;
   const System &system() const override { return system_; }

@@ -277,15 +277,12 @@ Jet PiecewisePolynomial::operator()(double t) const {
   return result;
 }
 
-Held::Held(const TimeFunction &function, double begin, double end)
-    : function_(std::make_shared<const TimeFunction>(function)), begin_(begin), end_(end) {}
-
-Jet Held::operator()(double t) const {
-  if (t < begin_)
-    return {(*function_)(begin_).value, 0.0, 0.0};
-  if (t > end_)
-    return {(*function_)(end_).value, 0.0, 0.0};
-  return (*function_)(t);
+TimeFunction TimeFunction::held(double begin, double end) const {
+  return UserFunction([function = *this, begin, end](double t) {
+    if (t >= begin && t <= end)
+      return function(t);
+    return Jet{function(t < begin ? begin : end).value, 0.0, 0.0};
+  });
 }
 
 Jet TimeFunction::operator()(double t) const {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <functional>
 #include <span>
 #include <variant>
 #include <vector>
@@ -92,18 +92,23 @@ private:
   double margin_;
 };
 
-class TimeFunction;
-
-/// Another function on [begin, end], and its values there before and after: at rest.
-class Held {
+/// A function of the user's: `compiled` writes value, rate and acceleration to its second argument.
+class UserFunction {
 public:
-  Held(const TimeFunction &function, double begin, double end);
+  using Compiled = void (*)(double, double *);
 
-  Jet operator()(double t) const;
+  explicit UserFunction(std::function<Jet(double)> function) : function_(std::move(function)) {}
+  explicit UserFunction(Compiled compiled)
+      : function_([compiled](double t) {
+          double out[3] = {};
+          compiled(t, out);
+          return Jet{out[0], out[1], out[2]};
+        }) {}
+
+  Jet operator()(double t) const { return function_(t); }
 
 private:
-  std::shared_ptr<const TimeFunction> function_;
-  double begin_, end_;
+  std::function<Jet(double)> function_;
 };
 
 /// Any prescribed function of time. Components that are not finite (domain error, overflow, out of range) are NaN:
@@ -113,12 +118,15 @@ public:
   TimeFunction(Constant function) : function_(function) {}
   TimeFunction(Expression function) : function_(std::move(function)) {}
   TimeFunction(PiecewisePolynomial function) : function_(std::move(function)) {}
-  TimeFunction(Held function) : function_(std::move(function)) {}
+  TimeFunction(UserFunction function) : function_(std::move(function)) {}
 
   Jet operator()(double t) const;
 
+  /// The same between `begin` and `end`, and at rest with its values there outside.
+  TimeFunction held(double begin, double end) const;
+
 private:
-  std::variant<Constant, Expression, PiecewisePolynomial, Held> function_;
+  std::variant<Constant, Expression, PiecewisePolynomial, UserFunction> function_;
 };
 
 } // namespace ffrobot
