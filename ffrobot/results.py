@@ -16,6 +16,7 @@ from .actuation.voltages import Voltages
 from .files import write_atomically
 from .mbs.analyses import Outcome
 from .mbs.fewer_modes import modes_kept
+from .mbs.motors_only import is_minimum_phase, path_error
 from .mbs.observation import (
     body_motion,
     energies,
@@ -25,11 +26,13 @@ from .mbs.observation import (
     trajectory_force,
     trajectory_target,
 )
+from .mbs.stable_inversion import Inversion
 from .mbs.stress import BodyStress
 from .solution import Solution
 
 FORMAT = "ffrobot-results"
 FORMAT_VERSION = 1
+INTEGRATED = ("pcid", "forward", "motors-only")  # kinds of analyses that take steps
 
 
 def write_results(solution: Solution, path: Path) -> None:
@@ -89,7 +92,7 @@ def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
     analysis = outcome.analysis
     group.attrs["kind"] = analysis.kind
-    integrated = analysis.kind in ("pcid", "forward")
+    integrated = analysis.kind in INTEGRATED
     group.attrs["integrator"] = outcome.integrator.name if integrated else "none"
     group.attrs["integrator_reason"] = outcome.integrator.reason if integrated else ""
     group.attrs["tolerance"] = analysis.tolerance
@@ -129,6 +132,8 @@ def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["force"] = trajectory_force(outcome, trajectory.name)
             entry["target"] = trajectory_target(outcome, trajectory.name)
             entry.attrs["components"] = list(trajectory.components)
+    if outcome.inversion is not None:
+        _write_servo(group, outcome, outcome.inversion)
     for joint in outcome.assembly.model.scene.joint:
         forces = joint_forces(outcome, joint.name)
         entry = group.create_group(f"joints/{joint.name}")
@@ -138,6 +143,25 @@ def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["reaction_moment"] = forces.reaction_moment
         if forces.motor is not None:
             entry["moment"] = forces.motor
+
+
+def _write_servo(group: h5py.Group, outcome: Outcome, inversion: Inversion) -> None:
+    """Of motors-only inverse dynamics: no force acts on the path's points, which may be off it."""
+    error, column = path_error(inversion, outcome.time, outcome.q), 0
+    for trajectory in outcome.assembly.model.scene.trajectory:
+        entry, count = group.create_group(f"trajectories/{trajectory.name}"), len(trajectory.components)
+        entry["target"] = trajectory_target(outcome, trajectory.name)
+        entry["error"] = error[:, column : column + count]
+        entry.attrs["components"] = list(trajectory.components)
+        column += count
+    entry = group.create_group("zero_dynamics")
+    entry["time"] = inversion.linearisation.times
+    entry["zeros"] = np.stack([inversion.linearisation.zeros.real, inversion.linearisation.zeros.imag], axis=2)
+    entry.attrs["columns"] = ["real", "imaginary"]
+    entry.attrs["factor"] = inversion.servo.factor
+    entry.attrs["minimum_phase"] = is_minimum_phase(inversion.linearisation)
+    entry.attrs["unmet_force"] = inversion.unmet
+    entry.attrs["off_rest"] = inversion.off_rest
 
 
 def _write_stress(group: h5py.Group, stress: BodyStress) -> None:

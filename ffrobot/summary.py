@@ -13,7 +13,10 @@ from rich.table import Table
 from .mbs.analyses import Outcome
 from .mbs.fewer_modes import modes_kept
 from .mbs.geometric_stiffening import NOTABLE
+from .mbs.motors_only import describe_zeros, is_minimum_phase, path_error
+from .mbs.stable_inversion import Inversion
 from .mode_choice import ModeChoice
+from .results import INTEGRATED
 from .solution import Solution
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
@@ -43,6 +46,8 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
             notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
     if solution.mode_choice is not None:
         notes.add_row("modes", _modes(solution, solution.mode_choice))
+        if outcome.inversion is not None:
+            notes.add_row("motors only", f"{name}: {_inversion(outcome, outcome.inversion)}")
     notes.add_row(*_stiffening(solution))
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
@@ -76,6 +81,21 @@ def _modes(solution: Solution, choice: ModeChoice) -> str:
     return "\n".join(lines)
 
 
+def _inversion(outcome: Outcome, inversion: Inversion) -> str:
+    """What the zeros are, how the path was inverted, and what that leaves of it."""
+    linear, factor = inversion.linearisation, inversion.servo.factor
+    error = np.abs(path_error(inversion, outcome.time, outcome.q)).max()
+    left = f"largest error of the path {error:.2g}"
+    if is_minimum_phase(linear):
+        output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the vibration"
+        return f"{output}: minimum phase, integrated forward; {left}"
+    return (
+        f"not minimum phase, zeros at {describe_zeros(linear)} 1/s; stable inversion with"
+        f" {outcome.analysis.pre_actuation:.3g} s of pre- and {outcome.analysis.post_actuation:.3g} s of post-actuation"
+        f" (start off rest by {inversion.off_rest:.1g}); {left}"
+    )
+
+
 def _stiffening(solution: Solution) -> tuple[str, str]:
     """What loads along the links do to their stiffness, and whether the equations know."""
     effect = max(solution.stiffening_effects.values(), default=0.0)
@@ -91,7 +111,7 @@ def _analyses(solution: Solution) -> Table:
     table = _table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
         analysis, reached = outcome.analysis, outcome.time[-1]
-        integrated = analysis.kind in ("pcid", "forward")
+        integrated = analysis.kind in INTEGRATED
         table.add_row(
             name,
             analysis.kind,

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from ..validation import Record
 from .record_types import Expression, Name, Positive
 
+NotNegative = Annotated[float, Field(ge=0.0)]
 MAX_OUTPUTS = 10_000_000
 TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
 
@@ -25,10 +26,15 @@ class Analysis(Record):
 
     `integrator`: see `integrators.choose_integrator` for "auto"; `spectral_radius` is what a step of generalized-alpha
     leaves of vibrations far above one over its size.
+
+    Of kind "motors-only": `output` "tip" has the path's own points follow it, "redefined" where they would be with
+    `factor` times the vibration (nine tenths of the largest that is minimum phase where none is given).
+    `pre_actuation` and `post_actuation` (s) are how long motors act before and after the path, which is held there;
+    where they are not given, as long as the zero dynamics asks for.
     """
 
     name: Name
-    kind: Literal["pcid", "fcid", "forward", "static"]
+    kind: Literal["pcid", "fcid", "forward", "static", "motors-only"]
     end: Positive = 0.0
     output_step: Positive = 0.0
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
@@ -39,6 +45,10 @@ class Analysis(Record):
     modal: dict[Name, tuple[Expression, ...]] | None = None
     integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
     spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8  # of generalized-alpha at infinite frequency
+    output: Literal["tip", "redefined"] = "tip"
+    factor: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    pre_actuation: NotNegative | None = None
+    post_actuation: NotNegative | None = None
     max_steps: Annotated[int, Field(gt=0)] = 5_000_000
 
     @model_validator(mode="after")
@@ -75,15 +85,28 @@ class Analysis(Record):
             raise ValueError(
                 f'expected limits = true only beside apply = "joints" or "joints+pzt", found apply = "{self.apply}"'
             )
+        self._check_motors_only()
         return self
+
+    def _check_motors_only(self) -> None:
+        for key in ("output", "factor", "pre_actuation", "post_actuation"):
+            if self.kind != "motors-only" and key in self.model_fields_set:
+                raise ValueError(f'expected the key "{key}" only in kind = "motors-only", found kind = "{self.kind}"')
+        if self.factor is not None and self.output != "redefined":
+            raise ValueError(f'expected the key "factor" only with output = "redefined", found "{self.output}"')
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """Output times (T,), in s: exact multiples of the output step, ending exactly at `end`."""
+        """Output times (T,), in s: exact multiples of the output step; `end` is one of them, exactly.
+
+        From 0 to `end`, and the pre- and post-actuation besides where they are known.
+        """
         if not (self.end and self.output_step):
             return np.zeros(1)
-        times = np.arange(round(self.end / self.output_step) + 1) * self.output_step
-        times[-1] = self.end
+        before, after = (round((x or 0.0) / self.output_step) for x in (self.pre_actuation, self.post_actuation))
+        count = round(self.end / self.output_step)
+        times = np.arange(-before, count + after + 1) * self.output_step
+        times[before + count] = self.end
         return times
 
 

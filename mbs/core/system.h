@@ -99,6 +99,10 @@ void required_force(const System &system, double t, const double *q, const doubl
 // Accelerations C_ddot (constraints) for accelerations a of the coordinates. Uses kinematics, rows and targets in w.
 void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c);
 
+// Acceleration of any row's value, without its target. Uses kinematics in w and the row's motion there.
+double row_acceleration(const System &system, const Row &row, const RowMotion &motion, const double *q, const double *a,
+                        const Workspace &w);
+
 // C_q (constraints x coordinates), dense, at the coordinates of the last evaluation.
 Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w);
 
