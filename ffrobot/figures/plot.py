@@ -42,12 +42,12 @@ def plot_modal_body(path: Path, folder: Path) -> list[Path]:
 
     Returns the files written, a PNG and a PDF of each. Raises `InputError` where the file cannot be read.
     """
-    _check_folder(folder)
+    check_folder(folder)
     body = read_modal_body(path)
     with style():
         return [
-            *_write(draw_mesh(body), folder, "mesh"),
-            *_write(draw_modes(body), folder, "modes"),
+            *write_figure(draw_mesh(body), folder, "mesh"),
+            *write_figure(draw_modes(body), folder, "modes"),
         ]
 
 
@@ -58,13 +58,13 @@ def plot_results(results_path: Path, folder: Path) -> list[Path]:
     Returns the files written, a PNG and a PDF of each figure. Raises `InputError` where the results or `figures.toml`
     cannot be read, or name what is not there.
     """
-    _check_folder(folder)
+    check_folder(folder)
     figure_file = results_path.parent / "figures.toml"
     written: list[Path] = []
     with Results(results_path) as results, style():
         figures = load_figures(figure_file) if figure_file.is_file() else FigureFile(figure=standard_figures(results))
         for record in figures.figure:
-            written += _write(draw(record, results), folder, record.name)
+            written += write_figure(draw(record, results), folder, record.name)
     return written
 
 
@@ -79,12 +79,13 @@ def draw(record: FigureRecord, results: Results) -> Figure:
     return picture
 
 
-def _check_folder(folder: Path) -> None:
+def check_folder(folder: Path) -> None:
+    """Raise `InputError` where `folder` is a file."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: output: expected a folder, found a file")
 
 
-def _write(picture: Figure, folder: Path, name: str) -> list[Path]:
+def write_figure(picture: Figure, folder: Path, name: str) -> list[Path]:
     """The PNG and the PDF of a picture."""
     paths = [folder / f"{name}.{extension}" for extension in METADATA]
     for path, extension in zip(paths, METADATA, strict=True):
