@@ -11,23 +11,11 @@ from types import FrameType
 
 import click
 
+from .bench.command import bench
 from .errors import FfrobotError
 from .parallel import end_all, is_first
 
 FILE = click.Path(path_type=Path)
-
-
-def _texts(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:
-    """The parts of a list with commas."""
-    return None if value is None else [part.strip() for part in value.split(",")]
-
-
-def _numbers(context: click.Context, parameter: click.Parameter, value: str | None) -> list[float] | None:
-    """Likewise, as numbers."""
-    try:
-        return None if value is None else [float(part) for part in value.split(",")]
-    except ValueError:
-        raise click.BadParameter(f'expected numbers with commas between them, found "{value}"') from None
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -146,67 +134,6 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 
 
 @cli.command()
-@click.argument("scene_file", metavar="[SCENE.toml]", required=False, type=FILE)
-@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder [SCENE.bench beside the scene; ./bench].")
-@click.option("--analysis", metavar="NAME", help="Of the scene [the first that integrates].")
-@click.option("--integrators", metavar="A,B", callback=_texts, help="Which [all, and auto].")
-@click.option("--tolerances", metavar="T,T", callback=_numbers, help="Which [1e-2 … 1e-7].")
-@click.option("--repeat", metavar="N", type=click.IntRange(1), default=5, show_default=True, help="Repetitions.")
-@click.option(
-    "--budget",
-    metavar="S",
-    type=click.FloatRange(0.0, min_open=True),
-    default=20.0,
-    show_default=True,
-    help="Seconds that one run may take; longer ones stay in the tables without errors.",
-)
-@click.option(
-    "--part",
-    "parts",
-    multiple=True,
-    type=click.Choice(["work-precision", "axes", "growth", "aims"]),
-    help="These parts only; may be repeated.",
-)
-@click.option("--peer", type=click.Choice(["exudyn"]), help="Compare with this program too (no scene).")
-@click.option("--peer-python", metavar="PYTHON", type=FILE, help="Interpreter that has the peer [this one].")
-@click.option("--source", metavar="DIR", type=FILE, default=Path(), help="ffrobot's source tree [.] (no scene).")
-def bench(
-    scene_file: Path | None,
-    output: Path | None,
-    analysis: str | None,
-    integrators: list[str] | None,
-    tolerances: list[float] | None,
-    repeat: int,
-    budget: float,
-    parts: tuple[str, ...],
-    peer: str | None,
-    peer_python: Path | None,
-    source: Path,
-) -> None:
-    """Measure run time against error, and where the error comes from.
-
-    With a scene: one of its analyses with every integrator at every tolerance, against a reference that two integrators
-    agree on; then the error of its mesh, of its number of modes and of time integration. Without one, in ffrobot's
-    source tree: the same for the two cases of the paper, how time grows with modes, links and outputs, and ratios to
-    the two-link case written by hand. Tables as CSV and JSON, figures as PNG and PDF.
-    """
-    from .bench.campaign import OF_A_SCENE, PARTS, Campaign, Settings
-    from .bench.sweep import INTEGRATORS, TOLERANCES
-    from .progress import Display
-    from .summary import summary_console
-
-    settings = Settings(integrators or INTEGRATORS, tolerances or TOLERANCES, repeat, budget)
-    folder = output or (scene_file.with_suffix(".bench") if scene_file else Path("bench"))
-    with Display() as display:
-        campaign = Campaign(folder, settings, display, summary_console())
-        if scene_file is not None:
-            campaign.scene(scene_file, analysis, folder, parts or OF_A_SCENE)
-        else:
-            python = (peer_python or Path(sys.executable)) if peer else None
-            campaign.everything(source, parts or (() if peer else PARTS), python)
-
-
-@cli.command()
 @click.argument("kind", type=click.Choice(["link", "scene"]))
 def schema(kind: str) -> None:
     r"""Print the JSON schema of link or scene files, for editors.
@@ -220,6 +147,9 @@ def schema(kind: str) -> None:
     from .schema import schema as schema_of
 
     click.echo(json.dumps(schema_of(kind), indent=2, ensure_ascii=False))
+
+
+cli.add_command(bench)
 
 
 def main() -> None:

@@ -9,4 +9,9 @@ growth       time per evaluation against modes and links, time of a run against 
 hand_written the two-link case written by hand, compiled
 aims         ratios to it
 peer         EXUDYN on the same modal bodies
+campaign     what runs in which order, what is written and printed
 """
+
+OF_A_SCENE = ("work-precision", "axes")
+PARTS = (*OF_A_SCENE, "growth", "aims")
+PEER = "peer"  # where asked for: it needs another program

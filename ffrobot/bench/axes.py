@@ -23,8 +23,8 @@ def measure_axes(scene: Scene, analysis: Analysis, budget: float, display: Watch
     """Rows of errors along each axis; runs that fail, or take longer than `budget` (s), stay as rows without errors.
 
     "mesh" compares with four times the elements, "modes" with twice the modes, on that mesh, "time" with a tenth of the
-    tolerance (time integration alone), "total" the scene as it is with all three: at most the sum of the others. What the link files do not let change is left out: scenes of rigid or ready-made modal bodies have "time"
-    alone.
+    tolerance (time integration alone), "total" the scene as it is with all three: at most the sum of the others. What
+    the link files do not let change is left out: scenes of rigid or ready-made modal bodies have "time" alone.
     """
     tight = max(TIGHTEST_TOLERANCE, TIGHTER * analysis.tolerance)
     rows: list[Row] = []

@@ -15,8 +15,9 @@ from ..figures.plot import check_folder
 from ..mbs.analysis_records import TIGHTEST_TOLERANCE
 from ..mbs.scene_file import load_scene
 from ..mbs.scene_records import Scene
-from ..solution import Watcher
+from ..solution import Watcher, prepare
 from ..validation import did_you_mean, quoted
+from . import OF_A_SCENE, PEER
 from .aims import measure_aims
 from .axes import measure_axes
 from .errors import KINDS
@@ -24,20 +25,20 @@ from .figures import draw_axes, draw_growth, draw_work_precision
 from .growth import measure_growth
 from .machine import about_machine, content_hash, load
 from .measuring import find_analysis
-from .peer import measure_peer
+from .peer import Exudyn, measure_peer
 from .record import write_record
 from .sweep import INTEGRATORS, TIGHTER, Point, Reference, Row, find_reference, sweep
 
-OF_A_SCENE = ("work-precision", "axes")
-PARTS = (*OF_A_SCENE, "growth", "aims")
 CASES = ("two_link", "slider_crank")  # of the paper, in the source tree
 
 ERRORS = tuple(f"error_{kind}" for kind in KINDS)
+Swept = tuple[Reference, list[Point]]
+
 COLUMNS = {
     "work-precision": ("integrator", "ran", "tolerance", "status", "seconds", "steps", *ERRORS),
     "axes": ("axis", "elements", "modes", "tolerance", "status", "against", "seconds", *ERRORS),
     "growth": ("with", "size", "seconds_min", "order"),
-    "aims": ("what", "run", "status", "integrator", "tolerance", "seconds", "ratio", "aim", "accurate"),
+    "aims": ("what", "run", "status", "integrator", "tolerance", "ratio", "ratio_median", "aim", "accurate"),
     "peer": ("step", "gravity", "status", "seconds", "error_force", "error_displacement", "error_force_at_start"),
 }
 
@@ -76,21 +77,36 @@ class Campaign:
         self.folder, self.settings, self.display, self.console = folder, settings, display, console
         self.machine = about_machine()
 
-    def scene(self, path: Path, analysis_name: str | None, folder: Path, parts: Sequence[str]) -> None:
-        """Run time against error of a scene, and where its error comes from."""
+    def scene(self, path: Path, analysis_name: str | None, folder: Path, parts: Sequence[str]) -> Swept | None:
+        """Run time against error of a scene, and where its error comes from. Returns the sweep where asked for one."""
         scene = load_scene(path)
         analysis = find_analysis(scene, analysis_name)
-        if "work-precision" in parts:
-            self.work_precision(scene, analysis.name, folder)
+        swept = self._work_precision(scene, analysis.name, folder) if "work-precision" in parts else None
         if "axes" in parts:
             rows = measure_axes(scene, analysis, self.settings.budget, self.display)
             about = {"inputs": _inputs(scene, {}), "analysis": analysis.name}
             self._keep("axes", rows, about, folder, f"{scene.name}, {analysis.name}: where errors come from")
             self._drawn(draw_axes(rows, scene.name, folder))
+        return swept
 
-    def work_precision(
-        self, scene: Scene, name: str, folder: Path, peer: Sequence[Row] = ()
-    ) -> tuple[Reference, list[Point]]:
+    def everything(self, repository: Path, parts: Sequence[str], peer_python: Path) -> None:
+        """Growth, aims, the two cases of the paper and the peer, as far as they are among `parts`."""
+        paths = {name: repository / "cases" / name / "scene.toml" for name in CASES}
+        of_cases = [part for part in parts if part in OF_A_SCENE]
+        if set(parts) - {"growth"} and not all(path.is_file() for path in paths.values()):
+            raise InputError(f"{repository}: --source: expected ffrobot's source tree, found no cases in it")
+        exudyn = self._exudyn(paths["two_link"], repository, peer_python) if PEER in parts else None
+        if "growth" in parts:
+            rows = measure_growth(max(self.settings.repeat, 5), self.display)
+            self._keep("growth", rows, {}, self.folder, "growth")
+            self._drawn(draw_growth(rows, self.folder))
+        if "aims" in parts:
+            self._aims(load_scene(paths["two_link"]), repository)
+        swept = {name: self.scene(path, None, self.folder / name, of_cases) for name, path in paths.items() if of_cases}
+        if exudyn is not None:
+            self._peer(exudyn, load_scene(paths["two_link"]), swept.get("two_link"))
+
+    def _work_precision(self, scene: Scene, name: str, folder: Path) -> Swept:
         """The sweep of one analysis, with its records and figures."""
         settings = self.settings
         tolerance = TIGHTER * min(settings.tolerances)
@@ -102,26 +118,8 @@ class Campaign:
         rows = [point.row() for point in points]
         about = {"inputs": _inputs(scene, reference.bodies), "analysis": name, "reference": reference.about()}
         self._keep("work-precision", rows, about, folder, f"{scene.name}, {name}: {_about(reference)}")
-        self._drawn(draw_work_precision(rows, peer, scene.name, folder))
+        self._drawn(draw_work_precision(rows, (), scene.name, folder))
         return reference, points
-
-    def everything(self, repository: Path, parts: Sequence[str], peer_python: Path | None) -> None:
-        """The two cases of the paper, growth and aims; the peer too, where an interpreter that has it is named."""
-        scenes = {name: repository / "cases" / name / "scene.toml" for name in CASES}
-        of_cases = [part for part in parts if part in OF_A_SCENE]
-        if (of_cases or "aims" in parts or peer_python) and not all(path.is_file() for path in scenes.values()):
-            raise InputError(f"{repository}: --source: expected ffrobot's source tree, found no cases in it")
-        if "growth" in parts:
-            rows = measure_growth(max(self.settings.repeat, 5), self.display)
-            self._keep("growth", rows, {}, self.folder, "growth")
-            self._drawn(draw_growth(rows, self.folder))
-        if "aims" in parts:
-            self._aims(load_scene(scenes["two_link"]), repository)
-        for name, path in scenes.items():
-            if of_cases:
-                self.scene(path, None, self.folder / name, of_cases)
-        if peer_python is not None:
-            self._peer(load_scene(scenes["two_link"]), repository, peer_python)
 
     def _aims(self, scene: Scene, repository: Path) -> None:
         with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as folder:
@@ -130,17 +128,23 @@ class Campaign:
             )
         self._keep("aims", rows, {"inputs": _inputs(scene, {})}, self.folder, "ratios to the hand-written version")
 
-    def _peer(self, scene: Scene, repository: Path, python: Path) -> None:
-        """After a sweep of our own in the same run, whose figures it joins."""
-        name, folder = find_analysis(scene, None).name, self.folder / "peer"
-        reference, points = self.work_precision(scene, name, folder)
+    def _exudyn(self, scene_path: Path, repository: Path, python: Path) -> Exudyn:
+        bodies = prepare(load_scene(scene_path), self.display).bodies
+        links = [body.path for body in bodies.values() if body.path is not None]
+        return Exudyn(repository, python, links, self.settings.budget)
+
+    def _peer(self, exudyn: Exudyn, scene: Scene, swept: Swept | None) -> None:
+        """The peer beside our sweep, on whose figures it comes."""
+        name, folder = find_analysis(scene, None).name, self.folder / scene.name
+        reference, points = swept or self._work_precision(scene, name, folder)
+        settings = self.settings
         rows, verdict = measure_peer(
-            scene, name, reference, points, repository, python, self.settings.repeat, self.settings.budget, self.display
+            exudyn, scene, name, reference, points, settings.repeat, settings.budget, self.display
         )
         about = {"inputs": _inputs(scene, reference.bodies), "reference": reference.about(), "verdict": verdict}
         self._keep("peer", rows, about, folder, "EXUDYN on the same modal bodies; force without its start")
         self._drawn(draw_work_precision([point.row() for point in points], rows, scene.name, folder))
-        self.console.print(f"speed ratio at the peer's best error: {verdict}")
+        self.console.print(f"at the peer's best error: {verdict}")
 
     def _keep(self, part: str, rows: Sequence[Row], about: Mapping[str, object], folder: Path, title: str) -> None:
         settings = asdict(self.settings)

@@ -105,9 +105,9 @@ def _scene(bodies: Sequence[PlanarBody], angles: dict[str, float], closed: bool)
     )
 
 
-def evaluation_timer(state: State) -> Callable[[], float]:
-    """Measures the seconds of one evaluation of all accelerations and multipliers."""
-    return partial(evaluation_seconds, state, 0.0, max(20, EVALUATIONS // len(state[1])))
+def evaluation_timer(state: State, evaluations: int = EVALUATIONS) -> Callable[[], float]:
+    """Measures the seconds of one of so many `evaluations` (over the number of coordinates, at least one)."""
+    return partial(evaluation_seconds, state, 0.0, max(1, evaluations // len(state[1])))
 
 
 def output_timer(outputs: int) -> Callable[[], float]:

@@ -14,9 +14,9 @@ import numpy as np
 
 from ..errors import InputError, SolveError
 from ..mbs.scene_records import Scene
-from ..solution import Watcher, prepare
+from ..solution import Watcher
 from .errors import relative
-from .sweep import Point, Reference, Row, fastest, repeat_point
+from .sweep import PATIENCE, Point, Reference, Row, fastest, repeat_point
 
 SCRIPT = Path("tests/benchmarks/peers/exudyn_two_link.py")
 NAME = "EXUDYN generalized-alpha"
@@ -31,7 +31,7 @@ class Exudyn:
     """
 
     def __init__(self, repository: Path, python: Path, links: Sequence[Path], budget: float) -> None:
-        self._script, self._python, self._links, self._budget = repository / SCRIPT, python, links, budget
+        self._script, self._python, self._links, self._budget = repository / SCRIPT, python, links, PATIENCE * budget
         if not self._script.is_file():
             raise InputError(f"{repository}: source: expected ffrobot's source tree, found no {SCRIPT} in it")
         probe: list[str | Path] = [python, "-c", "import exudyn, h5py"]
@@ -85,12 +85,11 @@ def _errors(path: Path, reference: Reference) -> dict[str, float]:
 
 
 def measure_peer(
+    exudyn: Exudyn,
     scene: Scene,
     name: str,
     reference: Reference,
     points: Sequence[Point],
-    repository: Path,
-    python: Path,
     repeat: int,
     budget: float,
     display: Watcher,
@@ -100,8 +99,6 @@ def measure_peer(
     `scene` is cases/two_link, `name` its inverse analysis with outputs every millisecond, `points` our sweep of it.
     Best is its smallest error of the tip force; ours has all forces and all deflections within its errors.
     """
-    links = [body.path for body in prepare(scene).bodies.values() if body.path is not None]
-    exudyn = Exudyn(repository, python, links, budget)
     rows = []
     for gravity in GRAVITY:
         for step in STEPS:
