@@ -14,6 +14,9 @@ from ..mbs.scene_records import Scene
 
 Keys = dict[str, Any]
 
+# Patches that fit the modes of the scene need not fit others; where they do, this changes nothing.
+_ANY_NUMBER_OF_MODES = {"allocation": "least-squares", "mode_weights": None}
+
 
 def refined(scene: Scene, elements: float, modes: float, folder: Path) -> Scene | None:
     """The scene with `elements` and `modes` times as many of them in every link that is given by its link file.
@@ -33,7 +36,10 @@ def refined(scene: Scene, elements: float, modes: float, folder: Path) -> Scene 
             path.write_text(tomli_w.dumps(keys), encoding="utf-8")
             body = body.model_copy(update={"link": path})
         bodies.append(body)
-    return scene.model_copy(update={"body": tuple(bodies)}) if changed else None
+    update: Keys = {"body": tuple(bodies)}
+    if modes != 1:
+        update["pzt"] = tuple(layout.model_copy(update=_ANY_NUMBER_OF_MODES) for layout in scene.pzt)
+    return scene.model_copy(update=update) if changed else None
 
 
 def elements_of(scene: Scene) -> str:
