@@ -20,27 +20,17 @@ from ..validation import did_you_mean, quoted
 from . import OF_A_SCENE, PEER
 from .aims import measure_aims
 from .axes import measure_axes
-from .errors import KINDS
 from .figures import draw_axes, draw_growth, draw_work_precision
 from .growth import measure_growth
 from .machine import about_machine, content_hash, load
 from .measuring import find_analysis
 from .peer import Exudyn, measure_peer
-from .record import write_record
+from .record import as_text, write_record
 from .sweep import INTEGRATORS, TIGHTER, Point, Reference, Row, find_reference, sweep
 
 CASES = ("two_link", "slider_crank")  # of the paper, in the source tree
 
-ERRORS = tuple(f"error_{kind}" for kind in KINDS)
 Swept = tuple[Reference, list[Point]]
-
-COLUMNS = {
-    "work-precision": ("integrator", "ran", "tolerance", "status", "seconds", "steps", *ERRORS),
-    "axes": ("axis", "elements", "modes", "tolerance", "status", "against", "seconds", *ERRORS),
-    "growth": ("with", "size", "seconds_min", "order"),
-    "aims": ("what", "run", "status", "integrator", "tolerance", "ratio", "ratio_median", "aim", "accurate"),
-    "peer": ("step", "gravity", "status", "seconds", "error_force", "error_displacement", "error_force_at_start"),
-}
 
 
 @dataclass(frozen=True)
@@ -149,9 +139,16 @@ class Campaign:
     def _keep(self, part: str, rows: Sequence[Row], about: Mapping[str, object], folder: Path, title: str) -> None:
         settings = asdict(self.settings)
         inputs = content_hash(repr((settings, about.get("inputs"))))
-        record = {"machine": self.machine, "load": load(), "settings": settings, "inputs_hash": inputs, **about}
-        self._drawn(write_record(folder, part.replace("-", "_"), rows, record))
-        self.console.print(_table(title, rows, COLUMNS[part]))
+        record = {
+            "machine": self.machine,
+            "load": load(),
+            "settings": settings,
+            "inputs_hash": inputs,
+            "title": title,
+            **about,
+        }
+        self._drawn(write_record(folder, part, rows, record))
+        self.console.print(_table(title, rows, part))
 
     def _drawn(self, paths: Sequence[Path]) -> None:
         for path in paths:
@@ -170,18 +167,11 @@ def _about(reference: Reference) -> str:
     )
 
 
-def _table(title: str, rows: Sequence[Row], columns: Sequence[str]) -> Table:
-    """The columns that are not empty, as text."""
-    shown = [column for column in columns if any(row.get(column) is not None for row in rows)]
+def _table(title: str, rows: Sequence[Row], part: str) -> Table:
+    columns, lines = as_text(rows, part)
     table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    for column in shown:
-        table.add_column(column.replace("error_", "").replace("_", " "), overflow="fold")
-    for row in rows:
-        table.add_row(*(_text(row.get(column)) for column in shown))
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    for line in lines:
+        table.add_row(*line)
     return table
-
-
-def _text(value: object) -> str:
-    if value is None:
-        return ""
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
