@@ -2,7 +2,7 @@
 
 measuring    one solve within a budget of time, and the histories it gives
 errors       how far histories are from a reference, by kind of quantity
-sweep        reference and sweep over integrators and tolerances: the work-precision diagram
+precision    a reference, and every integrator at every tolerance: the work-precision diagram
 axes         error of mesh, of the number of modes, of time integration, and of all three
 evaluation   time of one evaluation of the equations
 growth       time per evaluation against modes and links, time of a run against outputs

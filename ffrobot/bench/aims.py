@@ -14,7 +14,7 @@ from ..solution import Watcher, prepare
 from .errors import KINDS
 from .evaluation import State, evaluation_seconds
 from .hand_written import TIME, HandWritten, general_state
-from .sweep import Point, Row, fastest, find_reference, repeat_point, sweep
+from .precision import Point, Row, fastest, find_reference, measure_points, repeat_point
 
 ACCURACY = 1e-4
 INTEGRATORS = ("auto", "dop853", "radau")
@@ -82,7 +82,7 @@ def _scene(scene: Scene, aim: Aim) -> Scene:
 def _rows(aim: Aim, scene: Scene, hand_written: HandWritten, repeat: int, budget: float, display: Watcher) -> list[Row]:
     """The run that a user gets who asks for 1e-4, and the fastest of all whose measured error is that small."""
     reference = find_reference(scene, NAME, REFERENCE_TOLERANCE, budget, display)
-    points = sweep(scene, NAME, reference, INTEGRATORS, TOLERANCES, 2, budget, display)
+    points = measure_points(scene, NAME, reference, INTEGRATORS, TOLERANCES, 2, budget, display)
     asked = next(point for point in points if (point.integrator, point.tolerance) == ("auto", ACCURACY))
     chosen = {"asked for 1e-4": asked, "fastest within 1e-4": fastest(points, dict.fromkeys(aim.within, ACCURACY))}
     pairs: dict[str, list[tuple[float, float]]] = {label: [] for label in chosen}

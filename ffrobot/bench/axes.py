@@ -12,7 +12,7 @@ from ..solution import Watcher
 from .errors import KINDS, errors
 from .links import elements_of, modes_of, refined
 from .measuring import Run, run, with_analysis
-from .sweep import Row
+from .precision import Row
 
 # Times the elements and the modes of the link files; the last of each stands for the exact solution.
 ELEMENTS, MODES = (0.5, 1.0, 2.0, 4.0), (0.5, 1.0, 1.5, 2.0)

@@ -25,8 +25,8 @@ from .growth import measure_growth
 from .machine import about_machine, content_hash, load
 from .measuring import find_analysis
 from .peer import Exudyn, measure_peer
+from .precision import INTEGRATORS, TIGHTER, Point, Reference, Row, find_reference, measure_points
 from .record import as_text, write_record
-from .sweep import INTEGRATORS, TIGHTER, Point, Reference, Row, find_reference, sweep
 
 CASES = ("two_link", "slider_crank")  # of the paper, in the source tree
 
@@ -101,7 +101,7 @@ class Campaign:
         settings = self.settings
         tolerance = TIGHTER * min(settings.tolerances)
         reference = find_reference(scene, name, tolerance, settings.budget, self.display)
-        points = sweep(
+        points = measure_points(
             scene, name, reference, settings.integrators, settings.tolerances, settings.repeat, settings.budget,
             self.display,
         )  # fmt: skip

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from ..logs import logging_options
 from . import OF_A_SCENE, PARTS, PEER
 
 FILE = click.Path(path_type=Path)
@@ -50,6 +51,7 @@ def _numbers(context: click.Context, parameter: click.Parameter, value: str | No
 @click.option("--peer", type=click.Choice(["exudyn"]), help="Measure this program too, as part peer.")
 @click.option("--peer-python", metavar="PYTHON", type=FILE, help="Interpreter that has the peer [this one].")
 @click.option("--source", metavar="DIR", type=FILE, default=Path(), help="ffrobot's source tree [.].")
+@logging_options
 def bench(
     scene_file: Path | None,
     output: Path | None,
@@ -73,7 +75,7 @@ def bench(
     from ..progress import Display
     from ..summary import summary_console
     from .campaign import Campaign, Settings
-    from .sweep import INTEGRATORS, TOLERANCES
+    from .precision import INTEGRATORS, TOLERANCES
 
     if scene_file is not None and (peer or set(parts) - set(OF_A_SCENE)):
         raise click.UsageError(f"of a scene, only the parts {' and '.join(OF_A_SCENE)} can be measured")

@@ -20,7 +20,7 @@ from ..mbs.planar_body import PlanarBody, PlanarPoint
 from ..mbs.scene_records import Scene
 from ..solution import Watcher
 from .evaluation import State, evaluation_seconds
-from .sweep import Row
+from .precision import Row
 
 MASS, LENGTH, STIFFNESS = 1.0, 1.0, 100.0  # kg, m, EI in N·m²
 MODES, LINKS, OUTPUTS = (2, 5, 10, 20, 50, 100, 200), (2, 5, 10, 20, 50), (100, 1000, 10_000, 100_000)

@@ -16,7 +16,7 @@ from ..errors import InputError, SolveError
 from ..mbs.scene_records import Scene
 from ..solution import Watcher
 from .errors import relative
-from .sweep import PATIENCE, Point, Reference, Row, fastest, repeat_point
+from .precision import PATIENCE, Point, Reference, Row, fastest, repeat_point
 
 SCRIPT = Path("tests/benchmarks/peers/exudyn_two_link.py")
 NAME = "EXUDYN generalized-alpha"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..files import write_atomically
 from .errors import KINDS
-from .sweep import Row
+from .precision import Row
 
 FORMAT, FORMAT_VERSION = "ffrobot-bench", 1
 

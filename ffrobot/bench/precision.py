@@ -99,7 +99,7 @@ def find_reference(scene: Scene, name: str, tolerance: float, budget: float, dis
     return Reference(integrator, at, other, other_at, error, best.histories, best.bodies)
 
 
-def sweep(
+def measure_points(
     scene: Scene,
     name: str,
     reference: Reference,
