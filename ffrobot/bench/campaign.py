@@ -87,7 +87,7 @@ class Campaign:
             raise InputError(f"{repository}: --source: expected ffrobot's source tree, found no cases in it")
         exudyn = self._exudyn(paths["two_link"], repository, peer_python) if PEER in parts else None
         if "growth" in parts:
-            rows = measure_growth(max(self.settings.repeat, 5), self.display)
+            rows = measure_growth(self.settings.repeat, self.display)
             self._keep("growth", rows, {}, self.folder, "growth")
             self._drawn(draw_growth(rows, self.folder))
         if "aims" in parts:

@@ -25,7 +25,7 @@ from .precision import Row
 MASS, LENGTH, STIFFNESS = 1.0, 1.0, 100.0  # kg, m, EI in N·m²
 MODES, LINKS, OUTPUTS = (2, 5, 10, 20, 50, 100, 200), (2, 5, 10, 20, 50), (100, 1000, 10_000, 100_000)
 MODES_IN_CHAINS, RUN_LENGTH = 5, 0.1  # s
-EVALUATIONS = 200_000  # over the number of coordinates, in one timing
+EVALUATIONS, ROUNDS = 50_000, 25  # over the number of coordinates, in one timing; a millisecond is often undisturbed
 
 
 def sine_link(name: str, modes: int) -> PlanarBody:
@@ -119,7 +119,7 @@ def output_timer(outputs: int) -> Callable[[], float]:
 
 
 def measure_growth(repeat: int, display: Watcher) -> list[Row]:
-    """A row for each size; sizes of one kind are measured in turn, `repeat` times.
+    """A row for each size; sizes of one kind are measured in turn, evaluations in at least `ROUNDS` rounds.
 
     Seconds are of one evaluation, or of a whole run for "outputs". `order` is the slope against the size before, in
     logarithms: 1 is linear growth.
@@ -133,8 +133,9 @@ def measure_growth(repeat: int, display: Watcher) -> list[Row]:
     rows: list[Row] = []
     for kind, timers in kinds.items():
         seconds: dict[int, list[float]] = {size: [] for size in timers}
-        for repetition in range(repeat):
-            display.stage(f"growth with {kind}: repetition {repetition + 1} of {repeat}")
+        rounds = repeat if kind == "outputs" else max(repeat, ROUNDS)
+        for repetition in range(rounds):
+            display.stage(f"growth with {kind}: repetition {repetition + 1} of {rounds}")
             for size, timer in timers.items():
                 seconds[size].append(timer())
         rows += _rows(kind, seconds)
