@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..errors import InputError
-from ..figures.plot import check_folder
+from ..files import check_folder
 from ..mbs.analysis_records import TIGHTEST_TOLERANCE
 from ..mbs.scene_file import load_scene
 from ..mbs.scene_records import Scene
