@@ -126,6 +126,8 @@ def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["reaction_moment"] = forces.reaction_moment
         if forces.motor is not None:
             entry["moment"] = forces.motor
+            if "gear_ratio" in joint.model_fields_set:
+                entry["motor_moment"] = forces.motor / joint.gear_ratio
 
 
 def _write_stress(group: h5py.Group, stress: BodyStress) -> None:

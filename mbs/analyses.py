@@ -158,9 +158,9 @@ def _integrate(
         recording,
     )  # fmt: skip
     seconds = time.perf_counter() - began
-    reached = len(run.q)
+    reached, held = len(run.q), len(assembly.constraints)
     return Outcome(
-        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers,
+        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers[:, :held],
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
         _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, integrator, recording,
     )  # fmt: skip

@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..validation import did_you_mean, quoted
 from . import _core
 from ._core import TimeFunction
+from .built_joints import Friction, joint_frictions, joint_rotors
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
 from .record_types import GROUND, split_point
 from .rows import FRAME, End, Row, joint_coordinate, joint_rows, motor_joints, trajectory_rows
@@ -52,6 +53,8 @@ class Model:
     trajectories: tuple[Constraint, ...]
     motors: dict[str, Row]
     loads: tuple[tuple[Row, TimeFunction], ...]
+    rotors: tuple[tuple[Row, float], ...] = ()
+    frictions: tuple[tuple[Row, Friction], ...] = ()
 
     def body(self, name: str) -> PlanarBody:
         """The body of that name."""
@@ -80,7 +83,10 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
         for component, row in trajectory_rows(scene, trajectory).items()
     )
     motors = {joint.name: joint_coordinate(scene, joint) for joint in motor_joints(scene)}
-    model = Model(scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(_load_rows(scene)))
+    model = Model(
+        scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(_load_rows(scene)),
+        tuple(joint_rotors(scene)), tuple(joint_frictions(scene)),
+    )  # fmt: skip
     named = any(joint.motor for joint in scene.joint)
     if named and trajectories and len(motors) != model.rigid_freedom:
         raise InputError(
@@ -128,7 +134,8 @@ def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
 class Assembly:
     """A core `System` with the numbering that leads back from its rows to the scene.
 
-    `constraints` are in the core's order: joints and trajectories sorted for a small envelope of C M⁻¹ Cᵀ.
+    `constraints` are in the core's order: joints and trajectories sorted for a small envelope of C M⁻¹ Cᵀ. Rotors of
+    joints come after them in the core, where they are rows, too, and friction after the drives.
     """
 
     def __init__(
@@ -144,14 +151,20 @@ class Assembly:
         self.constraints = tuple(constraints[i] for i in envelope_order([c.row for c in constraints]))
         constraint_rows = [self._core_row(c.row) for c in self.constraints]
         drive_rows = [(self._core_row(row), size) for row, size in drives]
+        rotor_rows = [(self._core_row(row), inertia) for row, inertia in model.rotors]
+        friction_rows = [(self._core_row(row), friction) for row, friction in model.frictions]
         self.motor_rows = [self._core_row(row) for row in motors]
         self.system = _core.System(np.array(model.scene.gravity))
         for body, markers in zip(model.bodies, self._markers, strict=True):
             self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))
         for constraint, row in zip(self.constraints, constraint_rows, strict=True):
             self.system.add_constraint(row, constraint.target)
+        for row, inertia in rotor_rows:
+            self.system.add_rotor(row, inertia)
         for row, size in drive_rows:
             self.system.add_drive(row, size)
+        for row, friction in friction_rows:
+            self.system.add_friction(row, friction.viscous, friction.coulomb, friction.speed)
         for load in model.modal_loads:
             self.system.add_modal_drive(self.index[load.body], load.vector, load.size)
         self.system.finish()

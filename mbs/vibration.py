@@ -46,6 +46,8 @@ def vibrations(assembly: Assembly, state: State) -> Vibrations:
     bodies = assembly.model.bodies
     blocks = [state.q[first : first + 3 + body.n_modes] for first, body in zip(assembly.first, bodies, strict=True)]
     M = _block_diagonal([mass_matrix(body, q) for body, q in zip(bodies, blocks, strict=True)])
+    gradient, inertia = assembly.system.rotor_rows(state.q)
+    M += gradient.T @ (inertia[:, None] * gradient)
     K = np.concatenate([np.concatenate([np.zeros(3), body.stiffness]) for body in bodies])
     D = _block_diagonal([block for body in bodies for block in (np.zeros((3, 3)), body.damping)])
     _, _, C_q = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))

@@ -22,17 +22,18 @@ struct MarkerReference {
   }
 };
 
-enum class RowKind {
-  x,     // (r_b - r_a)_x, global
-  y,     // (r_b - r_a)_y, global
-  angle, // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
-  slide, // n . (r_b - r_a), n fixed to the section of a
+enum class RowKind { // those before `slide` have coefficients +1 on b, -1 on a
+  x,                 // (r_b - r_a)_x, global
+  y,                 // (r_b - r_a)_y, global
+  angle,             // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
+  slide,             // n . (r_b - r_a), n fixed to the section of a
+  gear,              // N alpha_b - (N - 1) alpha_a: the angle of a rotor on a that turns N times as fast as b does on a
 };
 
 struct Row {
   RowKind kind;
   MarkerReference a, b;
-  Eigen::Vector2d direction = Eigen::Vector2d::Zero(); // of a slide, in the axes of a
+  Eigen::Vector2d direction = Eigen::Vector2d::Zero(); // of a slide, in the axes of a; of a gear (N, 0)
   double offset = 0;                                   // the row's value at its zero
 };
 
