@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ..validation import Record
+from .control_records import ClosedLoopKeys
 from .record_types import Expression, Name, Positive
 
 MAX_OUTPUTS = 10_000_000
 TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
 
 
-class Analysis(Record):
+class Analysis(ClosedLoopKeys):
     """One run, with outputs at 0, output_step, …, end (s).
 
     Both are 0 where the file does not give them: in static analyses (t = 0 only), and in forward analyses that take
@@ -28,7 +28,7 @@ class Analysis(Record):
     """
 
     name: Name
-    kind: Literal["pcid", "fcid", "forward", "static"]
+    kind: Literal["pcid", "fcid", "forward", "static", "closed-loop"]
     end: Positive = 0.0
     output_step: Positive = 0.0
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
@@ -51,13 +51,17 @@ class Analysis(Record):
                 raise ValueError(f'expected the key "{key}" in kind = "{self.kind}", found none')
         if self.end and self.output_step:
             check_steps(self.end, self.output_step)
-        if (self.actuation is None) != (self.apply is None):
+        if self.kind != "closed-loop" and (self.actuation is None) != (self.apply is None):
             raise ValueError(
                 'expected the keys "actuation" and "apply" together, found only '
                 + ('"apply"' if self.actuation is None else '"actuation"')
             )
-        if self.actuation is not None and self.kind != "forward":
-            raise ValueError(f'expected the key "actuation" only in kind = "forward", found kind = "{self.kind}"')
+        if self.actuation is not None and self.kind not in ("forward", "closed-loop"):
+            raise ValueError(
+                f'expected the key "actuation" only in kind = "forward" or "closed-loop", found kind = "{self.kind}"'
+            )
+        if self.apply is not None and self.kind == "closed-loop":
+            raise ValueError('expected the key "feed_forward" in kind = "closed-loop", found "apply"')
         if "spectral_radius" in self.model_fields_set and self.integrator != "generalized-alpha":
             raise ValueError(
                 'expected the key "spectral_radius" only with integrator = "generalized-alpha", found integrator ='

@@ -13,6 +13,7 @@ from ..validation import did_you_mean, quoted
 from . import _core
 from ._core import TimeFunction
 from .built_joints import Friction, joint_frictions, joint_rotors
+from .mechanism_records import Load
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
 from .record_types import GROUND, split_point
 from .rows import FRAME, End, Row, joint_coordinate, joint_rows, motor_joints, trajectory_rows
@@ -84,7 +85,7 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
     )
     motors = {joint.name: joint_coordinate(scene, joint) for joint in motor_joints(scene)}
     model = Model(
-        scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(_load_rows(scene)),
+        scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(load_rows(scene, scene.load)),
         tuple(joint_rotors(scene)), tuple(joint_frictions(scene)),
     )  # fmt: skip
     named = any(joint.motor for joint in scene.joint)
@@ -96,10 +97,11 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
     return model
 
 
-def _load_rows(scene: Scene) -> Iterator[tuple[Row, TimeFunction]]:
+def load_rows(scene: Scene, loads: Sequence[Load]) -> Iterator[tuple[Row, TimeFunction]]:
+    """Directions of given loads and their sizes."""
     kinds = {"x": _core.RowKind.x, "y": _core.RowKind.y, "moment": _core.RowKind.angle}
     joints = {joint.name: joint for joint in scene.joint}
-    for load in scene.load:
+    for load in loads:
         if load.joint is not None:
             yield joint_coordinate(scene, joints[load.joint]), load.components["moment"]
         elif load.point is not None:
@@ -113,6 +115,11 @@ def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
     references += [(f'trajectory "{t.name}": point', t.point) for t in scene.trajectory if t.point]
     references += [(f'trajectory "{t.name}": angle', t.angle) for t in scene.trajectory if t.angle and "." in t.angle]
     references += [("load: point", load.point) for load in scene.load if load.point]
+    for analysis in scene.analysis:
+        key = f'analysis "{analysis.name}"'
+        references += [(f"{key}: sensor: point", sensor.point) for sensor in analysis.sensor if sensor.point]
+        references += [(f"{key}: disturbance: point", load.point) for load in analysis.disturbance if load.point]
+        references += [(f"{key}: tip", analysis.tip)] if analysis.tip else []
     for key, reference in references:
         if reference == GROUND:
             continue

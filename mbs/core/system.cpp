@@ -57,14 +57,14 @@ Workspace::Workspace(const System &system)
   }
 }
 
-namespace {
-
 void update_kinematics(const System &system, const double *q, const double *v, Workspace &w) {
   for (std::size_t b = 0; b < system.bodies.size(); ++b) {
     const Index i = system.first_coordinate[b];
     kinematics(system.bodies[b], q + i, v + i, w.bodies[b]);
   }
 }
+
+namespace {
 
 // The stages of a step and its projection meet the same time again and again.
 void update_targets(const System &system, double t, Workspace &w) {
@@ -226,20 +226,26 @@ void required_force(const System &system, double t, const double *q, const doubl
   }
 }
 
+double row_acceleration(const System &system, const Row &row, const RowMotion &motion, const double *q, const double *a,
+                        const Workspace &w) {
+  double sum = 0;
+  for (const auto &[m, coefficient] :
+       {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)}) {
+    if (m->body < 0)
+      continue;
+    const auto b = static_cast<std::size_t>(m->body);
+    const Index i = system.first_coordinate[b];
+    double size = 0;
+    sum += coefficient->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker, q + i, a + i, size));
+  }
+  return sum;
+}
+
 void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c) {
   for (std::size_t r = 0; r < system.constraints.size(); ++r) {
     const Row &row = system.constraints[r].row;
     const RowMotion &motion = w.rows[r];
-    c[r] = motion.bias - w.targets[r].acceleration;
-    for (const auto &[m, coefficient] :
-         {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)}) {
-      if (m->body < 0)
-        continue;
-      const auto b = static_cast<std::size_t>(m->body);
-      const Index i = system.first_coordinate[b];
-      double size = 0;
-      c[r] += coefficient->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker, q + i, a + i, size));
-    }
+    c[r] = motion.bias - w.targets[r].acceleration + row_acceleration(system, row, motion, q, a, w);
   }
 }
 

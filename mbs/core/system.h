@@ -108,6 +108,14 @@ void static_force(const System &system, double t, const double *q, Workspace &w,
 void required_force(const System &system, double t, const double *q, const double *v, const double *a, Workspace &w,
                     double *f);
 
+// Positions and velocities of all markers.
+void update_kinematics(const System &system, const double *q, const double *v, Workspace &w);
+
+// The part of a row's acceleration that belongs to the accelerations a of the coordinates, without its bias; after the
+// kinematics.
+double row_acceleration(const System &system, const Row &row, const RowMotion &motion, const double *q, const double *a,
+                        const Workspace &w);
+
 // Accelerations C_ddot (constraints, rotors too) for accelerations a of the coordinates. Uses kinematics, rows and
 // targets in w.
 void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c);
