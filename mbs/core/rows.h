@@ -22,13 +22,19 @@ struct MarkerReference {
   }
 };
 
-enum class RowKind { // those before `slide` have coefficients +1 on b, -1 on a
-  x,                 // (r_b - r_a)_x, global
-  y,                 // (r_b - r_a)_y, global
-  angle,             // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
-  slide,             // n . (r_b - r_a), n fixed to the section of a
-  gear,              // N alpha_b - (N - 1) alpha_a: the angle of a rotor on a that turns N times as fast as b does on a
+enum class RowKind {
+  x,     // (r_b - r_a)_x, global
+  y,     // (r_b - r_a)_y, global
+  angle, // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
+  slide, // n . (r_b - r_a), n fixed to the section of a
+  gear,  // N alpha_b - (N - 1) alpha_a: the angle of a rotor on a that turns N times as fast as b does on a
 };
+
+// Whether the directions of such rows, and with them their coefficients below, move with the bodies.
+constexpr bool moves(RowKind kind) { return kind == RowKind::slide; }
+
+// The only coefficient (x, y, angle) that is not zero in rows that do not move.
+constexpr int component_of(RowKind kind) { return kind == RowKind::gear ? 2 : static_cast<int>(kind); }
 
 struct Row {
   RowKind kind;
