@@ -14,6 +14,7 @@ from .actuation.patches import PatchArray
 from .actuation.points import PointForces, PointSet
 from .actuation.voltages import Voltages
 from .files import write_atomically
+from .loop_results import write_loop
 from .mbs.analyses import Outcome
 from .mbs.observation import (
     body_motion,
@@ -65,6 +66,8 @@ def results_image(solution: Solution) -> bytes:
                 group[f"points/{point}/predicted_shift"] = shift
             if name in solution.feasibility:
                 _write_feasibility(group.create_group("feasibility"), solution, solution.feasibility[name])
+            if name in solution.loops:
+                write_loop(group.create_group("control"), solution.loops[name])
             for body_name, stress in solution.stresses.get(name, {}).items():
                 _write_stress(group.create_group(f"stress/{body_name}"), stress)
         file.flush()
@@ -84,9 +87,8 @@ def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
     analysis = outcome.analysis
     group.attrs["kind"] = analysis.kind
-    integrated = analysis.kind in ("pcid", "forward")
-    group.attrs["integrator"] = outcome.integrator.name if integrated else "none"
-    group.attrs["integrator_reason"] = outcome.integrator.reason if integrated else ""
+    group.attrs["integrator"] = outcome.integrator.name if analysis.integrated else "none"
+    group.attrs["integrator_reason"] = outcome.integrator.reason if analysis.integrated else ""
     group.attrs["tolerance"] = analysis.tolerance
     group.attrs["actuation"] = analysis.actuation or ""
     group.attrs["apply"] = analysis.apply or ""

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .actuation.control.closed_loop import LoopRecord, run_closed_loop
 from .actuation.feasibility import Feasibility, judge_motors, judge_patches
 from .actuation.patch_structure import StructureEffect, structure_effect, with_patches
 from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
@@ -76,6 +77,7 @@ class Solution:
         point_forces: likewise.
         predicted_shift: by analysis and point, (T, 2) m: what voltages within their limits leave undone.
         feasibility: by analysis.
+        loops: what happened at the samples, by analysis of kind "closed-loop".
         stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
         stiffened: whether geometric stiffening is in the equations.
@@ -94,6 +96,7 @@ class Solution:
     point_forces: dict[str, dict[str, PointForces]] = field(default_factory=dict)
     predicted_shift: dict[str, dict[str, Array]] = field(default_factory=dict)
     feasibility: dict[str, Feasibility] = field(default_factory=dict)
+    loops: dict[str, LoopRecord] = field(default_factory=dict)
     stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
@@ -132,7 +135,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         _allocate(solution, outcome)
         solution.stresses[analysis.name] = _stresses(solution, outcome)
         solution.seconds[analysis.name] = time.perf_counter() - started
-        if outcome.status != "completed":
+        if outcome.failed:
             break
     return True
 
@@ -237,6 +240,11 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
         replayed = any(later.actuation == analysis.name for later in solution.scene.analysis)
         return run_pcid(model, analysis, replayed, progress)
     source = solution.outcomes[analysis.actuation] if analysis.actuation else None
+    if analysis.kind == "closed-loop":
+        assert source is not None
+        outcome, loop = run_closed_loop(model, analysis, source, solution.patches, progress)
+        solution.loops[analysis.name] = loop
+        return outcome
     return run_forward(model, analysis, source, _equipment(solution), progress)
 
 

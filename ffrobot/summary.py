@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from .loop_results import HEADINGS, metrics_row
 from .mbs.analyses import Outcome
 from .mbs.geometric_stiffening import NOTABLE
 from .solution import Solution
@@ -30,6 +31,9 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     if any(solution.voltages.values()):
         console.print()
         console.print(_voltages(solution))
+    if solution.loops:
+        console.print()
+        console.print(_loops(solution))
     for name in solution.feasibility:
         console.print(f"{name}: {_verdict(solution, name)}")
     if any(solution.stresses.values()):
@@ -37,8 +41,11 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
         console.print(_stresses(solution))
     notes = Table.grid(padding=(0, 2))
     for name, outcome in solution.outcomes.items():
-        if outcome.analysis.kind in ("pcid", "forward") and outcome.analysis.integrator == "auto":
+        if outcome.analysis.integrated and outcome.analysis.integrator == "auto":
             notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
+    for name, loop in solution.loops.items():
+        for line in loop.warnings:
+            notes.add_row("warning", f"{name}: {line}")
     notes.add_row(*_stiffening(solution))
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
@@ -63,7 +70,7 @@ def _analyses(solution: Solution) -> Table:
     table = _table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
         analysis, reached = outcome.analysis, outcome.time[-1]
-        integrated = analysis.kind in ("pcid", "forward")
+        integrated = analysis.integrated
         table.add_row(
             name,
             analysis.kind,
@@ -101,6 +108,13 @@ def _verdict(solution: Solution, analysis: str) -> str:
         return "motors and patches can do it, as far as limits are given"
     lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
     return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility"
+
+
+def _loops(solution: Solution) -> Table:
+    table = _table(*HEADINGS)
+    for name, loop in solution.loops.items():
+        table.add_row(*metrics_row(name, loop.metrics))
+    return table
 
 
 def _stresses(solution: Solution) -> Table:

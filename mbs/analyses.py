@@ -20,7 +20,7 @@ from .steering import Equipment, actuation_source, applied_actuators
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
 
-_STATUS = {
+STATUS = {
     _core.IntegrationStatus.completed: "completed",
     _core.IntegrationStatus.step_underflow: "step underflow",
     _core.IntegrationStatus.too_many_steps: "too many steps",
@@ -73,9 +73,15 @@ class Outcome:
         first = int(self.assembly.first[i]) - 3 * i
         return slice(first, first + self.assembly.model.bodies[i].n_modes)
 
+    @property
+    def failed(self) -> bool:
+        """Whether the run did not do what it was for; that a closed loop diverges is a finding."""
+        found = self.analysis.kind == "closed-loop" and self.status in ("diverged", "step underflow")
+        return self.status != "completed" and not found
+
     def check_completed(self) -> None:
-        """Raise `SolveError` with advice unless the run reached its end."""
-        if self.status != "completed":
+        """Raise `SolveError` with advice where the run failed."""
+        if self.failed:
             raise SolveError(
                 f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {self.time[-1]:g} s'
                 f" ({self.status}): {_ADVICE[self.status]}"
@@ -162,5 +168,5 @@ def _integrate(
     return Outcome(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers[:, :held],
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
-        _STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, integrator, recording,
+        STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, integrator, recording,
     )  # fmt: skip

@@ -82,6 +82,11 @@ class Analysis(ClosedLoopKeys):
         return self
 
     @property
+    def integrated(self) -> bool:
+        """Whether the motion comes from an integration over time."""
+        return self.kind in ("pcid", "forward", "closed-loop")
+
+    @property
     def times(self) -> NDArray[np.float64]:
         """Output times (T,), in s: exact multiples of the output step, ending exactly at `end`."""
         if not (self.end and self.output_step):

@@ -18,7 +18,8 @@ class Sensor(Record):
     """What is measured, and how well: of a joint its coordinate, of a point x and y, of patches their voltages.
 
     `measure` is the value, its rate, or (points) its acceleration. Readings are whole numbers of `resolution`, after
-    Gaussian noise with the standard deviation `noise`, both in the unit of the reading. `modal` names a body whose modal coordinates are read as they are, which no sensor can. Patches read the
+    Gaussian noise with the standard deviation `noise`, both in the unit of the reading. `modal` names a body whose
+    modal coordinates are read as they are, which no sensor can. Patches read the
     charge c [φ'(x2) − φ'(x1)] p over `capacitance` (F; that of the patch itself where it is not given).
     """
 

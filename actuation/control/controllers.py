@@ -93,6 +93,7 @@ class LinearFeedback:
         self.sum = np.zeros(len(setup.outputs))
 
     def __call__(self, k: int, y: Array) -> Array:
+        """Commands at sample k."""
         e = self.reference[k] - y
         u: Array = self.P @ e
         if self.D is not None:
@@ -107,7 +108,7 @@ class LinearFeedback:
 def joint_pid(record: JointPid, setup: Setup, mobility: Array) -> LinearFeedback:
     """PID of joints; `mobility` (motors,) is the acceleration of each joint per moment on it, for the bandwidth."""
     shape = (len(setup.inputs), len(setup.outputs))
-    P, D, rate, integral = (np.zeros(shape) for _ in range(4))
+    P, D, integral = (np.zeros(shape) for _ in range(3))
     bandwidth = 0.0
     for joint in record.joints:
         (u,), (y,) = setup.places(f"joint/{joint}"), setup.columns(f"joint/{joint}")
@@ -118,7 +119,6 @@ def joint_pid(record: JointPid, setup: Setup, mobility: Array) -> LinearFeedback
             P[u, setup.columns(f"joint/{joint}/rate")] = gain
         D[u, y] = gain
         bandwidth = max(bandwidth, float(np.sqrt(P[u, y] * mobility[u])), gain * float(mobility[u]))
-    del rate
     differences = D if record.rate == "difference" and D.any() else None
     return LinearFeedback(setup, P, differences, integral if integral.any() else None, bandwidth)
 

@@ -38,6 +38,7 @@ class PythonControl:
         self.act = factory(setup)
 
     def __call__(self, k: int, y: Array) -> Array:
+        """What the user's function commands at sample k."""
         try:
             u = np.asarray(self.act(k, y), dtype=float)
         except Exception as error:  # the user's code may raise anything

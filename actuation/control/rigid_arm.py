@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...mbs import _core
+from ...mbs.analyses import Outcome
 from ...mbs.control_records import ComputedTorque
 from ...mbs.initial_state import undeformed_state
 from ...mbs.model import ZERO, Assembly, Constraint, Model
@@ -21,7 +22,7 @@ TOLERANCE, MOST_ITERATIONS = 1e-10, 20
 
 
 class RigidArm:
-    """τ(γ, γ̇, γ̈) of all motors with rigid links, by the equations of motion of the core (gravity, rotors, friction too).
+    """τ(γ, γ̇, γ̈) of all motors with rigid links, by the equations of motion of the core, rotors and friction too.
 
     The motors' moments are the multipliers of γ = γ(t), affine in γ̈: one evaluation with γ̈ = 0, one for each motor.
     Raises `InputError` where the motors do not fit the mechanism.
@@ -62,6 +63,15 @@ class RigidArm:
                 break
         self._q = q
         return q, C_q
+
+    def angles(self, source: Outcome) -> Array:
+        """Joint angles (motors,) at the start of an analysis, its links taken as straight."""
+        frames = source.q[0][source.assembly.rigid_coordinates]
+        q = np.zeros_like(self._q)
+        q[self._at_rest.rigid_coordinates] = frames
+        C = self._at_rest.system.constraints(0.0, q, np.zeros_like(q))[0]
+        angles: Array = C[self._motors]
+        return angles
 
     def terms(self, gamma: Array, gamma_dot: Array) -> tuple[Array, Array]:
         """M (motors, motors) and h (motors,) of τ = M γ̈ + h."""
@@ -107,6 +117,7 @@ class ComputedTorqueControl:
         self.accelerations = np.gradient(self.reference[:, self.rates], setup.times, axis=0, edge_order=2)
 
     def __call__(self, k: int, y: Array) -> Array:
+        """Commands at sample k."""
         r, m = self.reference[k], len(self.values)
         e, e_dot = r[self.values] - y[self.values], r[self.rates] - y[self.rates]
         wanted = self.accelerations[k] + self.gains[0] * e + self.gains[1] * e_dot

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...mbs import _core
 from ...mbs.control_records import PERMITTIVITY, Sensor
-from ...mbs.model import Model
+from ...mbs.model import Assembly, Model
 from ...mbs.rows import End, Row, joint_coordinate
 from ..patches import PatchArray
 
@@ -83,10 +83,9 @@ def merged(given: Sequence[Signal], needed: Sequence[Signal]) -> tuple[Signal, .
     return tuple(sorted(by_name.values(), key=lambda signal: signal.row is None))
 
 
-def sensing(
-    model_index: Mapping[str, int], system: _core.System, rows: Sequence[_core.Row], read: Sequence[Signal]
-) -> _core.Sensing:
-    """What reads these signals in the core; `rows` are those of the signals along rows, in order."""
-    along = [(row, signal.order) for row, signal in zip(rows, (s for s in read if s.row is not None), strict=True)]
-    modal = [(model_index[s.body], s.vector, s.order) for s in read if s.row is None]
-    return _core.Sensing(system, along, modal)
+def sensing(assembly: Assembly, read: Sequence[Signal]) -> _core.Sensing:
+    """What reads these signals in the core; the motor rows of `assembly` are those of the signals along rows."""
+    orders = [signal.order for signal in read if signal.row is not None]
+    along = list(zip(assembly.motor_rows, orders, strict=True))
+    modal = [(assembly.index[s.body], s.vector, s.order) for s in read if s.row is None]
+    return _core.Sensing(assembly.system, along, modal)

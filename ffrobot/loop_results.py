@@ -1,0 +1,45 @@
+"""Closed loops in results files and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+
+from .actuation.control.closed_loop import LoopRecord
+from .actuation.control.metrics import Metrics
+
+HEADINGS = (
+    "closed loop", "verdict", "tip error rms (m)", "max (m)", "settled (s)", "vibration (m)", "motor work (J)",
+    "largest moment (N·m)", "voltage (V)", "cut",
+)  # fmt: skip
+
+
+def write_loop(group: h5py.Group, record: LoopRecord) -> None:
+    """Samples as datasets, metrics and names as attributes of `group`, which is NAME/control."""
+    for key in ("time", "readings", "reference", "commands", "wanted"):
+        group[key] = getattr(record, key)
+    group["tip_error"] = record.tip_error  # at the outputs of the analysis
+    group.attrs["inputs"] = list(record.inputs)
+    group.attrs["outputs"] = list(record.outputs)
+    group.attrs["warnings"] = list(record.warnings)
+    group.attrs.update(vars(record.metrics))
+
+
+def metrics_of(attributes: Mapping[str, Any]) -> Metrics:
+    """The metrics that `write_loop` wrote."""
+    return Metrics(**{key: attributes[key] for key in Metrics.__dataclass_fields__})
+
+
+def metrics_row(name: str, metrics: Metrics) -> Iterator[str]:
+    """One run as text, below `HEADINGS`."""
+    yield name
+    yield metrics.verdict
+    for value in (metrics.tip_error_rms, metrics.tip_error_max):
+        yield f"{value:.3g}"
+    yield "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}"
+    for value in (metrics.vibration, metrics.motor_work, metrics.peak_moment, metrics.peak_voltage):
+        yield f"{value:.3g}"
+    yield f"{100 * metrics.saturated:.2g} %"
