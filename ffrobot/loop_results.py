@@ -12,8 +12,8 @@ from .actuation.control.closed_loop import LoopRecord
 from .actuation.control.metrics import Metrics
 
 HEADINGS = (
-    "closed loop", "verdict", "tip error rms (m)", "max (m)", "settled (s)", "vibration (m)", "motor work (J)",
-    "largest moment (N·m)", "voltage (V)", "cut",
+    "closed loop", "verdict", "error rms (m)", "max (m)", "settled (s)", "vibration (m)", "work (J)",
+    "moment (N·m)", "voltage (V)", "cut",
 )  # fmt: skip
 
 
