@@ -142,13 +142,13 @@ class Assembly:
         self.index = {body.name: i for i, body in enumerate(model.bodies)}
         self._markers: list[list[str]] = [[] for _ in model.bodies]
         self.constraints = tuple(constraints[i] for i in envelope_order([c.row for c in constraints]))
-        constraint_rows = [self._core_row(c.row) for c in self.constraints]
+        self.constraint_rows = [self._core_row(c.row) for c in self.constraints]
         drive_rows = [(self._core_row(row), size) for row, size in drives]
         self.motor_rows = [self._core_row(row) for row in motors]
         self.system = _core.System(np.array(model.scene.gravity))
         for body, markers in zip(model.bodies, self._markers, strict=True):
             self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))
-        for constraint, row in zip(self.constraints, constraint_rows, strict=True):
+        for constraint, row in zip(self.constraints, self.constraint_rows, strict=True):
             self.system.add_constraint(row, constraint.target)
         for row, size in drive_rows:
             self.system.add_drive(row, size)
