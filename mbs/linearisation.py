@@ -89,9 +89,10 @@ class Linearisation:
         system = self.assembly.system
         linear = _core.reduce(system, self.independent, t, q, v, a, 1)
         if not linear.reciprocal_condition > DEPENDENT**2 or not np.all(np.isfinite(linear.K)):
+            rows = ", ".join(self.names[: len(self.independent)])
             raise SolveError(
-                f"{self.model.scene.path}: linear model at t = {t:g} s: {', '.join(self.names[: len(self.independent)])}"
-                " do not determine the configuration there (a singular one)"
+                f"{self.model.scene.path}: linear model at t = {t:g} s: {rows} do not determine the configuration there"
+                " (a singular one)"
             )
         inputs = self._motors | {f"force/{place}": row for place, row in self._places.items()}
         outputs = self._joints | {f"point/{place}": row for place, row in self._places.items()}

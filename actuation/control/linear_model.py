@@ -60,7 +60,8 @@ class LinearModel:
         f, L = self.freedom, np.linalg.cholesky(self.mass)
         L_T, inverse = L.T, np.linalg.inv(L.T)
         A_K, A_D = L_T @ self.A[f:, :f] @ inverse, L_T @ self.A[f:, f:] @ inverse
-        return -A_K, -A_D, L_T @ self.B[f:], self.C[:, :f] @ inverse
+        inputs, outputs = L_T @ self.B[f:], self.C[:, :f] @ inverse
+        return -1.0 * A_K, -1.0 * A_D, inputs, outputs
 
     def inputs(self, names: Names) -> list[int]:
         """Columns of B by name. Raises `InputError` for unknown ones."""
@@ -75,8 +76,7 @@ class LinearModel:
         K, D, B, C = self.second_order
         s = 1j * np.asarray(omega)[:, None, None]
         X = np.linalg.solve(s**2 * np.eye(self.freedom) + s * D + K, B[None, :, self.inputs(inputs)])
-        response: ComplexArray = C[self.outputs(outputs)] @ X
-        return response
+        return np.asarray(C[self.outputs(outputs)] @ X, dtype=complex)
 
     def arrays(self) -> dict[str, Any]:
         """Everything of the model by name, as files hold it."""
@@ -147,7 +147,6 @@ def _numbers(kind: str, names: Names, known: tuple[str, ...]) -> list[int]:
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:
         if name not in known:
-            raise InputError(
-                f'linear model: expected an {kind} ({quoted(known)}), found "{name}"{did_you_mean(name, known)}'
-            )
+            hint = did_you_mean(name, known)
+            raise InputError(f'linear model: expected an {kind} ({quoted(known)}), found "{name}"{hint}')
     return [known.index(name) for name in wanted]

@@ -63,7 +63,8 @@ def robot_modes(model: LinearModel) -> RobotModes:
     largest = np.take_along_axis(Z, np.abs(Z).argmax(axis=0)[None], axis=0)
     Z = Z * (np.abs(largest) / largest) / np.linalg.norm(Z, axis=0)
     shape = np.linalg.solve(np.linalg.cholesky(model.mass).T, Z).T
-    return RobotModes(poles, shape, shape @ model.transformation.T)
+    motion = shape @ model.transformation.T
+    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex))
 
 
 def _pairs(poles: ComplexArray) -> NDArray[np.intp]:

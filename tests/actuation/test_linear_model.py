@@ -37,7 +37,9 @@ def hub_and_beam(ratio, modes=8, damping_ratio=0.0):
 def roots(function, count, step=0.01):
     x = np.arange(0.5, 20.0, step)
     y = function(x)
-    return np.array([brentq(function, a, a + step) for a, u, v in zip(x, y, y[1:]) if u * v < 0][:count])
+    return np.array(
+        [brentq(function, a, a + step) for a, u, v in zip(x[:-1], y[:-1], y[1:], strict=True) if u * v < 0][:count]
+    )
 
 
 @pytest.mark.parametrize("ratio", [0.01, 0.1, 1.0, 10.0])
@@ -124,19 +126,19 @@ def test_mat_file_names_its_columns(tmp_path):
 
 
 def test_modes_without_reach_are_named():
-    """The middle of a pinned-pinned-like link does not move in its second mode; one motor cannot stop two free joints."""
+    """One motor cannot stop two free joints, and a stretched arm's tip does not move along it, to first order."""
     model = at_rest(arm(gravity=(0.0, 0.0)))
     assert controllability(model, ["joint/O", "joint/A"]).lost == ()
     assert controllability(model, "joint/O").lost == ("mode 1 (0 Hz)", "mode 2 (0 Hz)")
     assert observability(model, "joint/O").lost == ("mode 1 (0 Hz)", "mode 2 (0 Hz)")
     straight = arm(gravity=(0.0, 0.0), initial={"angles": {"link1": 0.0, "link2": 0.0}}, trajectory=())
     along = observability(at_rest(straight), "point/link2.tip/x")
-    assert len(along.lost) == model.freedom  # a stretched arm's tip does not move along it, to first order
+    assert len(along.lost) == model.freedom
 
 
 def test_unknown_names_are_refused():
     model = hub_and_beam(0.1, modes=2)
-    with pytest.raises(InputError, match='expected an input .*"force/arm.tip/x".* found "joint/hubb"'):
+    with pytest.raises(InputError, match=r'expected an input .*"force/arm.tip/x".* found "joint/hubb"'):
         zeros(model, "joint/hubb", "joint/hub")
     with pytest.raises(InputError, match="expected as many inputs as outputs, found 1 and 2"):
         zeros(model, "joint/hub", ["joint/hub", "point/arm.tip/y"])

@@ -1,4 +1,4 @@
-"""The linear equations about a motion against the nonlinear ones: what they leave falls with the perturbation squared."""
+"""The linear equations about a motion against the nonlinear ones: errors fall with the perturbation squared."""
 
 from dataclasses import replace
 
