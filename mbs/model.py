@@ -156,7 +156,7 @@ class Assembly:
         self.index = {body.name: i for i, body in enumerate(model.bodies)}
         self._markers: list[list[str]] = [[] for _ in model.bodies]
         self.constraints = tuple(constraints[i] for i in envelope_order([c.row for c in constraints]))
-        constraint_rows = [self._core_row(c.row) for c in self.constraints]
+        self.constraint_rows = [self._core_row(c.row) for c in self.constraints]
         drive_rows = [(self._core_row(row), size) for row, size in drives]
         rotor_rows = [(self._core_row(row), inertia) for row, inertia in model.rotors]
         friction_rows = [(self._core_row(row), friction) for row, friction in model.frictions]
@@ -164,7 +164,7 @@ class Assembly:
         self.system = _core.System(np.array(model.scene.gravity))
         for body, markers in zip(model.bodies, self._markers, strict=True):
             self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))
-        for constraint, row in zip(self.constraints, constraint_rows, strict=True):
+        for constraint, row in zip(self.constraints, self.constraint_rows, strict=True):
             self.system.add_constraint(row, constraint.target)
         for row, inertia in rotor_rows:
             self.system.add_rotor(row, inertia)

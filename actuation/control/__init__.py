@@ -1,1 +1,1 @@
-"""Closed loops: sampled controllers of motors and patches, and how well they do."""
+"""What acts on a robot by what it does: linear models, and what is made with them."""

@@ -10,4 +10,5 @@ NB_MODULE(_core, m) {
   bind_system(m);
   bind_run(m);
   bind_actuation(m);
+  bind_tangent(m);
 }

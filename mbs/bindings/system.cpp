@@ -20,12 +20,6 @@ using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eig
 
 namespace {
 
-void check_size(const char *name, Eigen::Index got, Eigen::Index expected) {
-  if (got != expected)
-    throw nb::value_error(
-        (std::string(name) + ": expected size " + std::to_string(expected) + ", got " + std::to_string(got)).c_str());
-}
-
 PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
                      const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
                      const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions,

@@ -67,18 +67,17 @@ std::vector<Event> schedule(const Sampling &sampling, double end) {
   const auto &times = sampling.times;
   const double same = 1e-9 * (times.size() > 1 ? times[1] - times[0] : end);
   std::size_t acted = 0;
-  const auto act_until = [&](double t) {
-    for (; acted < times.size() && times[acted] + sampling.delay <= t + same; ++acted)
+  const auto act_until = [&](double t, std::size_t taken) {
+    for (; acted < taken && times[acted] + sampling.delay <= t + same; ++acted)
       events.push_back({std::min(times[acted] + sampling.delay, t), acted, true});
   };
   for (std::size_t k = 0; k < times.size(); ++k) {
-    if (k > 0)
-      act_until(times[k]); // commands of earlier samples
+    act_until(times[k], k);
     events.push_back({times[k], k, false});
     if (sampling.delay == 0)
-      act_until(times[k]);
+      act_until(times[k], k + 1);
   }
-  act_until(end);
+  act_until(end, times.size());
   return events;
 }
 

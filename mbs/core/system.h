@@ -31,6 +31,10 @@ struct Friction {
   double viscous = 0, coulomb = 0, speed = 1;
 
   double resistance(double rate) const { return viscous * rate + coulomb * std::tanh(rate / speed); }
+  double slope(double rate) const { // of the resistance
+    const double steady = std::cosh(rate / speed);
+    return viscous + coulomb / (speed * steady * steady);
+  }
   bool acts() const { return viscous != 0 || coulomb != 0; }
 };
 
