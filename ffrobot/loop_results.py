@@ -18,10 +18,11 @@ HEADINGS = (
 
 
 def write_loop(group: h5py.Group, record: LoopRecord) -> None:
-    """Samples as datasets, metrics and names as attributes of `group`, which is NAME/control."""
+    """Of an analysis: tip_error at its outputs; in control/, samples, with metrics and names as attributes."""
+    group["tip_error"] = record.tip_error
+    group = group.create_group("control")
     for key in ("time", "readings", "reference", "commands", "wanted"):
         group[key] = getattr(record, key)
-    group["tip_error"] = record.tip_error  # at the outputs of the analysis
     group.attrs["inputs"] = list(record.inputs)
     group.attrs["outputs"] = list(record.outputs)
     group.attrs["warnings"] = list(record.warnings)

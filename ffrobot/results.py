@@ -67,7 +67,7 @@ def results_image(solution: Solution) -> bytes:
             if name in solution.feasibility:
                 _write_feasibility(group.create_group("feasibility"), solution, solution.feasibility[name])
             if name in solution.loops:
-                write_loop(group.create_group("control"), solution.loops[name])
+                write_loop(group, solution.loops[name])
             for body_name, stress in solution.stresses.get(name, {}).items():
                 _write_stress(group.create_group(f"stress/{body_name}"), stress)
         file.flush()

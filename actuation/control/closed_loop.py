@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mbs import _core
-from ...mbs.analyses import STATUS, Outcome, Progress
+from ...mbs.analyses import STATUS, Outcome, Progress, initial_state
 from ...mbs.analysis_records import Analysis
 from ...mbs.initial_state import State
 from ...mbs.integrators import METHODS, choose_integrator
@@ -143,6 +143,9 @@ def _integrate(
 ) -> Outcome:
     began = time.perf_counter()
     start = State(source.q[0].copy(), source.v[0].copy())
+    if analysis.start == "scene":
+        model = assembly.model
+        start = initial_state(Assembly(model, [*model.joints, *model.trajectories], model.loads))
     integrator = choose_integrator(assembly, analysis, start)
     voltages = [(assembly.index[body], array.Phi_V) for body, array in patches.items()]
     run = _core.run_sampled(

@@ -188,8 +188,8 @@ def _estimates(record: Lqr, setup: Setup, model: LinearModel) -> tuple[Array, Ar
         values[i, setup.columns(f"joint/{joint}")] = 1.0
         rates[i, setup.columns(f"joint/{joint}/rate")] = 1.0
     for body in setup.model.bodies:
-        rows = [i for i, name in enumerate(names) if name.startswith(f"modal/{body.name}/")]
-        if not rows or (record.sensor == "pzt" and body.name not in setup.patches):
+        rows = np.array([i for i, name in enumerate(names) if name.startswith(f"modal/{body.name}/")], dtype=int)
+        if not rows.size or (record.sensor == "pzt" and body.name not in setup.patches):
             continue
         m = len(rows)
         estimate = modal_estimate(record.sensor, setup, body.name, m)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +29,11 @@ class Signal:
 
     name: str
     order: int
+    resolution: float
+    noise: float
     row: Row | None = None
     body: str = ""
-    vector: Array | None = None
-    resolution: float = 0.0
-    noise: float = 0.0
+    vector: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def input_names(model: Model, patches: Mapping[str, PatchArray]) -> tuple[str, ...]:
@@ -45,22 +45,22 @@ def input_names(model: Model, patches: Mapping[str, PatchArray]) -> tuple[str, .
 def signals(model: Model, patches: Mapping[str, PatchArray], sensor: Sensor) -> Iterator[Signal]:
     """The readings of one sensor of the scene."""
     order, ending = ORDERS[sensor.measure], "" if sensor.measure == "value" else f"/{sensor.measure}"
-    quality = {"resolution": sensor.resolution, "noise": sensor.noise}
+    quality = sensor.resolution, sensor.noise
     if sensor.joint is not None:
         joint = next(joint for joint in model.scene.joint if joint.name == sensor.joint)
         row = joint_coordinate(model.scene, joint)
-        yield Signal(f"joint/{sensor.joint}{ending}", order, row, **quality)
+        yield Signal(f"joint/{sensor.joint}{ending}", order, *quality, row)
     elif sensor.point is not None:
         body, _, point = sensor.point.partition(".")
         for axis in ("x", "y"):
             row = Row(f'sensor on "{sensor.point}"', getattr(_core.RowKind, axis), End(None), End(body, point))
-            yield Signal(f"point/{sensor.point}/{axis}{ending}", order, row, **quality)
+            yield Signal(f"point/{sensor.point}/{axis}{ending}", order, *quality, row)
     elif sensor.pzt is not None:
         for k, vector in enumerate(volts_per_modal_coordinate(patches[sensor.pzt], sensor.capacitance), 1):
-            yield Signal(f"pzt/{sensor.pzt}/{k}", order, body=sensor.pzt, vector=vector, **quality)
+            yield Signal(f"pzt/{sensor.pzt}/{k}", order, *quality, body=sensor.pzt, vector=vector)
     elif sensor.modal is not None:
         for k, vector in enumerate(np.eye(model.body(sensor.modal).n_modes), 1):
-            yield Signal(f"modal/{sensor.modal}/{k}{ending}", order, body=sensor.modal, vector=vector, **quality)
+            yield Signal(f"modal/{sensor.modal}/{k}{ending}", order, *quality, body=sensor.modal, vector=vector)
 
 
 def volts_per_modal_coordinate(patches: PatchArray, capacitance: float | None = None) -> Array:

@@ -24,6 +24,7 @@ def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
             *_over_time(results, "joints", "moment", "moment (N·m), force (N)", "motor of joint"),
             *_over_time(results, "joints", "reaction", "reaction (N)", "reaction of joint"),
             *_voltages(results),
+            *_tip_errors(results),
         ]
     )
 
@@ -114,6 +115,13 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
                     y_label="voltage (V)",
                     limits=() if limit is None else (-limit, limit),
                 )
+
+
+def _tip_errors(results: Results) -> Iterator[FigureRecord]:
+    """Of all closed loops in one figure."""
+    curves = tuple(Curve(data=f"{a}/tip_error", label=a) for a in results.analyses if results.has(f"{a}/tip_error"))
+    if curves:
+        yield FigureRecord(name="tip_error", title="tip, distance from its place", curves=curves, y_label="error (m)")
 
 
 def _members(results: Results, group: str) -> list[str]:

@@ -71,11 +71,13 @@ VectorXd newton_step(const System &system, double t, const VectorXd &q, const Ve
   y << q, v;
   check_size("y", y.size(), slope.size());
   check_size("r", r.size(), x.size());
-  check_size("c", c.size(), static_cast<Eigen::Index>(system.constraints.size()));
+  check_size("c", c.size(), static_cast<Eigen::Index>(system.held));
+  VectorXd all = VectorXd::Zero(static_cast<Eigen::Index>(system.constraints.size())); // nothing holds rotors
+  all.head(c.size()) = c;
   ConstrainedMotion motion(system, {}, {}, nullptr);
   motion.slope(t, y.data(), slope.data());
   motion.factorise(damping_factor, stiffness_factor);
-  motion.solve(r.data(), c.data(), x.data());
+  motion.solve(r.data(), all.data(), x.data());
   return x;
 }
 
