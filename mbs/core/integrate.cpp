@@ -118,8 +118,10 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       break;
     }
     // Steps that were shortened to land on an output tell what the step asked for would have cost.
+    // A much shorter one, on the way to a break, tells nothing: what was found before it stands.
     const double asked = std::clamp(h, step, 2 * step);
-    h = control.after_accepted(asked, size * std::pow(asked / step, method.error_order()));
+    if (!(t == target && breaks && 2 * step < h))
+      h = control.after_accepted(asked, size * std::pow(asked / step, method.error_order()));
     if (pass_breaks()) {
       system.slope(t, y.data(), method.first_slope());
       method.restart();

@@ -68,8 +68,10 @@ std::vector<Event> schedule(const Sampling &sampling, double end) {
   const double same = 1e-9 * (times.size() > 1 ? times[1] - times[0] : end);
   std::size_t acted = 0;
   const auto act_until = [&](double t, std::size_t taken) {
-    for (; acted < taken && times[acted] + sampling.delay <= t + same; ++acted)
-      events.push_back({std::min(times[acted] + sampling.delay, t), acted, true});
+    for (; acted < taken && times[acted] + sampling.delay <= t + same; ++acted) {
+      const double then = times[acted] + sampling.delay;
+      events.push_back({then < t - same ? then : t, acted, true});
+    }
   };
   for (std::size_t k = 0; k < times.size(); ++k) {
     act_until(times[k], k);

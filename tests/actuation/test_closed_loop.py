@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
-from scipy.optimize import brentq
 
 from ffrobot.actuation.control.closed_loop import run_closed_loop
 from ffrobot.actuation.control.lqr import gains, sampled
@@ -26,13 +25,13 @@ def loop(name="loop", **keys):
     return {"name": name, "kind": "closed-loop", "actuation": "inverse", "sample_time": T} | keys
 
 
-def wheel(*analyses, joint=None, target="0", **keys):
+def wheel(*analyses, joint=None, target="0", bodies=(), joints=(), gravity=(0.0, 0.0), **keys):
     """A wheel about O that is to stand still, or to follow `target`: I γ̈ = u, the simplest plant."""
     body = {"mass": 1.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0], "rim": [0.3, 0.0]}}
     revolute = {"name": "O", "type": "revolute", "between": ["ground", "w.root"]} | (joint or {})
     inverse = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": T, "tolerance": 1e-9}
     return make_scene(
-        name="wheel", gravity=[0.0, 0.0], body=[{"name": "w", "rigid": body}], joint=[revolute],
+        name="wheel", gravity=gravity, body=[{"name": "w", "rigid": body}, *bodies], joint=[revolute, *joints],
         trajectory=[{"name": "stand", "joint": "O", "value": target}], analysis=[inverse, *analyses], **keys,
     )  # fmt: skip
 
@@ -98,7 +97,8 @@ def test_noise_is_that_of_the_seed():
     def readings(seed):
         sensor = [{"joint": "O", "measure": "rate", "noise": 0.02}, {"joint": "O"}]
         scene = wheel(loop(sensor=sensor, seed=seed))
-        return solve(scene).loops["loop"].readings[:, 1]
+        record = solve(scene).loops["loop"]
+        return record.readings[:, record.outputs.index("joint/O/rate")]
 
     first, again, other = readings(1), readings(1), readings(2)
     np.testing.assert_array_equal(first, again)
@@ -287,20 +287,19 @@ def test_patches_add_the_damping_that_is_asked_for(link_file, sensor):
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
 
 
-def test_lqr_names_the_modes_that_a_patch_at_a_node_does_not_reach(link_file):
-    """The rotation differences of one patch vanish where the curvature does: no voltage serves that mode."""
-    link = link_file("cantilever3", count=3)
-    free = prepare(held_link(link, loop(sample_time=1e-3)))
-    body = free.bodies["link"].modal
-
-    def difference(start):  # of the second mode, over the length of a patch
-        return body.interpolate(start + 0.05).rotation[2][1] - body.interpolate(start).rotation[2][1]
-
-    start = brentq(difference, 0.1, 0.4, xtol=1e-13)
-    pzt = {"count": None, "centers": [start + 0.025], "allocation": "least-squares"}
-    control = [{"kind": "lqr", "modes": 2, "sensor": "ideal"}]
-    solution = solve(held_link(link, loop(sample_time=1e-3, controller=control), pzt=pzt))
-    assert any("uncontrollable" in line for line in solution.loops["loop"].warnings)
+def test_lqr_names_the_modes_out_of_reach():
+    """A second wheel that hangs on its own, without motor and sensor: it swings with √(m g d/(I + m d²))."""
+    pendulum = {"mass": 1.0, "inertia": 0.3, "center": [0.1, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.2, 0.0]}}
+    scene = wheel(
+        loop(controller=[{"kind": "lqr", "moment": 1.0}], disturbance=blow()),
+        bodies=[{"name": "p", "rigid": pendulum}], gravity=[0.0, -9.81], initial={"angles": {"p": -np.pi / 2}},
+        joints=[{"name": "P", "type": "revolute", "between": ["ground", "p.root"], "motor": False,
+                 "viscous_friction": 0.1}],
+    )  # fmt: skip
+    frequency = np.sqrt(9.81 * 0.1 / 0.31) / (2 * np.pi)
+    lines = solve(scene).loops["loop"].warnings
+    for word in ("uncontrollable", "unobservable"):
+        assert any(word in line and f"({frequency:.4g} Hz)" in line for line in lines), lines
 
 
 def test_a_patch_reads_the_charge_of_its_bending(link_file):
@@ -313,4 +312,5 @@ def test_a_patch_reads_the_charge_of_its_bending(link_file):
     turn = np.diff(array.edges - array.edges**2 / 2, axis=1)[:, 0] / EI
     capacitance = 1e-7
     expected = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2 * turn / capacitance
-    np.testing.assert_allclose(volts_per_modal_coordinate(array, capacitance) @ p, expected, rtol=2e-2)
+    volts = volts_per_modal_coordinate(array, capacitance) @ p  # of ten modes: patches at the ends miss the others
+    np.testing.assert_allclose(volts, expected, atol=2e-2 * expected.max())
