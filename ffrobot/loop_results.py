@@ -12,8 +12,8 @@ from .actuation.control.closed_loop import LoopRecord
 from .actuation.control.metrics import Metrics
 
 HEADINGS = (
-    "closed loop", "verdict", "error rms (m)", "max (m)", "settled (s)", "vibration (m)", "work (J)",
-    "moment (N·m)", "voltage (V)", "cut",
+    "closed loop", "verdict", "rms (m)", "max (m)", "settled (s)", "vibration (m)", "at end (m)", "work (J)", "N·m",
+    "V", "cut",
 )  # fmt: skip
 
 
@@ -41,6 +41,6 @@ def metrics_row(name: str, metrics: Metrics) -> Iterator[str]:
     for value in (metrics.tip_error_rms, metrics.tip_error_max):
         yield f"{value:.3g}"
     yield "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}"
-    for value in (metrics.vibration, metrics.motor_work, metrics.peak_moment, metrics.peak_voltage):
+    for value in (metrics.vibration, metrics.residual, metrics.motor_work, metrics.peak_moment, metrics.peak_voltage):
         yield f"{value:.3g}"
     yield f"{100 * metrics.saturated:.2g} %"

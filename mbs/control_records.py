@@ -87,10 +87,12 @@ class Lqr(Record):
     """u = −K x for the sampled linear model about the reference at `time`, links with their lowest `modes`.
 
     Weights are one over the squares of what is acceptable: angles (rad), rates (rad/s), deflections of the links
-    relative to their length, moments (N·m), voltages (V). States as in `ModalVelocity`.
+    relative to their length, moments (N·m), voltages (V). `inputs`: all, or motors or
+    patches alone, the latter about joints that a "joint-pid" beside holds. States as in `ModalVelocity`.
     """
 
     kind: Literal["lqr"]
+    inputs: Literal["all", "motors", "patches"] = "all"
     modes: Annotated[int, Field(gt=0)] = 1
     time: NotNegative = 0.0
     angle: Positive = 0.01

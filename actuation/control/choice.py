@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +45,11 @@ def _bending(model: Model, sensor: str, patches: Mapping[str, PatchArray]) -> li
     return list(patches) if sensor == "pzt" else [body.name for body in model.bodies if body.n_modes]
 
 
-def make_controller(record: Record, setup: Setup) -> Controller:
-    """The controller of one table of the scene. Raises `InputError` where it does not fit the robot."""
+def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> Controller:
+    """The controller of one table of the scene, acting with those `beside`.
+
+    Raises `InputError` where it does not fit the robot.
+    """
     if isinstance(record, JointPid):
         return joint_pid(record, setup, joint_mobility(setup))
     if isinstance(record, ModalVelocity):
@@ -56,7 +59,7 @@ def make_controller(record: Record, setup: Setup) -> Controller:
     if isinstance(record, Lqr):
         from .lqr import LqrControl
 
-        return LqrControl(record, setup)
+        return LqrControl(record, setup, [other for other in beside if isinstance(other, JointPid)])
     label = f"{setup.model.scene.path}: controller: {record.python}"
     return PythonControl(load_function(record.python), setup, label)
 

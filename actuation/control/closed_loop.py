@@ -115,7 +115,7 @@ def run_closed_loop(
         model, patches, inputs, tuple(s.name for s in read), times, analysis.sample_time, analysis.delay, reference,
         feed_forward, source,
     )  # fmt: skip
-    acting = [make_controller(record, setup) for record in analysis.controller]
+    acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     acting += [make(setup) for make in controllers]
     limit = np.concatenate([motor_limits(model), *(array.limit for array in patches.values())])
     loop = Loop(setup, read, acting, limit, analysis.seed)

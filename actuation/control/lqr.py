@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...mbs.control_records import Lqr
+from ...mbs.control_records import JointPid, Lqr
 from ...mbs.linearisation import LinearMechanism, linearise
 from .controllers import Setup, modal_columns, modal_estimate
 from .linear_model import LinearModel, linear_model
 from .modes import controllability, observability
 
 Array = NDArray[np.float64]
+MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion
 
 
 @dataclass(frozen=True)
@@ -90,10 +91,11 @@ def gains(model: SampledModel, Q: Array, R: Array) -> Array:
 class LqrControl:
     """u = −K x, x the joint errors, the lowest modes of the links and their rates, and the commands on their way."""
 
-    def __init__(self, record: Lqr, setup: Setup) -> None:
-        model = design_model(record, setup)
-        motors = [f"joint/{name}" for name in setup.model.motors]
-        self.inputs = [*setup.places(*motors), *(i for body in setup.patches for i in setup.patch_places(body))]
+    def __init__(self, record: Lqr, setup: Setup, beside: Sequence[JointPid] = ()) -> None:
+        model = design_model(record, setup, beside if record.inputs == "patches" else ())
+        motors = [] if record.inputs == "patches" else [f"joint/{name}" for name in setup.model.motors]
+        patches = {} if record.inputs == "motors" else setup.patches
+        self.inputs = [*setup.places(*motors), *(i for body in patches for i in setup.patch_places(body))]
         names = [setup.inputs[i] for i in self.inputs]
         self.warnings = _out_of_reach(record, setup, model, names)
         Q, R = _weights(record, setup, model, names)
@@ -105,7 +107,7 @@ class LqrControl:
                 f"{setup.model.scene.path}: controller lqr: expected a model that motors and patches can stabilise,"
                 f" found none ({error}): {'; '.join(self.warnings) or 'more modes or other weights?'}"
             ) from None
-        self.bandwidth = float(np.abs(np.linalg.eigvals(model.A)).max())
+        self.bandwidth = _bandwidth(model.A, discrete.A - discrete.B @ self.K, setup.sample_time)
         self.values, self.rates, differences = _estimates(record, setup, model)
         self.differences = differences / setup.sample_time
         self.reference, self.f = setup.reference, model.freedom
@@ -130,14 +132,34 @@ class LqrControl:
         return u
 
 
-def design_model(record: Lqr, setup: Setup) -> LinearModel:
-    """About the reference at `time`, links with their lowest modes: the higher ones are left out (truncated)."""
+def _bandwidth(A: Array, closed: Array, T: float) -> float:
+    """The fastest of the model's motions that feedback changes: whose discrete pole moves."""
+    poles = np.linalg.eigvals(A)
+    moved = np.abs(np.exp(poles * T)[:, None] - np.linalg.eigvals(closed)).min(axis=1) > MOVED
+    return float(np.abs(poles[moved]).max(initial=0.0))
+
+
+def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> LinearModel:
+    """About the reference at `time`, links with their lowest modes: the higher ones are left out (truncated).
+
+    Joints that other controllers hold are held by springs and dampers, as if these neither sampled nor waited.
+    """
     source = setup.source
     i = int(np.argmin(np.abs(source.time - record.time)))
     mechanism = linearise(setup.model, float(source.time[i]), source.q[i], source.v[i], source.a[i])
     keep = [j for j, name in enumerate(mechanism.names) if _is_kept(name, record.modes)]
     patches = {name: replace(a, Phi_V=a.Phi_V[: record.modes]) for name, a in setup.patches.items()}
-    return linear_model(_restricted(mechanism, keep), patches)
+    mechanism = _restricted(mechanism, keep)
+    for pid in beside:
+        for joint in pid.joints:
+            along = mechanism.inputs[f"joint/{joint}"]
+            spring, damper = pid.proportional.get(joint, 0.0), pid.derivative.get(joint, 0.0)
+            mechanism = replace(
+                mechanism,
+                K=mechanism.K + spring * np.outer(along, along),
+                D=mechanism.D + damper * np.outer(along, along),
+            )
+    return linear_model(mechanism, patches)
 
 
 def _is_kept(name: str, modes: int) -> bool:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 SETTLED = 0.05  # of the largest error
-WINDOW = 0.1  # s, over which the motion that is no vibration is taken
+WINDOW, CUBIC = 0.1, 3  # s, over which motion that a cubic follows is no vibration: below about 80 rad/s
 GROWTH = 4.0  # of the vibration's peak, from the second quarter of a run to its last
 
 
@@ -30,7 +30,8 @@ class Metrics:
         verdict: "stable", "grows" (vibration, quarter by quarter of an undisturbed run) or "diverges".
         tip_error_rms, tip_error_max: distance of the tip from its place, m.
         settling_time: s, after which that stays below 5 % of its largest value; NaN where it does not before the end.
-        vibration: largest distance of the tip's error from its moving mean over 0.1 s, m.
+        vibration: root mean square of the tip's error, less the cubics that follow it best over 0.1 s, m.
+        residual: the largest such difference in 0.1 s near the end, m.
         motor_work: ∫ Σ |τ γ̇| dt, J.
         voltage_effort: ∫ Σ V² dt, V² s.
         peak_moment: N·m; peak_voltage: V.
@@ -42,6 +43,7 @@ class Metrics:
     tip_error_max: float
     settling_time: float
     vibration: float
+    residual: float
     motor_work: float
     voltage_effort: float
     peak_moment: float
@@ -54,7 +56,7 @@ def measure(outcome: Outcome, source: Outcome, setup: Setup, loop: Loop, held: A
     error = _tip_error(outcome, source)
     distance = np.linalg.norm(error, axis=1)
     t, motors = outcome.time, len(setup.model.motors)
-    shaking = np.linalg.norm(error - _moving_mean(t, error), axis=1)
+    shaking = np.linalg.norm(error - _slow(t, error), axis=1)
     taken = slice(loop.taken)
     moments, volts = loop.commands[taken, :motors], loop.commands[taken, motors:]
     work = np.abs(held[:, :motors] * motor_rates(outcome)).sum(axis=1)
@@ -64,7 +66,8 @@ def measure(outcome: Outcome, source: Outcome, setup: Setup, loop: Loop, held: A
         float(np.sqrt(np.mean(distance**2))),
         float(distance.max()),
         _settling(t, distance),
-        float(shaking.max()),
+        float(np.sqrt(np.mean(shaking**2))),
+        _residual(t, shaking),
         float(((work[1:] + work[:-1]) / 2 * np.diff(t)).sum()),
         float((volts**2).sum() * setup.sample_time),
         float(np.abs(moments).max(initial=0.0)),
@@ -101,14 +104,20 @@ def _interpolated(times: Array, known: Array, values: Array) -> Array:
     return np.column_stack([np.interp(times, known, column) for column in values.T])
 
 
-def _moving_mean(t: Array, values: Array) -> Array:
-    """Of (T, columns) over `WINDOW`, shorter at the ends."""
-    count = max(1, round(WINDOW / (t[1] - t[0]))) if len(t) > 1 else 1
-    sums = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
-    first = np.clip(np.arange(len(t)) - count // 2, 0, None)
-    last = np.clip(np.arange(len(t)) + count // 2 + 1, None, len(t))
-    mean: Array = (sums[last] - sums[first]) / (last - first)[:, None]
-    return mean
+def _slow(t: Array, values: Array) -> Array:
+    """The part of (T, columns) that is no vibration: least-squares cubics over `WINDOW` (Savitzky and Golay 1964)."""
+    from scipy.signal import savgol_filter
+
+    count = 2 * round(WINDOW / (2 * (t[1] - t[0]))) + 1 if len(t) > 1 else 1
+    if not CUBIC < count <= len(t):
+        return np.broadcast_to(values.mean(axis=0), values.shape)
+    smooth: Array = savgol_filter(values, count, CUBIC, axis=0)
+    return smooth
+
+
+def _residual(t: Array, shaking: Array) -> float:
+    late = (t > t[-1] - 1.5 * WINDOW) & (t < t[-1] - 0.5 * WINDOW)
+    return float(shaking[late].max(initial=0.0))
 
 
 def _settling(t: Array, distance: Array) -> float:
