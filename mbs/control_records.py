@@ -124,14 +124,15 @@ class ClosedLoopKeys(Record):
     """What an analysis of kind "closed-loop" takes besides; its `actuation` gives reference, feed-forward and start.
 
     Samples are at 0, sample_time, …; the command of each acts `delay` later and is held. Moments and voltages keep
-    within the limits of the scene. The run starts as the inverse analysis does, or as [initial] of the scene says, on
-    the trajectories. `seed` starts the noise. `tip` is the point whose error is reported.
+    within the limits of the scene unless `unlimited`. The run starts as the inverse analysis does, or as [initial] of
+    the scene says, on the trajectories. `seed` starts the noise. `tip` is the point whose error is reported.
     """
 
     sample_time: Positive | None = None
     delay: NotNegative = 0.0
     start: Literal["actuation", "scene"] = "actuation"
     feed_forward: Literal["none", "joints", "joints+pzt"] = "joints"
+    unlimited: bool = False
     seed: Annotated[int, Field(ge=0)] = 0
     tip: PointReference | None = None
     controller: tuple[Controller, ...] = ()

@@ -118,6 +118,7 @@ def run_closed_loop(
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     acting += [make(setup) for make in controllers]
     limit = np.concatenate([motor_limits(model), *(array.limit for array in patches.values())])
+    limit = np.full_like(limit, np.inf) if analysis.unlimited else limit
     loop = Loop(setup, read, acting, limit, analysis.seed)
     outcome = _integrate(assembly, analysis, source, patches, sensor, loop, times, progress)
     taken = slice(loop.taken)
@@ -183,7 +184,9 @@ def _feed_forward(
         moments, F_p = _found(source, middle)
         if analysis.feed_forward == "joints+pzt" and F_p is not None:
             voltages = [
-                allocation(array, limited=True).solve(np.ascontiguousarray(F_p[:, source.modal_columns(body)]))
+                allocation(array, limited=not analysis.unlimited).solve(
+                    np.ascontiguousarray(F_p[:, source.modal_columns(body)])
+                )
                 for body, array in patches.items()
             ]
     return np.hstack([moments, *voltages])
