@@ -82,7 +82,7 @@ def _results(file: h5py.File) -> str:
         lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
     analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "wall (s)")
     datasets = Table("dataset", "shape")
-    loops = Table(*HEADINGS)
+    loops = Table(*HEADINGS, box=None, padding=(0, 1, 0, 0))
     for name, group in file.items():
         time, attributes = group["time"], group.attrs
         analyses.add_row(
