@@ -1,5 +1,5 @@
 // LDL^T of a symmetric matrix with nonzero pivots (positive definite, say) stored by row envelopes (lower triangle,
-// from the first nonzero).
+// from the first nonzero). Small ones are stored in full: a size that the compiler knows stays in registers.
 #pragma once
 
 #include <Eigen/Core>

@@ -21,34 +21,38 @@ bool moves(const PlanarBody &body, Index row) {
 bool carries_anything(const PlanarBody &body, Index row) { return moves(body, row) || !body.W.row(row).isZero(0); }
 
 // A row count known to the compiler keeps the sums in registers.
-template <int Count>
-void project_rows(const PlanarBody &body, const double *p, const double *p_dot, Index first, PackedRows &s) {
-  using Sum = Eigen::Array<double, Count, 1>;
-  Sum Wp = Sum::Zero(), Wp_dot = Sum::Zero(), Wk = Sum::Zero();
-  const Index n = body.modes(), stride = s.rows();
-  const double *column = s.W.data() + first, *stiffness = body.stiffness.data();
-  const double *damping = body.damping.cols() == 1 ? body.damping.data() : nullptr;
-  for (Index i = 0; i < n; ++i, column += stride) {
-    const auto w = Eigen::Map<const Sum>(column);
-    double k = stiffness[i] * p[i];
-    if (damping)
-      k += damping[i] * p_dot[i];
-    Wp += w * p[i];
-    Wp_dot += w * p_dot[i];
-    Wk += w * k;
+template <int Count> void project_rows(const double *p, const double *p_dot, Index first, PackedRows &s) {
+  constexpr int groups = Count / lane_count;
+  Lanes Wp[groups] = {}, Wp_dot[groups] = {}, Wk[groups] = {};
+  const Index n = s.W.cols(), stride = s.rows();
+  const double *column = s.W.data() + first, *k = s.elastic_force.data();
+  for (Index i = 0; i < n; ++i, column += stride)
+    for (int group = 0; group < groups; ++group) {
+      const Lanes w = load(column + group * lane_count);
+      Wp[group] += w * p[i];
+      Wp_dot[group] += w * p_dot[i];
+      Wk[group] += w * k[i];
+    }
+  for (int group = 0; group < groups; ++group) {
+    const Index i = first + group * lane_count;
+    store(s.Wp.data() + i, Wp[group]);
+    store(s.Wp_dot.data() + i, Wp_dot[group]);
+    store(s.Wk.data() + i, Wk[group]);
   }
-  Eigen::Map<Sum>(s.Wp.data() + first) = Wp;
-  Eigen::Map<Sum>(s.Wp_dot.data() + first) = Wp_dot;
-  Eigen::Map<Sum>(s.Wk.data() + first) = Wk;
 }
 
-template <int Count>
-void accumulate_rows(const double *W_transposed, const double *z, Index n, double *__restrict out) {
-  for (Index k = 0; k < n; ++k) {
-    double sum = out[k];
+template <int Count> void combine_rows(const double *z, Index first, PackedRows &s) {
+  const Index n = s.W_transposed.rows();
+  const double *W_transposed = s.W_transposed.data() + first * n;
+  Lanes factor[Count];
+  for (int row = 0; row < Count; ++row)
+    factor[row] = Lanes{} + z[first + row];
+  for (Index i = 0; i < n; i += lane_count) {
+    double *out = s.W_transposed_z.data() + i;
+    Lanes sum[lane_count] = {first == 0 ? Lanes{} : load(out)}; // several: products need not wait for each other
     for (int row = 0; row < Count; ++row)
-      sum += z[row] * W_transposed[row * n + k];
-    out[k] = sum;
+      sum[row % lane_count] += factor[row] * load(W_transposed + row * n + i);
+    store(out, (sum[0] + sum[1]) + (sum[2] + sum[3]));
   }
 }
 
@@ -103,8 +107,11 @@ PackedRows::PackedRows(const PlanarBody &body) : place(static_cast<std::size_t>(
   for (Index row = 0; row < body.W.rows(); ++row)
     if (at(row) != empty_row)
       W.row(at(row)) = body.W.row(row);
-  W_transposed = W.transpose();
-  G = W * W_transposed;
+  W_transposed = Eigen::MatrixXd::Zero(padded(n), rows);
+  W_transposed.topRows(n) = W.transpose();
+  G = W * W.transpose();
+  elastic_force = VectorXd::Zero(n);
+  W_transposed_z = VectorXd::Zero(padded(n));
   Wp = Wp_dot = Wk = VectorXd::Zero(rows);
   along_x = along_y = is_translation = is_rotation = turn = position = VectorXd::Zero(ports);
   for (Index k = 0; k < markers; ++k)
@@ -120,20 +127,28 @@ PackedRows::PackedRows(const PlanarBody &body) : place(static_cast<std::size_t>(
 void PackedRows::replace(Index row, const Eigen::Ref<const Eigen::RowVectorXd> &values) {
   const Index i = place[static_cast<std::size_t>(row)];
   W.row(i) = values;
-  W_transposed.col(i) = values.transpose();
-  G.row(i).noalias() = W.row(i) * W_transposed;
+  W_transposed.col(i).head(W.cols()) = values.transpose();
+  G.row(i).noalias() = W.row(i) * W_transposed.topRows(W.cols());
   G.col(i) = G.row(i).transpose();
 }
 
 void PackedRows::project(const PlanarBody &body, const double *p, const double *p_dot) {
-  in_pieces(rows(), [&]<int Count>(Index first) { project_rows<Count>(body, p, p_dot, first, *this); });
+  const bool damped = body.damping.cols() == 1;
+  const double *k = body.stiffness.data(), *d = body.damping.data();
+  double *__restrict force = elastic_force.data();
+  double square = 0, product = 0;
+  for (Index i = 0; i < W.cols(); ++i) {
+    force[i] = k[i] * p[i] + (damped ? d[i] * p_dot[i] : 0.0);
+    square += p[i] * p[i];
+    product += p[i] * p_dot[i];
+  }
+  p_p = square;
+  p_p_dot = product;
+  in_pieces(rows(), [&]<int Count>(Index first) { project_rows<Count>(p, p_dot, first, *this); });
 }
 
-void PackedRows::accumulate(const VectorXd &z, double *out) const {
-  const Index n = W.cols();
-  in_pieces(rows(), [&]<int Count>(Index first) {
-    accumulate_rows<Count>(W_transposed.data() + first * n, z.data() + first, n, out);
-  });
+void PackedRows::combine(const VectorXd &z) {
+  in_pieces(rows(), [&]<int Count>(Index first) { combine_rows<Count>(z.data(), first, *this); });
 }
 
 } // namespace ffrobot

@@ -24,16 +24,19 @@ struct PackedRows {
   // Row `row` of W has moved with p.
   void replace(Eigen::Index row, const Eigen::Ref<const Eigen::RowVectorXd> &values);
 
-  // p_products, … from p and p_dot
+  // elastic_force, Wp, Wp_dot, Wk, p_p and p_p_dot
   void project(const PlanarBody &body, const double *p, const double *p_dot);
 
-  // out += W^T z
-  void accumulate(const Eigen::VectorXd &z, double *out) const;
+  // W_transposed_z from z
+  void combine(const Eigen::VectorXd &z);
 
   std::vector<Eigen::Index> place;    // of each row of W; rows that carry nothing share the frame's empty one
   Eigen::Index ports = 0;             // padded
-  Eigen::MatrixXd W, W_transposed, G; // (rows, n), (n, rows), W W^T
+  Eigen::MatrixXd W, W_transposed, G; // (rows, n), (n padded, rows), W W^T
+  Eigen::VectorXd elastic_force;      // (n) K p + D p_dot
   Eigen::VectorXd Wp, Wp_dot, Wk;     // W p, W p_dot, W (K p + D p_dot)
+  Eigen::VectorXd W_transposed_z;     // (n padded)
+  double p_p = 0, p_p_dot = 0;        // p . p, p . p_dot
   // by port, in body axes: 1 along x, along y, in translations, in rotations; (-1, 1) in translations: with swap_pairs
   // a quarter turn; the undeformed marker
   Eigen::VectorXd along_x, along_y, is_translation, is_rotation, turn, position;

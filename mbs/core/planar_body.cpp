@@ -3,6 +3,7 @@
 #include "core/lanes.h"
 #include "core/moving_rows.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ffrobot {
@@ -76,22 +77,25 @@ bool collect_extra(const PlanarBody &body, const double *p, const double *p_dot,
   return any;
 }
 
-void factorise_rotation(const Vector2d &coupling, double inertia, PlanarBodyState &s) {
-  const double y = coupling.y() - s.L[0] * coupling.x();
-  s.L[1] = coupling.x() * s.D_inverse[0];
+// coupling: between translation and rotation of the frame
+void factorise_rotation(double coupling_x, double coupling_y, double inertia, PlanarBodyState &s) {
+  const double y = coupling_y - s.L[0] * coupling_x;
+  s.L[1] = coupling_x * s.D_inverse[0];
   s.L[2] = y * s.D_inverse[1];
-  s.D_inverse[2] = 1 / (inertia - s.L[1] * coupling.x() - s.L[2] * y);
+  s.D_inverse[2] = 1 / (inertia - s.L[1] * coupling_x - s.L[2] * y);
 }
 
+// Coefficient by coefficient: what has just been written one by one is slow to load as a vector.
 Vector3d forward(const Vector3d &L, Vector3d b) {
   b[1] -= L[0] * b[0];
   b[2] -= L[1] * b[0] + L[2] * b[1];
   return b;
 }
 
-Vector3d backward(const Vector3d &L, Vector3d b) {
-  b[1] -= L[2] * b[2];
-  b[0] -= L[0] * b[1] + L[1] * b[2];
+Vector3d backward(const PlanarBodyState &s, Vector3d b) {
+  b[2] *= s.D_inverse[2];
+  b[1] = b[1] * s.D_inverse[1] - s.L[2] * b[2];
+  b[0] = b[0] * s.D_inverse[0] - s.L[0] * b[1] - s.L[1] * b[2];
   return b;
 }
 
@@ -110,7 +114,7 @@ double weighted(const PlanarBody &body, const double *p, const double *x) {
 
 PlanarBodyState::PlanarBodyState(const PlanarBody &body)
     : markers(static_cast<std::size_t>(body.markers())), W(body.W), rows(body) {
-  for (auto *v : {&W_extra, &z, &z_response, &displacement, &convective})
+  for (auto *v : {&W_extra, &z, &none, &z_response, &displacement, &convective})
     *v = Eigen::VectorXd::Zero(rows.rows());
   extra = modal_load = curvature = Eigen::VectorXd::Zero(body.modes());
   wrench = Eigen::Matrix3Xd::Zero(3, body.markers());
@@ -127,41 +131,54 @@ void kinematics(const PlanarBody &body, const double *q, const double *v, Planar
   s.theta_dot = v[2];
   update_moving_rows(body, q + 3, v + 3, s);
   s.rows.project(body, q + 3, v + 3);
-  if (body.second_order.empty())
-    s.displacement = s.rows.Wp;
-  else
-    s.displacement += s.rows.Wp;
-  const Vector2d R(q[0], q[1]), R_dot(v[0], v[1]);
+  for (Index i = 0; i < s.rows.rows(); i += lane_count) {
+    const Lanes u = load(s.rows.Wp.data() + i);
+    store(s.displacement.data() + i, body.second_order.empty() ? u : u + load(s.displacement.data() + i));
+  }
+  const double c = s.cosine, sn = s.sine, w = s.theta_dot;
   for (std::size_t k = 0; k < s.markers.size(); ++k) {
     auto &m = s.markers[k];
     const Index *place = s.rows.place.data() + 3 + 3 * k;
-    const Vector2d u(s.displacement[place[0]], s.displacement[place[1]]);
-    const Vector2d u_dot(s.rows.Wp_dot[place[0]], s.rows.Wp_dot[place[1]]);
-    const Vector2d arm = body.marker_positions[k] + u;
-    m.arm = rotate(s, arm);
-    m.position = R + m.arm;
-    m.velocity = R_dot + rotate(s, s.theta_dot * perpendicular(arm) + u_dot);
-    m.angle = theta + s.displacement[place[2]];
-    m.angular_velocity = s.theta_dot + s.rows.Wp_dot[place[2]];
+    const double *u = s.displacement.data(), *u_dot = s.rows.Wp_dot.data();
+    const double x = body.marker_positions[k].x() + u[place[0]], y = body.marker_positions[k].y() + u[place[1]];
+    const double x_dot = u_dot[place[0]] - w * y, y_dot = u_dot[place[1]] + w * x;
+    m.arm = {c * x - sn * y, sn * x + c * y};
+    m.position = {q[0] + m.arm.x(), q[1] + m.arm.y()};
+    m.velocity = {v[0] + c * x_dot - sn * y_dot, v[1] + sn * x_dot + c * y_dot};
+    m.angle = theta + u[place[2]];
+    m.angular_velocity = w + u_dot[place[2]];
   }
 }
 
 namespace {
 
-// Forces on the frame: (Q_R in body axes, Q_theta) of inertia and gravity.
+// Forces on the frame: (Q_R in body axes, Q_theta) of inertia and gravity (g, body axes).
 Vector3d frame_force(const PlanarBody &body, const double *p, const double *p_dot, const Vector2d &g,
-                     const Vector2d &moment, const PlanarBodyState &s) {
-  const double theta_dot = s.theta_dot;
+                     const PlanarBodyState &s) {
+  const double w = s.theta_dot;
+  const Eigen::VectorXd &Wp_dot = s.rows.Wp_dot;
   Vector3d Q;
-  Q.head<2>() = body.mass * g + theta_dot * theta_dot * moment - 2 * theta_dot * perpendicular(s.rows.Wp_dot.head<2>());
-  Q[2] = -2 * theta_dot * weighted(body, p, p_dot) + perpendicular(moment).dot(g);
+  Q[0] = body.mass * g[0] + w * w * s.moment[0] + 2 * w * Wp_dot[1];
+  Q[1] = body.mass * g[1] + w * w * s.moment[1] - 2 * w * Wp_dot[0];
+  Q[2] = s.moment[0] * g[1] - s.moment[1] * g[0];
+  Q[2] -= 2 * w * (body.m_xy.size() ? weighted(body, p, p_dot) : s.rows.p_p_dot);
   if (!body.second_order.empty())
     Q += s.convective.head<3>();
   if (body.K_omega.size())
-    Q[2] += 2 * theta_dot * VectorMap(p, body.modes()).dot(body.K_omega * VectorMap(p_dot, body.modes()));
+    Q[2] += 2 * w * VectorMap(p, body.modes()).dot(body.K_omega * VectorMap(p_dot, body.modes()));
   if (body.j.size())
-    Q[2] -= 2 * theta_dot * body.j.dot(VectorMap(p_dot, body.modes()));
+    Q[2] -= 2 * w * body.j.dot(VectorMap(p_dot, body.modes()));
   return Q;
+}
+
+// W Q_f of the modal forces Q_f = theta_dot^2 p - K p - D p_dot + S_bar^T g, in place of W (K p + D p_dot)
+void project_modal_force(const Vector2d &g, PlanarBodyState &s) {
+  const PackedRows &rows = s.rows;
+  const double *G = rows.G.data(), w_2 = s.theta_dot * s.theta_dot;
+  for (Index i = 0; i < rows.rows(); i += lane_count) {
+    double *Wk = s.rows.Wk.data() + i;
+    store(Wk, w_2 * load(rows.Wp.data() + i) - load(Wk) + g[0] * load(G + i) + g[1] * load(G + rows.rows() + i));
+  }
 }
 
 // Adds the applied wrenches to the force on the frame, and to z in body axes.
@@ -232,77 +249,82 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
                  PlanarBodyState &s) {
   const double *p = q + 3, *p_dot = v + 3;
   PackedRows &rows = s.rows;
-  const Vector2d g = rotate_back(s, gravity);
-  const Vector2d moment = s.moment = body.first_moment + s.displacement.head<2>();
-  Vector3d Q = frame_force(body, p, p_dot, g, moment, s);
-
-  // Known part of the modal forces: Q_f = theta_dot^2 p - K p - D p_dot + W^T z + extra
-  auto &WQ = rows.Wk; // W Q_f, in place of W (K p + D p_dot)
-  WQ = s.theta_dot * s.theta_dot * rows.Wp - rows.Wk + rows.G.col(0) * g.x() + rows.G.col(1) * g.y();
-  s.z.setZero();
+  s.gravity = rotate_back(s, gravity);
+  s.moment[0] = body.first_moment[0] + s.displacement[0];
+  s.moment[1] = body.first_moment[1] + s.displacement[1];
+  Vector3d Q = frame_force(body, p, p_dot, s.gravity, s);
+  project_modal_force(s.gravity, s);
+  Eigen::VectorXd &WQ = rows.Wk;
   if (s.has_wrench) {
+    s.z.setZero();
     add_wrenches(body, Q, s);
     WQ.noalias() += rows.G * s.z;
   }
-  s.z.head<2>() += g;
-  if (collect_extra(body, p, p_dot, s))
+  s.has_extra = collect_extra(body, p, p_dot, s);
+  if (s.has_extra)
     WQ += s.W_extra;
-  else
-    s.extra.setZero();
 
   // The frame after elimination of p
-  const Vector2d coupling = perpendicular(moment) - rows.G.col(2).head<2>();
-  s.inertia = body.inertia + weighted(body, p, p);
+  const Index n = body.modes();
+  s.inertia = body.inertia + (body.m_xy.size() ? weighted(body, p, p) : rows.p_p);
   if (body.j.size())
-    s.inertia += 2 * body.j.dot(VectorMap(p, body.modes()));
+    s.inertia += 2 * body.j.dot(VectorMap(p, n));
   if (body.K_omega.size())
-    s.inertia -= VectorMap(p, body.modes()).dot(body.K_omega * VectorMap(p, body.modes()));
-  factorise_rotation(coupling, s.inertia - rows.G(2, 2), s);
-  s.free_frame = backward(s.L, forward(s.L, Q - WQ.head<3>()).cwiseProduct(s.D_inverse));
-
+    s.inertia -= VectorMap(p, n).dot(body.K_omega * VectorMap(p, n));
+  factorise_rotation(-s.moment[1] - rows.G(0, 2), s.moment[0] - rows.G(1, 2), s.inertia - rows.G(2, 2), s);
+  s.free_frame = backward(s, forward(s.L, {Q[0] - WQ[0], Q[1] - WQ[1], Q[2] - WQ[2]}));
   eliminate_ports(WQ, s);
   update_mobility(s);
 }
 
 namespace {
 
-// (a, alpha) in body axes caused by the forces on the ports; adds the rows of W^T they load to z.
-Vector3d frame_response(PlanarBodyState &s, Eigen::VectorXd &z) {
-  const Index ports = s.rows.ports;
-  Lanes b0{}, b1{}, b2{};
-  for (Index i = 0; i < ports; i += lane_count) {
-    const Lanes f = load(s.port_force.data() + i);
-    b0 += f * load(s.Z.data() + i);
-    b1 += f * load(s.Z.data() + ports + i);
-    b2 += f * load(s.Z.data() + 2 * ports + i);
-    double *z_ports = z.data() + first_port + i;
-    store(z_ports, load(z_ports) + Turn(s.rows, i, s.cosine, -s.sine)(f));
+// (a, alpha) in body axes caused by the forces on the ports, and the multipliers of packed rows that they change: those
+// of ports are written, applied loads with them.
+Vector3d frame_response(PlanarBodyState &s, const Eigen::VectorXd &z_applied) {
+  const PackedRows &rows = s.rows;
+  const double *Z = s.Z.data(), *f = s.port_force.data();
+  Vector3d b(0, 0, 0);
+  if (s.has_wrench)
+    s.z_response = z_applied; // else only ports and the frame carry anything
+  for (Index i = 0; i < rows.ports; ++i) {
+    b[0] += f[i] * Z[i];
+    b[1] += f[i] * Z[i + rows.ports];
+    b[2] += f[i] * Z[i + 2 * rows.ports];
   }
-  const Vector3d x = backward(s.L, Vector3d(sum(b0), sum(b1), sum(b2)).cwiseProduct(s.D_inverse));
-  z.head<3>() -= x;
-  return x;
+  for (Index i = 0; i < rows.ports; i += 2) {
+    const bool translation = rows.is_translation[i] != 0;
+    const double c = translation ? s.cosine : 1, sn = translation ? s.sine : 0;
+    s.z_response[first_port + i] = z_applied[first_port + i] + c * f[i] + sn * f[i + 1];
+    s.z_response[first_port + i + 1] = z_applied[first_port + i + 1] + c * f[i + 1] - sn * f[i];
+  }
+  return backward(s, b);
 }
 
 } // namespace
 
-void accelerations(const PlanarBody &body, const double *q, const double *v, PlanarBodyState &s, double *a) {
+void accelerations(const PlanarBody &body, const double *q, PlanarBodyState &s, double *a) {
   const Index n = body.modes();
-  s.z_response = s.z;
-  const Vector3d x = s.free_frame + frame_response(s, s.z_response);
-  s.z_response.head<3>() -= s.free_frame;
-  const Vector2d R_ddot = rotate(s, x.head<2>());
-  a[0] = R_ddot.x();
-  a[1] = R_ddot.y();
+  Vector3d x = frame_response(s, s.z);
+  for (int i = 0; i < 3; ++i)
+    x[i] += s.free_frame[i];
+  s.z_response[0] = s.gravity[0] - x[0];
+  s.z_response[1] = s.gravity[1] - x[1];
+  s.z_response[2] = -x[2];
+  a[0] = s.cosine * x[0] - s.sine * x[1];
+  a[1] = s.sine * x[0] + s.cosine * x[1];
   a[2] = x[2];
-  const double theta_dot_squared = s.theta_dot * s.theta_dot;
-  const double *p = q + 3, *p_dot = v + 3, *stiffness = body.stiffness.data(), *extra = s.extra.data();
+  s.rows.combine(s.z_response);
+  const double w_2 = s.theta_dot * s.theta_dot;
+  const double *p = q + 3, *elastic = s.rows.elastic_force.data(), *W_z = s.rows.W_transposed_z.data();
   double *p_ddot = a + 3;
-  for (Index i = 0; i < n; ++i)
-    p_ddot[i] = (theta_dot_squared - stiffness[i]) * p[i] + extra[i];
-  if (body.damping.cols() == 1)
-    for (Index i = 0; i < n; ++i)
-      p_ddot[i] -= body.damping(i, 0) * p_dot[i];
-  s.rows.accumulate(s.z_response, p_ddot);
+  Index i = 0;
+  for (; i + lane_count <= n; i += lane_count)
+    store(p_ddot + i, w_2 * load(p + i) - load(elastic + i) + load(W_z + i));
+  for (; i < n; ++i)
+    p_ddot[i] = w_2 * p[i] - elastic[i] + W_z[i];
+  if (s.has_extra)
+    Eigen::Map<Eigen::VectorXd>(p_ddot, n) += s.extra;
 }
 
 Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, Index k, const double *q,
@@ -325,14 +347,14 @@ Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, I
 }
 
 void respond(const PlanarBody &body, PlanarBodyState &s, double *dq) {
-  s.z_response.setZero();
-  const Vector3d x = frame_response(s, s.z_response);
-  const Vector2d dR = rotate(s, x.head<2>());
-  dq[0] = dR.x();
-  dq[1] = dR.y();
+  const Vector3d x = frame_response(s, s.none);
+  for (int i = 0; i < 3; ++i)
+    s.z_response[i] = -x[i];
+  dq[0] = s.cosine * x[0] - s.sine * x[1];
+  dq[1] = s.sine * x[0] + s.cosine * x[1];
   dq[2] = x[2];
-  std::fill(dq + 3, dq + 3 + body.modes(), 0.0);
-  s.rows.accumulate(s.z_response, dq + 3);
+  s.rows.combine(s.z_response);
+  std::copy_n(s.rows.W_transposed_z.data(), body.modes(), dq + 3);
 }
 
 void add_modal_force(const PlanarBody &body, const PlanarBodyState &s, const Eigen::Matrix3Xd &wrench,

@@ -81,14 +81,16 @@ struct PlanarBodyState {
   Eigen::VectorXd displacement;   // packed W p, its second-order part right
   Eigen::VectorXd convective;     // p_dot^T K p_dot, by packed rows; zero without geometric stiffening
   Eigen::VectorXd extra, W_extra; // modal forces outside the common fast path, and packed W times them
-  Eigen::VectorXd curvature;      // (n) K p of a second-order displacement
-  Eigen::VectorXd z;              // multipliers of the packed rows in p_ddot
-  Eigen::VectorXd z_response;
+  bool has_extra = false;
+  Eigen::VectorXd curvature;  // (n) K p of a second-order displacement
+  Eigen::VectorXd z, none;    // applied wrenches in body axes, by packed rows; none at all
+  Eigen::VectorXd z_response; // multipliers of the packed rows in p_ddot
   Eigen::MatrixXd Z; // (ports, 3) B L^-T: B port acceleration per (a, alpha) of the frame, global by body axes, with p
                      // eliminated; L D L^T the eliminated mass matrix
   Eigen::Vector3d L; // (L_10, L_20, L_21)
   Eigen::Vector3d D_inverse;
   Eigen::Vector3d free_frame; // free (a, alpha) of the body frame, body axes
+  Eigen::Vector2d gravity;    // body axes
   Eigen::Vector2d moment;     // s0 + S_bar p
   double inertia = 0;         // m_thetatheta
 };
@@ -101,7 +103,7 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
                  PlanarBodyState &state);
 
 // Accelerations of (R, theta, p) under state.port_force. After free_motion.
-void accelerations(const PlanarBody &body, const double *q, const double *v, PlanarBodyState &state, double *a);
+void accelerations(const PlanarBody &body, const double *q, PlanarBodyState &state, double *a);
 
 // Acceleration (x, y, angular) of marker k for accelerations a of the coordinates, and the sum of its terms' sizes:
 // those of the elastic forces in p_ddot too, which cancel against others when a stiff link hardly vibrates.

@@ -41,12 +41,10 @@ PortCouplings::PortCouplings(const std::vector<PlanarBodyState> &bodies, const s
     evaluate(row, bodies, motion);
     for (std::size_t i = first; i < terms_.size(); ++i)
       coefficient_.push_back(coefficient(terms_[i], motion));
-    if (!moves(row.kind))
-      continue;
-    moving_rows_.push_back(r);
-    for (std::size_t i = first; i < terms_.size(); ++i)
-      moving_terms_.push_back(i);
+    if (moves(row.kind))
+      moving_rows_.push_back(r);
   }
+  couplings_.resize(bodies.size());
   for (std::size_t i = 0; i < terms_.size(); ++i)
     for (std::size_t j = 0; j < terms_.size(); ++j) {
       const PortTerm &a = terms_[i], &b = terms_[j];
@@ -54,19 +52,28 @@ PortCouplings::PortCouplings(const std::vector<PlanarBodyState> &bodies, const s
         continue;
       const Index ports = bodies[a.body].rows.ports;
       const Index mobility = std::max(a.port, b.port) + std::min(a.port, b.port) * ports;
-      couplings_.push_back({schur.place(static_cast<Index>(a.row), static_cast<Index>(b.row)), i, j, a.body, mobility});
+      const Index entry = schur.place(static_cast<Index>(a.row), static_cast<Index>(b.row));
+      couplings_[a.body].push_back({entry, mobility, coefficient_[i] * coefficient_[j], i, j});
     }
 }
 
 void PortCouplings::update(const std::vector<RowMotion> &rows) {
-  for (const std::size_t i : moving_terms_)
+  if (moving_rows_.empty())
+    return;
+  for (std::size_t i = 0; i < terms_.size(); ++i)
     coefficient_[i] = coefficient(terms_[i], rows[terms_[i].row]);
+  for (auto &couplings : couplings_)
+    for (PortCoupling &c : couplings)
+      c.factor = coefficient_[c.first] * coefficient_[c.second];
 }
 
 void PortCouplings::assemble(const std::vector<PlanarBodyState> &bodies, EnvelopeMatrix<double> &schur) const {
   double *entries = schur.entries();
-  for (const auto &[entry, first, second, body, mobility] : couplings_)
-    entries[entry] += coefficient_[first] * coefficient_[second] * bodies[body].mobility.data()[mobility];
+  for (std::size_t b = 0; b < couplings_.size(); ++b) {
+    const double *mobility = bodies[b].mobility.data();
+    for (const PortCoupling &c : couplings_[b])
+      entries[c.entry] += c.factor * mobility[c.mobility];
+  }
 }
 
 void PortCouplings::add_accelerations(const std::vector<PlanarBodyState> &bodies, double *rows) const {

@@ -19,9 +19,10 @@ struct PortTerm {
 };
 
 struct PortCoupling {
-  Eigen::Index entry; // of C M^-1 C^T in its envelope
-  std::size_t first, second, body;
-  Eigen::Index mobility; // index into the body's
+  Eigen::Index entry;        // of C M^-1 C^T in its envelope
+  Eigen::Index mobility;     // index into the body's
+  double factor;             // product of the coefficients of both terms
+  std::size_t first, second; // terms
 };
 
 class PortCouplings {
@@ -40,9 +41,9 @@ public:
 
 private:
   std::vector<PortTerm> terms_;
-  std::vector<std::size_t> moving_rows_, moving_terms_;
-  std::vector<double> coefficient_; // of each term
-  std::vector<PortCoupling> couplings_;
+  std::vector<std::size_t> moving_rows_;
+  std::vector<double> coefficient_;                  // of each term
+  std::vector<std::vector<PortCoupling>> couplings_; // of each body
 };
 
 } // namespace ffrobot

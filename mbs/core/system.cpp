@@ -147,7 +147,7 @@ void accelerations(const System &system, double t, const double *q, const double
   solve_multipliers(w);
   for (std::size_t b = 0; b < system.bodies.size(); ++b) {
     const Index i = system.first_coordinate[b];
-    accelerations(system.bodies[b], q + i, v + i, w.bodies[b], a + i);
+    accelerations(system.bodies[b], q + i, w.bodies[b], a + i);
   }
 }
 
