@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from .control_records import ClosedLoopKeys
+from .loop_records import ClosedLoopKeys
 from .record_types import Expression, Name, Positive
 
 MAX_OUTPUTS = 10_000_000

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mbs.analysis_records import Analysis
-from ...mbs.control_records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
-from ...mbs.control_records import Controller as Record
+from ...mbs.loop_records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
+from ...mbs.loop_records import Controller as Record
 from ...mbs.model import Model
 from ..patches import PatchArray
 from .controllers import Controller, Setup, joint_pid, modal_velocity
@@ -61,7 +61,8 @@ def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> C
 
         return LqrControl(record, setup, [other for other in beside if isinstance(other, JointPid)])
     label = f"{setup.model.scene.path}: controller: {record.python}"
-    return PythonControl(load_function(record.python), setup, label)
+    function = load_function(record.python) if isinstance(record.python, str) else record.python
+    return PythonControl(function, setup, label)
 
 
 def joint_mobility(setup: Setup) -> Array:

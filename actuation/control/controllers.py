@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...mbs.analyses import Outcome
-from ...mbs.control_records import JointPid, ModalVelocity
+from ...mbs.loop_records import JointPid, ModalVelocity
 from ...mbs.model import Model
 from ...validation import quoted
 from ..patches import PatchArray

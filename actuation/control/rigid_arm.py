@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...mbs import _core
 from ...mbs.analyses import Outcome
-from ...mbs.control_records import ComputedTorque
 from ...mbs.initial_state import undeformed_state
+from ...mbs.loop_records import ComputedTorque
 from ...mbs.model import ZERO, Assembly, Constraint, Model
 from ...mbs.planar_body import PlanarBody, PlanarPoint
 from .controllers import Setup

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mbs import _core
-from ...mbs.control_records import PERMITTIVITY, Sensor
+from ...mbs.loop_records import PERMITTIVITY, Sensor
 from ...mbs.model import Assembly, Model
 from ...mbs.rows import End, Row, joint_coordinate
 from ..patches import PatchArray

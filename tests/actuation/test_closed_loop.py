@@ -1,5 +1,7 @@
 """Sampled control: against exact discrete models of rigid arms, closed forms of links, and what goes wrong."""
 
+import runpy
+
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
@@ -172,13 +174,16 @@ def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_p
     )
     sensor = [{"joint": "O"}, {"joint": "O", "measure": "rate"}]
     mine = {"kind": "python", "python": f"{file}:controller"}
+    itself = {"kind": "python", "python": runpy.run_path(str(file))["controller"]}
     loops = [
+        loop("itself", controller=[itself], sensor=sensor, disturbance=blow()),
         loop("theirs", controller=[PID], sensor=sensor, disturbance=blow()),
         loop("mine", controller=[mine], sensor=sensor, disturbance=blow()),
     ]
     solution = solve(wheel(*loops))
     theirs, own = solution.loops["theirs"], solution.loops["mine"]
     np.testing.assert_allclose(own.commands, theirs.commands, atol=1e-12)
+    np.testing.assert_array_equal(solution.loops["itself"].commands, own.commands)
     assert np.abs(own.commands).max() > 0.5
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from ..validation import Record, existing_file, quoted
 from .mechanism_records import Load
@@ -103,18 +103,25 @@ class Lqr(Record):
     sensor: Literal["pzt", "ideal"] = "pzt"
 
 
-def _python_function(value: str, info: ValidationInfo) -> str:
-    path, colon, function = value.rpartition(":")
+def _python_function(value: object, info: ValidationInfo) -> object:
+    """A function that a scene made in Python carries, or "FILE.py:FUNCTION" with the file where it is."""
+    objects = (info.context or {}).get("objects", {})
+    if callable(value) or (isinstance(value, str) and value in objects):
+        return objects.get(value, value)
+    path, colon, function = value.rpartition(":") if isinstance(value, str) else ("", "", "")
     if not colon or not path or not function.isidentifier():
         raise ValueError(f'expected "FILE.py:FUNCTION", found "{value}"')
     return f"{existing_file(Path(path), info)}:{function}"
 
 
 class PythonController(Record):
-    """A function of the user's in a file beside the scene: see `actuation.control.python_controller`."""
+    """A function of the user's, "FILE.py:FUNCTION" with the file beside the scene, or itself in scenes made in Python.
+
+    See `actuation.control.python_controller`.
+    """
 
     kind: Literal["python"]
-    python: Annotated[str, AfterValidator(_python_function)]
+    python: Annotated[Any, PlainValidator(_python_function, json_schema_input_type=str)]
 
 
 Controller = Annotated[JointPid | ComputedTorque | ModalVelocity | Lqr | PythonController, Field(discriminator="kind")]
