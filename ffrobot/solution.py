@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .actuation.control.linear_analysis import LinearAnalysis, analyse, linear_models
 from .actuation.feasibility import Feasibility, judge_motors, judge_patches
 from .actuation.patch_structure import StructureEffect, structure_effect, with_patches
 from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
@@ -28,6 +29,7 @@ from .mbs.fcid import run_fcid
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.observation import body_motion
+from .mbs.operating_points import operating_points
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.record_types import split_point
 from .mbs.scene_file import load_scene
@@ -37,6 +39,8 @@ from .mbs.stress import BodyStress, body_stress
 from .validation import did_you_mean, quoted
 
 Array = NDArray[np.float64]
+
+ALLOCATED = ("pcid", "fcid", "static")  # kinds of analysis whose forces patches and actuation points have to meet
 
 
 class Watcher:
@@ -76,6 +80,7 @@ class Solution:
         point_forces: likewise.
         predicted_shift: by analysis and point, (T, 2) m: what voltages within their limits leave undone.
         feasibility: by analysis.
+        linear: linear models, by analysis.
         stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
         stiffened: whether geometric stiffening is in the equations.
@@ -95,6 +100,7 @@ class Solution:
     predicted_shift: dict[str, dict[str, Array]] = field(default_factory=dict)
     feasibility: dict[str, Feasibility] = field(default_factory=dict)
     stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
+    linear: dict[str, LinearAnalysis] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
     stiffened: bool = False
@@ -130,6 +136,8 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         solution.stiffening_effects[analysis.name] = effect
         solution.outcomes[analysis.name] = outcome
         _allocate(solution, outcome)
+        if analysis.kind == "linear":
+            solution.linear[analysis.name] = analyse(linear_models(outcome, solution.patches))
         solution.stresses[analysis.name] = _stresses(solution, outcome)
         solution.seconds[analysis.name] = time.perf_counter() - started
         if outcome.status != "completed":
@@ -163,7 +171,7 @@ def _assembled(
         for layout in scene.pzt
         if (modal := bodies[layout.body].modal) is not None
     }
-    if any(analysis.kind != "forward" for analysis in scene.analysis) and scene.trajectory:
+    if any(analysis.kind in ALLOCATED for analysis in scene.analysis) and scene.trajectory:
         for array in patches.values():
             check_reach(scene.path, array)
     points = {
@@ -204,7 +212,7 @@ def _allocate(solution: Solution, outcome: Outcome) -> None:
             unmet = unmet_modal_forces(outcome, solution.voltages[name])
             solution.predicted_shift[name] = predicted_shift(outcome, unmet)
         solution.feasibility[name] = _judge(solution, outcome)
-    if outcome.analysis.kind != "forward" and any(outcome.assembly.is_trajectory):
+    if outcome.analysis.kind in ALLOCATED and any(outcome.assembly.is_trajectory):
         solution.point_forces[name] = {
             body: solve_point_forces(points, outcome) for body, points in solution.points.items()
         }
@@ -229,6 +237,8 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
     def progress(t: float) -> bool:
         return watcher.advance(t, end) and not interruption.requested
 
+    if analysis.kind in ("linear", "placement"):
+        return operating_points(model, analysis, solution.outcomes[analysis.source] if analysis.source else None)
     if analysis.kind == "static":
         return run_static(model, analysis)
     if analysis.kind == "fcid":

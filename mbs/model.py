@@ -107,6 +107,7 @@ def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
     references += [(f'trajectory "{t.name}": point', t.point) for t in scene.trajectory if t.point]
     references += [(f'trajectory "{t.name}": angle', t.angle) for t in scene.trajectory if t.angle and "." in t.angle]
     references += [("load: point", load.point) for load in scene.load if load.point]
+    references += [(f'analysis "{a.name}": points', point) for a in scene.analysis for point in a.points or ()]
     for key, reference in references:
         if reference == GROUND:
             continue
