@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .actuation.control.linear_analysis import LinearAnalysis
 from .actuation.control.linear_model import LinearModel, save_arrays
+from .actuation.control.placement import Placed
 from .actuation.control.zeros import Zeros
 from .errors import InputError
 from .mbs.analyses import Outcome
@@ -53,6 +54,17 @@ def _write_zeros(group: h5py.Group, name: str, pair: tuple[str, ...], found: tup
     dataset.attrs["columns"] = ["real", "imaginary"]
     dataset.attrs["inputs"], dataset.attrs["outputs"] = list(pair[:half]), list(pair[half:])
     dataset.attrs["minimum_phase"] = [zeros.minimum_phase for zeros in found]
+
+
+def write_placement(group: h5py.Group, placed: Placed) -> None:
+    """The patches found and those spread evenly, what each reaches, and what one patch would reach anywhere."""
+    group.attrs.update({"body": placed.wanted.body, "criterion": placed.wanted.criterion})
+    group.attrs.update({"measure": placed.wanted.measure, "sets": placed.sets, "method": placed.method})
+    for key, found in (("best", placed.best), ("even", placed.even)):
+        for name, values in vars(found).items():
+            group[f"{key}/{name}"] = values
+    for key in ("frequency", "share", "largest_voltage", "candidates", "candidate_reach"):
+        group[key] = getattr(placed, key)
 
 
 def read_linear(results: Results, analysis: str) -> tuple[LinearModel, ...]:

@@ -41,6 +41,25 @@ def linear_lines(solution: Solution) -> Iterator[str]:
         yield from _lost(name, linear)
 
 
+PLACEMENT_COLUMNS = ("placement", "on", "by", "centres (m)", "found", "evenly spread", "of sets")
+
+
+def placement_table(solution: Solution, table: Table) -> Table:
+    """The patches found against as many spread evenly: reach of modes, or the largest voltage of the path."""
+    for name, placed in solution.placements.items():
+        over_path = placed.wanted.criterion == "voltage"
+        pair = placed.largest_voltage if over_path else (placed.best.value, placed.even.value)
+        table.add_row(
+            name,
+            placed.wanted.body,
+            "voltage" if over_path else f"{placed.wanted.measure} reach",
+            ", ".join(f"{x:.3g}" for x in placed.best.centers),
+            *(f"{value:.4g}" + (" V" if over_path else "") for value in pair),
+            f"{placed.sets}" + (" (evolution)" if placed.method == "evolution" else ""),
+        )
+    return table
+
+
 def _lost(name: str, linear: LinearAnalysis) -> Iterator[str]:
     for verb, reaches in (
         ("no motor or patch moves", linear.controllable), ("no joint or point of it sees", linear.observable)

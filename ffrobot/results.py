@@ -13,7 +13,7 @@ from .actuation.feasibility import Feasibility
 from .actuation.patches import PatchArray
 from .actuation.points import PointForces, PointSet
 from .actuation.voltages import Voltages
-from .control_results import write_linear
+from .control_results import write_linear, write_placement
 from .files import write_atomically
 from .mbs.analyses import Outcome
 from .mbs.observation import (
@@ -66,6 +66,8 @@ def results_image(solution: Solution) -> bytes:
                 group[f"points/{point}/predicted_shift"] = shift
             if name in solution.linear:
                 write_linear(group.create_group("linear"), solution.linear[name], outcome)
+            if name in solution.placements:
+                write_placement(group.create_group("placement"), solution.placements[name])
             if name in solution.feasibility:
                 _write_feasibility(group.create_group("feasibility"), solution, solution.feasibility[name])
             for body_name, stress in solution.stresses.get(name, {}).items():

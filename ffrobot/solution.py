@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .actuation.control.linear_analysis import LinearAnalysis, analyse, linear_models
+from .actuation.control.placement import Placed, place
 from .actuation.feasibility import Feasibility, judge_motors, judge_patches
 from .actuation.patch_structure import StructureEffect, structure_effect, with_patches
 from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
@@ -25,6 +26,7 @@ from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.analysis_records import Analysis
+from .mbs.control_records import Placement
 from .mbs.fcid import run_fcid
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
@@ -80,7 +82,7 @@ class Solution:
         point_forces: likewise.
         predicted_shift: by analysis and point, (T, 2) m: what voltages within their limits leave undone.
         feasibility: by analysis.
-        linear: linear models, by analysis.
+        linear: linear models, by analysis; placements: of patches, likewise.
         stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
         stiffened: whether geometric stiffening is in the equations.
@@ -101,6 +103,7 @@ class Solution:
     feasibility: dict[str, Feasibility] = field(default_factory=dict)
     stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
     linear: dict[str, LinearAnalysis] = field(default_factory=dict)
+    placements: dict[str, Placed] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
     stiffened: bool = False
@@ -138,6 +141,8 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         _allocate(solution, outcome)
         if analysis.kind == "linear":
             solution.linear[analysis.name] = analyse(linear_models(outcome, solution.patches))
+        if analysis.placement is not None:
+            solution.placements[analysis.name] = _place(solution, analysis.placement, outcome)
         solution.stresses[analysis.name] = _stresses(solution, outcome)
         solution.seconds[analysis.name] = time.perf_counter() - started
         if outcome.status != "completed":
@@ -248,6 +253,25 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
         return run_pcid(model, analysis, replayed, progress)
     source = solution.outcomes[analysis.actuation] if analysis.actuation else None
     return run_forward(model, analysis, source, _equipment(solution), progress)
+
+
+def _place(solution: Solution, wanted: Placement, outcome: Outcome) -> Placed:
+    """The best places for the patches of one body, about `outcome` or over the path that it stands on."""
+    path, loaded = solution.scene.path, solution.bodies[wanted.body]
+    assert loaded.modal is not None
+    model, F_p = None, None
+    if wanted.criterion == "voltage":
+        source = solution.outcomes[str(outcome.analysis.source)]
+        if source.F_p is None:
+            raise InputError(
+                f'{path}: analysis "{outcome.analysis.name}": placement.criterion: expected motors that fit the'
+                f' mechanism for "voltage", found {len(solution.model.motors)} for {solution.model.rigid_freedom}'
+            )
+        F_p = source.F_p[:, source.modal_columns(wanted.body)]
+    else:
+        (model,) = linear_models(outcome, {})
+    layout = solution.patches[wanted.body].layout
+    return place(path, wanted, layout, loaded.modal, loaded.planar, model, F_p)
 
 
 def _equipment(solution: Solution) -> Equipment:

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from .control_summary import LINEAR_COLUMNS, linear_lines, linear_table
+from .control_summary import LINEAR_COLUMNS, PLACEMENT_COLUMNS, linear_lines, linear_table, placement_table
 from .mbs.analyses import Outcome
 from .mbs.geometric_stiffening import NOTABLE
 from .solution import Solution
@@ -41,6 +41,9 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
         console.print(linear_table(solution, _table(*LINEAR_COLUMNS)))
         for line in linear_lines(solution):
             console.print(line)
+    if solution.placements:
+        console.print()
+        console.print(placement_table(solution, _table(*PLACEMENT_COLUMNS)))
     notes = Table.grid(padding=(0, 2))
     for name, outcome in solution.outcomes.items():
         if outcome.analysis.kind in ("pcid", "forward") and outcome.analysis.integrator == "auto":

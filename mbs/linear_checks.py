@@ -40,6 +40,8 @@ def _placement_problems(scene: SceneKeys, analysis: Analysis, earlier: Sequence[
     if wanted.body not in layouts:
         yield f'placement.body: expected a body with patches, {quoted(layouts)}, found "{wanted.body}"'
     if wanted.criterion != "voltage":
+        if analysis.instants is not None and len(analysis.instants) != 1:
+            yield f"times: expected one time to place patches for, found {len(analysis.instants)}"
         return
     source = next((other for other in earlier if other.name == analysis.source), None)
     if source is None or source.kind not in ("pcid", "fcid"):
