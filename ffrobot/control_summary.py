@@ -31,7 +31,7 @@ LINEAR_COLUMNS = ("linear model", "t (s)", "freedom", "lowest frequencies (Hz)",
 
 
 def linear_lines(solution: Solution) -> Iterator[str]:
-    """Zeros, and modes that nothing moves or sees, a line each."""
+    """Zeros, modes that nothing moves or sees, and places of patches, a line each."""
     for name, linear in solution.linear.items():
         for pair, found in linear.zeros.items():
             half = len(pair) // 2
@@ -39,9 +39,11 @@ def linear_lines(solution: Solution) -> Iterator[str]:
             worst = next((zeros for zeros in found if not zeros.minimum_phase), found[0])
             yield f"{name}: {transfer}: {worst.describe()}"
         yield from _lost(name, linear)
+    for name, placed in solution.placements.items():
+        yield f"{name}: centres at {', '.join(f'{x:.4g}' for x in placed.best.centers)} m"
 
 
-PLACEMENT_COLUMNS = ("placement", "on", "by", "centres (m)", "found", "evenly spread", "of sets")
+PLACEMENT_COLUMNS = ("placement", "on", "by", "found", "evenly spread", "of sets")
 
 
 def placement_table(solution: Solution, table: Table) -> Table:
@@ -53,7 +55,6 @@ def placement_table(solution: Solution, table: Table) -> Table:
             name,
             placed.wanted.body,
             "voltage" if over_path else f"{placed.wanted.measure} reach",
-            ", ".join(f"{x:.3g}" for x in placed.best.centers),
             *(f"{value:.4g}" + (" V" if over_path else "") for value in pair),
             f"{placed.sets}" + (" (evolution)" if placed.method == "evolution" else ""),
         )

@@ -39,11 +39,11 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     if solution.linear:
         console.print()
         console.print(linear_table(solution, _table(*LINEAR_COLUMNS)))
-        for line in linear_lines(solution):
-            console.print(line)
     if solution.placements:
         console.print()
         console.print(placement_table(solution, _table(*PLACEMENT_COLUMNS)))
+    for line in linear_lines(solution):
+        console.print(line)
     notes = Table.grid(padding=(0, 2))
     for name, outcome in solution.outcomes.items():
         if outcome.analysis.kind in ("pcid", "forward") and outcome.analysis.integrator == "auto":

@@ -40,12 +40,13 @@ class FigureRecord(Record):
 
     Kinds: "time" draws its curves over time; "path" draws (x, y) datasets against each other; "configurations" draws
     the bodies of `analysis` at `times` (s), and its curves as paths. Of a linear `analysis`, at the first of `times`:
-    "bode" draws the frequency responses of `transfers` [input, output], "modes" the mode shapes of the robot.
+    "bode" draws the frequency responses of `transfers` [input, output], "modes" the mode shapes of the robot;
+    "placement" the patches that an analysis of that kind found.
     """
 
     name: FileName
     title: str = ""
-    kind: Literal["time", "path", "configurations", "bode", "modes"] = "time"
+    kind: Literal["time", "path", "configurations", "bode", "modes", "placement"] = "time"
     transfers: tuple[tuple[str, str], ...] = ()
     curves: tuple[Curve, ...] = ()
     analysis: str | None = None
@@ -59,7 +60,7 @@ class FigureRecord(Record):
     def _consistent(self) -> FigureRecord:
         if self.kind == "configurations" and (self.analysis is None or not self.times):
             raise ValueError('expected the keys "analysis" and "times" in kind = "configurations"')
-        if self.kind in ("bode", "modes") and self.analysis is None:
+        if self.kind in ("bode", "modes", "placement") and self.analysis is None:
             raise ValueError(f'expected the key "analysis" in kind = "{self.kind}", found none')
         if (self.kind == "bode") != bool(self.transfers):
             raise ValueError(

@@ -18,11 +18,17 @@ from .configurations import draw_configurations
 from .figure_file import FigureFile, FigureRecord, load_figures
 from .linear import draw_bode, draw_robot_modes
 from .path import draw_path
+from .placement import draw_placement
 from .standard import standard_figures
 from .style import new_axes, style
 from .time_history import draw_time_history
 
-DRAW = {"time": draw_time_history, "path": draw_path, "configurations": draw_configurations}
+DRAW = {
+    "time": draw_time_history,
+    "path": draw_path,
+    "configurations": draw_configurations,
+    "placement": draw_placement,
+}
 
 DRAW_WHOLE = {"bode": draw_bode, "modes": draw_robot_modes}  # with axes of their own
 

@@ -120,6 +120,9 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
 def _linear(results: Results) -> Iterator[FigureRecord]:
     """Mode shapes of the robot, and the responses of points and joints to each motor and each body's first patch."""
     for analysis in results.analyses:
+        if results.has(f"{analysis}/placement"):
+            name, title = file_name("placement", analysis), f"patches, {analysis}"
+            yield FigureRecord(name=name, title=title, kind="placement", analysis=analysis)
         if not results.has(f"{analysis}/linear"):
             continue
         attributes = results.attributes(f"{analysis}/linear")
