@@ -186,6 +186,19 @@ def sweep(
 
 
 @cli.command()
+@click.argument("results_file", metavar="RESULTS.h5", type=FILE)
+@click.option("--analysis", metavar="NAME", help="Of this analysis; the first linear one if absent.")
+@click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Where to write [RESULTS.npz].")
+def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
+    """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
+    from .control_results import export_linear
+
+    path = output or results_file.with_suffix(".npz")
+    name = export_linear(results_file, analysis, path)
+    click.echo(f"{path}: linear model of {name}")
+
+
+@cli.command()
 @click.argument("kind", type=click.Choice(["link", "scene"]))
 def schema(kind: str) -> None:
     r"""Print the JSON schema of link or scene files, for editors.

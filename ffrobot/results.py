@@ -13,6 +13,7 @@ from .actuation.feasibility import Feasibility
 from .actuation.patches import PatchArray
 from .actuation.points import PointForces, PointSet
 from .actuation.voltages import Voltages
+from .control_results import write_linear, write_placement
 from .files import write_atomically
 from .loop_results import write_loop
 from .mbs.analyses import Outcome
@@ -64,6 +65,10 @@ def results_image(solution: Solution) -> bytes:
                     group[f"patch_structure/{body_name}/{key}"] = pair
             for point, shift in solution.predicted_shift.get(name, {}).items():
                 group[f"points/{point}/predicted_shift"] = shift
+            if name in solution.linear:
+                write_linear(group.create_group("linear"), solution.linear[name], outcome)
+            if name in solution.placements:
+                write_placement(group.create_group("placement"), solution.placements[name])
             if name in solution.feasibility:
                 _write_feasibility(group.create_group("feasibility"), solution, solution.feasibility[name])
             if name in solution.loops:

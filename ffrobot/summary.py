@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from .control_summary import LINEAR_COLUMNS, PLACEMENT_COLUMNS, linear_lines, linear_table, placement_table
 from .loop_results import HEADINGS, metrics_row
 from .mbs.analyses import Outcome
 from .mbs.geometric_stiffening import NOTABLE
@@ -39,6 +40,14 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     if any(solution.stresses.values()):
         console.print()
         console.print(_stresses(solution))
+    if solution.linear:
+        console.print()
+        console.print(linear_table(solution, _table(*LINEAR_COLUMNS)))
+    if solution.placements:
+        console.print()
+        console.print(placement_table(solution, _table(*PLACEMENT_COLUMNS)))
+    for line in linear_lines(solution):
+        console.print(line)
     notes = Table.grid(padding=(0, 2))
     for name, outcome in solution.outcomes.items():
         if outcome.analysis.integrated and outcome.analysis.integrator == "auto":

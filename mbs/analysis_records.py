@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from .control_records import Placement
 from .loop_records import ClosedLoopKeys
-from .record_types import Expression, Name, Positive
+from .record_types import Expression, Name, NotNegative, PointReference, Positive
 
 MAX_OUTPUTS = 10_000_000
+UNTIMED = ("static", "linear", "placement")  # kinds without an end
+STATIC = "static"  # instead of an analysis' name: about the static equilibrium
 TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
 
 
@@ -25,10 +28,13 @@ class Analysis(ClosedLoopKeys):
 
     `integrator`: see `integrators.choose_integrator` for "auto"; `spectral_radius` is what a step of generalized-alpha
     leaves of vibrations far above one over its size.
+
+    Linear models and placements are `about` the static equilibrium (None, or "static") or an earlier analysis at
+    `times`; `points` are those whose motion and disturbance a linear model knows.
     """
 
     name: Name
-    kind: Literal["pcid", "fcid", "forward", "static", "closed-loop"]
+    kind: Literal["pcid", "fcid", "forward", "static", "linear", "placement", "closed-loop"]
     end: Positive = 0.0
     output_step: Positive = 0.0
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
@@ -40,17 +46,22 @@ class Analysis(ClosedLoopKeys):
     integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
     spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8  # of generalized-alpha at infinite frequency
     max_steps: Annotated[int, Field(gt=0)] = 5_000_000
+    about: str | None = None
+    instants: tuple[NotNegative, ...] | None = Field(default=None, alias="times", min_length=1)
+    points: tuple[PointReference, ...] | None = None
+    placement: Placement | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Analysis:
         for key in ("end", "output_step"):
             given = key in self.model_fields_set
-            if self.kind == "static" and given:
-                raise ValueError(f'expected no key "{key}" in kind = "static", found {getattr(self, key):g}')
-            if self.kind != "static" and self.actuation is None and not given:
+            if self.kind in UNTIMED and given:
+                raise ValueError(f'expected no key "{key}" in kind = "{self.kind}", found {getattr(self, key):g}')
+            if self.kind not in UNTIMED and self.actuation is None and not given:
                 raise ValueError(f'expected the key "{key}" in kind = "{self.kind}", found none')
         if self.end and self.output_step:
             check_steps(self.end, self.output_step)
+        self._check_linear_keys()
         if self.kind != "closed-loop" and (self.actuation is None) != (self.apply is None):
             raise ValueError(
                 'expected the keys "actuation" and "apply" together, found only '
@@ -81,6 +92,21 @@ class Analysis(ClosedLoopKeys):
             )
         return self
 
+    def _check_linear_keys(self) -> None:
+        allowed = {"linear": ("about", "times", "points"), "placement": ("about", "times", "placement")}
+        for key, value in (
+            ("about", self.about), ("times", self.instants), ("points", self.points), ("placement", self.placement)
+        ):  # fmt: skip
+            if value is not None and key not in allowed.get(self.kind, ()):
+                raise ValueError(f'expected no key "{key}" in kind = "{self.kind}", found one')
+        if self.kind == "placement" and self.placement is None:
+            raise ValueError('expected the table "placement" in kind = "placement", found none')
+
+    @property
+    def source(self) -> str | None:
+        """Name of the earlier analysis that a linear model or a placement is about; None for the equilibrium."""
+        return None if self.about == STATIC else self.about
+
     @property
     def integrated(self) -> bool:
         """Whether the motion comes from an integration over time."""
@@ -89,6 +115,8 @@ class Analysis(ClosedLoopKeys):
     @property
     def times(self) -> NDArray[np.float64]:
         """Output times (T,), in s: exact multiples of the output step, ending exactly at `end`."""
+        if self.instants is not None:
+            return np.array(self.instants)
         if not (self.end and self.output_step):
             return np.zeros(1)
         times = np.arange(round(self.end / self.output_step) + 1) * self.output_step

@@ -120,6 +120,7 @@ def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
         references += [(f"{key}: sensor: point", sensor.point) for sensor in analysis.sensor if sensor.point]
         references += [(f"{key}: disturbance: point", load.point) for load in analysis.disturbance if load.point]
         references += [(f"{key}: tip", analysis.tip)] if analysis.tip else []
+    references += [(f'analysis "{a.name}": points', point) for a in scene.analysis for point in a.points or ()]
     for key, reference in references:
         if reference == GROUND:
             continue

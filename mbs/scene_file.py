@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..validation import did_you_mean, load_toml, quoted, validate
 from .analysis_records import Analysis
+from .linear_checks import linear_problems
 from .mechanism_records import Load, Trajectory
 from .record_types import GROUND
 from .scene_records import Scene, SceneKeys
@@ -148,6 +149,10 @@ def _references(scene: SceneKeys) -> Iterator[tuple[str, str]]:
     for analysis in scene.analysis:
         for body in analysis.modal or ():
             yield f'analysis "{analysis.name}": modal', body
+        for point in analysis.points or ():
+            yield f'analysis "{analysis.name}": points', point
+        if analysis.placement is not None:
+            yield f'analysis "{analysis.name}": placement.body', analysis.placement.body
     for k, load in enumerate(scene.load, 1):
         if load.point is not None:
             yield f"load no. {k}: point", load.point
@@ -260,6 +265,8 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
 def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Analysis, ...]) -> Iterator[str]:
     if analysis.kind in ("pcid", "fcid") and not scene.trajectory:
         yield f'kind: expected at least one [[trajectory]] for "{analysis.kind}", found none'
+    if analysis.kind in ("linear", "placement"):
+        yield from linear_problems(scene, analysis, earlier)
     if analysis.actuation is None:
         return
     sources = {source.name: source for source in earlier}

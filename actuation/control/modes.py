@@ -33,10 +33,16 @@ class RobotModes:
 
     @property
     def frequency(self) -> Array:
-        """(f,) √|λ₁ λ₂|/2π, Hz: the undamped one; 0 where the robot moves without stiffness."""
-        omega = np.sqrt(np.abs(self.poles.prod(axis=1)))
+        """(f,) √(λ₁ λ₂)/2π, Hz: the undamped one; 0 where the robot moves without stiffness, or falls."""
+        omega = np.sqrt(self.poles.prod(axis=1).real.clip(min=0.0))
         result: Array = np.where(omega < RIGID * omega.max(initial=0.0), 0.0, omega) / (2 * np.pi)
         return result
+
+    @property
+    def growth(self) -> float:
+        """The largest real part of a pole, 1/s; 0 where it is rounding: the robot falls or is driven to vibrate."""
+        largest = float(self.poles.real.max(initial=0.0))
+        return largest if largest > RIGID * np.abs(self.poles).max(initial=0.0) else 0.0
 
     @property
     def damping_ratio(self) -> Array:

@@ -73,6 +73,8 @@ def _eigenvalues(M: Array, D: Array, K: Array) -> ComplexArray:
     from scipy.linalg import eigvals
 
     n, unit = len(M), np.eye(len(M))
+    if not n:
+        return np.zeros(0, dtype=complex)
     if not np.any(D):
         squares = _finite(eigvals(-K, M, homogeneous_eigvals=True), INFINITE**2)
         roots = np.sqrt(squares.astype(complex))

@@ -1,50 +1,85 @@
-"""Joints as built and closed loops, each through `ffrobot solve`; the tables of their READMEs hold."""
+"""One case per capability of control, each through `ffrobot solve`; the tables of their READMEs hold."""
 
 import numpy as np
 import pytest
-from test_actuation_cases import check_table, peak, tip_error
+from checkpoints import check_table
 
 
 @pytest.fixture(scope="module")
-def geared(solved):
-    return solved("geared_arm")
+def linear(solved):
+    return solved("two_link_linear")
 
 
 @pytest.fixture(scope="module")
-def loops(solved):
-    return solved("two_link_closed_loop")
+def placement(solved):
+    return solved("two_link_placement")
 
 
-def test_geared_arm(geared):
-    ideal = np.loadtxt(geared.folder / "ideal.csv", delimiter=",", skiprows=2)
+def frequencies(group, row=0):
+    """Modes 3 to 6, and the largest real part of a pole."""
+    return [*group["linear/frequency"][row, 2:6], group["linear/pole"][row, :, 0].max()]
+
+
+def test_frequencies_at_rest_and_along_the_path(linear):
+    along = linear.file["along"]
+    (early, late) = linear.rows("along", [0.4, 1.0])
+    check_table(
+        "two_link_linear",
+        "about",
+        {
+            "rest": frequencies(linear.file["at_rest"]),
+            "path, 0.4 s": frequencies(along, early),
+            "path, 1 s": frequencies(along, late),
+        },
+        1e-3,
+    )
+
+
+def zeros_of(case, analysis):
+    """{"inputs → outputs": (k, 2)} at the first time."""
+    found = {}
+    for dataset in case.file[f"{analysis}/linear/zeros"].values():
+        names = [", ".join(dataset.attrs[key]) for key in ("inputs", "outputs")]
+        found[" → ".join(names)] = dataset[0]
+    return found
+
+
+def test_zeros_at_rest(linear):
+    zeros = zeros_of(linear, "at_rest")
+    slowest = {}
+    for pair in ("joint/O → joint/O", "joint/A → joint/A", "joint/A → point/link2.tip/y"):
+        slowest[pair] = zeros[pair]
+    slowest["joint/O, joint/A → point/link2.tip/x, point/link2.tip/y"] = zeros[list(zeros)[-1]]
+    right = {pair: values[values[:, 0] > 0.1] for pair, values in slowest.items()}
+    right = {pair: values[np.linalg.norm(values, axis=1).argmin()] for pair, values in right.items()}
+    check_table("two_link_linear", "from → to", right, 1e-3)
+    held = np.abs(zeros["joint/O, joint/A → joint/O, joint/A"][:, 1])
+    assert held.min() / (2 * np.pi) == pytest.approx(3.582, abs=1e-3)
+
+
+def test_tip_zeros_are_those_of_a_hinged_beam(linear):
+    """2 x² √(EI/ρA)/L², x = 2.36502037 the first root of tan x = −tanh x; EI/ρA from cases/two_link/link1.toml."""
+    rate = np.sqrt(2.068427e11 * 0.015**2 / 12 / 7850.0)
+    zeros = zeros_of(linear, "at_rest")["joint/O, joint/A → point/link2.tip/x, point/link2.tip/y"]
+    assert zeros[:, 0].max(where=zeros[:, 0] < 249.0, initial=0.0) == pytest.approx(2 * 2.36502037**2 * rate, rel=2e-3)
+
+
+def test_every_mode_is_reached_and_seen(linear):
+    for kind in ("controllability", "observability"):
+        assert list(linear.file[f"at_rest/linear/{kind}"].attrs["lost"]) == []
+    assert "non-minimum phase" in linear.stdout
+    assert "joint/O, joint/A → joint/O, joint/A: minimum phase" in linear.stdout
+
+
+def test_patches_found_beat_even_spacing(placement):
     measured = {}
-    for k, joint in enumerate("OA"):
-        group = geared.file[f"inverse/joints/{joint}"]
-        without, built = ideal[:, 1 + k], group["moment"][()]
-        difference = np.abs(built[::10] - without).max()
-        measured[joint] = [peak(built), np.abs(without).max(), difference, peak(group["motor_moment"])]
-    check_table("geared_arm", "joint", measured)
-
-
-def test_geared_arm_carries_out_its_moments(geared):
-    assert tip_error(geared.file, "forward", "inverse") < 5e-5
-    energy = geared.file["inverse/energy/dissipated_power"][()]
-    assert np.trapz(energy, geared.file["inverse/time"][()]) == pytest.approx(2.72, rel=0.01)  # noqa: NPY201
-
-
-def test_closed_loops(loops):
-    keys = ("tip_error_rms", "tip_error_max", "vibration", "residual", "peak_moment", "peak_voltage")
-    runs = [name for name in loops.file if "control" in loops.file[name]]
-    metrics = {name: loops.file[f"{name}/control"].attrs for name in runs}
-    assert all(entry["verdict"] == "stable" for entry in metrics.values())
-    check_table("two_link_closed_loop", "run", {f"`{n}`": [entry[key] for key in keys] for n, entry in metrics.items()})
-    assert metrics["pd_patches_blow"]["residual"] < metrics["pd_blow"]["residual"] / 10
-    assert metrics["lqr_blow"]["residual"] < metrics["moments_blow"]["residual"] / 1000
-
-
-def test_closed_loops_are_told_of(loops, ffrobot):
-    assert "lqr_blow" in loops.stdout
-    assert "closed loop" in loops.stdout
-    told = ffrobot("info", loops.folder / "scene.results.h5").stdout
-    assert "closed loop" in told
-    assert "/lqr_blow/control/commands" in told
+    for name in ("reach_link1", "reach_link2", "path_link1", "path_link2", "eight_link2"):
+        group = placement.file[f"{name}/placement"]
+        pair = (
+            group["largest_voltage"][()]
+            if name.startswith("path")
+            else [group[f"{k}/value"][()] for k in ("best", "even")]
+        )
+        measured[f"`{name}`"] = [*pair, group.attrs["sets"]]
+        assert np.diff(group["best/centers"][()]).min() > 0.05 - 1e-9
+    check_table("two_link_placement", "analysis", measured, 0.01)

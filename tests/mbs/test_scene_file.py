@@ -225,7 +225,7 @@ MISTAKES = [
     ("end = 1.0", 'end = 1.0\nintegrator = "generalized-alpha"', 'analysis "forward": actuation: expected an analysis', "again"),
     ("end = 1.0", 'end = 1.0\nshape = "zero"', 'analysis "inverse": expected the key "shape" only in kind = "fcid"', "found"),
     ('kind = "pcid"', 'kind = "fcid"', 'analysis "inverse": expected the key "shape" in kind = "fcid"', "found none"),
-    ('kind = "pcid"', 'kind = "pcd"', 'analysis "inverse": kind: expected "pcid", "fcid", "forward" or "static"', '"pcid"?'),
+    ('kind = "pcid"', 'kind = "pcd"', 'analysis "inverse": kind: expected "pcid", "fcid", "forward", ', '"pcid"?'),
     ('actuation = "inverse"', 'actuation = "invers"', 'analysis "forward": actuation: expected an earlier', '"inverse"?'),
     ('actuation = "inverse"', 'actuation = "forward"', 'analysis "forward": actuation: expected', "does not come before"),
     ('apply = "joints+pzt"', "", 'analysis "forward": expected the keys "actuation" and "apply" together, found only', ""),
