@@ -17,6 +17,7 @@ from .control_results import write_linear, write_placement
 from .files import write_atomically
 from .loop_results import write_loop
 from .mbs.analyses import Outcome
+from .mbs.motors_only import is_minimum_phase, path_error
 from .mbs.observation import (
     body_motion,
     energies,
@@ -25,6 +26,7 @@ from .mbs.observation import (
     trajectory_force,
     trajectory_target,
 )
+from .mbs.stable_inversion import Inversion
 from .mbs.stress import BodyStress
 from .solution import Solution
 
@@ -124,6 +126,8 @@ def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["force"] = trajectory_force(outcome, trajectory.name)
             entry["target"] = trajectory_target(outcome, trajectory.name)
             entry.attrs["components"] = list(trajectory.components)
+    if outcome.inversion is not None:
+        _write_servo(group, outcome, outcome.inversion)
     for joint in outcome.assembly.model.scene.joint:
         forces = joint_forces(outcome, joint.name)
         entry = group.create_group(f"joints/{joint.name}")
@@ -135,6 +139,25 @@ def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["moment"] = forces.motor
             if "gear_ratio" in joint.model_fields_set:
                 entry["motor_moment"] = forces.motor / joint.gear_ratio
+
+
+def _write_servo(group: h5py.Group, outcome: Outcome, inversion: Inversion) -> None:
+    """Of motors-only inverse dynamics: no force acts on the path's points, which may be off it."""
+    error, column = path_error(inversion, outcome.time, outcome.q), 0
+    for trajectory in outcome.assembly.model.scene.trajectory:
+        entry, count = group.create_group(f"trajectories/{trajectory.name}"), len(trajectory.components)
+        entry["target"] = trajectory_target(outcome, trajectory.name)
+        entry["error"] = error[:, column : column + count]
+        entry.attrs["components"] = list(trajectory.components)
+        column += count
+    entry = group.create_group("zero_dynamics")
+    entry["time"] = inversion.linearisation.times
+    entry["zeros"] = np.stack([inversion.linearisation.zeros.real, inversion.linearisation.zeros.imag], axis=2)
+    entry.attrs["columns"] = ["real", "imaginary"]
+    entry.attrs["factor"] = inversion.servo.factor
+    entry.attrs["minimum_phase"] = is_minimum_phase(inversion.linearisation)
+    entry.attrs["unmet_force"] = inversion.unmet
+    entry.attrs["off_rest"] = inversion.off_rest
 
 
 def _write_stress(group: h5py.Group, stress: BodyStress) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .actuation.control.closed_loop import LoopRecord, run_closed_loop
 from .actuation.control.linear_analysis import LinearAnalysis, analyse, linear_models
 from .actuation.control.placement import Placed, place
-from .actuation.feasibility import Feasibility, judge_motors, judge_patches
+from .actuation.feasibility import Feasibility, MotorFeasibility, judge_motors, judge_patches
 from .actuation.patch_structure import StructureEffect, structure_effect, with_patches
 from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
 from .actuation.points import PointForces, PointSet, point_set, solve_point_forces, with_points
@@ -32,6 +32,7 @@ from .mbs.control_records import Placement
 from .mbs.fcid import run_fcid
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
+from .mbs.motors_only import run_motors_only
 from .mbs.observation import body_motion
 from .mbs.operating_points import operating_points
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
@@ -231,6 +232,8 @@ def _allocate(solution: Solution, outcome: Outcome) -> None:
             unmet = unmet_modal_forces(outcome, solution.voltages[name])
             solution.predicted_shift[name] = predicted_shift(outcome, unmet)
         solution.feasibility[name] = _judge(solution, outcome)
+    elif outcome.inversion is not None:
+        solution.feasibility[name] = Feasibility(_judge_motors(solution, outcome), {})
     if outcome.analysis.kind in ALLOCATED and any(outcome.assembly.is_trajectory):
         solution.point_forces[name] = {
             body: solve_point_forces(points, outcome) for body, points in solution.points.items()
@@ -246,7 +249,11 @@ def _judge(solution: Solution, outcome: Outcome) -> Feasibility:
         assert loaded.modal is not None
         trial = partial(with_patch_count, scene.path, array.layout, loaded.modal, loaded.planar)
         patches[body] = judge_patches(array, solution.voltages[name][body], outcome, trial)
-    return Feasibility(judge_motors(outcome, {joint.name: joint for joint in scene.joint}), patches)
+    return Feasibility(_judge_motors(solution, outcome), patches)
+
+
+def _judge_motors(solution: Solution, outcome: Outcome) -> dict[str, MotorFeasibility]:
+    return judge_motors(outcome, {joint.name: joint for joint in solution.scene.joint})
 
 
 def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Outcome:
@@ -262,6 +269,8 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
         return run_static(model, analysis)
     if analysis.kind == "fcid":
         return run_fcid(model, analysis)
+    if analysis.kind == "motors-only":
+        return run_motors_only(model, analysis, progress)
     if analysis.kind == "pcid":
         replayed = any(later.actuation == analysis.name for later in solution.scene.analysis)
         return run_pcid(model, analysis, replayed, progress)

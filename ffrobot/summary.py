@@ -14,6 +14,8 @@ from .control_summary import LINEAR_COLUMNS, PLACEMENT_COLUMNS, linear_lines, li
 from .loop_results import HEADINGS, metrics_row
 from .mbs.analyses import Outcome
 from .mbs.geometric_stiffening import NOTABLE
+from .mbs.motors_only import describe_zeros, is_minimum_phase, path_error
+from .mbs.stable_inversion import Inversion
 from .solution import Solution
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
@@ -52,6 +54,8 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     for name, outcome in solution.outcomes.items():
         if outcome.analysis.integrated and outcome.analysis.integrator == "auto":
             notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
+        if outcome.inversion is not None:
+            notes.add_row("motors only", f"{name}: {_inversion(outcome, outcome.inversion)}")
     for name, loop in solution.loops.items():
         for line in loop.warnings:
             notes.add_row("warning", f"{name}: {line}")
@@ -62,6 +66,21 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     console.print()
     console.print(notes)
     console.print(f"results    {path}", soft_wrap=True)
+
+
+def _inversion(outcome: Outcome, inversion: Inversion) -> str:
+    """What the zeros are, how the path was inverted, and what that leaves of it."""
+    linear, factor = inversion.linearisation, inversion.servo.factor
+    error = np.abs(path_error(inversion, outcome.time, outcome.q)).max()
+    left = f"largest error of the path {error:.2g}"
+    if is_minimum_phase(linear):
+        output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the deflections"
+        return f"{output}: minimum phase, integrated forward; {left}"
+    return (
+        f"not minimum phase, zeros at {describe_zeros(linear)} 1/s; stable inversion with"
+        f" {outcome.analysis.pre_actuation:.3g} s of pre- and {outcome.analysis.post_actuation:.3g} s of post-actuation"
+        f" (start off rest by {inversion.off_rest:.1g}); {left}"
+    )
 
 
 def _stiffening(solution: Solution) -> tuple[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from .integrators import METHODS, Choice, choose_integrator
 from .model import ZERO, Array, Assembly, Model
 from .statics import static_equilibrium
 from .steering import Equipment, actuation_source, applied_actuators
+
+if TYPE_CHECKING:
+    from .stable_inversion import Inversion
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -32,6 +36,10 @@ _ADVICE = {
     " trajectory) or the load grows without bound",
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
     "interrupted": "stopped on request",
+    "mesh too coarse": "motors do not get close enough to the path: vibrations of the zero dynamics that are hardly"
+    " damped take too fine a mesh; add damping, leave out high modes, smooth the path or loosen the tolerance",
+    "inversion not converged": "no motion was found that motors alone carry along the path: slow the path down, add"
+    ' damping, leave out high modes, or use output = "redefined"',
     "diverged": "a link is bent by as much as it is long, which small deformations do not describe: loads beyond"
     " buckling, a spin that needs geometric_stiffening = true, or an arm without motors that falls apart",
 }
@@ -60,6 +68,7 @@ class Outcome:
     recording: _core.Recording | None = field(default=None, repr=False)
     shape: list[list[_core.TimeFunction]] | None = field(default=None, repr=False)  # prescribed p(t), FCID only
     shape_force: Array | None = None  # (T, modes of all bodies) −λ_p, the forces that hold the shape; FCID only
+    inversion: Inversion | None = field(default=None, repr=False)  # motors-only alone
 
     def coordinates(self, body: str) -> slice:
         """Columns of (R, θ, p) of a body in q, v and a."""
@@ -111,11 +120,21 @@ def run_forward(
     if source is None:
         assembly = Assembly(model, model.joints, model.loads)
         return _integrate(assembly, analysis, initial_state(assembly), None, None, None, progress)
+    analysis, loads = as_long_as(source, analysis), model.loads
+    if source.inversion is not None:
+        loads = source.inversion.servo.loads
     rows, actuators = applied_actuators(model, analysis, source, equipment)
-    assembly = Assembly(model, model.joints, [*((row, ZERO) for row in rows), *model.loads])
+    assembly = Assembly(model, model.joints, [*((row, ZERO) for row in rows), *loads])
     steering = _core.Actuation(actuation_source(source), actuators)
     start = State(source.q[0].copy(), source.v[0].copy())  # bodies and their order are the same
     return _integrate(assembly, analysis, start, steering, None, None, progress, source.integrator)
+
+
+def as_long_as(source: Outcome, analysis: Analysis) -> Analysis:
+    """`analysis` with the pre- and, where it runs to the end of the path, the post-actuation of its source."""
+    pre, post = source.analysis.pre_actuation, source.analysis.post_actuation
+    post = post if analysis.end == source.analysis.end else None
+    return analysis.model_copy(update={"pre_actuation": pre, "post_actuation": post})
 
 
 def run_static(model: Model, analysis: Analysis) -> Outcome:

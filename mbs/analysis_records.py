@@ -29,12 +29,17 @@ class Analysis(ClosedLoopKeys):
     `integrator`: see `integrators.choose_integrator` for "auto"; `spectral_radius` is what a step of generalized-alpha
     leaves of vibrations far above one over its size.
 
+    Of kind "motors-only": `output` "tip" has the path's own points follow it, "redefined" where they would be with
+    `factor` times the deflections (the largest that is minimum phase where none is given). `pre_actuation` and
+    `post_actuation` (s) are how long motors act before and after the path, which is held there; where they are not
+    given, as long as the zero dynamics asks for.
+
     Linear models and placements are `about` the static equilibrium (None, or "static") or an earlier analysis at
     `times`; `points` are those whose motion and disturbance a linear model knows.
     """
 
     name: Name
-    kind: Literal["pcid", "fcid", "forward", "static", "linear", "placement", "closed-loop"]
+    kind: Literal["pcid", "fcid", "forward", "static", "linear", "placement", "motors-only", "closed-loop"]
     end: Positive = 0.0
     output_step: Positive = 0.0
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
@@ -45,6 +50,10 @@ class Analysis(ClosedLoopKeys):
     modal: dict[Name, tuple[Expression, ...]] | None = None
     integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
     spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8  # of generalized-alpha at infinite frequency
+    output: Literal["tip", "redefined"] = "tip"
+    factor: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    pre_actuation: NotNegative | None = None
+    post_actuation: NotNegative | None = None
     max_steps: Annotated[int, Field(gt=0)] = 5_000_000
     about: str | None = None
     instants: tuple[NotNegative, ...] | None = Field(default=None, alias="times", min_length=1)
@@ -90,6 +99,7 @@ class Analysis(ClosedLoopKeys):
             raise ValueError(
                 f'expected limits = true only beside apply = "joints" or "joints+pzt", found apply = "{self.apply}"'
             )
+        self._check_motors_only()
         return self
 
     def _check_linear_keys(self) -> None:
@@ -110,17 +120,29 @@ class Analysis(ClosedLoopKeys):
     @property
     def integrated(self) -> bool:
         """Whether the motion comes from an integration over time."""
-        return self.kind in ("pcid", "forward", "closed-loop")
+        return self.kind in ("pcid", "forward", "motors-only", "closed-loop")
+
+    def _check_motors_only(self) -> None:
+        for key in ("output", "factor", "pre_actuation", "post_actuation"):
+            if self.kind != "motors-only" and key in self.model_fields_set:
+                raise ValueError(f'expected the key "{key}" only in kind = "motors-only", found kind = "{self.kind}"')
+        if self.factor is not None and self.output != "redefined":
+            raise ValueError(f'expected the key "factor" only with output = "redefined", found "{self.output}"')
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """Output times (T,), in s: exact multiples of the output step, ending exactly at `end`."""
+        """Output times (T,), in s: exact multiples of the output step; `end` is one of them, exactly.
+
+        From 0 to `end`, and the pre- and post-actuation besides where they are known.
+        """
         if self.instants is not None:
             return np.array(self.instants)
         if not (self.end and self.output_step):
             return np.zeros(1)
-        times = np.arange(round(self.end / self.output_step) + 1) * self.output_step
-        times[-1] = self.end
+        before, after = (round((x or 0.0) / self.output_step) for x in (self.pre_actuation, self.post_actuation))
+        count = round(self.end / self.output_step)
+        times = np.arange(-before, count + after + 1) * self.output_step
+        times[before + count] = self.end
         return times
 
 

@@ -90,11 +90,12 @@ def _nodes(analysis: Analysis) -> Array:
     return np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1))
 
 
-def spline(nodes: Array, values: Array) -> list[TimeFunction]:
-    """The interpolating splines through the columns of `values` (T, n)."""
+def spline(nodes: Array, values: Array, at_rest: bool = False) -> list[TimeFunction]:
+    """The interpolating splines through the columns of `values` (T, n); `at_rest` without rate at both ends."""
     from scipy.interpolate import make_interp_spline
 
-    curve = make_interp_spline(nodes, values, k=DEGREE)
+    rest = [(m, np.zeros(values.shape[1])) for m in (1, 2)]
+    curve = make_interp_spline(nodes, values, k=DEGREE, bc_type=(rest, rest) if at_rest else None)
     breaks = np.unique(curve.t)
     powers = [curve.derivative(m)(breaks[:-1]) / math.factorial(m) for m in range(DEGREE, -1, -1)]
     coefficients = np.ascontiguousarray(np.array(powers).transpose(2, 1, 0))  # (n, intervals, powers)

@@ -52,7 +52,7 @@ def choose_integrator(assembly: Assembly, analysis: Analysis, start: State, sour
         return Choice(analysis.integrator, "asked for")
     if len(analysis.times) == 1:
         return Choice("dop853", "nothing to integrate")
-    if source == NOT_INTEGRATED:
+    if source is not None and source.name not in METHODS:
         return Choice("dop853", f"the actuation of {analysis.actuation} is solved anew at every stage")
     if source is not None:
         name = "dop853" if source.name == "generalized-alpha" else source.name

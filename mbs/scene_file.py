@@ -263,7 +263,7 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
 
 
 def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Analysis, ...]) -> Iterator[str]:
-    if analysis.kind in ("pcid", "fcid") and not scene.trajectory:
+    if analysis.kind in ("pcid", "fcid", "motors-only") and not scene.trajectory:
         yield f'kind: expected at least one [[trajectory]] for "{analysis.kind}", found none'
     if analysis.kind in ("linear", "placement"):
         yield from linear_problems(scene, analysis, earlier)
@@ -276,8 +276,11 @@ def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Anal
         why = ", which does not come before this one" if later else did_you_mean(analysis.actuation, sources)
         yield f'actuation: expected an earlier analysis, {quoted(sources)}, found "{analysis.actuation}"{why}'
         return
-    if source.kind not in ("pcid", "fcid"):
-        yield f'actuation: expected an analysis of kind "pcid" or "fcid", found "{source.name}" of kind "{source.kind}"'
+    if source.kind not in ("pcid", "fcid", "motors-only"):
+        yield (
+            f'actuation: expected an analysis of kind "pcid", "fcid" or "motors-only", found "{source.name}" of kind'
+            f' "{source.kind}"'
+        )
     elif source.kind == "pcid" and source.integrator == "generalized-alpha":
         yield (
             f"actuation: expected an analysis whose steps can be made again to replay it (any integrator but"
@@ -291,6 +294,10 @@ def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Anal
         yield 'apply: expected at least one [[pzt]] for "joints+pzt", found none'
     if analysis.apply == "points" and not scene.actuation_points:
         yield 'apply: expected at least one [[actuation_points]] for "points", found none'
+    if source.kind == "motors-only" and analysis.feed_forward == "joints+pzt":
+        yield 'feed_forward: expected "joints" with an analysis of kind "motors-only", found "joints+pzt"'
+    if source.kind == "motors-only" and analysis.kind == "forward" and analysis.apply != "joints":
+        yield f'apply: expected "joints" with an analysis of kind "motors-only", found "{analysis.apply}"'
     if analysis.apply == "trajectory" and source.kind == "fcid":
         yield (
             f'apply: expected "joints", "joints+pzt" or "points" with an analysis of kind "fcid", found "trajectory":'
@@ -306,7 +313,7 @@ def _prescribed(scene: SceneKeys) -> Iterator[tuple[str, Trajectory | Load, Any]
             yield f'analysis "{analysis.name}": disturbance no. {k}', load, analysis.times
     for trajectory in scene.trajectory:
         for analysis in specified:
-            yield f'trajectory "{trajectory.name}"', trajectory, analysis.times
+            yield f'trajectory "{trajectory.name}"', trajectory, np.clip(analysis.times, 0.0, analysis.end)
     for k, load in enumerate(scene.load, 1):
         for analysis in scene.analysis:
-            yield f"load no. {k}", load, analysis.times
+            yield f"load no. {k}", load, np.clip(analysis.times, 0.0, analysis.end)

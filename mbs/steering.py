@@ -100,6 +100,8 @@ def is_driven(source: Outcome, body: str) -> bool:
 
 def actuation_source(source: Outcome) -> _core.ActuationSource:
     """The findings of an inverse analysis at any time of it, not at its outputs alone."""
+    if source.inversion is not None:
+        return source.inversion.source()
     assembly = source.assembly
     resolver = None
     if source.tau is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mbs import _core
-from ...mbs.analyses import STATUS, Outcome, Progress, initial_state
+from ...mbs.analyses import STATUS, Outcome, Progress, as_long_as, initial_state
 from ...mbs.analysis_records import Analysis
 from ...mbs.initial_state import State
 from ...mbs.integrators import METHODS, choose_integrator
@@ -98,17 +98,20 @@ def run_closed_loop(
     Raises `InputError` for controllers that do not fit the robot, `SolveError` where a user's function fails.
     """
     assert analysis.sample_time is not None
+    analysis, loads = as_long_as(source, analysis), model.loads
+    if source.inversion is not None:
+        loads = source.inversion.servo.loads
     inputs = input_names(model, patches)
     needed = [s for sensor in needed_sensors(model, analysis, patches) for s in signals(model, patches, sensor)]
     read = merged([s for sensor in analysis.sensor for s in signals(model, patches, sensor)], needed)
     rows = [signal.row for signal in read if signal.row is not None]
-    drives = [*((row, ZERO) for row in model.motors.values()), *model.loads]
+    drives = [*((row, ZERO) for row in model.motors.values()), *loads]
     drives += load_rows(model.scene, analysis.disturbance)
     assembly = Assembly(model, model.joints, drives, rows)
     sensor = sensing(assembly, read)
 
-    times = np.arange(int(analysis.end / analysis.sample_time * (1 + 1e-12)) + 1) * analysis.sample_time
-    times = times[times < analysis.end * (1 - 1e-12)]
+    begin, duration = analysis.times[0], np.ptp(analysis.times)
+    times = begin + np.arange(int(np.ceil(duration / analysis.sample_time * (1 - 1e-12)))) * analysis.sample_time
     reference = _at(times, source.time, sensor.read(*(np.ascontiguousarray(x) for x in (source.q, source.v, source.a))))
     feed_forward = _feed_forward(model, analysis, source, patches, times)
     setup = Setup(

@@ -93,9 +93,9 @@ def _tip_error(outcome: Outcome, source: Outcome) -> Array:
     point = tip_of(outcome)
     place = _interpolated(outcome.time, source.time, point_motion(source, point).position)
     for trajectory in outcome.assembly.model.scene.trajectory:
-        if trajectory.point == point:
+        if trajectory.point == point:  # held where it is before the path and after it
             for component, target in trajectory.components.items():
-                place[:, "xy".index(component)] = target.sample(outcome.time)[0]
+                place[:, "xy".index(component)] = target.sample(np.clip(outcome.time, 0.0, outcome.analysis.end))[0]
     error: Array = point_motion(outcome, point).position - place
     return error
 

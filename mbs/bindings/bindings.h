@@ -9,6 +9,7 @@ void bind_time_function(nanobind::module_ &m);
 void bind_system(nanobind::module_ &m);
 void bind_run(nanobind::module_ &m);
 void bind_actuation(nanobind::module_ &m);
+void bind_servo(nanobind::module_ &m);
 void bind_tangent(nanobind::module_ &m);
 
 // Raises ValueError with both sizes where they differ.

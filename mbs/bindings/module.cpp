@@ -11,4 +11,5 @@ NB_MODULE(_core, m) {
   bind_run(m);
   bind_actuation(m);
   bind_tangent(m);
+  bind_servo(m);
 }

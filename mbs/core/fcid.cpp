@@ -33,14 +33,30 @@ void FullyConstrained::set_shape(double t, const std::vector<ModalShape> &shape)
 }
 
 void FullyConstrained::set_shape(const VectorXd &p) {
+  const VectorXd rest = VectorXd::Zero(p.size());
+  set_shape(p, rest, rest);
+}
+
+void FullyConstrained::set_shape(const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
   Index column = 0;
   for (std::size_t b = 0; b < system_.bodies.size(); ++b) {
     const Index i = system_.first_coordinate[b] + 3, n = system_.bodies[b].modes();
     q_.segment(i, n) = p.segment(column, n);
-    v_.segment(i, n).setZero();
-    a_.segment(i, n).setZero();
+    v_.segment(i, n) = p_dot.segment(column, n);
+    a_.segment(i, n) = p_ddot.segment(column, n);
     column += n;
   }
+}
+
+void FullyConstrained::start_at(const VectorXd &q) {
+  for (const Index i : system_.first_coordinate)
+    q_.segment<3>(i) = q.segment<3>(i);
+  started_ = false;
+}
+
+void FullyConstrained::set_target(double t, std::size_t constraint, const Jet &target) {
+  workspace_.targets[constraint] = target;
+  workspace_.target_time = t;
 }
 
 void FullyConstrained::update_jacobian() {
@@ -94,6 +110,13 @@ void FullyConstrained::add_rotors(VectorXd &f_r) {
 }
 
 bool FullyConstrained::solve(double t) {
+  if (!move(t))
+    return false;
+  balance(t);
+  return workspace_.lambda.allFinite();
+}
+
+bool FullyConstrained::move(double t) {
   for (std::size_t b = 0; started_ && b < system_.bodies.size(); ++b) {
     const Index i = system_.first_coordinate[b];
     q_.segment<3>(i) += (t - time_) * v_.segment<3>(i);
@@ -108,7 +131,10 @@ bool FullyConstrained::solve(double t) {
     evaluate(system_.constraints[r].row, workspace_.bodies, workspace_.rows[r]);
   constraint_accelerations(system_, q_.data(), a_.data(), workspace_, acceleration_.data());
   move_frames(a_, acceleration_, -1);
+  return a_.allFinite();
+}
 
+void FullyConstrained::balance(double t) {
   required_force(system_, t, q_.data(), v_.data(), a_.data(), workspace_, f_.data());
   VectorXd f_r(gradients_.rows());
   for (std::size_t b = 0; b < system_.bodies.size(); ++b)
@@ -124,7 +150,6 @@ bool FullyConstrained::solve(double t) {
     shape_force_[b] = f_.segment(system_.first_coordinate[b] + 3, system_.bodies[b].modes());
     add_modal_force(system_.bodies[b], workspace_.bodies[b], workspace_.wrench[b], shape_force_[b]);
   }
-  return workspace_.lambda.allFinite();
 }
 
 namespace {
@@ -150,9 +175,9 @@ VectorXd modal_stiffness(const System &system) {
 
 } // namespace
 
-FcidOutputs fully_constrained(const System &system, const std::vector<double> &times,
-                              const std::vector<ModalShape> &shape, const VectorXd &guess,
-                              ActuationResolver *resolver) {
+FcidOutputs collect(const FullyConstrained &motion, const std::vector<double> &times,
+                    const std::function<bool(double)> &solve, ActuationResolver *resolver) {
+  const System &system = motion.system();
   const auto T = static_cast<Index>(times.size()), m = static_cast<Index>(system.constraints.size());
   const Index n = total_modes(system);
   FcidOutputs out;
@@ -165,11 +190,8 @@ FcidOutputs fully_constrained(const System &system, const std::vector<double> &t
     out.tau.resize(T, resolver->tau().size());
     out.F_p.resize(T, n);
   }
-  FullyConstrained motion(system, guess);
   for (Index i = 0; i < T; ++i) {
-    const double t = times[static_cast<std::size_t>(i)];
-    motion.set_shape(t, shape);
-    if (!motion.solve(t)) {
+    if (!solve(times[static_cast<std::size_t>(i)])) {
       out.completed = false;
       return out;
     }
@@ -191,6 +213,17 @@ FcidOutputs fully_constrained(const System &system, const std::vector<double> &t
     out.F_p.row(i) = joined(resolver->modal_force(), n).transpose() + out.shape_force.row(i);
   }
   return out;
+}
+
+FcidOutputs fully_constrained(const System &system, const std::vector<double> &times,
+                              const std::vector<ModalShape> &shape, const VectorXd &guess,
+                              ActuationResolver *resolver) {
+  FullyConstrained motion(system, guess);
+  const auto solve = [&](double t) {
+    motion.set_shape(t, shape);
+    return motion.solve(t);
+  };
+  return collect(motion, times, solve, resolver);
 }
 
 MatrixXd static_shape(const System &system, const std::vector<double> &times, const VectorXd &guess,

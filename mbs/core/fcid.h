@@ -5,6 +5,7 @@
 #include "core/system.h"
 
 #include <Eigen/LU>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -23,16 +24,27 @@ public:
   // guess: coordinates from which the first position is found; later ones start at the one before.
   FullyConstrained(const System &system, Eigen::VectorXd guess);
 
+  // The next position is found from the frames of q, without looking at the last one.
+  void start_at(const Eigen::VectorXd &q);
+
   // Shape p, p_dot, p_ddot at time t: fills the modal part of q, v, a.
   void set_shape(double t, const std::vector<ModalShape> &shape);
   void set_shape(const Eigen::VectorXd &p); // of all bodies, at rest
+  void set_shape(const Eigen::VectorXd &p, const Eigen::VectorXd &p_dot, const Eigen::VectorXd &p_ddot);
+
+  // The target of a constraint at time t, in place of its own in the solve(t) that follows. Once one is given, so have
+  // to be all that are not zero.
+  void set_target(double t, std::size_t constraint, const Jet &target);
 
   // The motion of the frames and all forces, for the shape that was set. False where no position is found.
   bool solve(double t);
+  bool move(double t);    // the motion alone
+  void balance(double t); // the forces of that motion
 
   const Eigen::VectorXd &q() const { return q_; }
   const Eigen::VectorXd &v() const { return v_; }
   const Eigen::VectorXd &a() const { return a_; }
+  const System &system() const { return system_; }
   const Workspace &workspace() const { return workspace_; }                        // lambda, rows, kinematics
   const std::vector<Eigen::VectorXd> &shape_force() const { return shape_force_; } // -lambda_p of each body
   const Eigen::VectorXd &position_residual() const { return value_; }
@@ -62,7 +74,12 @@ struct FcidOutputs {
       residual;
 };
 
-// resolver may be null; F_p then stays empty.
+// What is reported of `motion` at `times`; solve(t) makes it that of time t. resolver may be null; F_p then stays
+// empty.
+FcidOutputs collect(const FullyConstrained &motion, const std::vector<double> &times,
+                    const std::function<bool(double)> &solve, ActuationResolver *resolver);
+
+// resolver may be null, as above.
 FcidOutputs fully_constrained(const System &system, const std::vector<double> &times,
                               const std::vector<ModalShape> &shape, const Eigen::VectorXd &guess,
                               ActuationResolver *resolver);

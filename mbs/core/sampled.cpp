@@ -23,7 +23,7 @@ const VectorXd &Sensing::read(const double *q, const double *v, const double *a)
     evaluate(row, workspace_.bodies, motion);
     readings_[i++] = order == 0   ? motion.value
                      : order == 1 ? motion.rate
-                                  : motion.bias + row_acceleration(system_, row, motion, q, a, workspace_);
+                                  : row_acceleration(system_, row, motion, q, a, workspace_);
   }
   for (const auto &[body, vector, order] : modes_)
     readings_[i++] = vector.dot(VectorMap((order == 0 ? q : v) + system_.first_coordinate[body] + 3, vector.size()));

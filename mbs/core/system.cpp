@@ -208,7 +208,7 @@ void required_force(const System &system, double t, const double *q, const doubl
 
 double row_acceleration(const System &system, const Row &row, const RowMotion &motion, const double *q, const double *a,
                         const Workspace &w) {
-  double sum = 0;
+  double acceleration = motion.bias;
   for (const auto &[m, coefficient] :
        {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)}) {
     if (m->body < 0)
@@ -216,17 +216,14 @@ double row_acceleration(const System &system, const Row &row, const RowMotion &m
     const auto b = static_cast<std::size_t>(m->body);
     const Index i = system.first_coordinate[b];
     double size = 0;
-    sum += coefficient->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker, q + i, a + i, size));
+    acceleration += coefficient->dot(marker_acceleration(system.bodies[b], w.bodies[b], m->marker, q + i, a + i, size));
   }
-  return sum;
+  return acceleration;
 }
 
 void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c) {
-  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
-    const Row &row = system.constraints[r].row;
-    const RowMotion &motion = w.rows[r];
-    c[r] = motion.bias - w.targets[r].acceleration + row_acceleration(system, row, motion, q, a, w);
-  }
+  for (std::size_t r = 0; r < system.constraints.size(); ++r)
+    c[r] = row_acceleration(system, system.constraints[r].row, w.rows[r], q, a, w) - w.targets[r].acceleration;
 }
 
 double project(const System &system, double t, double *q, double *v, Workspace &w) {

@@ -118,8 +118,7 @@ void required_force(const System &system, double t, const double *q, const doubl
 // Positions and velocities of all markers.
 void update_kinematics(const System &system, const double *q, const double *v, Workspace &w);
 
-// The part of a row's acceleration that belongs to the accelerations a of the coordinates, without its bias; after the
-// kinematics.
+// Acceleration of any row's value, without its target. Uses kinematics in w and the row's motion there.
 double row_acceleration(const System &system, const Row &row, const RowMotion &motion, const double *q, const double *a,
                         const Workspace &w);
 

@@ -128,7 +128,7 @@ void add_built_joints(const System &system, const double *q, const double *v, co
   for (std::size_t r = system.held; r < system.constraints.size(); ++r) {
     const auto &[rotor, target, compliance] = system.constraints[r];
     look_at(rotor);
-    const double moment = (motion.bias + row_acceleration(system, rotor, motion, q, a, w)) / compliance;
+    const double moment = row_acceleration(system, rotor, motion, q, a, w) / compliance;
     result.force += moment * gradient;
     gradient /= compliance;
     result.M.noalias() += gradient * row.by_acceleration;

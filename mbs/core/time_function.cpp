@@ -277,6 +277,14 @@ Jet PiecewisePolynomial::operator()(double t) const {
   return result;
 }
 
+TimeFunction TimeFunction::held(double begin, double end) const {
+  return UserFunction([function = *this, begin, end](double t) {
+    if (t >= begin && t <= end)
+      return function(t);
+    return Jet{function(t < begin ? begin : end).value, 0.0, 0.0};
+  });
+}
+
 Jet TimeFunction::operator()(double t) const {
   const Jet jet = std::visit([t](const auto &function) { return function(t); }, function_);
   return {finite_or_nan(jet.value), finite_or_nan(jet.rate), finite_or_nan(jet.acceleration)};

@@ -122,6 +122,9 @@ public:
 
   Jet operator()(double t) const;
 
+  /// The same between `begin` and `end`, and at rest with its values there outside.
+  TimeFunction held(double begin, double end) const;
+
 private:
   std::variant<Constant, Expression, PiecewisePolynomial, UserFunction> function_;
 };

@@ -226,6 +226,10 @@ MISTAKES = [
     ("end = 1.0", 'end = 1.0\nshape = "zero"', 'analysis "inverse": expected the key "shape" only in kind = "fcid"', "found"),
     ('kind = "pcid"', 'kind = "fcid"', 'analysis "inverse": expected the key "shape" in kind = "fcid"', "found none"),
     ('kind = "pcid"', 'kind = "pcd"', 'analysis "inverse": kind: expected "pcid", "fcid", "forward", ', '"pcid"?'),
+    ("end = 1.0", "end = 1.0\nfactor = 0.5", 'analysis "inverse": expected the key "factor" only in kind = "motors-only"', ""),
+    ('kind = "pcid"', 'kind = "motors-only"\nfactor = 0.5', 'analysis "inverse": expected the key "factor" only with', "tip"),
+    ('kind = "pcid"', 'kind = "motors-only"\npre_actuation = -1', 'analysis "inverse": pre_actuation: expected a number', ""),
+    ('kind = "pcid"', 'kind = "motors-only"', 'analysis "forward": apply: expected "joints" with', "joints+pzt"),
     ('actuation = "inverse"', 'actuation = "invers"', 'analysis "forward": actuation: expected an earlier', '"inverse"?'),
     ('actuation = "inverse"', 'actuation = "forward"', 'analysis "forward": actuation: expected', "does not come before"),
     ('apply = "joints+pzt"', "", 'analysis "forward": expected the keys "actuation" and "apply" together, found only', ""),
@@ -283,7 +287,9 @@ def test_stiffening_knows_no_loads_between_interfaces(folder, value, old, new, s
 
 
 def test_actuation_comes_from_pcid(folder):
-    with pytest.raises(InputError, match='actuation: expected an analysis of kind "pcid" or "fcid", found "inv'):
+    with pytest.raises(
+        InputError, match='actuation: expected an analysis of kind "pcid", "fcid" or "motors-only", found "inv'
+    ):
         load(folder, SCENE.replace('kind = "pcid"', 'kind = "forward"', 1))
 
 

@@ -1,0 +1,99 @@
+"""Gauss collocation of second-order boundary value problems against solutions that are known."""
+
+import numpy as np
+import pytest
+
+from ffrobot.mbs.collocation import Boundary, Problem, collocate
+
+SIGMA = np.array([30.0, 2e4])  # 1/s: p̈ = σ² p + f has the motions e^(σt) and e^(−σt)
+
+
+def bell(t):
+    """p, ṗ, p̈ (N, 2) of a pulse that is over at 0 and 2."""
+    x = (np.asarray(t)[:, None] - 1) / np.array([0.15, 0.2])
+    p = np.exp(-(x**2))
+    width = np.array([0.15, 0.2])
+    return p, -2 * x * p / width, (4 * x**2 - 2) * p / width**2
+
+
+def dichotomy():
+    """Of p̈ = σ² p + f, f such that `bell` is the bounded solution: decaying parts vanish at 0, growing ones at 2."""
+
+    def residual(t, p, v, a):
+        known = bell(t)
+        return a - SIGMA**2 * p - (known[2] - SIGMA**2 * known[0])
+
+    def derivatives(t):
+        one = np.broadcast_to(np.eye(2), (len(t), 2, 2))
+        return one, 0 * one, -np.diag(SIGMA**2) * one
+
+    rest = np.zeros(4)
+    no_decaying, no_growing = (np.hstack([-sign * np.diag(SIGMA), np.eye(2)]) for sign in (1, -1))
+    return Problem(residual, derivatives, SIGMA, 1.0, Boundary(no_decaying, rest), Boundary(no_growing, rest))
+
+
+def zero(t):
+    return (np.zeros((len(t), 2)),) * 3
+
+
+def error_at_breaks(intervals):
+    breaks = np.linspace(0, 2, intervals + 1)
+    found = collocate(dichotomy(), breaks, zero)
+    assert found.converged
+    return np.abs(found.curve(breaks) - bell(breaks)[0]).max(axis=0)
+
+
+def test_order_at_the_breaks_is_twice_the_number_of_points():
+    """Superconvergence h⁸ of four Gauss points, where intervals resolve the motion (Ascher et al. 1995, ch. 5)."""
+    errors = [error_at_breaks(n)[0] for n in (20, 40)]
+    assert np.log2(errors[0] / errors[1]) > 7.0
+
+
+def test_intervals_need_not_resolve_fast_growing_and_decaying_motions():
+    """σh = 1000 in the second component: forward integration would grow by e^40000."""
+    assert error_at_breaks(40)[1] < 1e-4
+
+
+def test_curve_meets_the_equations_at_gauss_points_and_is_smooth():
+    breaks = np.linspace(0, 2, 41)
+    problem = dichotomy()
+    curve = collocate(problem, breaks, zero).curve
+    c = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2
+    t = (breaks[:-1, None] + np.diff(breaks)[:, None] * c).ravel()
+    r = problem.residual(t, curve(t), curve.derivative()(t), curve.derivative(2)(t))
+    assert np.abs(r).max() < 1e-9 * SIGMA.max() ** 2
+    for derivative in (curve, curve.derivative()):
+        jumps = derivative(breaks[1:-1]) - derivative(np.nextafter(breaks[1:-1], 0))
+        assert np.abs(jumps).max() < 1e-9
+
+
+def test_all_conditions_at_the_start_make_an_initial_value_problem():
+    """p̈ = −ω² p from p = 1, ṗ = 0 is cos ωt."""
+    omega = np.array([7.0])
+    problem = Problem(
+        lambda t, p, v, a: a + omega**2 * p,
+        lambda t: (np.ones((len(t), 1, 1)), np.zeros((len(t), 1, 1)), np.full((len(t), 1, 1), 49.0)),
+        omega,
+        1.0,
+        Boundary(np.eye(2), np.array([1.0, 0.0])),
+        Boundary(np.zeros((0, 2)), np.zeros(2)),
+    )
+    breaks = np.linspace(0, 3, 31)
+    found = collocate(problem, breaks, lambda t: (np.zeros((len(t), 1)),) * 3)
+    assert found.converged
+    np.testing.assert_allclose(found.curve(breaks)[:, 0], np.cos(7 * breaks), atol=1e-9)
+
+
+def test_equations_without_numbers_are_reported():
+    problem = dichotomy()
+    broken = Problem(
+        lambda t, p, v, a: np.full_like(p, np.nan), problem.derivatives, SIGMA, 1.0, problem.start, problem.end
+    )
+    assert not collocate(broken, np.linspace(0, 2, 11), zero).converged
+
+
+@pytest.mark.parametrize("guess", [0.0, 5.0])
+def test_linear_equations_take_one_iteration_whatever_the_guess(guess):
+    found = collocate(dichotomy(), np.linspace(0, 2, 21), lambda t: (np.full((len(t), 2), guess), *zero(t)[1:]))
+    assert found.converged
+    assert found.iterations <= 3

@@ -1,0 +1,245 @@
+"""Inverse dynamics with motors only: against closed forms, a linear inverse by FFT, and forward runs."""
+
+import numpy as np
+import pytest
+from links import arm, arm_links, quintic, ritz_link
+from mechanisms import always, forward, make_model, oracle_of, relative, revolute
+from numpy.polynomial import Polynomial
+
+from ffrobot.errors import InputError
+from ffrobot.mbs import stable_inversion
+from ffrobot.mbs._core import TimeFunction
+from ffrobot.mbs.analyses import run_forward
+from ffrobot.mbs.analysis_records import Analysis
+from ffrobot.mbs.motors_only import is_minimum_phase, path_error, run_motors_only
+from ffrobot.mbs.observation import point_motion
+from ffrobot.mbs.servo import equilibrium, is_unstable, linear_dynamics, make_servo, zeros
+from ffrobot.mbs.steering import Equipment
+
+C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
+
+
+def motors_only(**keys):
+    return Analysis(**({"name": "inverse", "kind": "motors-only", "end": 1.0, "output_step": 0.01} | keys))
+
+
+def single_link(path, modes=4, damping_ratio=0.0, **keys):
+    """One link on a motor at the origin, its tip on `path`(t) along y; no gravity."""
+    tables = {
+        "joint": [revolute("O", "ground", "link.root")],
+        "trajectory": [{"name": "tip", "point": "link.tip", "y": path}],
+        "gravity": (0.0, 0.0),
+    }
+    link = ritz_link("link", "cantilever", modes=modes, damping_ratio=damping_ratio, extra=4)
+    return make_model([link], **(tables | keys))
+
+
+def at_rest(model, factor=1.0):
+    """The equations of motors only with the robot at rest at t = 0: evaluator, scale, M, D and K."""
+    servo = make_servo(model, 1.0, factor)
+    core = servo.core()
+    p, rest = equilibrium(servo, core, 0.0), np.zeros((1, len(servo.scale)))
+    return servo, linear_dynamics(core, np.zeros(1), p[None], rest, rest)
+
+
+def exact_forward(model, outcome, **keys):
+    """The motors' moments without the path."""
+    analysis = forward(actuation="inverse", apply="joints", **keys)
+    replayed = run_forward(model, analysis, outcome, Equipment(), always)
+    assert replayed.status == "completed"
+    return replayed
+
+
+def test_zeros_of_a_uniform_beam():
+    """sin z + sinh z = 0 for hub moment to tip: s = ±2η² √(EI/ρA)/L² with tan η = −tanh η (Kanoh 1990).
+
+    η = 2.36502, 5.49780: the second roots are those of tan η = −1 to 1e-5.
+    """
+    servo, dynamics = at_rest(single_link("0*t", modes=10))
+    s = zeros(dynamics, servo.scale)[0]
+    expected = 2 * np.array([2.36502037, 5.49780388]) ** 2 * C
+    np.testing.assert_allclose(s.imag[:2], 0, atol=1e-6)
+    np.testing.assert_allclose(np.sort(s.real[:2]), [-expected[0], expected[0]], rtol=1e-3)
+    np.testing.assert_allclose(np.sort(s.real[2:4]), [-expected[1], expected[1]], rtol=2e-2)
+
+
+def test_zeros_of_joint_motion_are_the_frequencies_with_the_joint_locked():
+    """factor = 0 asks for a motion of the hub: what is left is the cantilever of the link itself, s = ±iω."""
+    servo, dynamics = at_rest(single_link("0*t"), factor=0.0)
+    s = zeros(dynamics, servo.scale)[0]
+    assert np.all(np.abs(s.real) < 1e-6 * np.abs(s))
+    np.testing.assert_allclose(np.sort(s.imag)[4:], servo.scale, rtol=1e-6)
+
+
+def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
+    """M of r is Lᵀ M Z: Z keeps C_m and C_s, L C_m and the motors' coordinates (formulation.md, sections 5 and 8)."""
+    model = arm()
+    servo, dynamics = at_rest(model)
+    p = iter(equilibrium(servo, servo.core(), 0.0))
+    shape = [[TimeFunction.constant(next(p)) for _ in body.stiffness] for body in model.bodies]
+    q = servo.core().outputs([0.0], shape, servo.resolver()).q[0]
+    modes = np.setdiff1d(np.arange(len(q)), servo.path.rigid_coordinates)
+
+    def keeps(assembly):
+        mechanism = oracle_of(assembly)
+        rows = np.array([row.gradient for row in mechanism.rows(q, np.zeros_like(q))])
+        basis = np.zeros((len(q), len(modes)))
+        basis[modes] = np.eye(len(modes))
+        frames = assembly.rigid_coordinates
+        basis[frames] = -np.linalg.solve(rows[:, frames], rows[:, modes])
+        return basis, mechanism.mass_matrix(q)
+
+    (Z, M), (L, _) = keeps(servo.path), keeps(servo.driven)
+    np.testing.assert_allclose(dynamics.M[0], L.T @ M @ Z, atol=1e-9)
+
+
+def smooth_step():
+    """The polynomial from 0 at 0 to 1 at 1 with six derivatives zero at both."""
+    bell = Polynomial.fromroots([0.0] * 6 + [1.0] * 6).integ()
+    return bell / bell(1.0)
+
+
+def tip_per_moment(body, omega):
+    """G(iω) of a link on a hub, linear: from its invariants alone."""
+    n, h = body.n_modes, body.h
+    M = np.block([[np.atleast_2d(body.inertia), h[None]], [h[:, None], np.eye(n)]])
+    K, D = np.zeros((2, n + 1, n + 1))
+    K[1:, 1:], D[1:, 1:] = np.diag(body.stiffness), body.damping
+    T = np.array([1.0, *body.points["root"].rotation])
+    y = np.array([body.points["tip"].position[0], *body.points["tip"].translation[1]])
+    return np.array([y @ np.linalg.solve(K - w**2 * M + 1j * w * D, T) for w in omega])
+
+
+def test_moment_of_a_single_link_is_the_linear_inverse_in_the_frequency_domain():
+    """τ(ω) = ÿ(ω) / (−ω² G(ω)), G from moment to tip of the linear link, by FFT (Bayo 1987).
+
+    G comes from the link's invariants alone. Tip path of 0.1 mm: the equations are linear to 1e-8.
+    """
+    f, size = smooth_step(), 1e-4
+    path = f"{size}*(" + "+".join(f"({float(c)!r})*t**{k}" for k, c in enumerate(f.coef) if c) + ")"
+    model = single_link(path, damping_ratio=0.01)
+    outcome = run_motors_only(model, motors_only(tolerance=1e-8, output_step=1 / 128), always)
+    assert outcome.status == "completed"
+
+    t = np.arange(-4 * 2048, 4 * 2048) / 2048
+    acceleration = np.where((t > 0) & (t < 1), size * f.deriv(2)(t), 0.0)
+    omega = 2 * np.pi * np.fft.rfftfreq(len(t), t[1] - t[0])[1:]
+    moment = np.fft.rfft(acceleration)[1:] / (-(omega**2) * tip_per_moment(model.bodies[0], omega))
+    tau = np.fft.irfft([0.0, *moment], len(t))  # ÿ has no mean
+    expected = tau[np.round((outcome.time + 4) * 2048).astype(int)]
+    assert relative(outcome.tau[:, 0], expected) < 1e-7
+
+
+@pytest.fixture(scope="module")
+def two_links():
+    """Two soft links under gravity, the tip 1 m from rest to rest in a second, jerk jumping at both ends."""
+    return arm()
+
+
+@pytest.fixture(scope="module")
+def carried(two_links):
+    return run_motors_only(two_links, motors_only(), always)
+
+
+def test_tip_follows_its_path_with_the_motors_alone(two_links, carried):
+    """The requirement is 1e-6 of the path; measured 1e-9."""
+    assert carried.status == "completed"
+    replayed = exact_forward(two_links, carried)
+    np.testing.assert_array_equal(replayed.time, carried.time)
+    way = np.ptp(point_motion(carried, "link2.tip").position, axis=0).max()
+    assert np.abs(path_error(carried.inversion, replayed.time, replayed.q)).max() < 1e-7 * way
+
+
+def test_equations_of_motion_hold_with_the_motors_moments(carried):
+    """M q̈ + C_mᵀ ν − T_qᵀ τ = Q, by the oracle alone, and the path by kinematics."""
+    mechanism = oracle_of(carried.assembly)
+    motor = np.array(carried.assembly.is_trajectory)
+    for k in range(0, len(carried.time), 17):
+        q, v, a = carried.q[k], carried.v[k], carried.a[k]
+        _, _, C_q = mechanism.constraint_values(0.0, q, v)
+        Q = mechanism.forces(float(np.clip(carried.time[k], 0, 1)), q, v)
+        reaction = C_q[~motor].T @ carried.lambda_[k][~motor] - C_q[motor].T @ carried.tau[k]
+        assert relative(mechanism.mass_matrix(q) @ a + reaction, Q, np.abs(Q).max()) < 1e-6
+    assert np.abs(path_error(carried.inversion, carried.time, carried.q)).max() < 1e-12
+
+
+def test_actuation_begins_before_the_path_and_ends_after_it(carried):
+    """Pre-actuation is long enough for the slowest zero, and what is left at its start is told."""
+    pre, post = carried.analysis.pre_actuation, carried.analysis.post_actuation
+    assert carried.time[0] == -pre < -0.1
+    assert carried.time[-1] == pytest.approx(1 + post)
+    assert carried.inversion.off_rest < 1e-9
+    before = carried.time < -1e-9
+    assert np.abs(carried.tau[before] - carried.tau[0]).max() > 0.01 * np.abs(np.ptp(carried.tau, axis=0)).max()
+    s = carried.inversion.linearisation.zeros[0]
+    assert is_unstable(s).sum() == 6  # as many zeros grow as decay
+
+
+def test_shorter_pre_actuation_starts_off_rest_as_told(two_links, carried):
+    short = run_motors_only(two_links, motors_only(pre_actuation=0.05), always)
+    assert short.status == "completed"
+    assert 1e-4 < short.inversion.off_rest < 1.0
+    assert np.abs(path_error(short.inversion, short.time, short.q)).max() < 1e-12
+
+
+def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
+    """The motors alone bring the tip as near as reported, and the largest factor is taken that is minimum phase."""
+    model = arm(arm_links(damping_ratio=0.01, modes=2))
+    outcome = run_motors_only(model, motors_only(output="redefined"), always)
+    assert outcome.status == "completed"
+    assert is_minimum_phase(outcome.inversion.linearisation)
+    factor = outcome.inversion.servo.factor
+    assert 0.5 < factor < 1.0
+    left = np.abs(path_error(outcome.inversion, outcome.time, outcome.q))
+    assert 1e-4 < left.max() < 0.05  # m, of a path of 1 m
+    assert left[0].max() < 1e-6  # at rest nothing is left
+    replayed = exact_forward(model, outcome)
+    same = np.abs(path_error(outcome.inversion, replayed.time, replayed.q))
+    np.testing.assert_allclose(same, left, atol=1e-6)
+    with pytest.raises(InputError, match=r"minimum phase.*right half plane"):
+        run_motors_only(model, motors_only(output="redefined", factor=min(0.99, factor + 0.1)), always)
+
+
+def test_joint_trajectories_need_no_future():
+    """A specified joint angle is collocated with its motor: integrated forward from rest, without pre-actuation."""
+    path = [{"name": "swing", "joint": "O", "value": quintic(0, 1)}]
+    model = single_link("0*t", damping_ratio=0.02, trajectory=path)
+    outcome = run_motors_only(model, motors_only(), always)
+    assert outcome.status == "completed"
+    assert outcome.time[0] == 0.0
+    assert is_minimum_phase(outcome.inversion.linearisation)
+    replayed = exact_forward(model, outcome)
+    assert np.abs(path_error(outcome.inversion, replayed.time, replayed.q)).max() < 1e-6
+
+
+def test_path_that_does_not_start_at_rest_is_refused():
+    with pytest.raises(InputError, match=r'trajectory "tip": y: .* at rest at t = 0 s.*found the rate 0.3'):
+        run_motors_only(single_link("0.3*t*(1-t)**2"), motors_only(), always)
+
+
+def test_path_that_does_not_end_at_rest_is_refused():
+    with pytest.raises(InputError, match=r"at rest at t = 1 s.*found the rate 0.6"):
+        run_motors_only(single_link("0.3*t**2"), motors_only(), always)
+
+
+def test_too_few_motors_are_refused():
+    joints = [revolute("O", "ground", "link.root", motor=False)]
+    with pytest.raises(InputError, match=r"as many motors as .* \(1\), found 0"):
+        run_motors_only(single_link(quintic(0, 0.1), joint=joints), motors_only(), always)
+
+
+def test_too_few_trajectory_components_are_refused():
+    model = arm(trajectory=[{"name": "tip", "point": "link2.tip", "y": "0.5+0*t"}])
+    with pytest.raises(InputError, match=r"trajectory components .* \(2\), found 1"):
+        run_motors_only(model, motors_only(), always)
+
+
+def test_failed_inversion_keeps_what_it_found(monkeypatch):
+    """A mesh that may not get fine enough: status, advice, and the motion as far as it was found."""
+    monkeypatch.setattr(stable_inversion, "MOST_INTERVALS", 80)
+    outcome = run_motors_only(arm(), motors_only(tolerance=1e-9), always)
+    assert outcome.status == "mesh too coarse"
+    assert len(outcome.time) > 100
+    assert np.all(np.isfinite(outcome.tau))
+    with pytest.raises(Exception, match="add damping, leave out high modes"):
+        outcome.check_completed()
