@@ -97,8 +97,8 @@ def run_closed_loop(
     `controllers` makes further ones, beside those of the scene. A run that diverges ends there and is kept.
     Raises `InputError` for controllers that do not fit the robot, `SolveError` where a user's function fails.
     """
-    assert analysis.sample_time is not None
-    analysis, loads = as_long_as(source, analysis), model.loads
+    analysis, loads, T = as_long_as(source, analysis), model.loads, analysis.sample_time
+    assert T is not None
     if source.inversion is not None:
         loads = source.inversion.servo.loads
     inputs = input_names(model, patches)
@@ -111,12 +111,11 @@ def run_closed_loop(
     sensor = sensing(assembly, read)
 
     begin, duration = analysis.times[0], np.ptp(analysis.times)
-    times = begin + np.arange(int(np.ceil(duration / analysis.sample_time * (1 - 1e-12)))) * analysis.sample_time
+    times = begin + np.arange(int(np.ceil(duration / T * (1 - 1e-12)))) * T
     reference = _at(times, source.time, sensor.read(*(np.ascontiguousarray(x) for x in (source.q, source.v, source.a))))
     feed_forward = _feed_forward(model, analysis, source, patches, times)
     setup = Setup(
-        model, patches, inputs, tuple(s.name for s in read), times, analysis.sample_time, analysis.delay, reference,
-        feed_forward, source,
+        model, patches, inputs, tuple(s.name for s in read), times, T, analysis.delay, reference, feed_forward, source
     )  # fmt: skip
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     acting += [make(setup) for make in controllers]

@@ -292,6 +292,19 @@ def test_patches_add_the_damping_that_is_asked_for(link_file, sensor):
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
 
 
+def test_all_integrators_go_from_sample_to_sample_alike(link_file):
+    """Loads jump at every sample: methods that look back must not look across."""
+    control = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05, "sensor": "ideal"}
+    names = ["dop853", "dopri5", "radau", "generalized-alpha"]
+    loops = [loop(name, integrator=name, sample_time=2e-3, controller=[control]) for name in names]
+    solution = solve(held_link(link_file("cantilever3", count=3), *loops))
+    first = solution.outcomes["dop853"].q
+    sag = solution.outcomes["inverse"].q
+    for name in names[1:]:
+        assert solution.outcomes[name].status == "completed"
+        assert np.abs(solution.outcomes[name].q - first).max() < 1e-3 * np.abs(first - sag).max(), name
+
+
 def test_lqr_names_the_modes_out_of_reach():
     """A second wheel that hangs on its own, without motor and sensor: it swings with √(m g d/(I + m d²))."""
     pendulum = {"mass": 1.0, "inertia": 0.3, "center": [0.1, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.2, 0.0]}}
