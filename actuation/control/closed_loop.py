@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,12 +90,11 @@ def run_closed_loop(
     source: Outcome,
     patches: Mapping[str, PatchArray],
     progress: Progress,
-    controllers: Sequence[Callable[[Setup], Controller]] = (),
 ) -> tuple[Outcome, LoopRecord]:
     """Run the closed loop of `analysis` about the motion of the inverse analysis `source`, from its initial state.
 
-    `controllers` makes further ones, beside those of the scene. A run that diverges ends there and is kept.
-    Raises `InputError` for controllers that do not fit the robot, `SolveError` where a user's function fails.
+    A run that diverges ends there and is kept. Raises `InputError` for controllers that do not fit the robot,
+    `SolveError` where a user's function fails.
     """
     analysis, loads, T = as_long_as(source, analysis), model.loads, analysis.sample_time
     assert T is not None
@@ -118,7 +117,6 @@ def run_closed_loop(
         model, patches, inputs, tuple(s.name for s in read), times, T, analysis.delay, reference, feed_forward, source
     )  # fmt: skip
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
-    acting += [make(setup) for make in controllers]
     limit = np.concatenate([motor_limits(model), *(array.limit for array in patches.values())])
     limit = np.full_like(limit, np.inf) if analysis.unlimited else limit
     loop = Loop(setup, read, acting, limit, analysis.seed)
