@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from links import arm, arm_links
+from links import ANGLES, arm, arm_links
 from mechanisms import always, forward, make_model, pcid, relative, revolute
 from test_balances import OUTPUT_STEP, energy_and_losses
 from test_rigid_limit import rod
@@ -14,12 +14,14 @@ from ffrobot.mbs.fcid import run_fcid
 from ffrobot.mbs.initial_state import undeformed_state
 from ffrobot.mbs.mechanism_records import RigidBody
 from ffrobot.mbs.model import ZERO, Assembly
+from ffrobot.mbs.motors_only import run_motors_only
 from ffrobot.mbs.observation import joint_forces
 from ffrobot.mbs.planar_body import from_rigid_body
-from ffrobot.mbs.steering import actuation_source
+from ffrobot.mbs.steering import Equipment, actuation_source
 from ffrobot.mbs.vibration import mass_matrix
 
 G = 9.81
+AT_REST = {"state": "static", "angles": ANGLES}
 GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
 FRICTION = {"viscous_friction": 0.3, "coulomb_friction": 0.5, "friction_speed": 0.05}
 
@@ -117,6 +119,17 @@ def test_geared_two_link_arm_needs_the_moments_of_spong():
         for joint, expected in (("O", J1 * N1**2 * alpha + rotor), ("A", N2 * rotor)):
             added = joint_forces(geared, joint).motor - joint_forces(bare, joint).motor
             assert relative(added, expected) < 1e-9, (kind, joint)
+
+
+def test_motors_alone_carry_rotors_and_friction_along():
+    """Inverse dynamics with motors only, applied to the flexible arm, brings its tip along the path."""
+    model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION, initial=AT_REST)
+    servo = Analysis(name="servo", kind="motors-only", end=1.0, output_step=0.01)
+    source = run_motors_only(model, servo, always)
+    replay = forward(actuation="servo", apply="joints", tolerance=1e-7)
+    outcome = run_forward(model, replay, source, Equipment(), always)
+    assert source.q.shape == outcome.q.shape
+    assert relative(outcome.q, source.q) < 1e-5
 
 
 def test_friction_takes_the_energy_that_is_missing():
