@@ -16,12 +16,13 @@ from ..errors import InputError
 # First of all that load dolfinx: mesh.compat sets PETSc up.
 from ..mesh.interval import graded_nodes, interval_mesh, with_points
 from .beam import R_X, U_X, FamilyModel, family_model
-from .beam_stress import beam_stresses
+from .beam_stress import beam_stresses, segments
 from .eigen import lowest_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
 from .link_records import FAMILIES, BeamLink, Family, Link
 from .lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
+from .section_outline import section_outlines
 
 # Elements are not cut closer to their ends than this fraction of their length.
 SLIVER = 0.01
@@ -66,7 +67,10 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
     omega: Floats = np.sqrt([mode.omega2 for mode in modes])
     translation, rotation = np.moveaxis(fields[:R_X], 0, 1), np.moveaxis(fields[R_X:], 0, 1)
     position = _on_axis(stations.x)
-    kept = Stations(position, translation, rotation, _heights(link, stations.x), stations.element)
+    segment = segments(link, stations.x)
+    heights = np.array([section.height for section in link.sections])[segment]
+    outlines = section_outlines(link.shapes)[segment]
+    kept = Stations(position, translation, rotation, heights, stations.element, outlines)
     return ModalBody(
         name=link.name,
         kind=link.geometry.kind,
@@ -191,12 +195,6 @@ def _interface(stations: StationSpace, fields: Floats, position: float) -> Inter
 
 def _on_axis(x: Floats) -> Floats:
     return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)
-
-
-def _heights(link: BeamLink, x: Floats) -> Floats:
-    """(k,) height of the section from each station on; at the tip, of the last section."""
-    heights = np.array([section.height for section in link.sections])
-    return heights[np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")]
 
 
 def damping_ratio(link: Link, omega: Floats) -> Floats:

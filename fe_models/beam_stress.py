@@ -66,7 +66,7 @@ def beam_stresses(
         assert nu is not None  # the link file has been checked for it
         x, y, z = position
         F, M = _section_forces(link, stations, omega2, attached, x)
-        segment = int(_segments(link, np.array(x)))
+        segment = int(segments(link, np.array(x)))
         stress = section_stress(link.shapes[segment], link.sections[segment], F, M, y, z)
         strain = stress * (2 * (1 + nu) / E)
         strain[:3] = np.outer([1.0, -nu, -nu], stress[0] / E)
@@ -99,7 +99,7 @@ def _inertia(link: BeamLink, stations: Stations, omega2: Floats, attached: Seque
     shapes = _lagrange(nodes[element], s)
     translation = np.einsum("egi,eikn->egkn", shapes, stations.translation[stations.element[element]])
     rotation = np.einsum("egi,eikn->egkn", shapes, stations.rotation[stations.element[element]])
-    mass, inertia = _line_inertia(link, _segments(link, 0.5 * (start + end)))
+    mass, inertia = _line_inertia(link, segments(link, 0.5 * (start + end)))
     scale = half * weights
     force = (scale * mass[:, None])[:, :, None, None] * translation
     moment = scale[:, :, None, None] * inertia[:, None, :, None] * rotation
@@ -126,7 +126,7 @@ def _line_inertia(link: BeamLink, segments: Integers) -> tuple[Floats, Floats]:
     return mass[segments], inertia[segments]
 
 
-def _segments(link: BeamLink, x: Floats) -> Integers:
+def segments(link: BeamLink, x: Floats) -> Integers:
     """Number of the segment at each x; at a step of the section, of the one beyond it."""
     return np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")
 

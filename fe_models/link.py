@@ -25,7 +25,7 @@ from .modal_body_file import FORMAT, FORMAT_VERSION, read_modal_body, write_moda
 Progress = Callable[[str], None]
 
 # To be raised whenever the same link file gives other numbers than before.
-ALGORITHM_VERSION = 1
+ALGORITHM_VERSION = 2
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,8 @@ class Stations:
         height: (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a
             taper, the height in the middle between the two).
         element: (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known.
+        outline: (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not
+            known.
     """
 
     position: Floats
@@ -58,6 +60,7 @@ class Stations:
     rotation: Floats
     height: Floats
     element: Integers | None = None
+    outline: Floats | None = None
 
     def __post_init__(self) -> None:
         _freeze(self)
@@ -348,6 +351,8 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         shapes.append((f"stress/points/{name}/strain", point.strain, (6, n)))
     if body.mesh.edges is not None:
         shapes.append(("mesh.edges", body.mesh.edges, (len(body.mesh.edges), 2)))
+    if (outline := body.stations.outline) is not None:
+        shapes.append(("stations.outline", outline, (k, *outline.shape[1:2], 2)))
     if body.surface_stress is not None:
         shapes.append(("stress/surface", body.surface_stress, (p, 6, n)))
     if body.surface_patches is not None:

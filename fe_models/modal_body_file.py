@@ -69,6 +69,15 @@ def read_modal_body(path: Path) -> ModalBody:
         raise InputError(f"{path}: not a modal body file, or a damaged one: {error}") from None
 
 
+def is_modal_body_file(path: Path) -> bool:
+    """Whether the file says so; False for what cannot be read."""
+    try:
+        with h5py.File(path, "r") as file:
+            return bool(file.attrs.get("format") == FORMAT)
+    except OSError:
+        return False
+
+
 def _check_format(path: Path, attributes: h5py.AttributeManager) -> None:
     if attributes.get("format") != FORMAT:
         raise InputError(f'{path}: expected format "{FORMAT}", found {attributes.get("format", "no such attribute")!r}')

@@ -19,7 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .api import load_scene, make_link, plot_results, read_modal_body, solve, write_report
+    from .api import load_scene, make_link, plot_results, read_modal_body, solve, view_file, write_report
     from .errors import FfrobotError, InputError, SolveError
     from .fe_models.modal_body import ModalBody
     from .mbs.scene_file import make_scene
@@ -34,6 +34,7 @@ _HOME = {
     "plot_results": ".api",
     "read_modal_body": ".api",
     "solve": ".api",
+    "view_file": ".api",
     "write_report": ".api",
     "FfrobotError": ".errors",
     "InputError": ".errors",
@@ -57,6 +58,7 @@ __all__ = [
     "plot_results",
     "read_modal_body",
     "solve",
+    "view_file",
     "write_report",
 ]
 

@@ -63,11 +63,14 @@ def read_modal_body(path: AnyPath) -> ModalBody:
     return read_modal_body(Path(path))
 
 
-def plot_results(results: AnyPath, folder: AnyPath) -> list[Path]:
-    """Draw the figures of a results file into `folder`: `ffrobot plot`. Returns the files written."""
+def plot_results(results: AnyPath, folder: AnyPath, formats: Sequence[str] = ("png", "pdf")) -> list[Path]:
+    """Draw the figures of a results file into `folder`: `ffrobot plot`. Returns the files written.
+
+    `formats` are "png", "pdf", "svg".
+    """
     from .figures.plot import plot_results
 
-    return plot_results(Path(results), Path(folder))
+    return plot_results(Path(results), Path(folder), formats)
 
 
 def write_report(results: Sequence[AnyPath], path: AnyPath) -> None:
@@ -75,3 +78,23 @@ def write_report(results: Sequence[AnyPath], path: AnyPath) -> None:
     from .report import write_report
 
     write_report([Path(file) for file in results], Path(path))
+
+
+def view_file(
+    file: AnyPath,
+    folder: AnyPath,
+    *,
+    analysis: str | None = None,
+    frames: int | None = None,
+    time: float | None = None,
+    scale: float | None = None,
+    pictures: bool | None = None,
+) -> list[Path]:
+    """Write grids for ParaView, and pictures, of a results file or modal body file: `ffrobot view`.
+
+    `frames` outputs at most of one `analysis`, or of all; the picture at `time` (s) with deflections `scale` times as
+    large. `pictures`: whether to draw them; None: where PyVista can. Returns the files written.
+    """
+    from .view.view import FRAMES, Options, view_file
+
+    return view_file(Path(file), Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths

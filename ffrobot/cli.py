@@ -8,6 +8,7 @@ import time
 import traceback
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import click
 
@@ -26,7 +27,7 @@ def cli() -> None:
     \b
     Stage 1:  ffrobot link  LINK.toml   finite elements → modal body file
     Stage 2:  ffrobot solve SCENE.toml  modal bodies → moments and voltages
-    Then:     ffrobot info, ffrobot plot, ffrobot report
+    Then:     ffrobot info, ffrobot plot, ffrobot view, ffrobot report
     """
 
 
@@ -112,12 +113,38 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
 @cli.command()
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
-def plot(file: Path, output: Path | None) -> None:
-    """Draw the figures of a results file, or mesh and modes of a modal body file, as PNG and PDF."""
+@click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several [png,pdf].")
+def plot(file: Path, output: Path | None, formats: str) -> None:
+    """Draw the figures of a results file, or mesh and modes of a modal body file.
+
+    Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn.
+    """
     from .figures.plot import plot_file
 
-    for path in plot_file(file, output or file.with_suffix(".figures")):
+    for path in plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(",")):
         click.echo(path)
+
+
+@cli.command()
+@click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the files; FILE.view if absent.")
+@click.option("--analysis", metavar="NAME", help="Of this analysis only.")
+@click.option("--frames", metavar="N", type=click.IntRange(1), default=201, help="Time steps at most [201].")
+@click.option("--time", metavar="SECONDS", type=float, help="Of the picture [where deflections are largest].")
+@click.option("--scale", metavar="S", type=float, help="Of deflections in the picture [as large as can be seen].")
+@click.option("--pictures/--no-pictures", default=None, help="PNG pictures too [where PyVista can draw].")
+def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN401 (the fields of Options)
+    """Write links and motions in space: VTKHDF and XDMF files for ParaView, pictures by PyVista.
+
+    Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies.
+    """
+    from .view import Options, view_file
+
+    viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
+    for path in viewed.paths:
+        click.echo(path)
+    for note in viewed.notes:
+        click.echo(f"ffrobot: {note}", err=True)
 
 
 @cli.command()

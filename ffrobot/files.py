@@ -58,6 +58,12 @@ def check_output(path: Path, file_format: str, *, force: bool = False) -> None:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
 
 
+def check_folder(folder: Path) -> None:
+    """Refuse an output folder whose place a file has; one that is absent is made later. Raises `InputError`."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: output: expected a folder, found a file")
+
+
 def _is_of_format(path: Path, file_format: str) -> bool:
     with suppress(OSError), path.open("rb") as stream:
         signature = stream.read(len(HDF5_SIGNATURE))

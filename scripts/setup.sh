@@ -117,6 +117,7 @@ wanted = project["build-system"]["requires"] + project["project"]["dependencies"
 wanted += [line for extra in ("plot", "report", "docs", "test") for line in extras[extra]]
 wanted = [line for line in wanted if re.match(r"[\w.-]+", line)[0] not in from_debian]
 Path(".venv/requirements.txt").write_text("\n".join(wanted) + "\n")
+Path(".venv/view.txt").write_text("\n".join(extras["view"]) + "\n")
 
 # Debian's h5py calls itself h5py._debian_h5py_serial.
 debian = {d.name.split(".")[0]: d.version for d in distributions(path=["/usr/lib/python3/dist-packages"])}
@@ -124,6 +125,11 @@ held = [f"{name}=={debian[name]}" for name in sorted(from_debian)]
 Path(".venv/constraints.txt").write_text("\n".join(held) + "\n")
 PYTHON
   .venv/bin/python -m pip install -r .venv/requirements.txt -c .venv/constraints.txt
+}
+
+# VTK is a large download, and only pictures in space need it: test.sh asks for it, demo.sh does not.
+install_view() {
+  .venv/bin/python -m pip install -r .venv/view.txt -c .venv/constraints.txt
 }
 
 # Python files are seen as they are edited; C++ sources and new files are taken in here.
@@ -176,6 +182,7 @@ setup() {
 
   dependencies_key=$({ installed_packages "${DEBIAN_PACKAGES[@]}" && cat pyproject.toml; } | digest)
   once dependencies "$dependencies_key" "installing Python packages" install_dependencies
+  [[ -z ${WITH_TEST_PACKAGES:-} ]] || once view "$dependencies_key" "installing PyVista for the tests" install_view
   once build "$(build_key) $dependencies_key" "building ffrobot" build_package
   once check "$(<.venv/build.stamp)" "checking the environment" check_environment
   exec 9<&-

@@ -119,3 +119,35 @@ def _copy(name, folder):
     if "../two_link/" in (copy / "scene.toml").read_text(encoding="utf-8"):
         shutil.copytree(CASES / "two_link", folder / "two_link", ignore=ignored)
     return copy / "scene.toml"
+
+
+@pytest.fixture(scope="session")
+def solid_arm(ffrobot, tmp_path_factory):
+    """A small soft solid link with stresses on its surface, swung by its tip; its folder, with `scene.results.h5`."""
+    folder = tmp_path_factory.mktemp("solid_arm")
+    (folder / "arm.toml").write_text(
+        """
+name = "arm"
+material = { youngs_modulus = 0.7e9, poissons_ratio = 0.4, density = 1200.0 }
+geometry = { kind = "solid", length = 0.4, section = { shape = "rectangle", height = 0.02, width = 0.03 } }
+mesh = { cell = "hexahedron", order = 2, divisions = [8, 1, 1] }
+reference = { condition = "cantilever" }
+modes = { count = 4, family = "all" }
+stress = { surface = true }
+""",
+        encoding="utf-8",
+    )
+    (folder / "scene.toml").write_text(
+        """
+name = "solid_arm"
+gravity = [0.0, -9.81]
+body = [{ name = "arm", link = "arm.toml" }]
+joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"], at = [0.1, 0.2] }]
+trajectory = [{ name = "tip", point = "arm.tip", y = "0.2 + 0.05*t" }]
+analysis = [{ name = "inverse", kind = "pcid", end = 0.02, output_step = 0.002 }]
+""",
+        encoding="utf-8",
+    )
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder

@@ -13,7 +13,9 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..body_surface import AMPLITUDE, drawn_mode
 from ..fe_models.modal_body import ModalBody
+from ..projection import RIGHT, UP, VIEWER
 from .palette import COLORS
 from .style import ORDERED
 
@@ -23,15 +25,9 @@ Integers = NDArray[np.int64]
 WIDTH = 7.0  # inches: both columns of a page
 MODES = 6  # that are drawn at most
 COLUMNS = 2
-AMPLITUDE = 0.1  # of the length: the largest displacement as drawn
 CLOSE_UP = 5.0  # heights of the section that the second view of a mesh shows
 FOLD = np.cos(np.radians(30.0))  # cells that meet at more than this show their edge
 FACE, EDGE, GHOST = "#cfdce8", "#30465c", "#9a9a9a"
-# The link's x goes right, its y up, as in planar scenes; the viewer stands before z, towards the root and above.
-AZIMUTH, ELEVATION = np.radians(28.0), np.radians(24.0)
-RIGHT = np.array([np.cos(AZIMUTH), 0.0, np.sin(AZIMUTH)])
-UP = np.array([np.sin(ELEVATION) * np.sin(AZIMUTH), np.cos(ELEVATION), -np.sin(ELEVATION) * np.cos(AZIMUTH)])
-VIEWER = np.cross(RIGHT, UP)
 LIGHT = (VIEWER + UP) / np.linalg.norm(VIEWER + UP)
 
 
@@ -70,11 +66,10 @@ def draw_modes(body: ModalBody) -> Figure:
     for k in range(count):
         axes = _view(figure, (rows, COLUMNS, k + 1), f"{k + 1}: {body.frequency[k]:.5g} Hz, {body.family[k]}")
         axes.add_collection(LineCollection(list(outline), colors=GHOST, linewidths=0.5, zorder=0))
-        shape = body.mesh.mode_shapes[:, :, k]
-        size = np.linalg.norm(shape, axis=1)
+        displacement, size = drawn_mode(body.mesh.mode_shapes[:, :, k], body.length)
         if np.any(size):
-            colors = matplotlib.colormaps[ORDERED](size[cells].mean(axis=1) / size.max())[:, :3]
-            _draw_cells(axes, points + AMPLITUDE * body.length / size.max() * shape, cells, colors)
+            colors = matplotlib.colormaps[ORDERED](size[cells].mean(axis=1))[:, :3]
+            _draw_cells(axes, points + displacement, cells, colors)
         else:
             axes.text(0.5, 0.1, "the axis does not move", transform=axes.transAxes, ha="center")
         axes.update_datalim(frame)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..outline import points_outline
 from ..results_file import Array, Results
 from .figure_file import FigureRecord
 from .path import draw_paths
 from .style import legend, shades
-
-CURVE_POINTS = 41
 
 
 def draw_configurations(axes: Axes, figure: FigureRecord, results: Results) -> None:
@@ -33,13 +32,10 @@ def draw_configurations(axes: Axes, figure: FigureRecord, results: Results) -> N
 def body_shape(results: Results, points: str, body: str, k: int) -> tuple[Array, Array]:
     """Outline (m, 2) of a body at output k and the points (n, 2) where joints attach, in global axes (m).
 
-    Through root, mid and tip the parabola; of other bodies the straight lines between the named points.
+    The shape is that of `points_outline`.
     """
     names = {name.removeprefix(f"{body}."): name for name in results.names(points) if name.startswith(f"{body}.")}
     at = {label: results.data(f"{points}/{name}/position")[k] for label, name in names.items()}
     ends = np.array([position for label, position in at.items() if label != "mid"]).reshape(-1, 2)
-    if not {"root", "mid", "tip"} <= at.keys():
-        return ends, ends
-    s = np.linspace(0.0, 1.0, CURVE_POINTS)[:, None]
-    shape: Array = (1 - s) * (1 - 2 * s) * at["root"] + 4 * s * (1 - s) * at["mid"] + s * (2 * s - 1) * at["tip"]
-    return shape, ends
+    still = np.zeros((1, len(at), 2))
+    return points_outline(list(at), np.array(list(at.values())).reshape(-1, 2), still).at, ends

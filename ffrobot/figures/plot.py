@@ -1,17 +1,16 @@
-"""From a results file, or a modal body file, to a folder of figures, PNG and PDF."""
+"""From a results file, or a modal body file, to a folder of figures."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 
-import h5py
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
-from ..fe_models.modal_body_file import read_modal_body
-from ..files import write_atomically
+from ..fe_models.modal_body_file import is_modal_body_file, read_modal_body
+from ..files import check_folder, write_atomically
 from ..results_file import Results
 from .body_shape import draw_mesh, draw_modes
 from .configurations import draw_configurations
@@ -33,47 +32,51 @@ DRAW = {
 DRAW_WHOLE = {"bode": draw_bode, "modes": draw_robot_modes}  # with axes of their own
 
 # No dates and no versions: the same results give the same files.
-METADATA = {"png": {"Software": None}, "pdf": {"CreationDate": None, "Producer": None, "Creator": None}}
+METADATA = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+    "svg": {"Date": None, "Creator": None},
+}
+FORMATS = ("png", "pdf")  # unless asked for otherwise
 
 
-def plot_file(path: Path, folder: Path) -> list[Path]:
+def plot_file(path: Path, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
     """Draw the figures of a results file or of a modal body file, whichever it is, into `folder`: see the two."""
-    try:
-        with h5py.File(path, "r") as file:
-            is_body = file.attrs.get("format") == MODAL_FORMAT
-    except OSError:
-        is_body = False
-    return plot_modal_body(path, folder) if is_body else plot_results(path, folder)
+    plot = plot_modal_body if is_modal_body_file(path) else plot_results
+    return plot(path, folder, formats)
 
 
-def plot_modal_body(path: Path, folder: Path) -> list[Path]:
+def plot_modal_body(path: Path, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
     """Draw mesh and lowest modes of a modal body file into `folder`, which is made when absent.
 
-    Returns the files written, a PNG and a PDF of each. Raises `InputError` where the file cannot be read.
+    Returns the files written, each figure in all `formats`: "png", "pdf", "svg". Raises `InputError` where the file
+    cannot be read, or for another format.
     """
-    _check_folder(folder)
+    check_folder(folder)
+    _check_formats(formats)
     body = read_modal_body(path)
     with style():
         return [
-            *_write(draw_mesh(body), folder, "mesh"),
-            *_write(draw_modes(body), folder, "modes"),
+            *_write(draw_mesh(body), folder, "mesh", formats),
+            *_write(draw_modes(body), folder, "modes", formats),
         ]
 
 
-def plot_results(results_path: Path, folder: Path) -> list[Path]:
+def plot_results(results_path: Path, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
     """Draw the figures of a results file into `folder`, which is made when absent.
 
     A file `figures.toml` beside the results says which figures and how; without one, the standard figures are drawn.
-    Returns the files written, a PNG and a PDF of each figure. Raises `InputError` where the results or `figures.toml`
-    cannot be read, or name what is not there.
+    Returns the files written, each figure in all `formats`: "png", "pdf", "svg". Raises `InputError` where the results
+    or `figures.toml` cannot be read, or name what is not there, or for another format.
     """
-    _check_folder(folder)
+    check_folder(folder)
+    _check_formats(formats)
     figure_file = results_path.parent / "figures.toml"
     written: list[Path] = []
     with Results(results_path) as results, style():
         figures = load_figures(figure_file) if figure_file.is_file() else FigureFile(figure=standard_figures(results))
         for record in figures.figure:
-            written += _write(draw(record, results), folder, record.name)
+            written += _write(draw(record, results), folder, record.name, formats)
     return written
 
 
@@ -90,15 +93,15 @@ def draw(record: FigureRecord, results: Results) -> Figure:
     return picture
 
 
-def _check_folder(folder: Path) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: output: expected a folder, found a file")
+def _check_formats(formats: Sequence[str]) -> None:
+    if not formats or not set(formats) <= set(METADATA):
+        raise InputError(f'format: expected one or several of {", ".join(METADATA)}, found "{",".join(formats)}"')
 
 
-def _write(picture: Figure, folder: Path, name: str) -> list[Path]:
-    """The PNG and the PDF of a picture."""
-    paths = [folder / f"{name}.{extension}" for extension in METADATA]
-    for path, extension in zip(paths, METADATA, strict=True):
+def _write(picture: Figure, folder: Path, name: str, formats: Sequence[str]) -> list[Path]:
+    """A picture in all formats."""
+    paths = [folder / f"{name}.{extension}" for extension in formats]
+    for path, extension in zip(paths, formats, strict=True):
         write_atomically(path, _image(picture, extension), "figure", make_folder=True)
     return paths
 

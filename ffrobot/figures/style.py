@@ -35,6 +35,7 @@ SETTINGS: dict[str, Any] = {
     "legend.frameon": False,
     "savefig.dpi": 200,
     "pdf.fonttype": 42,
+    "svg.hashsalt": "ffrobot",  # the same figure gives the same file
 }
 
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..figures.palette import COLORS
 from ..results_file import Array
@@ -75,7 +76,7 @@ def plain(text: str) -> str:
     return escape(text, quote=False)
 
 
-def encoded(values: Array, kind: str = "f4") -> dict[str, str]:
+def encoded(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
     """Plotly's typed array: base64 of little-endian numbers, row by row; "f4" keeps 7 digits."""
     array = np.ascontiguousarray(values, dtype=f"<{kind}")
     entry = {"dtype": kind, "bdata": b64encode(array.tobytes()).decode("ascii")}

@@ -15,6 +15,7 @@ from ..results_file import Results
 from .histories import history_charts
 from .mechanism import mechanism
 from .modes import link_modes
+from .modes_3d import modes_3d
 from .runs import runs, sources
 from .tables import analyses_table, origins_table, peaks_table, voltages_table
 
@@ -53,6 +54,7 @@ def report(files: Sequence[Results]) -> str:
         plotly_js=get_plotlyjs(),
         plotly_version=get_plotlyjs_version(),
         page_js=(HERE / "page.js").read_text(encoding="utf-8"),
+        modes_3d_js=(HERE / "modes_3d.js").read_text(encoding="utf-8"),
         mechanism_js=(HERE / "mechanism.js").read_text(encoding="utf-8"),
         page_css=(HERE / "page.css").read_text(encoding="utf-8"),
         ffrobot_version=__version__,
@@ -63,11 +65,14 @@ def _content(files: Sequence[Results]) -> dict[str, Any]:
     """What the template fills in."""
     all_runs = runs(files)
     moving, modes, histories = mechanism(all_runs), link_modes(all_runs), history_charts(files)
+    shapes = modes_3d(modes)
     charts = [*histories, *(chart for link in modes for chart in link.charts)]
     return {
         "title": ", ".join(dict.fromkeys(results.name for results in files)),
         "mechanism": _script_data(moving.data),
         "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
+        "shapes": shapes["links"],
+        "modes_3d": _script_data(shapes),
         "histories": histories,
         "modes": modes,
         "analyses": analyses_table(all_runs),

@@ -46,12 +46,23 @@ def test_standard_figures_are_png_and_pdf(results, tmp_path):
     assert expected <= stems(written)
 
 
+def test_formats_are_those_asked_for(results, tmp_path):
+    figures_beside(results, '[[figure]]\nname = "a"\ncurves = [{ data = "inverse/joints/O/reaction", label = "" }]')
+    first, second = (plot_results(results, tmp_path / name, ["svg", "png"]) for name in ("first", "second"))
+    assert [path.name for path in first] == ["a.svg", "a.png"]
+    assert "<svg" in first[0].read_text(encoding="utf-8")
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+    with pytest.raises(InputError, match='format: expected one or several of png, pdf, svg, found "png,eps"'):
+        plot_results(results, tmp_path / "third", ["png", "eps"])
+    assert not (tmp_path / "third").exists()
+
+
 def test_figure_file_decides_what_is_drawn(results, tmp_path):
     case = CASES / "slider_crank"
     for name in ("figures.toml", "reference.csv"):
         shutil.copy(case / name, tmp_path)
     written = plot_results(results, tmp_path / "figures")
-    assert stems(written) == {"fig03_actuator_force", "fig04_slider_motion", "fig05_rod_midpoint"}
+    assert stems(written) == {"fig02_mechanism", "fig03_actuator_force", "fig04_slider_motion", "fig05_rod_midpoint"}
 
 
 def test_same_results_give_the_same_files(results, tmp_path):
@@ -62,7 +73,7 @@ def test_same_results_give_the_same_files(results, tmp_path):
 
 @pytest.mark.parametrize("case", ["two_link", "slider_crank"])
 def test_case_figures_are_those_of_the_paper(case):
-    numbers = {"two_link": range(8, 18), "slider_crank": range(3, 6)}[case]
+    numbers = {"two_link": range(7, 18), "slider_crank": range(2, 6)}[case]
     titles = [record.title for record in load_figures(CASES / case / "figures.toml").figure]
     assert [title.split(":")[0] for title in titles] == [f"Fig. {number}" for number in numbers]
 

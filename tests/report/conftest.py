@@ -11,6 +11,9 @@ from ffrobot.cli import cli
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 
+# Remarks of the browser on the speed of its own graphics, made where Plotly draws in space.
+GRAPHICS = ("willReadFrequently", "GPU stall due to ReadPixels", "software WebGL")
+
 
 @pytest.fixture(scope="session")
 def page(tmp_path_factory):
@@ -35,8 +38,10 @@ class Browser:
     def __init__(self):
         options = ChromeOptions()
         options.binary_location = CHROMIUM
-        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-                         "--force-device-scale-factor=1", "--window-size=1400,1000"):  # fmt: skip
+        # WebGL in software, with which Plotly draws in space.
+        for argument in ("--headless=new", "--enable-unsafe-swiftshader", "--no-sandbox", "--disable-gpu",
+                         "--disable-dev-shm-usage", "--force-device-scale-factor=1",
+                         "--window-size=1400,1000"):  # fmt: skip
             options.add_argument(argument)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         self.driver = Chrome(options=options, service=ChromeService(DRIVER))
@@ -71,7 +76,8 @@ class Browser:
     @property
     def complaints(self):
         """What the page wrote to the console."""
-        return [entry["message"] for entry in self.driver.get_log("browser")]
+        messages = [entry["message"] for entry in self.driver.get_log("browser")]
+        return [message for message in messages if not any(remark in message for remark in GRAPHICS)]
 
     def screenshot(self, selector):
         return self.driver.find_element("css selector", selector).screenshot_as_png

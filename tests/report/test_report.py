@@ -11,10 +11,10 @@ import pytest
 
 from ffrobot.cli import cli
 from ffrobot.errors import InputError, SolveError
+from ffrobot.motion import hanging
+from ffrobot.outline import body_outline, points_outline
 from ffrobot.report import write_report
 from ffrobot.report.charts import MAX_POINTS, kept_outputs
-from ffrobot.report.mechanism import hanging
-from ffrobot.report.outline import body_outline, points_outline
 from ffrobot.report.runs import distinct_parts, runs, targets
 from ffrobot.report.tables import peaks_table
 from ffrobot.results_file import Results

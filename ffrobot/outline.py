@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..fe_models.modal_body import ModalBody
-from ..results_file import Array
+from .fe_models.modal_body import ModalBody
+from .results_file import Array
 
 CURVE_POINTS = 41
 

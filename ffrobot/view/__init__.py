@@ -1,0 +1,5 @@
+"""Three-dimensional output for ParaView and PyVista: `ffrobot view`."""
+
+from .view import Options, Viewed, view_file
+
+__all__ = ["Options", "Viewed", "view_file"]

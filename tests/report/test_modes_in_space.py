@@ -1,0 +1,122 @@
+"""Modes in space: what the page is given, coarse where meshes are large, and what the browser draws of it."""
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ffrobot.body_surface import AMPLITUDE, body_surface, drawn_mode
+from ffrobot.report.modes_3d import MAX_TRIANGLES, coarsened
+from ffrobot.results_file import Results
+
+
+def bar(n, m):
+    """Surface of a bar 1 × 0.02 × 0.03 m of n × m × m squares, in triangles."""
+    size = np.array([1.0, 0.02, 0.03])
+    faces, points = [], []
+    for axis in range(3):
+        u, v = (a for a in range(3) if a != axis)
+        counts = [n if a == 0 else m for a in (u, v)]
+        for end in (0.0, 1.0):
+            grid = np.stack(np.meshgrid(*(np.linspace(0, 1, c + 1) for c in counts), indexing="ij"), axis=-1).reshape(
+                -1, 2
+            )
+            at = np.full((len(grid), 3), end)
+            at[:, [u, v]] = grid
+            i, j = np.meshgrid(np.arange(counts[0]), np.arange(counts[1]), indexing="ij")
+            first = (i * (counts[1] + 1) + j).ravel() + sum(map(len, points))
+            step = counts[1] + 1
+            faces += [
+                np.stack([first, first + 1, first + step], 1),
+                np.stack([first + 1, first + step + 1, first + step], 1),
+            ]
+            points.append(at * size)
+    merged, inverse = np.unique(np.concatenate(points).round(9), axis=0, return_inverse=True)
+    return merged, inverse.ravel()[np.concatenate(faces)]
+
+
+def test_large_surfaces_become_coarse_and_keep_their_section():
+    points, triangles = bar(400, 20)
+    assert len(triangles) > 8 * MAX_TRIANGLES
+    kept, coarse = coarsened(points, triangles)
+    assert MAX_TRIANGLES / 3 < len(coarse) <= MAX_TRIANGLES
+    assert np.ptp(points[kept], axis=0) == pytest.approx([1.0, 0.02, 0.03], rel=0.05)
+    assert coarse.max() == len(kept) - 1
+    a, b, c = points[kept][coarse].transpose(1, 0, 2)
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+    assert area == pytest.approx(2 * (0.02 + 0.03) + 2 * 0.02 * 0.03, rel=0.1)  # still all the way around
+
+
+def test_small_surfaces_stay_as_they_are():
+    points, triangles = bar(20, 2)
+    kept, same = coarsened(points, triangles)
+    np.testing.assert_array_equal(points[kept][same], points[triangles])
+
+
+@pytest.fixture
+def shown(browser, page, solid_arm):
+    """The page of a solid link, its modes in space drawn."""
+    browser.open(page(solid_arm / "scene.results.h5"))
+    browser.run("modeStage.scrollIntoView()")
+    browser.wait("modeStage.data && modeStage.data.length === 2")
+    return browser
+
+
+def choose(browser, element, value):
+    browser.run(
+        "const box = document.getElementById(arguments[0]); box.value = arguments[1];"
+        'box.dispatchEvent(new Event("change"))',
+        element, value,
+    )  # fmt: skip
+
+
+def drawn(browser):
+    return np.array(browser.value("[0, 1, 2].map((c) => Array.from(modeStage.data[1]['xyz'[c]]))")).T
+
+
+def test_modes_are_those_of_the_link(shown, solid_arm):
+    with Results(solid_arm / "scene.results.h5") as results:
+        body = results.modal_body("arm")
+    mesh = body_surface(body)
+    names = shown.value("[...document.querySelectorAll('#mode-number option')].map((option) => option.textContent)")
+    assert names == [f"{k + 1}: {f:.5g} Hz, {body.family[k]}" for k, f in enumerate(body.frequency)]
+    for k, amplitude in ((0, 1.0), (1, 1.0), (3, -0.5)):
+        choose(shown, "mode-number", k)
+        shown.slide("mode-amplitude", amplitude)
+        shown.wait(f"modeState.mode === {k} && modeState.amplitude === {amplitude}")
+        displacement, size = drawn_mode(mesh.mode_shapes[:, :, k], body.length)
+        # Modes have 16 bits: the largest displacement is 32767 steps.
+        expected = mesh.points + amplitude * displacement
+        np.testing.assert_allclose(drawn(shown), expected, rtol=0, atol=AMPLITUDE * body.length / 32767)
+        intensity = np.array(shown.value("Array.from(modeStage.data[1].intensity)"))
+        np.testing.assert_allclose(intensity, size, rtol=0, atol=1e-4)
+    assert shown.complaints == []
+
+
+def test_picture_of_a_mode_moves_with_the_slider(shown):
+    pictures = []
+    for amplitude in (1, -1):
+        shown.slide("mode-amplitude", amplitude)
+        shown.wait(f"modeState.amplitude === {amplitude}")
+        image = np.asarray(Image.open(io.BytesIO(shown.screenshot("#modes-3d"))).convert("RGB"), dtype=int)
+        pictures.append(np.ptp(image[:, :800], axis=2) > 60)  # coloured, without the colour bar
+    up, down = pictures
+    assert up.sum() > 2000
+    assert down.sum() > 2000
+    assert (up & ~down).sum() > 1000
+
+
+def test_play_swings_the_mode(shown):
+    shown.run("document.getElementById('mode-play').click()")
+    shown.wait("modeState.playing && modeState.amplitude !== 1")
+    shown.run("document.getElementById('mode-play').click()")
+    assert shown.value("modeState.playing") is False
+
+
+def test_page_of_a_solid_stays_small(page, solid_arm):
+    """Plotly itself takes 4.9 MB; surface and modes of a link at most half a megabyte."""
+    text = page(solid_arm / "scene.results.h5").read_text(encoding="utf-8")
+    begin = text.index('id="modes-3d-data"')
+    assert text.index("</script>", begin) - begin < 0.5e6
+    assert len(text) < 6e6

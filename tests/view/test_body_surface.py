@@ -1,0 +1,81 @@
+"""Sections swept along beams: they are closed, have the right volume, and their corners move as plane sections do."""
+
+import numpy as np
+import pytest
+
+from ffrobot import make_link
+from ffrobot.body_surface import AMPLITUDE, body_surface, drawn_mode
+
+STEEL = "material = { youngs_modulus = 2.1e11, poissons_ratio = 0.3, density = 7850.0 }\n"
+RECTANGLE = 'section = { shape = "rectangle", height = 0.02, width = 0.03 }'
+TUBE = 'section = { shape = "tube", outer = 0.04, inner = 0.03 }'
+STEPPED = f"segment = [{{ until = 0.25, {TUBE} }}, {{ until = 1.0, {RECTANGLE} }}]"
+
+
+@pytest.fixture(scope="module")
+def beam(tmp_path_factory):
+    """Make a beam of the given geometry with six modes of all families."""
+    folder = tmp_path_factory.mktemp("beams")
+
+    def make(geometry):
+        path = folder / "beam.toml"
+        path.write_text(
+            f'name = "beam"\n{STEEL}geometry = {{ kind = "beam", length = 1.0, {geometry} }}\n'
+            'mesh = { elements = 4 }\nreference = { condition = "cantilever" }\n'
+            'modes = { count = 12, family = "all" }\n',
+            encoding="utf-8",
+        )
+        return make_link(path).body
+
+    return make
+
+
+def volume(mesh):
+    """∫ x·n dA / 3 over the faces: the mean of the two ways to divide a quadrilateral."""
+    corners = mesh.points[mesh.cells]
+    a, b, c, d = corners.transpose(1, 0, 2)
+    first = np.einsum("ci,ci->", a, np.cross(b, c) + np.cross(c, d))
+    other = np.einsum("ci,ci->", b, np.cross(c, d) + np.cross(d, a))
+    return (first + other) / 12
+
+
+def polygon(diameter, q=16):
+    return q / 8 * diameter**2 * np.sin(2 * np.pi / q)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "expected"),
+    [
+        (RECTANGLE, 0.02 * 0.03),
+        (TUBE, polygon(0.04)),
+        (STEPPED, 0.25 * polygon(0.04) + 0.75 * 0.02 * 0.03),
+    ],
+    ids=["rectangle", "tube", "stepped"],
+)  # fmt: skip
+def test_surface_is_closed_and_holds_the_volume(beam, geometry, expected):
+    mesh = body_surface(beam(geometry))
+    assert volume(mesh) == pytest.approx(expected, rel=1e-12)  # positive: normals point outwards
+    sides = np.stack([mesh.cells, np.roll(mesh.cells, -1, axis=1)], axis=2).reshape(-1, 2)
+    assert {tuple(side) for side in sides} == {tuple(side[::-1]) for side in sides}  # each once in either direction
+
+
+def test_corners_move_with_their_section(beam):
+    """All six motions at once, of a place that is a station: Φ + θ × a."""
+    body = beam(RECTANGLE)
+    p = 1e-3 * np.arange(1.0, 13.0)
+    mesh, place = body_surface(body), body.interpolate(0.5)
+    ring = np.flatnonzero(np.abs(mesh.points[:, 0] - 0.5) < 1e-12)
+    arm = mesh.points[ring] - [0.5, 0.0, 0.0]
+    assert {tuple(a) for a in arm.round(12)} == {(0.0, y, z) for y in (-0.01, 0.01) for z in (-0.015, 0.015)}
+    assert {"torsion", "in-plane-bending", "out-of-plane-bending"} <= set(body.family)
+    expected = place.translation @ p + np.cross(place.rotation @ p, arm)
+    np.testing.assert_allclose(mesh.mode_shapes[ring] @ p, expected, rtol=0, atol=1e-12)
+
+
+def test_modes_are_drawn_equally_large(beam):
+    mesh = body_surface(beam(RECTANGLE))
+    for k in range(12):
+        displacement, size = drawn_mode(mesh.mode_shapes[:, :, k], 1.0)
+        assert np.linalg.norm(displacement, axis=1).max() == pytest.approx(AMPLITUDE)
+        assert size.max() == 1.0
+    assert not drawn_mode(np.zeros((3, 3)), 1.0).displacement.any()

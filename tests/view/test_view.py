@@ -1,0 +1,228 @@
+"""`ffrobot view`: grids read back with VTK's own reader hold what was solved; pictures show it."""
+
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from PIL import Image
+
+from ffrobot.cli import cli
+from ffrobot.errors import InputError, SolveError
+from ffrobot.mbs.stress import von_mises
+from ffrobot.results_file import Results
+from ffrobot.view import Options, view_file
+
+GRIDS = Options(pictures=False)
+DIGITS = 2e-7  # numbers in the files have 7 digits; lengths are about 1 m
+
+
+@pytest.fixture(scope="module")
+def read():
+    """Read a .vtkhdf file with VTK: for each time step its time, points, point data and cell data."""
+    hdf = pytest.importorskip("vtkmodules.vtkIOHDF")
+    numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
+
+    def arrays(data):
+        found = [data.GetArray(i) for i in range(data.GetNumberOfArrays())]
+        return {array.GetName(): numpy_support.vtk_to_numpy(array).copy() for array in found}
+
+    def steps(path):
+        reader = hdf.vtkHDFReader()
+        reader.SetFileName(str(path))
+        reader.UpdateInformation()
+        for step in range(reader.GetNumberOfSteps()):
+            reader.SetStep(step)
+            reader.Update()
+            grid = reader.GetOutputDataObject(0)
+            points = numpy_support.vtk_to_numpy(grid.GetPoints().GetData()).copy()
+            yield reader.GetTimeValue(), grid, points, arrays(grid.GetPointData()), arrays(grid.GetCellData())
+
+    return lambda path: list(steps(path))
+
+
+@pytest.fixture(scope="module")
+def two_link_grids(two_link, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("view")
+    options = Options(analysis="joints_only", frames=5, pictures=False)
+    viewed = view_file(two_link.folder / "scene.results.h5", folder, options)
+    assert viewed.paths == [folder / "joints_only.vtkhdf", folder / "joints_only.xdmf"]
+    return viewed.paths[0]
+
+
+def axis(points):
+    """Middles of the rings of four corners that a rectangular beam is swept from."""
+    return points.reshape(-1, 4, 3).mean(axis=1)
+
+
+def test_beams_are_where_they_were_solved(read, two_link, two_link_grids):
+    """Ends of the axes against the points of the solver; every corner against R + A (x + Φ p + θ × a)."""
+    steps, file = read(two_link_grids), two_link.file["joints_only"]
+    assert [time for time, *_ in steps] == [0.0, 0.25, 0.5, 0.75, 1.0]
+    with Results(two_link.folder / "scene.results.h5") as results:
+        bodies = [results.modal_body(name) for name in ("link1", "link2")]
+    for time, grid, points, _, cells in steps:
+        row = round(1000 * time)
+        assert grid.GetNumberOfPoints() == 8 * 61  # stations of 20 elements
+        assert set(cells["body"]) == {0, 1}
+        for number, name in enumerate(("link1", "link2")):
+            corners = points[244 * number : 244 * (number + 1)]
+            for end, point in ((0, "root"), (-1, "tip")):
+                at = file[f"points/{name}.{point}/position"][row]
+                np.testing.assert_allclose(axis(corners)[end], [*at, 0.0], rtol=0, atol=DIGITS)
+            place, p = bodies[number].interpolate(0.35), file[f"bodies/{name}/modal"][row]
+            moved = place.translation @ p + np.cross(place.rotation @ p, [0.0, 0.0075, 0.0125])
+            at = np.array([0.35, 0.0075, 0.0125]) + moved
+            c, s = np.cos(file[f"bodies/{name}/angle"][row]), np.sin(file[f"bodies/{name}/angle"][row])
+            turned = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ at
+            expected = turned + np.append(file[f"bodies/{name}/position"][row], 0.0)
+            assert np.linalg.norm(corners - expected, axis=1).min() < DIGITS  # 0.35 m: a node of the beam
+
+
+def test_exaggeration_keeps_joints_shut(read, two_link, two_link_grids):
+    """At 20 times the deflection, too, link 2 begins where link 1 ends, and link 1 stays on the ground."""
+    for time, _, points, data, _ in read(two_link_grids):
+        shown = points + 19.0 * data["exaggeration"]
+        link1, link2 = axis(shown[:244]), axis(shown[244:])
+        np.testing.assert_allclose(link1[0], 0.0, rtol=0, atol=20 * DIGITS)
+        np.testing.assert_allclose(link2[0], link1[-1], rtol=0, atol=20 * DIGITS)
+        (row,) = two_link.rows("joints_only", [time])
+        deflection = two_link.file["joints_only/points/link2.tip/deflection"][row]
+        moved = axis(data["deflection"][244:])[-1]
+        assert np.linalg.norm(moved) == pytest.approx(np.linalg.norm(deflection), abs=DIGITS)
+
+
+def test_solid_deforms_with_its_modes_and_carries_its_stress(read, solid_arm, tmp_path):
+    path = solid_arm / "scene.results.h5"
+    grid, _ = view_file(path, tmp_path, GRIDS).paths
+    with Results(path) as results:
+        body, p = results.modal_body("arm"), results["inverse/bodies/arm/modal"]
+        R, theta = results["inverse/bodies/arm/position"], results["inverse/bodies/arm/angle"]
+    steps = read(grid)
+    assert len(steps) == 11
+    for k, (_, _, points, data, _) in enumerate(steps):
+        x = body.mesh.points + body.mesh.mode_shapes @ p[k]
+        c, s = np.cos(theta[k]), np.sin(theta[k])
+        expected = np.stack([R[k, 0] + c * x[:, 0] - s * x[:, 1], R[k, 1] + s * x[:, 0] + c * x[:, 1], x[:, 2]], axis=1)
+        np.testing.assert_allclose(points, expected, rtol=0, atol=DIGITS)
+        np.testing.assert_allclose(data["von_mises"], von_mises(body.surface_stress @ p[k]), rtol=1e-6)
+    assert max(np.linalg.norm(data["deflection"], axis=1).max() for _, _, _, data, _ in steps) > 1e-3
+
+
+def test_closed_loop_with_rigid_bodies(read, slider_crank, tmp_path):
+    """Crank and slider have no surface: a line, and a point that is where the slider is."""
+    grid, *_ = view_file(slider_crank.folder / "scene.results.h5", tmp_path, GRIDS).paths
+    time, data, points, _, cells = read(grid)[-1]
+    kinds = [data.GetCellType(i) for i in range(data.GetNumberOfCells())]
+    assert {kind for kind, body in zip(kinds, cells["body"], strict=True) if body == 1} == {9}  # quadrilaterals
+    assert kinds[-1] == 1  # a vertex
+    np.testing.assert_allclose(points[-1, 0], 0.35 - 0.12 * np.sin(100 * time), rtol=0, atol=1e-6)  # scene.toml
+
+
+def corners(grid):
+    cells = [grid.GetCell(i) for i in range(grid.GetNumberOfCells())]
+    return [[cell.GetPointId(c) for c in range(cell.GetNumberOfPoints())] for cell in cells]
+
+
+def test_xdmf_says_the_same(read, slider_crank, tmp_path):
+    """Read by VTK's reader of XDMF 2, as in ParaView before 5.12: lines, quadrilaterals and a point, at every step."""
+    xdmf = pytest.importorskip("vtkmodules.vtkIOXdmf2")
+    numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
+    options = Options(analysis="inverse", frames=3, pictures=False)
+    grid, index = view_file(slider_crank.folder / "scene.results.h5", tmp_path, options).paths
+    reader = xdmf.vtkXdmfReader()
+    reader.SetFileName(str(index))
+    reader.UpdateInformation()
+    for time, expected, points, data, cells in read(grid):
+        reader.UpdateTimeStep(time)
+        found = reader.GetOutputDataObject(0)
+        kinds = [[g.GetCellType(i) for i in range(g.GetNumberOfCells())] for g in (found, expected)]
+        assert [{2: 1, 4: 3}.get(kind, kind) for kind in kinds[0]] == kinds[1]  # XDMF has points and lines as "poly"
+        np.testing.assert_array_equal(numpy_support.vtk_to_numpy(found.GetPoints().GetData()), points)
+        moved = numpy_support.vtk_to_numpy(found.GetPointData().GetArray("exaggeration"))
+        np.testing.assert_array_equal(moved, data["exaggeration"])
+        np.testing.assert_array_equal(numpy_support.vtk_to_numpy(found.GetCellData().GetArray("body")), cells["body"])
+        assert corners(found) == corners(expected)
+
+
+def test_modal_body_has_its_modes_as_vectors(read, solid_arm, tmp_path):
+    with Results(solid_arm / "scene.results.h5") as results:
+        body, path = results.modal_body("arm"), results.modal_files["arm"].path
+    cli(["view", str(path), "-o", str(tmp_path / "v"), "--no-pictures"], standalone_mode=False)
+    ((_, grid, points, data, _),) = read(tmp_path / "v" / "arm.vtkhdf")
+    np.testing.assert_allclose(points, body.mesh.points, rtol=0, atol=DIGITS)
+    assert grid.GetNumberOfCells() == len(body.mesh.cells)
+    assert sorted(data) == [f"mode {k + 1:02d}, {body.frequency[k]:.5g} Hz, {body.family[k]}" for k in range(4)]
+    for k, name in enumerate(sorted(data)):
+        np.testing.assert_allclose(data[name], body.mesh.mode_shapes[:, :, k], rtol=0, atol=1e-6)
+
+
+def test_body_without_its_file_is_drawn_through_its_points(read, two_link, tmp_path):
+    path = shutil.copy(two_link.folder / "scene.results.h5", tmp_path)
+    with h5py.File(path, "r+") as file:
+        file.attrs["modal_bodies"] = file.attrs["modal_bodies"].replace('.h5"', '.gone.h5"')
+    viewed = view_file(path, tmp_path / "view", Options(analysis="inverse", frames=2, pictures=False))
+    assert [note.split(":")[0] for note in viewed.notes] == [
+        f"link{k} is drawn through its points only" for k in (1, 2)
+    ]
+    _, _, points, _, _ = read(viewed.paths[0])[-1]
+    at = two_link.file["inverse/points/link2.tip/position"][-1]
+    np.testing.assert_allclose(points[-1, :2], at, rtol=0, atol=DIGITS)
+
+
+def test_same_results_give_the_same_file(solid_arm, tmp_path):
+    first, second = (view_file(solid_arm / "scene.results.h5", tmp_path / name, GRIDS).paths for name in "ab")
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+
+
+@pytest.fixture(scope="module")
+def can_draw():
+    """Whether PyVista draws here; only a machine without it, or without OpenGL, may skip."""
+    pytest.importorskip("pyvista")
+    if not list(Path("/usr/lib").glob("*/libEGL_mesa*")):
+        pytest.skip("no EGL on this machine")
+
+
+@pytest.mark.usefixtures("can_draw")
+def test_picture_shows_the_arm_exaggerated(solid_arm, tmp_path, capsys):
+    """In colour as exaggerated, in grey outline as it was: 1 mm of 400 mm, 60 times, is far to be seen at the tip."""
+    arguments = ["view", solid_arm / "scene.results.h5", "-o", tmp_path, "--scale", 60, "--pictures"]
+    cli([str(argument) for argument in arguments], standalone_mode=False)
+    assert capsys.readouterr().out.split() == [
+        str(tmp_path / name) for name in ("inverse.vtkhdf", "inverse.xdmf", "inverse.png")
+    ]
+    image = np.asarray(Image.open(tmp_path / "inverse.png").convert("RGB"), dtype=int)[30:700, 200:]
+    spread = np.ptp(image, axis=2)
+    colored, grey = spread > 40, (spread < 10) & (image[..., 0] > 80) & (image[..., 0] < 220)
+    columns = np.flatnonzero(colored.any(axis=0))
+    tip = slice(columns[-1] - 100, columns[-1])
+    assert colored.sum() > 20_000
+    upper, lower = (np.nonzero(part[:, tip])[0].mean() for part in (colored, grey))
+    assert 100 < lower - upper < 250  # 60 mm where the arm of 400 mm is about 1050 pixels long
+
+
+@pytest.mark.usefixtures("can_draw")
+def test_machine_without_opengl_gets_grids_and_a_clear_message(solid_arm, tmp_path, monkeypatch):
+    """VTK ends the process that draws, by a real crash: told to use OSMesa, which is not here."""
+    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
+    if list(Path("/usr/lib").glob("*/libOSMesa*")):
+        pytest.skip("OSMesa is installed here")
+    path = solid_arm / "scene.results.h5"
+    viewed = view_file(path, tmp_path / "a")
+    assert [p.name for p in viewed.paths] == ["inverse.vtkhdf", "inverse.xdmf"]
+    assert "expected OpenGL through EGL" in viewed.notes[0]
+    with pytest.raises(SolveError, match="PyVista cannot draw on this machine"):
+        view_file(path, tmp_path / "b", Options(pictures=True))
+    assert {p.name for p in (tmp_path / "b").iterdir()} == {"inverse.vtkhdf", "inverse.xdmf"}
+
+
+def test_what_is_refused(solid_arm, tmp_path):
+    path = solid_arm / "scene.results.h5"
+    with pytest.raises(InputError, match='expected one of inverse, found "invers"'):
+        view_file(path, tmp_path / "a", Options(analysis="invers"))
+    with pytest.raises(InputError, match="expected a folder, found a file"):
+        view_file(path, path)
+    with pytest.raises(InputError, match="expected a results file, found no such file"):
+        view_file(tmp_path / "none.h5", tmp_path / "a")
+    assert not (tmp_path / "a").exists()
