@@ -74,7 +74,7 @@ def _inversion(outcome: Outcome, inversion: Inversion) -> str:
     error = np.abs(path_error(inversion, outcome.time, outcome.q)).max()
     left = f"largest error of the path {error:.2g}"
     if is_minimum_phase(linear):
-        output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the deflections"
+        output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the vibration"
         return f"{output}: minimum phase, integrated forward; {left}"
     return (
         f"not minimum phase, zeros at {describe_zeros(linear)} 1/s; stable inversion with"

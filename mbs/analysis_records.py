@@ -30,7 +30,7 @@ class Analysis(ClosedLoopKeys):
     leaves of vibrations far above one over its size.
 
     Of kind "motors-only": `output` "tip" has the path's own points follow it, "redefined" where they would be with
-    `factor` times the deflections (the largest that is minimum phase where none is given). `pre_actuation` and
+    `factor` times the vibration (nine tenths of the largest that is minimum phase where none is given). `pre_actuation` and
     `post_actuation` (s) are how long motors act before and after the path, which is held there; where they are not
     given, as long as the zero dynamics asks for.
 

@@ -26,6 +26,7 @@ from .stable_inversion import Inversion, Linearisation, invert, linearise
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
 FACTOR_STEP = 0.02  # of the search for the largest factor
+MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
 GROWTH = 1.0  # ln of what a motion of the zero dynamics may grow by along a path and count as bounded
 REST = 1e-9  # speed of a path at rest, relative to its mean speed
 
@@ -73,7 +74,7 @@ def _output(model: Model, analysis: Analysis) -> tuple[Servo, Linearisation]:
         servo = make_servo(model, end, max(0.0, 1.0 - k * FACTOR_STEP))
         linear = linearise(servo, end)
         if is_minimum_phase(linear):
-            return _with_expected_deflections(servo, linear)
+            return _with_expected_deflections(replace(servo, factor=MARGIN * servo.factor), linear)
     raise InputError(
         f'{model.scene.path}: analysis "{analysis.name}": output: expected a robot whose joint motion is minimum phase'
         f' for "redefined", found zeros in the right half plane even then: {describe_zeros(linear)}'
