@@ -12,7 +12,8 @@ from types import FrameType
 import click
 
 from .errors import FfrobotError
-from .parallel import end_all, is_first
+from .logs import LOGGER, logging_options
+from .parallel import end_all, is_first, on_first
 
 FILE = click.Path(path_type=Path)
 
@@ -33,6 +34,7 @@ def cli() -> None:
 @click.argument("link_file", metavar="LINK.toml", type=FILE)
 @click.option("-o", "--output", metavar="BODY.h5", type=FILE, help="Where to write [LINK.h5 beside the input].")
 @click.option("--force", is_flag=True, help="Compute even if the file is up to date.")
+@logging_options
 def link(link_file: Path, output: Path | None, force: bool) -> None:
     """Compute the modal body file of one link (stage 1).
 
@@ -62,6 +64,7 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     type=FILE,
     help="Where to write [SCENE.results.h5 beside the input].",
 )
+@logging_options
 def solve(scene_file: Path, output: Path | None) -> None:
     """Run the analyses of a scene (stage 2).
 
@@ -146,6 +149,56 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
 
 
 @cli.command()
+@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@click.option("--vary", metavar="KEY=VALUES", multiple=True, required=True, help="What takes which values; repeatable.")
+@click.option("--sample", metavar="N", type=click.IntRange(1), help="N points of a Latin hypercube, not the full grid.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the sample.")
+@click.option("--collect", metavar="DATASET[:max|rms|first|last]", multiple=True, help="Further columns; repeatable.")
+@click.option("-j", "--processes", type=click.IntRange(1), default=1, show_default=True, help="Runs side by side.")
+@click.option("--retry", is_flag=True, help="Run again what failed before.")
+@click.option("--keep/--no-keep", default=True, show_default=True, help="Whether results files of the runs stay.")
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder of the sweep [SCENE.sweep beside the input].")
+@logging_options
+def sweep(
+    scene_file: Path,
+    vary: tuple[str, ...],
+    sample: int | None,
+    seed: int,
+    collect: tuple[str, ...],
+    processes: int,
+    retry: bool,
+    keep: bool,
+    output: Path | None,
+) -> None:
+    r"""Solve a scene many times with some of its keys varied; one table of all runs, failed ones too.
+
+    \b
+    --vary links.link1.geometry.section.height=0.01:0.03:9   a key of a body's link file, 9 values
+    --vary pzt.link1.thickness=1e-4:1e-3:5:log               evenly spaced in the logarithm
+    --vary 'initial.state="static","undeformed"'             a list
+    --vary gravity.1=-9.81,0                                 an entry of a list by its number, from 0
+
+    Entries of lists of tables go by their name or body. The same command takes up a sweep that was stopped. Runs go
+    side by side with -j on one machine, and on several under mpirun, where the first process hands them out.
+    """
+    from .progress import Display
+    from .summary import summary_console
+    from .sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep
+
+    folder = output or scene_file.with_suffix(".sweep")
+    plan = on_first(lambda: plan_sweep(scene_file, vary, folder, sample, seed, collect))
+    if retry and is_first():
+        forget_failures(plan)
+    with Display() as display:
+        rows = run_sweep(plan, processes, display)
+    if not is_first():
+        return
+    if not keep:
+        drop_results(plan)
+    print_table(plan.table, plan.keys, rows, plan.collected, summary_console())
+
+
+@cli.command()
 @click.argument("kind", type=click.Choice(["link", "scene"]))
 def schema(kind: str) -> None:
     r"""Print the JSON schema of link or scene files, for editors.
@@ -181,9 +234,11 @@ def main() -> None:
             click.echo("ffrobot: stopped", err=True)
             sys.exit(130)
         if not isinstance(error, FfrobotError):
+            LOGGER.error("failed", exc_info=True)
             traceback.print_exc()
             end_all()
             sys.exit(1)
         if is_first():
+            LOGGER.error("%s", error)
             click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)

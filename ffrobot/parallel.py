@@ -44,6 +44,11 @@ def on_first(work: Callable[[], T]) -> T:
     return cast(T, result)
 
 
+def environment_without_mpi() -> dict[str, str]:
+    """The environment for a process of its own: what a library's MPI has left in this one would make it join in."""
+    return {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PMI_", "PRTE_"))}
+
+
 def end_all() -> None:
     """End every process of the run: after an error that only this one has seen the others would wait for ever."""
     if processes() > 1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -11,6 +12,9 @@ from .solution import Watcher
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
+
+
+logger = logging.getLogger(__name__)
 
 
 class Display(Watcher):
@@ -36,6 +40,7 @@ class Display(Watcher):
 
     def stage(self, title: str) -> None:
         """Replace what is shown by `title`, with a pulse until a time is known."""
+        logger.info("%s", title)
         if self._progress is None:
             return
         if self._task is not None:

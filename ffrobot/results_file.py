@@ -12,7 +12,7 @@ from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -22,6 +22,9 @@ from .errors import InputError
 from .fe_models.modal_body import ModalBody
 from .fe_models.modal_body_file import read_modal_body
 from .validation import did_you_mean
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Array = NDArray[np.float64]
 
@@ -166,7 +169,7 @@ class Results:
         return values[:, k : k + 1]
 
     def columns(self, analysis: str) -> dict[str, Array]:
-        """Everything an analysis holds over time, one (T,) array each; `pandas.DataFrame` takes it as it is.
+        """Everything an analysis holds over time, one (T,) array each.
 
         The name is the dataset's inside the analysis, with the column where it has several:
         `points/link2.tip/position[0]`.
@@ -183,6 +186,12 @@ class Results:
 
         self._file[analysis].visititems(collect)
         return found
+
+    def frame(self, analysis: str) -> DataFrame:
+        """`columns` of an analysis as a table of pandas, by time (s)."""
+        from pandas import DataFrame
+
+        return DataFrame(self.columns(analysis)).set_index("time")
 
     def _near(self, dataset: str) -> str:
         known: list[str] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -43,6 +44,8 @@ from .validation import did_you_mean, quoted
 Array = NDArray[np.float64]
 
 ALLOCATED = ("pcid", "fcid", "static")  # kinds of analysis whose forces patches and actuation points have to meet
+
+logger = logging.getLogger(__name__)
 
 
 class Watcher:
@@ -145,9 +148,18 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             solution.placements[analysis.name] = _place(solution, analysis.placement, outcome)
         solution.stresses[analysis.name] = _stresses(solution, outcome)
         solution.seconds[analysis.name] = time.perf_counter() - started
+        _log(outcome)
         if outcome.status != "completed":
             break
     return True
+
+
+def _log(outcome: Outcome) -> None:
+    logger.info(
+        'analysis "%s": %s at t = %g s, %d steps, %d rejected, %d evaluations, %.3f s; integrator %s: %s',
+        outcome.analysis.name, outcome.status, outcome.time[-1], outcome.steps, outcome.rejected, outcome.evaluations,
+        outcome.wall_seconds, outcome.integrator.name, outcome.integrator.reason,
+    )  # fmt: skip
 
 
 def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:

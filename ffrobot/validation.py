@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, get_args
@@ -56,11 +56,16 @@ def load_toml(path: Path, kind: str) -> dict[str, Any]:
         raise InputError(f"{path}: not a valid TOML {kind}: {error}") from None
 
 
-def validate(record: type[R], data: dict[str, Any], path: Path) -> R:
-    """Build `record` from `data`, read from `path`; an `InputError` lists every wrong key."""
+def validate(record: type[R], data: dict[str, Any], path: Path, objects: Mapping[str, object] | None = None) -> R:
+    """Build `record` from `data`, read from `path`; an `InputError` lists every wrong key.
+
+    `objects` are what TOML cannot hold, by the text that stands for them in `data`; validators find them in their
+    context.
+    """
+    context = {"folder": path.parent, "objects": objects or {}}
     try:
         # By way of JSON, whose strict mode reads lists as tuples and text as paths; TOML has no types for these either.
-        return record.model_validate_json(json.dumps(data, default=str), context={"folder": path.parent})
+        return record.model_validate_json(json.dumps(data, default=str), context=context)
     except ValidationError as error:
         problems = [_describe(item, record, data) for item in error.errors(include_url=False)]
         raise InputError("\n".join(f"{path}: {line}" for line in _merge(problems))) from None

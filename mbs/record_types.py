@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
 from ..validation import Record, existing_file, quoted
 from ._core import TimeFunction
-from .time_functions import Waypoints, load_waypoints, parse_expression
+from .time_functions import Waypoints, load_waypoints, parse_expression, user_function
 
 GROUND = "ground"
 
@@ -24,9 +24,12 @@ def split_point(reference: str) -> tuple[str, str]:
     return body, point
 
 
-def _time_function(value: object) -> TimeFunction:
+def _time_function(value: object, info: ValidationInfo) -> TimeFunction:
     if isinstance(value, TimeFunction):
         return value
+    objects = (info.context or {}).get("objects", {})
+    if isinstance(value, str) and value in objects:
+        return user_function(objects[value])
     if isinstance(value, str):
         return parse_expression(value)
     if isinstance(value, int | float) and not isinstance(value, bool):

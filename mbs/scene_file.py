@@ -37,33 +37,39 @@ def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # n
     """A scene from Python, with the keys of a scene file: tables are dictionaries, arrays of tables lists of them.
 
     Files it names are looked for in `folder`. NumPy numbers and arrays, tuples and paths may stand for numbers, lists
-    and text; keys that are None are left out. Raises `InputError` as `load_scene` does.
+    and text; keys that are None are left out. Functions may stand for expressions: see `time_functions.user_function`.
+    Raises `InputError` as `load_scene` does.
     """
     import tomli_w
 
     path = Path(folder) / MADE_IN_PYTHON
+    functions: dict[str, object] = {}
     try:
-        text = tomli_w.dumps(_plain(keys))
+        text = tomli_w.dumps(_plain(keys, functions))
     except TypeError as error:
         raise InputError(f"{path}: expected numbers, text, lists and tables, found something else: {error}") from None
-    return _scene(tomllib.loads(text), path, text)
+    return _scene(tomllib.loads(text), path, text, functions)
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401 (whatever TOML may hold)
-    """`value` in the types of TOML."""
+def _plain(value: Any, functions: dict[str, object]) -> Any:  # noqa: ANN401 (whatever TOML may hold)
+    """`value` in the types of TOML; functions go to `functions` under the text that stands for them."""
     if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items() if item is not None}
+        return {key: _plain(item, functions) for key, item in value.items() if item is not None}
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return _plain(value.tolist(), functions)
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [_plain(item, functions) for item in value]
+    if callable(value) or hasattr(value, "address"):
+        name = f"<{getattr(value, '__qualname__', type(value).__name__)}, function no. {len(functions) + 1}>"
+        functions[name] = value
+        return name
     return str(value) if isinstance(value, PathLike) else value
 
 
-def _scene(data: dict[str, Any], path: Path, text: str) -> Scene:
+def _scene(data: dict[str, Any], path: Path, text: str, objects: Mapping[str, object] | None = None) -> Scene:
     """The validated scene of `data`, which was read from `path` as `text`."""
     _refuse_unavailable(data, path)
-    keys = validate(SceneKeys, _with_times_of_actuation(data), path)
+    keys = validate(SceneKeys, _with_times_of_actuation(data), path, objects)
     problems = [f"{path}: {problem}" for problem in _problems(keys)]
     if problems:
         raise InputError("\n".join(problems))

@@ -253,6 +253,35 @@ class _Translation:
         raise ExpressionError(self._text, self._offset + len(before) + 1, problem, hint)
 
 
+def user_function(function: object) -> TimeFunction:
+    """A function of t (s) from Python: it returns (value, rate, acceleration); the value is enough for loads.
+
+    One that has been compiled (`numba.cfunc` and its like, with an `address`) writes the three numbers to its second
+    argument, `void(double t, double *out)`, and runs at the speed of the core. Raises `ValueError` for anything else.
+    """
+    address = getattr(function, "address", None)
+    if isinstance(address, int):
+        return TimeFunction.compiled(address)
+    if not callable(function):
+        raise ValueError(f"expected a function of t, found {function!r}")
+
+    def three(t: float) -> tuple[float, float, float]:
+        values = np.asarray(function(t), dtype=float)
+        if values.shape not in ((), (3,)):
+            raise InputError(
+                f"{_name_of(function)}: expected (value, rate, acceleration), or the value of a load, found an array of"
+                f" shape {values.shape} at t = {t:g} s"
+            )
+        value, rate, acceleration = (float(values), np.nan, np.nan) if values.ndim == 0 else map(float, values)
+        return value, rate, acceleration
+
+    return TimeFunction.python(three)
+
+
+def _name_of(function: object) -> str:
+    return str(getattr(function, "__qualname__", function))
+
+
 def _suggest(name: str) -> str:
     close = get_close_matches(name, _WORDS, n=1)
     return f"did you mean {close[0]!r}?" if close else "available: " + " ".join(_WORDS)

@@ -1,6 +1,5 @@
 """The program as a user runs it: the installed command, the cases of the repository, a cache folder of its own."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -11,6 +10,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+
+from ffrobot.parallel import environment_without_mpi
 
 CASES = Path(__file__).parent.parent / "cases"
 
@@ -25,8 +26,7 @@ class Command:
     @property
     def environment(self):
         """Without what MPI leaves behind in a process that has loaded dolfinx: a nested mpirun trips over it."""
-        clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-        return clean | {"XDG_CACHE_HOME": str(self.cache), "TERM": "dumb"}
+        return environment_without_mpi() | {"XDG_CACHE_HOME": str(self.cache), "TERM": "dumb"}
 
     def __call__(self, *arguments, timeout=120, **options):
         return subprocess.run(
@@ -59,6 +59,15 @@ class SolvedCase:
 @pytest.fixture(scope="session")
 def ffrobot(tmp_path_factory):
     return Command(tmp_path_factory.mktemp("cache"), Path(sys.executable).with_name("ffrobot"))
+
+
+@pytest.fixture(scope="session")
+def mpirun():
+    """How a command is started on two processes that share this machine."""
+    if shutil.which("mpirun") is None:
+        pytest.skip("there is no mpirun")
+    as_root = ["env", "OMPI_ALLOW_RUN_AS_ROOT=1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1"]
+    return [*as_root, "mpirun", "-n", "2", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1"]
 
 
 @pytest.fixture(scope="session")

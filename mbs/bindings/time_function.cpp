@@ -1,9 +1,13 @@
 #include "core/time_function.h"
 
 #include <cmath>
+#include <cstdint>
+#include <functional>
+#include <tuple>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/function.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
@@ -25,6 +29,17 @@ TimeFunction polynomial(Vector breaks, Matrix coefficients) {
     throw nb::value_error("polynomial: expected coefficients (k, order) for k + 1 breaks");
   return PiecewisePolynomial({breaks.data(), breaks.data() + breaks.size()},
                              {coefficients.data(), coefficients.data() + coefficients.size()});
+}
+
+TimeFunction python_function(const std::function<std::tuple<double, double, double>(double)> &function) {
+  return UserFunction([function](double t) {
+    const auto [value, rate, acceleration] = function(t);
+    return Jet{value, rate, acceleration};
+  });
+}
+
+TimeFunction compiled_function(std::uintptr_t address) {
+  return UserFunction(reinterpret_cast<UserFunction::Compiled>(address));
 }
 
 Samples sample(const TimeFunction &function, Vector times) {
@@ -81,6 +96,10 @@ void bind_time_function(nb::module_ &m) {
           "ops"_a, "constants"_a, "Postfix program; raises ValueError when it is malformed or too deep.")
       .def_static("polynomial", &polynomial, "breaks"_a, "coefficients"_a,
                   "Breaks (k+1,) and coefficients (k, order), highest power first, in powers of t − left break.")
+      .def_static("python", &python_function, "function"_a,
+                  "A callable of t (s) that returns (value, rate, acceleration).")
+      .def_static("compiled", &compiled_function, "address"_a,
+                  "Address of a C function void(double t, double *value_rate_acceleration).")
       .def(
           "__call__",
           [](const TimeFunction &function, double t) {

@@ -1,5 +1,5 @@
 // LDL^T of a symmetric matrix with nonzero pivots (positive definite, say) stored by row envelopes (lower triangle,
-// from the first nonzero).
+// from the first nonzero). Small ones are stored in full: a size that the compiler knows stays in registers.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,9 +17,11 @@ public:
 
   Eigen::Index size() const { return static_cast<Eigen::Index>(first_.size()); }
   void set_zero();
-  Scalar *entry(Eigen::Index row, Eigen::Index column) { // column >= first[row]
-    return rows_.data() + start_[static_cast<std::size_t>(row)] + column;
+  Eigen::Index place(Eigen::Index row, Eigen::Index column) const { // in entries(); column >= first[row]
+    return start_[static_cast<std::size_t>(row)] + column;
   }
+  Scalar *entries() { return rows_.data(); }
+  Scalar *entry(Eigen::Index row, Eigen::Index column) { return entries() + place(row, column); }
 
   void factorise();            // in place; unpivoted
   void solve(Scalar *x) const; // after factorise; x: right-hand side in, solution out

@@ -1,5 +1,8 @@
 #include "core/planar_body.h"
 
+#include "core/lanes.h"
+#include "core/moving_rows.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -8,12 +11,11 @@ namespace ffrobot {
 namespace {
 
 using Eigen::Index;
-using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using VectorMap = Eigen::Map<const Eigen::VectorXd>;
 
-constexpr Index register_width = 4; // doubles: rows of W are padded to a multiple of it
+constexpr Index first_port = PackedRows::first_port;
 
 Vector2d perpendicular(const Vector2d &v) { return {-v.y(), v.x()}; }
 
@@ -25,94 +27,15 @@ Vector2d rotate_back(const PlanarBodyState &s, const Vector2d &v) {
   return {s.cosine * v.x() + s.sine * v.y(), -s.sine * v.x() + s.cosine * v.y()};
 }
 
-// W p, W p_dot and W (K p + D p_dot) in one pass. A row count known to the compiler keeps the sums in registers.
-template <int Rows>
-void project_fixed(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
-  using Sum = Eigen::Array<double, Rows, 1>;
-  Sum Wp = Sum::Zero(), Wp_dot = Sum::Zero(), Wk = Sum::Zero();
-  const double *column = s.W_active.data();
-  const double *stiffness = body.stiffness.data();
-  const double *damping = body.damping.cols() == 1 ? body.damping.data() : nullptr;
-  for (Index i = 0; i < body.modes(); ++i, column += Rows) {
-    const auto w = Eigen::Map<const Sum>(column);
-    double k = stiffness[i] * p[i];
-    if (damping)
-      k += damping[i] * p_dot[i];
-    Wp += w * p[i];
-    Wp_dot += w * p_dot[i];
-    Wk += w * k;
-  }
-  for (std::size_t i = 0; i < s.active.size(); ++i) {
-    const auto k = static_cast<Index>(i), row = s.active[i];
-    s.Wp[row] = Wp[k];
-    s.Wp_dot[row] = Wp_dot[k];
-    s.Wk[row] = Wk[k];
-  }
-}
+// A turn of lanes: pairs (x, y) of translations, rotations as they are.
+struct Turn {
+  Turn(const PackedRows &rows, Index i, double c, double s)
+      : cosine(load(rows.is_rotation.data() + i) + c * load(rows.is_translation.data() + i)),
+        sine(s * load(rows.turn.data() + i)) {}
+  Lanes operator()(Lanes v) const { return cosine * v + sine * swap_pairs(v); }
 
-void project(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
-  switch (s.W_active.rows()) {
-  case 0:
-    s.Wk.setZero();
-    return;
-  case 4:
-    return project_fixed<4>(body, p, p_dot, s);
-  case 8:
-    return project_fixed<8>(body, p, p_dot, s);
-  case 12:
-    return project_fixed<12>(body, p, p_dot, s);
-  case 16:
-    return project_fixed<16>(body, p, p_dot, s);
-  }
-  const Index n = body.modes();
-  s.Wp.noalias() = s.W * VectorMap(p, n);
-  s.Wp_dot.noalias() = s.W * VectorMap(p_dot, n);
-  s.Wk.setZero();
-  for (Index i = 0; i < n; ++i)
-    s.Wk += s.W.col(i) * (body.stiffness[i] * p[i] + (body.damping.cols() == 1 ? body.damping(i, 0) * p_dot[i] : 0.0));
-}
-
-void update_gram(Index row, PlanarBodyState &s) {
-  s.W_transposed.col(row) = s.W.row(row).transpose();
-  const auto k = std::find(s.active.begin(), s.active.end(), row) - s.active.begin();
-  s.W_active.row(k) = s.W.row(row);
-  s.W_active_transposed.col(k) = s.W.row(row).transpose();
-  s.G.row(row).noalias() = s.W.row(row) * s.W_transposed;
-  s.G.col(row) = s.G.row(row).transpose();
-}
-
-// m_thetaf = h + p^T S_tilde replaces the row h of W where S_tilde is not zero.
-void update_rotation_row(const PlanarBody &body, const double *p, PlanarBodyState &s) {
-  s.W.row(2).noalias() = body.W.row(2) + VectorMap(p, body.modes()).transpose() * body.S_tilde;
-  update_gram(2, s);
-}
-
-// L D L^T of the 3 x 3 mass matrix of the frame, p eliminated. Its translational block m I - S_bar S_bar^T is constant
-// without geometric stiffening.
-void factorise_translation(double mass, PlanarBodyState &s) {
-  s.D_inverse[0] = 1 / (mass - s.G(0, 0));
-  s.L[0] = -s.G(1, 0) * s.D_inverse[0];
-  s.D_inverse[1] = 1 / (mass - s.G(1, 1) + s.L[0] * s.G(1, 0));
-}
-
-// W(p) = W - (K p)^T; after update_rotation_row, which writes row 2 anew.
-void update_second_order(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
-  const Index n = body.modes();
-  const VectorMap p_(p, n), p_dot_(p_dot, n);
-  s.displacement.setZero();
-  for (const auto &[row, K] : body.second_order) {
-    s.curvature.noalias() = K * p_;
-    if (row != 2 || body.S_tilde.size() == 0)
-      s.W.row(row) = body.W.row(row);
-    s.W.row(row) -= s.curvature.transpose();
-    s.displacement[row] = 0.5 * s.curvature.dot(p_); // what W(p) p has too little
-    s.curvature.noalias() = K * p_dot_;
-    s.convective[row] = s.curvature.dot(p_dot_);
-  }
-  for (const auto &second : body.second_order)
-    update_gram(second.row, s);
-  factorise_translation(body.mass, s);
-}
+  Lanes cosine, sine;
+};
 
 // Modal forces that the common case (mass-orthonormal planar modes, diagonal damping, no modal load) has not.
 bool collect_extra(const PlanarBody &body, const double *p, const double *p_dot, PlanarBodyState &s) {
@@ -150,194 +73,174 @@ bool collect_extra(const PlanarBody &body, const double *p, const double *p_dot,
     s.extra.noalias() -= body.damping * VectorMap(p_dot, n);
   }
   if (any)
-    s.W_extra.noalias() = s.W * s.extra;
+    s.W_extra.noalias() = s.rows.W * s.extra;
   return any;
 }
 
-void factorise_rotation(const Vector2d &coupling, double inertia, PlanarBodyState &s) {
-  const double y = coupling.y() - s.L[0] * coupling.x();
-  s.L[1] = coupling.x() * s.D_inverse[0];
+// coupling: between translation and rotation of the frame
+void factorise_rotation(double coupling_x, double coupling_y, double inertia, PlanarBodyState &s) {
+  const double y = coupling_y - s.L[0] * coupling_x;
+  s.L[1] = coupling_x * s.D_inverse[0];
   s.L[2] = y * s.D_inverse[1];
-  s.D_inverse[2] = 1 / (inertia - s.L[1] * coupling.x() - s.L[2] * y);
+  s.D_inverse[2] = 1 / (inertia - s.L[1] * coupling_x - s.L[2] * y);
 }
 
+// Coefficient by coefficient: what has just been written one by one is slow to load as a vector.
 Vector3d forward(const Vector3d &L, Vector3d b) {
   b[1] -= L[0] * b[0];
   b[2] -= L[1] * b[0] + L[2] * b[1];
   return b;
 }
 
-Vector3d backward(const Vector3d &L, Vector3d b) {
-  b[1] -= L[2] * b[2];
-  b[0] -= L[0] * b[1] + L[1] * b[2];
+Vector3d backward(const PlanarBodyState &s, Vector3d b) {
+  b[2] *= s.D_inverse[2];
+  b[1] = b[1] * s.D_inverse[1] - s.L[2] * b[2];
+  b[0] = b[0] * s.D_inverse[0] - s.L[0] * b[1] - s.L[1] * b[2];
   return b;
-}
-
-// p^T m_xy q
-double weighted(const PlanarBody &body, const double *p, const double *q) {
-  const Index n = body.modes();
-  const VectorMap p_(p, n);
-  if (body.m_xy.size() == 0)
-    return p_.dot(VectorMap(q, n));
-  double sum = 0;
-  for (Index i = 0; i < n; ++i)
-    sum += body.m_xy.col(i).dot(p_) * q[i];
-  return sum;
-}
-
-// Block (k, l) of the mobility, Z D^-1 Z^T + (Phi_k Phi_l^T in global axes), and its mirror.
-void add_mobility(const PlanarBody &body, Index k, Index l, PlanarBodyState &s) {
-  const double *g0 = s.G.data() + (3 + 3 * l) * s.padded_rows + 3 + 3 * k;
-  const double *g1 = g0 + s.padded_rows, *g2 = g1 + s.padded_rows;
-  const double c = s.cosine, sn = s.sine;
-  const double g00 = c * g0[0] - sn * g0[1], g10 = sn * g0[0] + c * g0[1]; // A Phi_k Phi_l^T
-  const double g01 = c * g1[0] - sn * g1[1], g11 = sn * g1[0] + c * g1[1];
-  Matrix3d E = Matrix3d::Zero();
-  E(0, 0) = c * g00 - sn * g01;
-  E(1, 0) = c * g10 - sn * g11;
-  E(0, 1) = sn * g00 + c * g01;
-  E(1, 1) = sn * g10 + c * g11;
-  const int rows = body.marker_rows[static_cast<std::size_t>(k)],
-            columns = body.marker_rows[static_cast<std::size_t>(l)];
-  if (columns == 3) {
-    E(0, 2) = c * g2[0] - sn * g2[1];
-    E(1, 2) = sn * g2[0] + c * g2[1];
-  }
-  if (rows == 3) {
-    E(2, 0) = c * g0[2] - sn * g1[2];
-    E(2, 1) = sn * g0[2] + c * g1[2];
-    E(2, 2) = g2[2];
-  }
-  for (int j = 0; j < columns; ++j) {
-    const Vector3d z = s.Z_transposed.col(3 * l + j).cwiseProduct(s.D_inverse);
-    for (int i = 0; i < rows; ++i)
-      E(i, j) += s.Z_transposed.col(3 * k + i).dot(z);
-  }
-  s.mobility.block<3, 3>(3 * k, 3 * l) = E;
-  if (l != k)
-    s.mobility.block<3, 3>(3 * l, 3 * k) = E.transpose();
-}
-
-// out += W^T z over the rows that carry anything
-void accumulate_rows(const PlanarBodyState &s, const Eigen::VectorXd &z, Index n, double *out) {
-  const std::size_t count = s.active.size();
-  const auto factor = [&](std::size_t i) { return i < count ? z[s.active[i]] : 0.0; };
-  for (std::size_t i = 0; i < count; i += register_width) {
-    const double *w0 = s.W_active_transposed.data() + static_cast<Index>(i) * n, *w1 = w0 + n, *w2 = w1 + n,
-                 *w3 = w2 + n;
-    const double z0 = factor(i), z1 = factor(i + 1), z2 = factor(i + 2), z3 = factor(i + 3);
-    for (Index k = 0; k < n; ++k)
-      out[k] += z0 * w0[k] + z1 * w1[k] + z2 * w2[k] + z3 * w3[k];
-  }
 }
 
 } // namespace
 
-PlanarBodyState::PlanarBodyState(const PlanarBody &body) : markers(static_cast<std::size_t>(body.markers())) {
-  const Index n = body.modes(), rows = body.W.rows();
-  padded_rows = (rows + register_width - 1) / register_width * register_width;
-  W = Eigen::MatrixXd::Zero(padded_rows, n);
-  W.topRows(rows) = body.W;
-  W_transposed = W.transpose();
-  G = W * W_transposed;
-  for (Index row = 0; row < rows; ++row) {
-    const bool moves = std::any_of(body.second_order.begin(), body.second_order.end(),
-                                   [&](const SecondOrder &second) { return second.row == row; });
-    if (moves || (row == 2 && body.S_tilde.size()) || !body.W.row(row).isZero(0))
-      active.push_back(row);
-  }
-  const auto count = static_cast<Index>(active.size());
-  W_active = Eigen::MatrixXd::Zero((count + register_width - 1) / register_width * register_width, n);
-  for (Index i = 0; i < count; ++i)
-    W_active.row(i) = W.row(active[static_cast<std::size_t>(i)]);
-  W_active_transposed = W_active.transpose();
-  for (auto *v : {&Wp, &Wp_dot, &Wk, &W_extra, &z, &z_response, &displacement, &convective})
-    *v = Eigen::VectorXd::Zero(padded_rows);
-  extra = modal_load = curvature = Eigen::VectorXd::Zero(n);
-  wrench = free_acceleration = Eigen::Matrix3Xd::Zero(3, body.markers());
-  Z_transposed = Eigen::Matrix3Xd::Zero(3, 3 * body.markers());
-  mobility = Eigen::MatrixXd::Zero(3 * body.markers(), 3 * body.markers());
+double weighted(const PlanarBody &body, const double *p, const double *x) {
+  const Index n = body.modes();
+  const VectorMap p_(p, n);
+  if (body.m_xy.size() == 0)
+    return p_.dot(VectorMap(x, n));
+  double sum = 0;
+  for (Index i = 0; i < n; ++i)
+    sum += body.m_xy.col(i).dot(p_) * x[i];
+  return sum;
+}
+
+PlanarBodyState::PlanarBodyState(const PlanarBody &body)
+    : markers(static_cast<std::size_t>(body.markers())), W(body.W), rows(body) {
+  for (auto *v : {&W_extra, &z, &none, &z_response, &displacement, &convective})
+    *v = Eigen::VectorXd::Zero(rows.rows());
+  extra = modal_load = curvature = Eigen::VectorXd::Zero(body.modes());
+  wrench = Eigen::Matrix3Xd::Zero(3, body.markers());
+  port_acceleration = port_force = Eigen::VectorXd::Zero(rows.ports);
+  Z = Eigen::MatrixXd::Zero(rows.ports, 3);
+  mobility = Eigen::MatrixXd::Zero(rows.ports, rows.ports);
   factorise_translation(body.mass, *this);
 }
 
 void kinematics(const PlanarBody &body, const double *q, const double *v, PlanarBodyState &s) {
-  s.cosine = std::cos(q[2]);
-  s.sine = std::sin(q[2]);
+  const double theta = q[2]; // one call of sincos
+  s.cosine = std::cos(theta);
+  s.sine = std::sin(theta);
   s.theta_dot = v[2];
-  if (body.S_tilde.size())
-    update_rotation_row(body, q + 3, s);
-  if (!body.second_order.empty())
-    update_second_order(body, q + 3, v + 3, s);
-  project(body, q + 3, v + 3, s);
-  if (body.second_order.empty())
-    s.displacement = s.Wp;
-  else
-    s.displacement += s.Wp;
-  const Vector2d R(q[0], q[1]), R_dot(v[0], v[1]);
+  update_moving_rows(body, q + 3, v + 3, s);
+  s.rows.project(body, q + 3, v + 3);
+  for (Index i = 0; i < s.rows.rows(); i += lane_count) {
+    const Lanes u = load(s.rows.Wp.data() + i);
+    store(s.displacement.data() + i, body.second_order.empty() ? u : u + load(s.displacement.data() + i));
+  }
+  const double c = s.cosine, sn = s.sine, w = s.theta_dot;
   for (std::size_t k = 0; k < s.markers.size(); ++k) {
     auto &m = s.markers[k];
-    const double *u = s.displacement.data() + 3 + 3 * k, *u_dot = s.Wp_dot.data() + 3 + 3 * k;
-    const Vector2d arm = body.marker_positions[k] + Vector2d(u[0], u[1]);
-    m.arm = rotate(s, arm);
-    m.position = R + m.arm;
-    m.velocity = R_dot + rotate(s, s.theta_dot * perpendicular(arm) + Vector2d(u_dot[0], u_dot[1]));
-    m.angle = q[2] + u[2];
-    m.angular_velocity = s.theta_dot + u_dot[2];
+    const Index *place = s.rows.place.data() + 3 + 3 * k;
+    const double *u = s.displacement.data(), *u_dot = s.rows.Wp_dot.data();
+    const double x = body.marker_positions[k].x() + u[place[0]], y = body.marker_positions[k].y() + u[place[1]];
+    const double x_dot = u_dot[place[0]] - w * y, y_dot = u_dot[place[1]] + w * x;
+    m.arm = {c * x - sn * y, sn * x + c * y};
+    m.position = {q[0] + m.arm.x(), q[1] + m.arm.y()};
+    m.velocity = {v[0] + c * x_dot - sn * y_dot, v[1] + sn * x_dot + c * y_dot};
+    m.angle = theta + u[place[2]];
+    m.angular_velocity = w + u_dot[place[2]];
   }
 }
 
 namespace {
 
-// Forces on the frame: (Q_R in body axes, Q_theta) of inertia and gravity.
+// Forces on the frame: (Q_R in body axes, Q_theta) of inertia and gravity (g, body axes).
 Vector3d frame_force(const PlanarBody &body, const double *p, const double *p_dot, const Vector2d &g,
-                     const Vector2d &moment, const PlanarBodyState &s) {
-  const double theta_dot = s.theta_dot;
+                     const PlanarBodyState &s) {
+  const double w = s.theta_dot;
+  const Eigen::VectorXd &Wp_dot = s.rows.Wp_dot;
   Vector3d Q;
-  Q.head<2>() = body.mass * g + theta_dot * theta_dot * moment - 2 * theta_dot * perpendicular(s.Wp_dot.head<2>());
-  Q[2] = -2 * theta_dot * weighted(body, p, p_dot) + perpendicular(moment).dot(g);
+  Q[0] = body.mass * g[0] + w * w * s.moment[0] + 2 * w * Wp_dot[1];
+  Q[1] = body.mass * g[1] + w * w * s.moment[1] - 2 * w * Wp_dot[0];
+  Q[2] = s.moment[0] * g[1] - s.moment[1] * g[0];
+  Q[2] -= 2 * w * (body.m_xy.size() ? weighted(body, p, p_dot) : s.rows.p_p_dot);
   if (!body.second_order.empty())
     Q += s.convective.head<3>();
   if (body.K_omega.size())
-    Q[2] += 2 * theta_dot * VectorMap(p, body.modes()).dot(body.K_omega * VectorMap(p_dot, body.modes()));
+    Q[2] += 2 * w * VectorMap(p, body.modes()).dot(body.K_omega * VectorMap(p_dot, body.modes()));
   if (body.j.size())
-    Q[2] -= 2 * theta_dot * body.j.dot(VectorMap(p_dot, body.modes()));
+    Q[2] -= 2 * w * body.j.dot(VectorMap(p_dot, body.modes()));
   return Q;
+}
+
+// W Q_f of the modal forces Q_f = theta_dot^2 p - K p - D p_dot + S_bar^T g, in place of W (K p + D p_dot)
+void project_modal_force(const Vector2d &g, PlanarBodyState &s) {
+  const PackedRows &rows = s.rows;
+  const double *G = rows.G.data(), w_2 = s.theta_dot * s.theta_dot;
+  for (Index i = 0; i < rows.rows(); i += lane_count) {
+    double *Wk = s.rows.Wk.data() + i;
+    store(Wk, w_2 * load(rows.Wp.data() + i) - load(Wk) + g[0] * load(G + i) + g[1] * load(G + rows.rows() + i));
+  }
 }
 
 // Adds the applied wrenches to the force on the frame, and to z in body axes.
 void add_wrenches(const PlanarBody &body, Vector3d &Q, PlanarBodyState &s) {
   for (Index k = 0; k < body.markers(); ++k) {
-    const Vector2d f = s.wrench.col(k).head<2>();
-    s.z.segment<2>(3 + 3 * k) = rotate_back(s, f);
-    s.z[5 + 3 * k] = s.wrench(2, k);
-    Q.head<2>() += s.z.segment<2>(3 + 3 * k);
+    const Index *place = s.rows.place.data() + 3 + 3 * k;
+    const Vector2d f = s.wrench.col(k).head<2>(), f_body = rotate_back(s, f);
+    s.z[place[0]] += f_body.x();
+    s.z[place[1]] += f_body.y();
+    s.z[place[2]] += s.wrench(2, k);
+    Q.head<2>() += f_body;
     Q[2] += perpendicular(s.markers[static_cast<std::size_t>(k)].arm).dot(f) + s.wrench(2, k);
   }
 }
 
-// Acceleration of marker k = B (a, alpha) + Phi_k p_ddot + velocity terms, with p_ddot from its eliminated rows.
-void eliminate_marker(const PlanarBody &body, Index k, const Eigen::VectorXd &WQ, PlanarBodyState &s) {
-  const Index row = 3 + 3 * k;
-  const Vector2d arm = rotate_back(s, s.markers[static_cast<std::size_t>(k)].arm);
-  Matrix3d B = -s.G.block<3, 3>(row, 0);
-  B(0, 0) += 1;
-  B(1, 1) += 1;
-  B(0, 2) -= arm.y();
-  B(1, 2) += arm.x();
-  B(2, 2) += 1;
-  Vector3d a = B * s.free_frame + WQ.segment<3>(row);
-  if (!body.second_order.empty())
-    a -= s.convective.segment<3>(row);
-  a.head<2>() += -s.theta_dot * s.theta_dot * arm + 2 * s.theta_dot * perpendicular(s.Wp_dot.segment<2>(row));
-  const Vector2d a_global = rotate(s, a.head<2>());
-  s.free_acceleration.col(k) << a_global, a[2];
-  for (int c = 0; c < 3; ++c) {
-    const double x = B(0, c), y = B(1, c);
-    B(0, c) = s.cosine * x - s.sine * y;
-    B(1, c) = s.sine * x + s.cosine * y;
+// Port acceleration = B (a, alpha) + Phi p_ddot + velocity terms, with p_ddot from its eliminated rows.
+void eliminate_ports(const Eigen::VectorXd &WQ, PlanarBodyState &s) {
+  const PackedRows &rows = s.rows;
+  const double w = s.theta_dot, *G = rows.G.data();
+  for (Index i = 0; i < rows.ports; i += lane_count) {
+    const Index row = first_port + i;
+    const Turn turn(rows, i, s.cosine, s.sine);
+    const Lanes quarter = load(rows.turn.data() + i), is_translation = load(rows.is_translation.data() + i);
+    const Lanes arm = is_translation * (load(rows.position.data() + i) + load(s.displacement.data() + row));
+    const Lanes Wp_dot = load(rows.Wp_dot.data() + row);
+    const Lanes B0 = load(rows.along_x.data() + i) - load(G + row);
+    const Lanes B1 = load(rows.along_y.data() + i) - load(G + rows.rows() + row);
+    const Lanes B2 = load(rows.is_rotation.data() + i) + quarter * swap_pairs(arm) - load(G + 2 * rows.rows() + row);
+    const Lanes a = s.free_frame[0] * B0 + s.free_frame[1] * B1 + s.free_frame[2] * B2 + load(WQ.data() + row) -
+                    load(s.convective.data() + row) - (w * w) * arm + (2 * w) * (quarter * swap_pairs(Wp_dot));
+    store(s.port_acceleration.data() + i, turn(a));
+    const Lanes Z0 = turn(B0), Z1 = turn(B1) - s.L[0] * Z0, Z2 = turn(B2) - s.L[1] * Z0 - s.L[2] * Z1;
+    store(s.Z.data() + i, Z0);
+    store(s.Z.data() + rows.ports + i, Z1);
+    store(s.Z.data() + 2 * rows.ports + i, Z2);
   }
-  for (int r = 0; r < body.marker_rows[static_cast<std::size_t>(k)]; ++r)
-    s.Z_transposed.col(3 * k + r) = forward(s.L, B.row(r).transpose());
+}
+
+// Z D^-1 Z^T + (Phi Phi^T in global axes)
+void update_mobility(PlanarBodyState &s) {
+  const PackedRows &rows = s.rows;
+  const Index ports = rows.ports;
+  const double *Z0 = s.Z.data(), *Z1 = Z0 + ports, *Z2 = Z1 + ports;
+  for (Index i = 0; i < ports; i += lane_count) {
+    const Turn turn(rows, i, s.cosine, s.sine);
+    const Lanes z0 = s.D_inverse[0] * load(Z0 + i), z1 = s.D_inverse[1] * load(Z1 + i),
+                z2 = s.D_inverse[2] * load(Z2 + i);
+    const auto column = [&](Index j, Lanes Phi_Phi) {
+      store(s.mobility.data() + j * ports + i, turn(Phi_Phi) + Z0[j] * z0 + Z1[j] * z1 + Z2[j] * z2);
+    };
+    const double *G = rows.G.data() + first_port * rows.rows() + first_port + i;
+    for (Index j = 0; j < i + lane_count; j += 2) {
+      const Lanes x = load(G + j * rows.rows()), y = load(G + (j + 1) * rows.rows());
+      if (rows.is_translation[j] != 0) {
+        column(j, s.cosine * x - s.sine * y);
+        column(j + 1, s.sine * x + s.cosine * y);
+      } else {
+        column(j, x);
+        column(j + 1, y);
+      }
+    }
+  }
 }
 
 } // namespace
@@ -345,89 +248,94 @@ void eliminate_marker(const PlanarBody &body, Index k, const Eigen::VectorXd &WQ
 void free_motion(const PlanarBody &body, const double *q, const double *v, const Vector2d &gravity,
                  PlanarBodyState &s) {
   const double *p = q + 3, *p_dot = v + 3;
-  const Vector2d g = rotate_back(s, gravity);
-  const Vector2d moment = s.moment = body.first_moment + s.displacement.head<2>();
-  Vector3d Q = frame_force(body, p, p_dot, g, moment, s);
-
-  // Known part of the modal forces: Q_f = theta_dot^2 p - K p - D p_dot + W^T z + extra
-  s.z.setZero();
-  s.z.head<2>() = g;
-  auto &WQ = s.Wk; // W Q_f, in place of W (K p + D p_dot)
-  WQ = s.theta_dot * s.theta_dot * s.Wp - s.Wk + s.G.col(0) * g.x() + s.G.col(1) * g.y();
+  PackedRows &rows = s.rows;
+  s.gravity = rotate_back(s, gravity);
+  s.moment[0] = body.first_moment[0] + s.displacement[0];
+  s.moment[1] = body.first_moment[1] + s.displacement[1];
+  Vector3d Q = frame_force(body, p, p_dot, s.gravity, s);
+  project_modal_force(s.gravity, s);
+  Eigen::VectorXd &WQ = rows.Wk;
   if (s.has_wrench) {
+    s.z.setZero();
     add_wrenches(body, Q, s);
-    WQ.noalias() += s.G.rightCols(s.padded_rows - 3) * s.z.tail(s.padded_rows - 3);
+    WQ.noalias() += rows.G * s.z;
   }
-  if (collect_extra(body, p, p_dot, s))
+  s.has_extra = collect_extra(body, p, p_dot, s);
+  if (s.has_extra)
     WQ += s.W_extra;
-  else
-    s.extra.setZero();
 
   // The frame after elimination of p
-  const Vector2d coupling = perpendicular(moment) - s.G.col(2).head<2>();
-  s.inertia = body.inertia + weighted(body, p, p);
+  const Index n = body.modes();
+  s.inertia = body.inertia + (body.m_xy.size() ? weighted(body, p, p) : rows.p_p);
   if (body.j.size())
-    s.inertia += 2 * body.j.dot(VectorMap(p, body.modes()));
+    s.inertia += 2 * body.j.dot(VectorMap(p, n));
   if (body.K_omega.size())
-    s.inertia -= VectorMap(p, body.modes()).dot(body.K_omega * VectorMap(p, body.modes()));
-  factorise_rotation(coupling, s.inertia - s.G(2, 2), s);
-  s.free_frame = backward(s.L, forward(s.L, Q - WQ.head<3>()).cwiseProduct(s.D_inverse));
-
-  for (Index k = 0; k < body.markers(); ++k)
-    eliminate_marker(body, k, WQ, s);
-  for (Index k = 0; k < body.markers(); ++k)
-    for (Index l = 0; l <= k; ++l)
-      add_mobility(body, k, l, s);
+    s.inertia -= VectorMap(p, n).dot(body.K_omega * VectorMap(p, n));
+  factorise_rotation(-s.moment[1] - rows.G(0, 2), s.moment[0] - rows.G(1, 2), s.inertia - rows.G(2, 2), s);
+  s.free_frame = backward(s, forward(s.L, {Q[0] - WQ[0], Q[1] - WQ[1], Q[2] - WQ[2]}));
+  eliminate_ports(WQ, s);
+  update_mobility(s);
 }
 
 namespace {
 
-// (a, alpha) in body axes caused by wrenches on the markers, and the rows of W^T they load.
-Vector3d frame_response(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, PlanarBodyState &s,
-                        Eigen::VectorXd &z) {
-  Vector3d b = Vector3d::Zero();
-  for (Index k = 0; k < body.markers(); ++k) {
-    const auto f = wrench.col(k);
-    b += s.Z_transposed.middleCols<3>(3 * k) * f;
-    z[3 + 3 * k] = s.cosine * f[0] + s.sine * f[1];
-    z[4 + 3 * k] = -s.sine * f[0] + s.cosine * f[1];
-    z[5 + 3 * k] = f[2];
+// (a, alpha) in body axes caused by the forces on the ports, and the multipliers of packed rows that they change: those
+// of ports are written, applied loads with them.
+Vector3d frame_response(PlanarBodyState &s, const Eigen::VectorXd &z_applied) {
+  const PackedRows &rows = s.rows;
+  const double *Z = s.Z.data(), *f = s.port_force.data();
+  Vector3d b(0, 0, 0);
+  if (s.has_wrench)
+    s.z_response = z_applied; // else only ports and the frame carry anything
+  for (Index i = 0; i < rows.ports; ++i) {
+    b[0] += f[i] * Z[i];
+    b[1] += f[i] * Z[i + rows.ports];
+    b[2] += f[i] * Z[i + 2 * rows.ports];
   }
-  const Vector3d x = backward(s.L, b.cwiseProduct(s.D_inverse));
-  z.head<3>() = -x;
-  return x;
+  for (Index i = 0; i < rows.ports; i += 2) {
+    const bool translation = rows.is_translation[i] != 0;
+    const double c = translation ? s.cosine : 1, sn = translation ? s.sine : 0;
+    s.z_response[first_port + i] = z_applied[first_port + i] + c * f[i] + sn * f[i + 1];
+    s.z_response[first_port + i + 1] = z_applied[first_port + i + 1] + c * f[i + 1] - sn * f[i];
+  }
+  return backward(s, b);
 }
 
 } // namespace
 
-void accelerations(const PlanarBody &body, const double *q, const double *v, const Eigen::Matrix3Xd &constraint_wrench,
-                   PlanarBodyState &s, double *a) {
+void accelerations(const PlanarBody &body, const double *q, PlanarBodyState &s, double *a) {
   const Index n = body.modes();
-  const Vector3d x = s.free_frame + frame_response(body, constraint_wrench, s, s.z_response);
-  s.z_response += s.z;
-  s.z_response.head<3>() -= s.free_frame;
-  const Vector2d R_ddot = rotate(s, x.head<2>());
-  a[0] = R_ddot.x();
-  a[1] = R_ddot.y();
+  Vector3d x = frame_response(s, s.z);
+  for (int i = 0; i < 3; ++i)
+    x[i] += s.free_frame[i];
+  s.z_response[0] = s.gravity[0] - x[0];
+  s.z_response[1] = s.gravity[1] - x[1];
+  s.z_response[2] = -x[2];
+  a[0] = s.cosine * x[0] - s.sine * x[1];
+  a[1] = s.sine * x[0] + s.cosine * x[1];
   a[2] = x[2];
-  const double theta_dot_squared = s.theta_dot * s.theta_dot;
-  const double *p = q + 3, *p_dot = v + 3, *stiffness = body.stiffness.data(), *extra = s.extra.data();
+  s.rows.combine(s.z_response);
+  const double w_2 = s.theta_dot * s.theta_dot;
+  const double *p = q + 3, *elastic = s.rows.elastic_force.data(), *W_z = s.rows.W_transposed_z.data();
   double *p_ddot = a + 3;
-  for (Index i = 0; i < n; ++i)
-    p_ddot[i] = (theta_dot_squared - stiffness[i]) * p[i] + extra[i];
-  if (body.damping.cols() == 1)
-    for (Index i = 0; i < n; ++i)
-      p_ddot[i] -= body.damping(i, 0) * p_dot[i];
-  accumulate_rows(s, s.z_response, n, p_ddot);
+  Index i = 0;
+  for (; i + lane_count <= n; i += lane_count)
+    store(p_ddot + i, w_2 * load(p + i) - load(elastic + i) + load(W_z + i));
+  for (; i < n; ++i)
+    p_ddot[i] = w_2 * p[i] - elastic[i] + W_z[i];
+  if (s.has_extra)
+    Eigen::Map<Eigen::VectorXd>(p_ddot, n) += s.extra;
 }
 
 Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, Index k, const double *q,
                              const double *a, double &size) {
-  const Index row = 3 + 3 * k;
-  const Vector3d Phi_p_ddot = s.W.middleRows<3>(row) * VectorMap(a + 3, body.modes()) - s.convective.segment<3>(row);
+  const Index row = 3 + 3 * k, *place = s.rows.place.data() + row;
+  const Vector3d convective(s.convective[place[0]], s.convective[place[1]], s.convective[place[2]]);
+  const Vector3d Phi_p_ddot = s.W.middleRows<3>(row) * VectorMap(a + 3, body.modes()) - convective;
   const Vector2d &arm = s.markers[static_cast<std::size_t>(k)].arm;
   const Vector2d elastic = rotate(s, Phi_p_ddot.head<2>());
-  const Vector2d coriolis = rotate(s, 2 * s.theta_dot * perpendicular(s.Wp_dot.segment<2>(row)));
+  const Vector2d coriolis =
+      rotate(s, 2 * s.theta_dot * perpendicular({s.rows.Wp_dot[place[0]], s.rows.Wp_dot[place[1]]}));
   const Vector2d frame = Vector2d(a[0], a[1]), turn = a[2] * perpendicular(arm);
   const Vector2d centripetal = -s.theta_dot * s.theta_dot * arm;
   const Vector3d elastic_force = s.W.middleRows<3>(row) * body.stiffness.cwiseProduct(VectorMap(q + 3, body.modes()));
@@ -438,14 +346,15 @@ Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, I
   return acceleration;
 }
 
-void respond(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, PlanarBodyState &s, double *dq) {
-  const Vector3d x = frame_response(body, wrench, s, s.z_response);
-  const Vector2d dR = rotate(s, x.head<2>());
-  dq[0] = dR.x();
-  dq[1] = dR.y();
+void respond(const PlanarBody &body, PlanarBodyState &s, double *dq) {
+  const Vector3d x = frame_response(s, s.none);
+  for (int i = 0; i < 3; ++i)
+    s.z_response[i] = -x[i];
+  dq[0] = s.cosine * x[0] - s.sine * x[1];
+  dq[1] = s.sine * x[0] + s.cosine * x[1];
   dq[2] = x[2];
-  std::fill(dq + 3, dq + 3 + body.modes(), 0.0);
-  accumulate_rows(s, s.z_response, body.modes(), dq + 3);
+  s.rows.combine(s.z_response);
+  std::copy_n(s.rows.W_transposed_z.data(), body.modes(), dq + 3);
 }
 
 void add_modal_force(const PlanarBody &body, const PlanarBodyState &s, const Eigen::Matrix3Xd &wrench,
@@ -475,39 +384,6 @@ void static_force(const PlanarBody &body, const double *q, const Vector2d &gravi
     }
     add_modal_force(body, s, s.wrench, Q_f);
   }
-}
-
-Energy energy(const PlanarBody &body, const double *q, const double *v, const Vector2d &gravity) {
-  const Index n = body.modes();
-  const VectorMap p(q + 3, n), p_dot(v + 3, n);
-  const double c = std::cos(q[2]), s = std::sin(q[2]), theta_dot = v[2];
-  const auto to_body = [&](const Vector2d &u) { return Vector2d(c * u.x() + s * u.y(), -s * u.x() + c * u.y()); };
-  const Vector2d R_dot = to_body({v[0], v[1]});
-  Vector2d moment = body.first_moment + body.W.topRows<2>() * p;
-  Vector3d rates = body.W.topRows<3>() * p_dot; // (S_bar, m_thetaf) p_dot
-  double inertia = body.inertia + weighted(body, q + 3, q + 3);
-  if (body.j.size())
-    inertia += 2 * body.j.dot(p);
-  if (body.S_tilde.size())
-    rates[2] += p.dot(body.S_tilde * p_dot);
-  if (body.K_omega.size())
-    inertia -= p.dot(body.K_omega * p);
-  for (const auto &[row, K] : body.second_order) {
-    if (row < 2)
-      moment[row] -= 0.5 * p.dot(K * p);
-    if (row < 3)
-      rates[row] -= p.dot(K * p_dot);
-  }
-  Energy e;
-  e.kinetic = 0.5 * (body.mass * R_dot.squaredNorm() + inertia * theta_dot * theta_dot + p_dot.squaredNorm()) +
-              theta_dot * R_dot.dot(perpendicular(moment)) + R_dot.dot(rates.head<2>()) + theta_dot * rates[2];
-  e.strain = 0.5 * p.dot(body.stiffness.cwiseProduct(p));
-  e.gravitational = -(body.mass * gravity.dot(Vector2d(q[0], q[1])) + to_body(gravity).dot(moment));
-  if (body.damping.cols() == 1)
-    e.dissipated_power = p_dot.dot(body.damping.col(0).cwiseProduct(p_dot));
-  else if (body.damping.cols() > 1)
-    e.dissipated_power = p_dot.dot(body.damping * p_dot);
-  return e;
 }
 
 } // namespace ffrobot

@@ -1,9 +1,12 @@
 // A planar flexible body in the floating frame of reference: coordinates (R, theta, p).
 //
-// What a body contributes to the system is independent of the space it moves in: the free accelerations of its
-// markers, and their mobility (the acceleration of marker k per unit wrench at marker l). Constraints, elimination
-// and integrators use nothing else, so that a spatial body can stand beside this one.
+// What a body contributes to the system is independent of the space it moves in: the free accelerations of its ports
+// (directions in which constraints hold its markers), and their mobility (the acceleration of one per unit force on
+// another). Constraints, elimination and integrators use nothing else, so that a spatial body can stand beside this
+// one.
 #pragma once
+
+#include "core/packed_rows.h"
 
 #include <Eigen/Core>
 #include <vector>
@@ -34,7 +37,7 @@ struct PlanarBody {
   Eigen::MatrixXd S_tilde;                       // (n, n) S_bar_12 - S_bar_21, skew; empty where it vanishes
   Eigen::MatrixXd m_xy;                          // (n, n) S_bar_11 + S_bar_22; empty where it is the identity
   std::vector<Eigen::Vector2d> marker_positions; // undeformed, body frame
-  std::vector<int> marker_rows;                  // 3, or 2 where no constraint asks for the marker's rotation
+  std::vector<int> marker_rows; // that constraints use: 0, 2 (translation) or 3 (rotation too); set by System::finish
   // Geometric stiffening. With W(p) = W - (K p)^T in place of W, and m_thetatheta less p^T K_omega p, every term that
   // follows from the kinetic energy and virtual work stays consistent. Both empty where it is left out.
   std::vector<SecondOrder> second_order;
@@ -67,30 +70,27 @@ struct PlanarBodyState {
   Eigen::VectorXd modal_load; // (n) generalized forces on p
   bool has_wrench = false, has_modal_load = false;
 
-  // free motion
-  Eigen::Matrix3Xd free_acceleration; // of each marker, global (x, y, angular), before constraint forces
-  Eigen::MatrixXd mobility;           // (3 markers, 3 markers), global
+  // Ports, in global axes: the translations and rotations of markers by which constraints hold the body (PackedRows).
+  Eigen::VectorXd port_acceleration; // before constraint forces
+  Eigen::MatrixXd mobility;          // acceleration of a port per unit force on another; from each diagonal entry down
+  Eigen::VectorXd port_force;        // of constraints; set before accelerations and respond
 
   // internals of the elimination
-  Eigen::Index padded_rows;         // rows of W, padded for vector registers
-  Eigen::MatrixXd W;                // (padded_rows, n)
-  std::vector<Eigen::Index> active; // rows of W that carry anything; products with W need only these
-  Eigen::MatrixXd W_active;         // (active, padded for vector registers; n)
-  Eigen::MatrixXd W_active_transposed;
-  Eigen::MatrixXd W_transposed;   // (n, padded_rows)
-  Eigen::MatrixXd G;              // (padded_rows, padded_rows)
-  Eigen::VectorXd Wp, Wp_dot, Wk; // W p, W p_dot, W (K p + D p_dot), W as it is at p
-  Eigen::VectorXd displacement;   // W p, its second-order part right
-  Eigen::VectorXd convective;     // p_dot^T K p_dot, by rows of W; zero without geometric stiffening
-  Eigen::VectorXd extra, W_extra; // modal forces outside the common fast path, and W times them
-  Eigen::VectorXd curvature;      // (n) K p of a second-order displacement
-  Eigen::VectorXd z;              // multipliers of the rows of W in p_ddot
-  Eigen::VectorXd z_response;
-  Eigen::Matrix3Xd Z_transposed; // (3, 3 markers) L^-1 B^T: B marker acceleration per (a, alpha) with p eliminated,
-                                 // global rows; L D L^T the eliminated mass matrix
-  Eigen::Vector3d L;             // (L_10, L_20, L_21)
+  Eigen::MatrixXd W;              // (3 + 3 markers, n), as it is at p
+  PackedRows rows;                // the same, and products with it
+  Eigen::VectorXd displacement;   // packed W p, its second-order part right
+  Eigen::VectorXd convective;     // p_dot^T K p_dot, by packed rows; zero without geometric stiffening
+  Eigen::VectorXd extra, W_extra; // modal forces outside the common fast path, and packed W times them
+  bool has_extra = false;
+  Eigen::VectorXd curvature;  // (n) K p of a second-order displacement
+  Eigen::VectorXd z, none;    // applied wrenches in body axes, by packed rows; none at all
+  Eigen::VectorXd z_response; // multipliers of the packed rows in p_ddot
+  Eigen::MatrixXd Z; // (ports, 3) B L^-T: B port acceleration per (a, alpha) of the frame, global by body axes, with p
+                     // eliminated; L D L^T the eliminated mass matrix
+  Eigen::Vector3d L; // (L_10, L_20, L_21)
   Eigen::Vector3d D_inverse;
   Eigen::Vector3d free_frame; // free (a, alpha) of the body frame, body axes
+  Eigen::Vector2d gravity;    // body axes
   Eigen::Vector2d moment;     // s0 + S_bar p
   double inertia = 0;         // m_thetatheta
 };
@@ -98,21 +98,20 @@ struct PlanarBodyState {
 // Positions and velocities of the markers for q = (R, theta, p), v = its rates.
 void kinematics(const PlanarBody &body, const double *q, const double *v, PlanarBodyState &state);
 
-// Eliminates p under gravity and the applied loads: free marker accelerations and mobility. After kinematics.
+// Eliminates p under gravity and the applied loads: free accelerations of the ports and mobility. After kinematics.
 void free_motion(const PlanarBody &body, const double *q, const double *v, const Eigen::Vector2d &gravity,
                  PlanarBodyState &state);
 
-// Accelerations of (R, theta, p) once the constraint wrenches on the markers are known. After free_motion.
-void accelerations(const PlanarBody &body, const double *q, const double *v, const Eigen::Matrix3Xd &constraint_wrench,
-                   PlanarBodyState &state, double *a);
+// Accelerations of (R, theta, p) under state.port_force. After free_motion.
+void accelerations(const PlanarBody &body, const double *q, PlanarBodyState &state, double *a);
 
 // Acceleration (x, y, angular) of marker k for accelerations a of the coordinates, and the sum of its terms' sizes:
 // those of the elastic forces in p_ddot too, which cancel against others when a stiff link hardly vibrates.
 Eigen::Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &state, Eigen::Index k,
                                     const double *q, const double *a, double &size);
 
-// M^-1 times the generalized force of wrenches on the markers (mass metric of the last free_motion).
-void respond(const PlanarBody &body, const Eigen::Matrix3Xd &wrench, PlanarBodyState &state, double *dq);
+// M^-1 times the generalized force of state.port_force (mass metric of the last free_motion).
+void respond(const PlanarBody &body, PlanarBodyState &state, double *dq);
 
 // Generalized force on p of wrenches on the markers (global axes): F_p += sum Phi_k^T A^T f_k + ...
 void add_modal_force(const PlanarBody &body, const PlanarBodyState &state, const Eigen::Matrix3Xd &wrench,
@@ -126,6 +125,9 @@ void static_force(const PlanarBody &body, const double *q, const Eigen::Vector2d
 // the applied loads. After kinematics.
 void required_force(const PlanarBody &body, const double *q, const double *v, const double *a,
                     const Eigen::Vector2d &gravity, PlanarBodyState &state, double *f);
+
+// p^T (S_bar_11 + S_bar_22) x, both (n)
+double weighted(const PlanarBody &body, const double *p, const double *x);
 
 // Kinetic, strain and gravitational energy.
 struct Energy {

@@ -29,6 +29,9 @@ enum class RowKind {
   slide, // n . (r_b - r_a), n fixed to the section of a
 };
 
+// Whether the directions of such rows, and with them their coefficients below, move with the bodies.
+constexpr bool moves(RowKind kind) { return kind == RowKind::slide; }
+
 struct Row {
   RowKind kind;
   MarkerReference a, b;

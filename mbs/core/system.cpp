@@ -15,12 +15,13 @@ void System::finish() {
     coordinates += body.coordinates();
   }
   for (auto &body : bodies)
-    body.marker_rows.assign(static_cast<std::size_t>(body.markers()), 2);
+    body.marker_rows.assign(static_cast<std::size_t>(body.markers()), 0);
   for (const auto &[row, target] : constraints)
-    if (row.kind == RowKind::angle || row.kind == RowKind::slide)
-      for (const auto *m : {&row.a, &row.b})
-        if (m->body >= 0)
-          bodies[static_cast<std::size_t>(m->body)].marker_rows[static_cast<std::size_t>(m->marker)] = 3;
+    for (const auto *m : {&row.a, &row.b})
+      if (m->body >= 0) {
+        int &used = bodies[static_cast<std::size_t>(m->body)].marker_rows[static_cast<std::size_t>(m->marker)];
+        used = std::max(used, row.kind == RowKind::angle || row.kind == RowKind::slide ? 3 : 2);
+      }
   couplings.clear();
   envelope.clear();
   const auto count = static_cast<int>(constraints.size());
@@ -43,15 +44,17 @@ void System::finish() {
 }
 
 Workspace::Workspace(const System &system)
-    : rows(system.constraints.size()), drive_rows(system.drives.size()), targets(system.constraints.size()),
-      external_drive(system.drives.size(), 0.0), schur(system.envelope),
+    : bodies(system.bodies.begin(), system.bodies.end()), rows(system.constraints.size()),
+      drive_rows(system.drives.size()), targets(system.constraints.size()), external_drive(system.drives.size(), 0.0),
+      schur(system.envelope), ports(bodies, system.constraints, schur),
       lambda(Eigen::VectorXd::Zero(static_cast<Index>(system.constraints.size()))),
       correction(Eigen::VectorXd::Zero(system.coordinates)), value(lambda), rate(lambda) {
   for (const auto &body : system.bodies) {
-    bodies.emplace_back(body);
     wrench.emplace_back(Eigen::Matrix3Xd::Zero(3, body.markers()));
     external_modal.emplace_back(Eigen::VectorXd::Zero(body.modes()));
   }
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    evaluate(system.constraints[r].row, bodies, rows[r]);
 }
 
 namespace {
@@ -96,32 +99,15 @@ void apply_drives(const System &system, double t, Workspace &w) {
   }
 }
 
-// w.lambda <- (C M^-1 C^T)^-1 w.lambda, and its wrenches -C^T lambda on the markers
-void solve_multipliers(const System &system, Workspace &w) {
+// w.lambda <- (C M^-1 C^T)^-1 w.lambda, and its forces -C^T lambda on the ports
+void solve_multipliers(Workspace &w) {
   w.schur.solve(w.lambda.data());
-  for (auto &wrench : w.wrench)
-    wrench.setZero();
-  for (std::size_t r = 0; r < system.constraints.size(); ++r)
-    add_wrench(system.constraints[r].row, w.rows[r], -w.lambda[static_cast<Index>(r)], w.wrench);
+  w.ports.set_forces(w.lambda.data(), w.bodies);
 }
 
-void assemble_schur(const System &system, Workspace &w) {
+void assemble_schur(Workspace &w) {
   w.schur.set_zero();
-  for (const auto &c : system.couplings) {
-    const auto &mobility = w.bodies[static_cast<std::size_t>(c.body)].mobility;
-    const Row &r = system.constraints[static_cast<std::size_t>(c.r)].row;
-    const Row &s = system.constraints[static_cast<std::size_t>(c.s)].row;
-    double &entry = *w.schur.entry(c.r, c.s);
-    if (r.kind != RowKind::slide && s.kind != RowKind::slide) { // unit coefficients, +1 on b, -1 on a
-      const double m = mobility(3 * c.k + static_cast<int>(r.kind), 3 * c.l + static_cast<int>(s.kind));
-      entry += c.r_is_b == c.s_is_b ? m : -m;
-    } else {
-      const RowMotion &mr = w.rows[static_cast<std::size_t>(c.r)], &ms = w.rows[static_cast<std::size_t>(c.s)];
-      const auto &cr = c.r_is_b ? mr.coefficient_b : mr.coefficient_a;
-      const auto &cs = c.s_is_b ? ms.coefficient_b : ms.coefficient_a;
-      entry += cr.dot(mobility.block<3, 3>(3 * c.k, 3 * c.l) * cs);
-    }
-  }
+  w.ports.assemble(w.bodies, w.schur);
   w.schur.factorise();
 }
 
@@ -133,11 +119,11 @@ void eliminate(const System &system, double t, const double *q, const double *v,
     const Index i = system.first_coordinate[b];
     free_motion(system.bodies[b], q + i, v + i, system.gravity, w.bodies[b]);
   }
-  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+  for (const std::size_t r : w.ports.moving_rows())
     evaluate(system.constraints[r].row, w.bodies, w.rows[r]);
-  }
+  w.ports.update(w.rows);
   update_targets(system, t, w);
-  assemble_schur(system, w);
+  assemble_schur(w);
 }
 
 } // namespace
@@ -145,19 +131,13 @@ void eliminate(const System &system, double t, const double *q, const double *v,
 void accelerations(const System &system, double t, const double *q, const double *v, Workspace &w, double *a) {
   ++w.evaluations;
   eliminate(system, t, q, v, w);
-  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
-    const Row &row = system.constraints[r].row;
-    const RowMotion &motion = w.rows[r];
-    double rhs = motion.bias - w.targets[r].acceleration;
-    for (const auto &[m, c] : {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)})
-      if (m->body >= 0)
-        rhs += c->dot(w.bodies[static_cast<std::size_t>(m->body)].free_acceleration.col(m->marker));
-    w.lambda[static_cast<Index>(r)] = rhs;
-  }
-  solve_multipliers(system, w);
+  for (std::size_t r = 0; r < w.rows.size(); ++r)
+    w.lambda[static_cast<Index>(r)] = w.rows[r].bias - w.targets[r].acceleration;
+  w.ports.add_accelerations(w.bodies, w.lambda.data());
+  solve_multipliers(w);
   for (std::size_t b = 0; b < system.bodies.size(); ++b) {
     const Index i = system.first_coordinate[b];
-    accelerations(system.bodies[b], q + i, v + i, w.wrench[b], w.bodies[b], a + i);
+    accelerations(system.bodies[b], q + i, w.bodies[b], a + i);
   }
 }
 
@@ -241,9 +221,9 @@ double project(const System &system, double t, double *q, double *v, Workspace &
   Eigen::VectorXd &value = w.value, &rate = w.rate;
   const auto correct = [&](const Eigen::VectorXd &residual, Eigen::Map<Eigen::VectorXd> &x) {
     w.lambda = residual;
-    solve_multipliers(system, w);
+    solve_multipliers(w);
     for (std::size_t b = 0; b < system.bodies.size(); ++b)
-      respond(system.bodies[b], w.wrench[b], w.bodies[b], w.correction.data() + system.first_coordinate[b]);
+      respond(system.bodies[b], w.bodies[b], w.correction.data() + system.first_coordinate[b]);
     x += w.correction;
   };
   double left = 0, previous = 1e300;

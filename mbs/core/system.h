@@ -5,6 +5,7 @@
 
 #include "core/envelope.h"
 #include "core/planar_body.h"
+#include "core/port_couplings.h"
 #include "core/rows.h"
 #include "core/time_function.h"
 
@@ -56,7 +57,8 @@ struct Workspace {
   explicit Workspace(const System &system);
 
   std::vector<PlanarBodyState> bodies;
-  std::vector<RowMotion> rows; // of the constraints, at the last evaluation
+  // Of the constraints, at the last evaluation; values and rates only where coefficients move.
+  std::vector<RowMotion> rows;
   std::vector<RowMotion> drive_rows;
   std::vector<Jet> targets; // of the constraints at target_time
   double target_time = std::numeric_limits<double>::quiet_NaN();
@@ -64,8 +66,9 @@ struct Workspace {
   std::vector<Eigen::VectorXd> external_modal; // likewise, modal forces of each body
   bool has_external_modal = false;
   EnvelopeMatrix<double> schur; // C M^-1 C^T, factorised
+  PortCouplings ports;
   Eigen::VectorXd lambda;
-  std::vector<Eigen::Matrix3Xd> wrench;    // of the constraints, on the markers of each body
+  std::vector<Eigen::Matrix3Xd> wrench;    // scratch: on the markers of each body
   Eigen::VectorXd correction, value, rate; // of projections
   unsigned long evaluations = 0;
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <variant>
 #include <vector>
@@ -91,6 +92,25 @@ private:
   double margin_;
 };
 
+/// A function of the user's: `compiled` writes value, rate and acceleration to its second argument.
+class UserFunction {
+public:
+  using Compiled = void (*)(double, double *);
+
+  explicit UserFunction(std::function<Jet(double)> function) : function_(std::move(function)) {}
+  explicit UserFunction(Compiled compiled)
+      : function_([compiled](double t) {
+          double out[3] = {};
+          compiled(t, out);
+          return Jet{out[0], out[1], out[2]};
+        }) {}
+
+  Jet operator()(double t) const { return function_(t); }
+
+private:
+  std::function<Jet(double)> function_;
+};
+
 /// Any prescribed function of time. Components that are not finite (domain error, overflow, out of range) are NaN:
 /// callers check.
 class TimeFunction {
@@ -98,11 +118,12 @@ public:
   TimeFunction(Constant function) : function_(function) {}
   TimeFunction(Expression function) : function_(std::move(function)) {}
   TimeFunction(PiecewisePolynomial function) : function_(std::move(function)) {}
+  TimeFunction(UserFunction function) : function_(std::move(function)) {}
 
   Jet operator()(double t) const;
 
 private:
-  std::variant<Constant, Expression, PiecewisePolynomial> function_;
+  std::variant<Constant, Expression, PiecewisePolynomial, UserFunction> function_;
 };
 
 } // namespace ffrobot

@@ -1,6 +1,5 @@
 """`mpirun -n 2 ffrobot link` makes the file that one process makes."""
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,16 +12,12 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "fe_models"))
 
 from solids import write_solid
 
-TOGETHER = ["mpirun", "-n", "2", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1"]
-AS_ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
-pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
-
-
-def link_on_two(ffrobot, *arguments):
-    return subprocess.run(
-        [*TOGETHER, ffrobot.path, "link", *map(str, arguments)],
-        env=ffrobot.environment | AS_ROOT,
+@pytest.fixture
+def link_on_two(ffrobot, mpirun):
+    return lambda *arguments: subprocess.run(
+        [*mpirun, ffrobot.path, "link", *map(str, arguments)],
+        env=ffrobot.environment,
         capture_output=True,
         text=True,
         timeout=300,
@@ -39,11 +34,11 @@ def arrays(path):
 
 
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
-def test_two_processes_make_the_same_file(ffrobot, tmp_path, condition):
+def test_two_processes_make_the_same_file(ffrobot, link_on_two, tmp_path, condition):
     link = write_solid(tmp_path, condition=condition, divisions=(20, 1, 1), count=4)
     one, two = tmp_path / "one.h5", tmp_path / "two.h5"
     assert ffrobot("link", link, "-o", one).returncode == 0
-    done = link_on_two(ffrobot, link, "-o", two)
+    done = link_on_two(link, "-o", two)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("computed in") == 1
     alone, together = arrays(one), arrays(two)
@@ -64,19 +59,19 @@ def largest_alike(name, arrays):
     return max(np.abs(arrays[n]).max(initial=0.0) for n in alike)
 
 
-def test_first_process_alone_computes_beams(ffrobot, tmp_path):
+def test_first_process_alone_computes_beams(ffrobot, link_on_two, tmp_path):
     link = write_solid(tmp_path)
     text = link.read_text().replace('"solid"', '"beam"').replace('cell = "tetrahedron"\norder = 3\n', "")
     link.write_text(text.replace("divisions = [36, 1, 1]", "elements = 10"))
-    done = link_on_two(ffrobot, link, "-o", tmp_path / "beam.h5")
+    done = link_on_two(link, "-o", tmp_path / "beam.h5")
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("computed in") == 1
     assert ffrobot("link", link, "-o", tmp_path / "one.h5").returncode == 0
     assert (tmp_path / "beam.h5").read_bytes() == (tmp_path / "one.h5").read_bytes()
 
 
-def test_one_error_for_all(ffrobot, tmp_path):
+def test_one_error_for_all(link_on_two, tmp_path):
     link = write_solid(tmp_path, cell="hexahedron", order=1, divisions=(4, 1, 1), family="all", count=100)
-    done = link_on_two(ffrobot, link)
+    done = link_on_two(link)
     assert done.returncode == 2
     assert done.stderr.count("modes.count") == 1

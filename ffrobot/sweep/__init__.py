@@ -1,0 +1,8 @@
+"""Many runs of one scene with keys varied: plan, folders of the runs, processes, table."""
+
+from __future__ import annotations
+
+from .sweep import Sweep, drop_results, forget_failures, plan_sweep, run_sweep
+from .table import print_table
+
+__all__ = ["Sweep", "drop_results", "forget_failures", "plan_sweep", "print_table", "run_sweep"]

@@ -1,0 +1,35 @@
+"""`--verbose` and `--log-file`: stages, analyses and errors, without a change of what a command prints."""
+
+import re
+
+
+def test_verbose_goes_to_the_error_stream(ffrobot, case_copy):
+    scene = case_copy("slider_crank")
+    ffrobot("solve", scene)  # stage 1
+    quiet, verbose = ffrobot("solve", scene), ffrobot("solve", scene, "--verbose")
+    assert quiet.stderr == ""
+    assert re.search(r'analysis "inverse": completed at t = 0.2 s, \d+ steps, \d+ rejected', verbose.stderr)
+    assert re.sub(r"\d", "", verbose.stdout).split() == re.sub(r"\d", "", quiet.stdout).split()
+
+
+def test_log_file_keeps_the_runs_in_order(ffrobot, case_copy):
+    scene = case_copy("slider_crank")
+    log = scene.with_name("run.log")
+    assert ffrobot("solve", scene, "--log-file", log).returncode == 0
+    wrong = scene.with_name("wrong.toml")
+    wrong.write_text(scene.read_text(encoding="utf-8").replace("kind =", "knid ="), encoding="utf-8")
+    done = ffrobot("solve", wrong, "--log-file", log)
+    assert done.returncode == 2
+    lines = log.read_text(encoding="utf-8").splitlines()
+    assert all(re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d", line) for line in lines if "wrong.toml:" not in line)
+    assert lines.index(next(line for line in lines if "completed" in line)) < len(lines) - 2
+    assert "knid" in "".join(lines[lines.index(next(line for line in lines if "ERROR" in line)) :])
+    assert done.stderr.count('did you mean "kind"?') == 2  # once for each analysis
+
+
+def test_log_file_that_cannot_be_written(ffrobot, case_copy):
+    scene = case_copy("slider_crank")
+    done = ffrobot("solve", scene, "--log-file", scene.parent / "no_such_folder" / "run.log")
+    assert done.returncode == 2
+    assert "No such file" in done.stderr
+    assert not scene.with_suffix(".results.h5").exists()

@@ -1,0 +1,134 @@
+"""`ffrobot sweep`: grids and samples over any key, failures as rows, taken up again, several processes."""
+
+import csv
+import subprocess
+from math import prod
+
+import pytest
+
+HEIGHTS = "links.rod.geometry.section.diameter=0.004:0.008:3"
+MASSES = "body.crank.rigid.mass=0.03,0.04"
+
+
+@pytest.fixture
+def short_scene(case_copy):
+    """The slider-crank's inverse analysis, a fifth of a turn."""
+    scene = case_copy("slider_crank")
+    head, _, _ = scene.read_text(encoding="utf-8").partition("[[analysis]]")
+    analysis = '[[analysis]]\nname = "inverse"\nkind = "pcid"\nend = 0.01\noutput_step = 0.001\ntolerance = 1e-4\n'
+    scene.write_text(head + analysis, encoding="utf-8")
+    return scene
+
+
+def table(scene):
+    with (scene.with_suffix(".sweep") / "table.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def deflections(scene):
+    return [float(row["inverse/points/rod.mid/deflection max"]) for row in table(scene)]
+
+
+def test_grid_over_link_and_scene(ffrobot, short_scene):
+    done = ffrobot("sweep", short_scene, "--vary", HEIGHTS, "--vary", MASSES)
+    assert done.returncode == 0, done.stderr
+    rows = table(short_scene)
+    assert [(row["links.rod.geometry.section.diameter"], row["body.crank.rigid.mass"]) for row in rows] == [
+        (diameter, mass) for diameter in ("0.004", "0.006", "0.008") for mass in ("0.03", "0.04")
+    ]
+    thin, thick = deflections(short_scene)[0], deflections(short_scene)[-1]
+    assert thin > 2 * thick  # inertia loads go as d², stiffness as d⁴
+
+
+def test_what_is_varied_is_what_is_solved(ffrobot, short_scene, tmp_path):
+    """A row equals a solve of the scene with that value written in by hand, kept files included."""
+    assert ffrobot("sweep", short_scene, "--vary", MASSES).returncode == 0
+    text = short_scene.read_text(encoding="utf-8")
+    assert "mass = 0.03308" in text
+    short_scene.write_text(text.replace("mass = 0.03308", "mass = 0.04"), encoding="utf-8")
+    by_hand = short_scene.with_name("by_hand.toml")
+    by_hand.write_text(text.replace("mass = 0.03308", "mass = 0.04"), encoding="utf-8")
+    short_scene.write_text(text, encoding="utf-8")
+    assert ffrobot("sweep", by_hand, "--vary", 'name="same"').returncode == 0
+    assert deflections(by_hand)[0] == deflections(short_scene)[1]
+
+
+def test_failures_are_rows(ffrobot, short_scene):
+    vary = ["--vary", "body.crank.rigid.mass=0.03,-1", "--vary", "analysis.inverse.max_steps=5,99999"]
+    done = ffrobot("sweep", short_scene, *vary)
+    assert done.returncode == 0, done.stderr
+    rows = table(short_scene)
+    assert [row["status"] for row in rows] == ["failed", "completed", "wrong input", "wrong input"]
+    assert "too many steps" in rows[0]["message"]
+    assert "expected a number greater than 0, found -1" in rows[2]["message"]
+
+
+def test_taken_up_again(ffrobot, short_scene):
+    assert ffrobot("sweep", short_scene, "--vary", MASSES).returncode == 0
+    folders = short_scene.with_suffix(".sweep") / "runs"
+    first, second = (folders / name / "row.json" for name in ("0000", "0001"))
+    before, expected = first.stat().st_mtime_ns, deflections(short_scene)
+    second.unlink()
+    assert ffrobot("sweep", short_scene, "--vary", MASSES, "--no-keep").returncode == 0
+    assert first.stat().st_mtime_ns == before
+    assert second.exists()
+    assert not list(folders.glob("*/results.h5"))
+    assert deflections(short_scene) == expected
+
+
+def test_processes_side_by_side(ffrobot, short_scene):
+    assert ffrobot("sweep", short_scene, "--vary", HEIGHTS, "-j", "2").returncode == 0
+    together = deflections(short_scene)
+    assert ffrobot("sweep", short_scene, "--vary", HEIGHTS, "-o", short_scene.with_name("alone")).returncode == 0
+    with (short_scene.with_name("alone") / "table.csv").open(encoding="utf-8") as file:
+        alone = [float(row["inverse/points/rod.mid/deflection max"]) for row in csv.DictReader(file)]
+    assert together == alone
+
+
+def test_under_mpirun(ffrobot, short_scene, mpirun):
+    done = subprocess.run(
+        [*mpirun, ffrobot.path, "sweep", short_scene, "--vary", MASSES],
+        env=ffrobot.environment, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("completed") == 2
+    assert [row["status"] for row in table(short_scene)] == ["completed"] * 2
+
+
+def test_latin_hypercube(ffrobot, short_scene):
+    vary = ["--vary", "payload.0.mass=0.01:1:2:log", "--vary", 'trajectory.slider.x="0.35","0.3"']
+    text = short_scene.read_text(encoding="utf-8") + '\n[[payload]]\npoint = "rod.mid"\nmass = 0.1\n'
+    short_scene.write_text(text, encoding="utf-8")
+    done = ffrobot("sweep", short_scene, *vary, "--sample", 4, "--seed", 7)
+    assert done.returncode == 0, done.stderr
+    rows = table(short_scene)
+    decades = sorted(float(row["payload.0.mass"]) for row in rows)
+    assert all(0.01 * 100 ** (k / 4) <= mass < 0.01 * 100 ** ((k + 1) / 4) for k, mass in enumerate(decades))
+    assert prod(row["trajectory.slider.x"] in ("0.35", "0.3") for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("vary", "message"),
+    [
+        ("gravity", "--vary: expected KEY=VALUES"),
+        ("gravity.1=", "--vary: expected FIRST:LAST:COUNT"),
+        ("gravity.1=1:2:x", "--vary: expected two numbers and a count"),
+        ("gravity.1=-1:1:3:log", "two ends of one sign"),
+        ("gravity.7=1,2", '--vary: expected one of "0", "1" in "gravity.7", found "7"'),
+        ("body.cranck.rigid.mass=1,2", 'did you mean "crank"?'),
+        ("links.crank.mesh.elements=4,8", 'a body that has a link file ("rod")'),
+        ("links.rod.mesh.element=4,8", 'did you mean "elements"?'),
+        ("gravitation=1,2", "with gravitation = 1"),
+        ("name.first=1,2", '--vary: expected a table or a list at "name"'),
+    ],
+)  # fmt: skip
+def test_wrong_variations(refused, short_scene, vary, message):
+    assert message in refused(short_scene.parent, "sweep", "scene.toml", "--vary", vary)
+
+
+def test_wrong_reduction_and_folder(refused, ffrobot, short_scene):
+    folder = short_scene.parent
+    message = refused(folder, "sweep", "scene.toml", "--vary", MASSES, "--collect", "inverse/time:mean")
+    assert "max|rms|first|last" in message
+    assert ffrobot("sweep", "scene.toml", "--vary", MASSES, cwd=folder).returncode == 0
+    assert "another's" in refused(folder, "sweep", "scene.toml", "--vary", HEIGHTS)

@@ -1,0 +1,91 @@
+"""Functions of Python and compiled ones in place of expressions, and histories as a table of pandas."""
+
+import ctypes
+import math
+import subprocess
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import ffrobot
+
+SINE = "void sine(double t, double *out) { out[0] = 0.5 * sin(t); out[1] = 0.5 * cos(t); out[2] = -out[0]; }"
+
+
+def sine(t):
+    return 0.5 * math.sin(t), 0.5 * math.cos(t), -0.5 * math.sin(t)
+
+
+@pytest.fixture(scope="module")
+def compiled_sine(tmp_path_factory):
+    """What `numba.cfunc` returns, as far as it is looked at."""
+    folder = tmp_path_factory.mktemp("compiled")
+    (folder / "sine.c").write_text(f"#include <math.h>\n{SINE}\n", encoding="utf-8")
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", "sine.so", "sine.c", "-lm"], cwd=folder, check=True)
+    library = ctypes.CDLL(str(folder / "sine.so"))
+    return SimpleNamespace(library=library, address=ctypes.cast(library.sine, ctypes.c_void_p).value)
+
+
+def swing(value="0.5*sin(t)", load="0"):
+    rod = {"mass": 1.0, "inertia": 0.1, "center": [0.3, 0.0], "points": {"root": [0, 0], "tip": [0.6, 0]}}
+    return ffrobot.make_scene(
+        name="swing",
+        gravity=[0.0, -9.81],
+        body=[{"name": "arm", "rigid": rod}],
+        joint=[{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+        trajectory=[{"name": "turn", "joint": "shoulder", "value": value}],
+        load=[{"point": "arm.tip", "y": load}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
+    )
+
+
+def moment(scene):
+    return ffrobot.solve(scene)["inverse/joints/shoulder/moment"]
+
+
+def test_functions_are_as_good_as_expressions(compiled_sine):
+    expected = moment(swing())
+    np.testing.assert_allclose(moment(swing(sine)), expected, rtol=1e-12)
+    np.testing.assert_allclose(moment(swing(compiled_sine)), expected, rtol=1e-12)
+
+
+def test_load_needs_the_value_alone():
+    np.testing.assert_allclose(moment(swing(load=lambda t: 3.0 * t)), moment(swing(load="3*t")), rtol=1e-12)
+
+
+def test_text_of_the_scene_names_the_function():
+    assert 'value = "<sine, function no. 1>"' in swing(sine).text
+
+
+@pytest.mark.parametrize(
+    ("value", "complaint"),
+    [
+        (lambda t: 0.5 * t, "expected a finite velocity"),
+        (lambda t: (0.0, 1.0), "expected (value, rate, acceleration)"),
+        (SimpleNamespace(address="here"), "expected a function of t"),
+    ],
+)
+def test_functions_that_are_none_of_a_path(value, complaint):
+    with pytest.raises(ffrobot.InputError) as error:
+        swing(value)
+    assert complaint in str(error.value)
+
+
+def test_errors_of_a_function_come_through():
+    def breaks(t):
+        if 0.031 < t < 0.039:  # no output time
+            raise ZeroDivisionError("in my function")
+        return sine(t)
+
+    with pytest.raises(ZeroDivisionError, match="in my function"):
+        ffrobot.solve(swing(breaks))
+
+
+def test_pandas_view():
+    results = ffrobot.solve(swing())
+    frame = results.frame("inverse")
+    assert frame.index.name == "time"
+    np.testing.assert_array_equal(frame.index, results.time("inverse"))
+    np.testing.assert_array_equal(frame["joints/shoulder/moment"], results["inverse/joints/shoulder/moment"])
+    assert "time" not in frame.columns
