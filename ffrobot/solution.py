@@ -45,8 +45,9 @@ from .validation import did_you_mean, quoted
 
 Array = NDArray[np.float64]
 
-logger = logging.getLogger(__name__)
 ALLOCATED = ("pcid", "fcid", "static")  # kinds of analysis whose forces patches and actuation points have to meet
+
+logger = logging.getLogger(__name__)
 
 
 class Watcher:

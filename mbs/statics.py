@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ..errors import SolveError
+from . import _core
 from .initial_state import State
 from .model import Array, Assembly
 
@@ -17,7 +16,6 @@ TOLERANCE = 1e-12  # residual forces relative to the largest of their terms
 def static_equilibrium(assembly: Assembly, start: State) -> State:
     """Solve Q(q) − C_qᵀλ = 0, C(q, 0) = 0 by Newton from `start`; returns the state (v kept on Ċ = 0).
 
-    The Jacobian is taken by central differences: convergence is to the exact residual, the slope only sets the pace.
     Raises `SolveError` where the robot has no equilibrium near the start.
     """
     system, n = assembly.system, assembly.system.coordinates
@@ -37,7 +35,7 @@ def static_equilibrium(assembly: Assembly, start: State) -> State:
         if np.abs(r[:n]).max() <= TOLERANCE * size and np.abs(r[n:]).max(initial=0.0) <= TOLERANCE:
             return _with_rates(assembly, x[:n], start.v)
         try:
-            step = np.linalg.solve(_jacobian(lambda y: residual(y)[0], x), r)
+            step = np.linalg.solve(_jacobian(assembly, x), r)
         except np.linalg.LinAlgError:
             break
         turn = np.abs(step[:n]).max()
@@ -59,13 +57,8 @@ def _with_rates(assembly: Assembly, q: Array, v: Array) -> State:
     return State(q, v)
 
 
-def _jacobian(function: Callable[[Array], Array], x: Array) -> Array:
-    """Central differences, column by column."""
-    steps = 1e-6 * np.maximum(1.0, np.abs(x))
-    columns = []
-    for i, h in enumerate(steps):
-        up, down = x.copy(), x.copy()
-        up[i] += h
-        down[i] -= h
-        columns.append((function(up) - function(down)) / (2 * h))
-    return np.column_stack(columns)
+def _jacobian(assembly: Assembly, x: Array) -> Array:
+    """Exact derivative of Q − C_qᵀλ and C with respect to (q, λ), at rest."""
+    n, rest = assembly.system.coordinates, np.zeros(assembly.system.coordinates)
+    _, _, K, C_q = _core.tangent(assembly.system, 0.0, x[:n], rest, rest, x[n:], [])
+    return np.block([[-K, -C_q.T], [C_q, np.zeros((len(C_q), len(C_q)))]])

@@ -135,7 +135,7 @@ void marker_tangent(const PlanarBody &body, const PlanarBodyState &s, Index k, c
   const Axes axes(s);
   const auto Phi = s.W.middleRows<2>(row);
   const Vector2d &arm = s.markers[static_cast<std::size_t>(k)].arm, arm_perp(-arm.y(), arm.x());
-  const Index *place = s.rows.place.data() + row;
+  const Index *place = &s.rows.place[static_cast<std::size_t>(row)];
   const Vector2d convective(s.convective[place[0]], s.convective[place[1]]);
   const Vector2d rate = Phi * p_dot, acceleration = Phi * p_ddot - convective;
   const MatrixXd A_Phi = axes.A * Phi, A_theta_Phi = axes.A_theta * Phi;
