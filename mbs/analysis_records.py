@@ -30,9 +30,9 @@ class Analysis(ClosedLoopKeys):
     leaves of vibrations far above one over its size.
 
     Of kind "motors-only": `output` "tip" has the path's own points follow it, "redefined" where they would be with
-    `factor` times the vibration (nine tenths of the largest that is minimum phase where none is given). `pre_actuation` and
-    `post_actuation` (s) are how long motors act before and after the path, which is held there; where they are not
-    given, as long as the zero dynamics asks for.
+    `factor` times the vibration (nine tenths of the largest that is minimum phase where none is given).
+    `pre_actuation` and `post_actuation` (s) are how long motors act before and after the path, which is held there;
+    where they are not given, as long as the zero dynamics asks for.
 
     Linear models and placements are `about` the static equilibrium (None, or "static") or an earlier analysis at
     `times`; `points` are those whose motion and disturbance a linear model knows.
