@@ -11,6 +11,7 @@ from ffrobot.actuation.control.lqr import gains, sampled
 from ffrobot.actuation.control.rigid_arm import RigidArm
 from ffrobot.actuation.control.signals import volts_per_modal_coordinate
 from ffrobot.errors import InputError, SolveError
+from ffrobot.figures.standard import standard_figures
 from ffrobot.mbs.analyses import run_pcid
 from ffrobot.mbs.scene_file import make_scene
 from ffrobot.results import results_image
@@ -214,6 +215,9 @@ def test_unstable_gains_are_reported_and_the_results_kept():
     results = Results.from_image(results_image(solution), scene.path)
     assert results.has("wild/control/commands")
     assert results.attributes("calm/control")["verdict"] == "stable"
+    assert len(results.time("calm/control/commands")) == len(results["calm/control/readings"]) == 50
+    (figure,) = [figure for figure in standard_figures(results) if figure.name == "tip_error"]
+    assert [curve.label for curve in figure.curves] == ["wild", "calm"]
 
 
 def test_slow_sampling_is_warned_of():
