@@ -165,6 +165,19 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 
 
 @cli.command()
+@click.argument("results_file", metavar="RESULTS.h5", type=FILE)
+@click.option("--analysis", metavar="NAME", help="Of this analysis; the first linear one if absent.")
+@click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Where to write [RESULTS.npz].")
+def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
+    """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
+    from .control_results import export_linear
+
+    path = output or results_file.with_suffix(".npz")
+    name = export_linear(results_file, analysis, path)
+    click.echo(f"{path}: linear model of {name}")
+
+
+@cli.command()
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
 @click.option("--vary", metavar="KEY=VALUES", multiple=True, required=True, help="What takes which values; repeatable.")
 @click.option("--sample", metavar="N", type=click.IntRange(1), help="N points of a Latin hypercube, not the full grid.")

@@ -17,6 +17,7 @@ from .errors import InputError
 from .fe_models.modal_body import ModalBody
 from .fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from .fe_models.modal_body_file import read_modal_body
+from .loop_results import HEADINGS, metrics_of, metrics_row
 from .results import FORMAT as RESULTS_FORMAT
 
 
@@ -81,16 +82,20 @@ def _results(file: h5py.File) -> str:
         lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
     analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "wall (s)")
     datasets = Table("dataset", "shape")
+    loops = Table(*HEADINGS, box=None, padding=(0, 1, 0, 0))
     for name, group in file.items():
         time, attributes = group["time"], group.attrs
         analyses.add_row(
             name, attributes["kind"], attributes["status"], f"{len(time)}", f"{time[-1]:g}", f"{attributes['steps']}",
             f"{attributes['wall_seconds']:.3f}",
         )  # fmt: skip
+        if "control/commands" in group:
+            loops.add_row(*metrics_row(name, metrics_of(group["control"].attrs)))
         group.visititems(
             lambda _, item: datasets.add_row(item.name, str(item.shape)) if isinstance(item, h5py.Dataset) else None
         )
-    return "\n".join(lines) + "\n" + _rendered(analyses) + _rendered(datasets)
+    tables = [analyses, loops, datasets] if loops.row_count else [analyses, datasets]
+    return "\n".join(lines) + "\n" + "".join(map(_rendered, tables))
 
 
 def _rendered(table: Table) -> str:

@@ -13,7 +13,9 @@ from .actuation.feasibility import Feasibility
 from .actuation.patches import PatchArray
 from .actuation.points import PointForces, PointSet
 from .actuation.voltages import Voltages
+from .control_results import write_linear, write_placement
 from .files import write_atomically
+from .loop_results import write_loop
 from .mbs.analyses import Outcome
 from .mbs.fewer_modes import modes_kept
 from .mbs.motors_only import is_minimum_phase, path_error
@@ -32,7 +34,6 @@ from .solution import Solution
 
 FORMAT = "ffrobot-results"
 FORMAT_VERSION = 1
-INTEGRATED = ("pcid", "forward", "motors-only")  # kinds of analyses that take steps
 
 
 def write_results(solution: Solution, path: Path) -> None:
@@ -71,8 +72,14 @@ def results_image(solution: Solution) -> bytes:
                     group[f"patch_structure/{body_name}/{key}"] = pair
             for point, shift in solution.predicted_shift.get(name, {}).items():
                 group[f"points/{point}/predicted_shift"] = shift
+            if name in solution.linear:
+                write_linear(group.create_group("linear"), solution.linear[name], outcome)
+            if name in solution.placements:
+                write_placement(group.create_group("placement"), solution.placements[name])
             if name in solution.feasibility:
                 _write_feasibility(group.create_group("feasibility"), solution, solution.feasibility[name])
+            if name in solution.loops:
+                write_loop(group, solution.loops[name])
             for body_name, stress in solution.stresses.get(name, {}).items():
                 _write_stress(group.create_group(f"stress/{body_name}"), stress)
         file.flush()
@@ -92,9 +99,8 @@ def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
     analysis = outcome.analysis
     group.attrs["kind"] = analysis.kind
-    integrated = analysis.kind in INTEGRATED
-    group.attrs["integrator"] = outcome.integrator.name if integrated else "none"
-    group.attrs["integrator_reason"] = outcome.integrator.reason if integrated else ""
+    group.attrs["integrator"] = outcome.integrator.name if analysis.integrated else "none"
+    group.attrs["integrator_reason"] = outcome.integrator.reason if analysis.integrated else ""
     group.attrs["tolerance"] = analysis.tolerance
     group.attrs["actuation"] = analysis.actuation or ""
     group.attrs["apply"] = analysis.apply or ""
@@ -143,6 +149,8 @@ def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["reaction_moment"] = forces.reaction_moment
         if forces.motor is not None:
             entry["moment"] = forces.motor
+            if "gear_ratio" in joint.model_fields_set:
+                entry["motor_moment"] = forces.motor / joint.gear_ratio
 
 
 def _write_servo(group: h5py.Group, outcome: Outcome, inversion: Inversion) -> None:

@@ -151,8 +151,12 @@ class Results:
         return dataset in self._file
 
     def time(self, dataset: str) -> Array:
-        """Output times (T,), in s, of the analysis that `dataset` belongs to; the analysis' own name does, too."""
-        return self[dataset.strip("/").split("/")[0] + "/time"]
+        """Output times (T,), in s, of the analysis that `dataset` belongs to; the analysis' own name does, too.
+
+        Of what is in `control/` of a closed loop, the times of its samples.
+        """
+        analysis, *inside = dataset.strip("/").split("/")
+        return self[f"{analysis}/control/time" if inside[:1] == ["control"] else f"{analysis}/time"]
 
     def __getitem__(self, dataset: str) -> Array:
         """A dataset with the shape it has in the file. Raises `InputError` if absent."""

@@ -13,6 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .actuation.control.closed_loop import LoopRecord, run_closed_loop
+from .actuation.control.linear_analysis import LinearAnalysis, analyse, linear_models
+from .actuation.control.placement import Placed, place
 from .actuation.feasibility import Feasibility, MotorFeasibility, judge_motors, judge_patches
 from .actuation.patch_structure import StructureEffect, structure_effect, with_patches
 from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
@@ -25,11 +28,13 @@ from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.analysis_records import Analysis
+from .mbs.control_records import Placement
 from .mbs.fcid import run_fcid
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.motors_only import run_motors_only
 from .mbs.observation import modes_of_file
+from .mbs.operating_points import operating_points
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.record_types import split_point
 from .mbs.scene_file import load_scene
@@ -41,6 +46,8 @@ from .skipped import skipped as skipped_lines
 from .validation import did_you_mean, quoted
 
 Array = NDArray[np.float64]
+
+ALLOCATED = ("pcid", "fcid", "static")  # kinds of analysis whose forces patches and actuation points have to meet
 
 logger = logging.getLogger(__name__)
 
@@ -83,6 +90,8 @@ class Solution:
         point_forces: likewise.
         predicted_shift: by analysis and point, (T, 2) m: what voltages within their limits leave undone.
         feasibility: by analysis.
+        loops: what happened at the samples, by analysis of kind "closed-loop".
+        linear: linear models, by analysis; placements: of patches, likewise.
         stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
         mode_choice: where `modes = "auto"`.
@@ -102,7 +111,10 @@ class Solution:
     point_forces: dict[str, dict[str, PointForces]] = field(default_factory=dict)
     predicted_shift: dict[str, dict[str, Array]] = field(default_factory=dict)
     feasibility: dict[str, Feasibility] = field(default_factory=dict)
+    loops: dict[str, LoopRecord] = field(default_factory=dict)
     stresses: dict[str, dict[str, BodyStress]] = field(default_factory=dict)
+    linear: dict[str, LinearAnalysis] = field(default_factory=dict)
+    placements: dict[str, Placed] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
     mode_choice: ModeChoice | None = None
@@ -193,9 +205,13 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
                 body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
                 for body, array in solution.patches.items()
             }
+        if analysis.kind == "linear":
+            solution.linear[analysis.name] = analyse(linear_models(outcome, solution.patches))
+        if analysis.placement is not None:
+            solution.placements[analysis.name] = _place(solution, analysis.placement, outcome)
         solution.seconds[analysis.name] = time.perf_counter() - started
         _log(outcome)
-        if outcome.status != "completed":
+        if outcome.failed:
             break
     return True
 
@@ -245,7 +261,7 @@ def _assembled(
         for layout in scene.pzt
         if (modal := bodies[layout.body].modal) is not None
     }
-    if any(analysis.kind != "forward" for analysis in scene.analysis) and scene.trajectory:
+    if any(analysis.kind in ALLOCATED for analysis in scene.analysis) and scene.trajectory:
         for array in patches.values():
             check_reach(scene.path, array)
     points = {
@@ -284,7 +300,7 @@ def _judge_actuation(solution: Solution, outcome: Outcome) -> None:
         solution.feasibility[name] = _judge(solution, outcome)
     elif outcome.inversion is not None:
         solution.feasibility[name] = Feasibility(_judge_motors(solution, outcome), {})
-    if outcome.analysis.kind != "forward" and any(outcome.assembly.is_trajectory):
+    if outcome.analysis.kind in ALLOCATED and any(outcome.assembly.is_trajectory):
         solution.point_forces[name] = {
             body: solve_point_forces(points, outcome) for body, points in solution.points.items()
         }
@@ -313,6 +329,8 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
     def progress(t: float) -> bool:
         return watcher.advance(t, end) and not interruption.requested
 
+    if analysis.kind in ("linear", "placement"):
+        return operating_points(model, analysis, solution.outcomes[analysis.source] if analysis.source else None)
     if analysis.kind == "static":
         return run_static(model, analysis)
     if analysis.kind == "fcid":
@@ -323,7 +341,31 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
         replayed = any(later.actuation == analysis.name for later in solution.scene.analysis)
         return run_pcid(model, analysis, replayed, progress)
     source = solution.outcomes[analysis.actuation] if analysis.actuation else None
+    if analysis.kind == "closed-loop":
+        assert source is not None
+        outcome, loop = run_closed_loop(model, analysis, source, solution.patches, progress)
+        solution.loops[analysis.name] = loop
+        return outcome
     return run_forward(model, analysis, source, _equipment(solution), progress)
+
+
+def _place(solution: Solution, wanted: Placement, outcome: Outcome) -> Placed:
+    """The best places for the patches of one body, about `outcome` or over the path that it stands on."""
+    path, loaded = solution.scene.path, solution.bodies[wanted.body]
+    assert loaded.modal is not None
+    model, F_p = None, None
+    if wanted.criterion == "voltage":
+        source = solution.outcomes[str(outcome.analysis.source)]
+        if source.F_p is None:
+            raise InputError(
+                f'{path}: analysis "{outcome.analysis.name}": placement.criterion: expected motors that fit the'
+                f' mechanism for "voltage", found {len(solution.model.motors)} for {solution.model.rigid_freedom}'
+            )
+        F_p = source.F_p[:, source.modal_columns(wanted.body)]
+    else:
+        (model,) = linear_models(outcome, {})
+    layout = solution.patches[wanted.body].layout
+    return place(path, wanted, layout, loaded.modal, loaded.planar, model, F_p)
 
 
 def _equipment(solution: Solution) -> Equipment:

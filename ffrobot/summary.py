@@ -10,13 +10,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from .control_summary import LINEAR_COLUMNS, PLACEMENT_COLUMNS, linear_lines, linear_table, placement_table
+from .loop_results import HEADINGS, metrics_row
 from .mbs.analyses import Outcome
 from .mbs.fewer_modes import modes_kept
 from .mbs.geometric_stiffening import NOTABLE
 from .mbs.motors_only import describe_zeros, is_minimum_phase, path_error
 from .mbs.stable_inversion import Inversion
 from .mode_choice import ModeChoice
-from .results import INTEGRATED
 from .solution import Solution
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
@@ -35,19 +36,33 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     if any(solution.voltages.values()):
         console.print()
         console.print(_voltages(solution))
+    if solution.loops:
+        console.print()
+        console.print(_loops(solution))
     for name in solution.feasibility:
         console.print(f"{name}: {_verdict(solution, name)}")
     if any(solution.stresses.values()):
         console.print()
         console.print(_stresses(solution))
+    if solution.linear:
+        console.print()
+        console.print(linear_table(solution, _table(*LINEAR_COLUMNS)))
+    if solution.placements:
+        console.print()
+        console.print(placement_table(solution, _table(*PLACEMENT_COLUMNS)))
+    for line in linear_lines(solution):
+        console.print(line)
     notes = Table.grid(padding=(0, 2))
     for name, outcome in solution.outcomes.items():
-        if outcome.analysis.kind in ("pcid", "forward") and outcome.analysis.integrator == "auto":
+        if outcome.analysis.integrated and outcome.analysis.integrator == "auto":
             notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
     if solution.mode_choice is not None:
         notes.add_row("modes", _modes(solution, solution.mode_choice))
         if outcome.inversion is not None:
             notes.add_row("motors only", f"{name}: {_inversion(outcome, outcome.inversion)}")
+    for name, loop in solution.loops.items():
+        for line in loop.warnings:
+            notes.add_row("warning", f"{name}: {line}")
     notes.add_row(*_stiffening(solution))
     notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     if solution.skipped:
@@ -111,7 +126,7 @@ def _analyses(solution: Solution) -> Table:
     table = _table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
         analysis, reached = outcome.analysis, outcome.time[-1]
-        integrated = analysis.kind in INTEGRATED
+        integrated = analysis.integrated
         table.add_row(
             name,
             analysis.kind,
@@ -149,6 +164,13 @@ def _verdict(solution: Solution, analysis: str) -> str:
         return "motors and patches can do it, as far as limits are given"
     lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
     return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility"
+
+
+def _loops(solution: Solution) -> Table:
+    table = _table(*HEADINGS)
+    for name, loop in solution.loops.items():
+        table.add_row(*metrics_row(name, loop.metrics))
+    return table
 
 
 def _stresses(solution: Solution) -> Table:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
 
-_STATUS = {
+STATUS = {
     _core.IntegrationStatus.completed: "completed",
     _core.IntegrationStatus.step_underflow: "step underflow",
     _core.IntegrationStatus.too_many_steps: "too many steps",
@@ -86,9 +86,15 @@ class Outcome:
         first = int(self.assembly.first[i]) - 3 * i
         return slice(first, first + self.assembly.model.bodies[i].n_modes)
 
+    @property
+    def failed(self) -> bool:
+        """Whether the run did not do what it was for; that a closed loop diverges is a finding."""
+        found = self.analysis.kind == "closed-loop" and self.status in ("diverged", "step underflow")
+        return self.status != "completed" and not found
+
     def check_completed(self) -> None:
-        """Raise `SolveError` with advice unless the run reached its end."""
-        if self.status != "completed":
+        """Raise `SolveError` with advice where the run failed."""
+        if self.failed:
             reached = self.time[-1] if self.time_reached is None else self.time_reached
             raise SolveError(
                 f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
@@ -120,7 +126,7 @@ def run_forward(
     if source is None:
         assembly = Assembly(model, model.joints, model.loads)
         return _integrate(assembly, analysis, initial_state(assembly), None, None, None, progress)
-    analysis, loads = _as_long_as(source, analysis), model.loads
+    analysis, loads = as_long_as(source, analysis), model.loads
     if source.inversion is not None:
         loads = source.inversion.servo.loads
     rows, actuators = applied_actuators(model, analysis, source, equipment)
@@ -130,7 +136,7 @@ def run_forward(
     return _integrate(assembly, analysis, start, steering, None, None, progress, source.integrator)
 
 
-def _as_long_as(source: Outcome, analysis: Analysis) -> Analysis:
+def as_long_as(source: Outcome, analysis: Analysis) -> Analysis:
     """`analysis` with the pre- and, where it runs to the end of the path, the post-actuation of its source."""
     pre, post = source.analysis.pre_actuation, source.analysis.post_actuation
     post = post if analysis.end == source.analysis.end else None
@@ -185,11 +191,11 @@ def _integrate(
         recording,
     )  # fmt: skip
     seconds = time.perf_counter() - began
-    reached, status = len(run.q), _STATUS[run.status]
+    reached, held, status = len(run.q), len(assembly.constraints), STATUS[run.status]
     failed = status not in ("completed", "interrupted")
     cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2))) if failed else ""
     return Outcome(
-        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers,
+        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers[:, :held],
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
         status, run.steps, run.rejected, run.evaluations, seconds, integrator, run.time_reached, cause, recording,
     )  # fmt: skip

@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ..validation import Record
-from .record_types import Expression, Name, Positive
+from .control_records import Placement
+from .loop_records import ClosedLoopKeys
+from .record_types import Expression, Name, NotNegative, PointReference, Positive
 
-NotNegative = Annotated[float, Field(ge=0.0)]
 MAX_OUTPUTS = 10_000_000
+UNTIMED = ("static", "linear", "placement")  # kinds without an end
+STATIC = "static"  # instead of an analysis' name: about the static equilibrium
 TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
 
 
-class Analysis(Record):
+class Analysis(ClosedLoopKeys):
     """One run, with outputs at 0, output_step, …, end (s).
 
     Both are 0 where the file does not give them: in static analyses (t = 0 only), and in forward analyses that take
@@ -31,10 +33,13 @@ class Analysis(Record):
     `factor` times the vibration (nine tenths of the largest that is minimum phase where none is given).
     `pre_actuation` and `post_actuation` (s) are how long motors act before and after the path, which is held there;
     where they are not given, as long as the zero dynamics asks for.
+
+    Linear models and placements are `about` the static equilibrium (None, or "static") or an earlier analysis at
+    `times`; `points` are those whose motion and disturbance a linear model knows.
     """
 
     name: Name
-    kind: Literal["pcid", "fcid", "forward", "static", "motors-only"]
+    kind: Literal["pcid", "fcid", "forward", "static", "linear", "placement", "motors-only", "closed-loop"]
     end: Positive = 0.0
     output_step: Positive = 0.0
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
@@ -50,24 +55,33 @@ class Analysis(Record):
     pre_actuation: NotNegative | None = None
     post_actuation: NotNegative | None = None
     max_steps: Annotated[int, Field(gt=0)] = 5_000_000
+    about: str | None = None
+    instants: tuple[NotNegative, ...] | None = Field(default=None, alias="times", min_length=1)
+    points: tuple[PointReference, ...] | None = None
+    placement: Placement | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Analysis:
         for key in ("end", "output_step"):
             given = key in self.model_fields_set
-            if self.kind == "static" and given:
-                raise ValueError(f'expected no key "{key}" in kind = "static", found {getattr(self, key):g}')
-            if self.kind != "static" and self.actuation is None and not given:
+            if self.kind in UNTIMED and given:
+                raise ValueError(f'expected no key "{key}" in kind = "{self.kind}", found {getattr(self, key):g}')
+            if self.kind not in UNTIMED and self.actuation is None and not given:
                 raise ValueError(f'expected the key "{key}" in kind = "{self.kind}", found none')
         if self.end and self.output_step:
             check_steps(self.end, self.output_step)
-        if (self.actuation is None) != (self.apply is None):
+        self._check_linear_keys()
+        if self.kind != "closed-loop" and (self.actuation is None) != (self.apply is None):
             raise ValueError(
                 'expected the keys "actuation" and "apply" together, found only '
                 + ('"apply"' if self.actuation is None else '"actuation"')
             )
-        if self.actuation is not None and self.kind != "forward":
-            raise ValueError(f'expected the key "actuation" only in kind = "forward", found kind = "{self.kind}"')
+        if self.actuation is not None and self.kind not in ("forward", "closed-loop"):
+            raise ValueError(
+                f'expected the key "actuation" only in kind = "forward" or "closed-loop", found kind = "{self.kind}"'
+            )
+        if self.apply is not None and self.kind == "closed-loop":
+            raise ValueError('expected the key "feed_forward" in kind = "closed-loop", found "apply"')
         if "spectral_radius" in self.model_fields_set and self.integrator != "generalized-alpha":
             raise ValueError(
                 'expected the key "spectral_radius" only with integrator = "generalized-alpha", found integrator ='
@@ -88,6 +102,26 @@ class Analysis(Record):
         self._check_motors_only()
         return self
 
+    def _check_linear_keys(self) -> None:
+        allowed = {"linear": ("about", "times", "points"), "placement": ("about", "times", "placement")}
+        for key, value in (
+            ("about", self.about), ("times", self.instants), ("points", self.points), ("placement", self.placement)
+        ):  # fmt: skip
+            if value is not None and key not in allowed.get(self.kind, ()):
+                raise ValueError(f'expected no key "{key}" in kind = "{self.kind}", found one')
+        if self.kind == "placement" and self.placement is None:
+            raise ValueError('expected the table "placement" in kind = "placement", found none')
+
+    @property
+    def source(self) -> str | None:
+        """Name of the earlier analysis that a linear model or a placement is about; None for the equilibrium."""
+        return None if self.about == STATIC else self.about
+
+    @property
+    def integrated(self) -> bool:
+        """Whether the motion comes from an integration over time."""
+        return self.kind in ("pcid", "forward", "motors-only", "closed-loop")
+
     def _check_motors_only(self) -> None:
         for key in ("output", "factor", "pre_actuation", "post_actuation"):
             if self.kind != "motors-only" and key in self.model_fields_set:
@@ -101,6 +135,8 @@ class Analysis(Record):
 
         From 0 to `end`, and the pre- and post-actuation besides where they are known.
         """
+        if self.instants is not None:
+            return np.array(self.instants)
         if not (self.end and self.output_step):
             return np.zeros(1)
         before, after = (round((x or 0.0) / self.output_step) for x in (self.pre_actuation, self.post_actuation))

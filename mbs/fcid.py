@@ -58,7 +58,7 @@ def run_fcid(model: Model, analysis: Analysis) -> Outcome:
             " prescribed shape takes the trajectory out of reach"
         )
     return Outcome(
-        analysis, assembly, analysis.times, run.q, run.v, run.a, run.multipliers,
+        analysis, assembly, analysis.times, run.q, run.v, run.a, run.multipliers[:, :frames],
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
         "completed", 0, 0, 0, seconds, NOT_INTEGRATED, shape_force=run.shape_force, shape=shape,
     )  # fmt: skip

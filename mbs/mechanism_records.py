@@ -12,6 +12,7 @@ from .record_types import (
     GROUND,
     Expression,
     Name,
+    NotNegative,
     PointReference,
     Positive,
     Side,
@@ -64,12 +65,19 @@ class Body(Record):
         return self
 
 
+AS_BUILT = ("gear_ratio", "rotor_inertia", "viscous_friction", "coulomb_friction", "friction_speed")
+
+
 class Joint(Record):
     """A joint between two points, or a point and the ground.
 
     `at` (m) is where it sits on the ground; `axis` the direction of a prismatic joint in the frame of the first body;
     `motor` None leaves it to the default: driven in open chains. Limits of the motor: N·m, rad/s, W (N, m/s where
     prismatic).
+
+    As it is built: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body and turns `gear_ratio` N times as
+    fast as the second does on the first (rad/m where prismatic); friction on the joint's coordinate γ,
+    −(c γ̇ + τ_c tanh(γ̇/γ̇_s)): `viscous_friction` c (N·m·s), `coulomb_friction` τ_c (N·m), `friction_speed` γ̇_s (rad/s).
     """
 
     name: Name
@@ -81,6 +89,11 @@ class Joint(Record):
     moment_limit: Positive | None = None
     speed_limit: Positive | None = None
     power_limit: Positive | None = None
+    gear_ratio: Positive = 1.0
+    rotor_inertia: NotNegative = 0.0
+    viscous_friction: NotNegative = 0.0
+    coulomb_friction: NotNegative = 0.0
+    friction_speed: Positive = 0.01
 
     @model_validator(mode="after")
     def _consistent(self) -> Joint:
@@ -101,6 +114,13 @@ class Joint(Record):
             raise ValueError(f'expected the key "axis" only in prismatic joints, found it in a {self.type} joint')
         if self.type == "weld" and self.motor:
             raise ValueError("expected no motor in a weld, which cannot move, found motor = true")
+        built = [key for key in AS_BUILT if key in self.model_fields_set]
+        if self.type == "weld" and built:
+            raise ValueError(
+                f"expected none of the keys {quoted(AS_BUILT)} in a weld, which cannot move, found {built[0]}"
+            )
+        if "friction_speed" in built and not self.coulomb_friction:
+            raise ValueError('expected the key "friction_speed" only beside coulomb_friction, found it alone')
         return self
 
 

@@ -12,6 +12,8 @@ from ..errors import InputError
 from ..validation import did_you_mean, quoted
 from . import _core
 from ._core import TimeFunction
+from .built_joints import Friction, joint_frictions, joint_rotors
+from .mechanism_records import Load
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
 from .record_types import GROUND, split_point
 from .rows import FRAME, End, Row, joint_coordinate, joint_rows, motor_joints, trajectory_rows
@@ -52,6 +54,8 @@ class Model:
     trajectories: tuple[Constraint, ...]
     motors: dict[str, Row]
     loads: tuple[tuple[Row, TimeFunction], ...]
+    rotors: tuple[tuple[Row, float], ...] = ()
+    frictions: tuple[tuple[Row, Friction], ...] = ()
 
     def body(self, name: str) -> PlanarBody:
         """The body of that name."""
@@ -80,7 +84,10 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
         for component, row in trajectory_rows(scene, trajectory).items()
     )
     motors = {joint.name: joint_coordinate(scene, joint) for joint in motor_joints(scene)}
-    model = Model(scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(_load_rows(scene)))
+    model = Model(
+        scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(load_rows(scene, scene.load)),
+        tuple(joint_rotors(scene)), tuple(joint_frictions(scene)),
+    )  # fmt: skip
     named = any(joint.motor for joint in scene.joint)
     if named and trajectories and len(motors) != model.rigid_freedom:
         raise InputError(
@@ -90,10 +97,11 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
     return model
 
 
-def _load_rows(scene: Scene) -> Iterator[tuple[Row, TimeFunction]]:
+def load_rows(scene: Scene, loads: Sequence[Load]) -> Iterator[tuple[Row, TimeFunction]]:
+    """Directions of given loads and their sizes."""
     kinds = {"x": _core.RowKind.x, "y": _core.RowKind.y, "moment": _core.RowKind.angle}
     joints = {joint.name: joint for joint in scene.joint}
-    for load in scene.load:
+    for load in loads:
         if load.joint is not None:
             yield joint_coordinate(scene, joints[load.joint]), load.components["moment"]
         elif load.point is not None:
@@ -107,6 +115,12 @@ def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
     references += [(f'trajectory "{t.name}": point', t.point) for t in scene.trajectory if t.point]
     references += [(f'trajectory "{t.name}": angle', t.angle) for t in scene.trajectory if t.angle and "." in t.angle]
     references += [("load: point", load.point) for load in scene.load if load.point]
+    for analysis in scene.analysis:
+        key = f'analysis "{analysis.name}"'
+        references += [(f"{key}: sensor: point", sensor.point) for sensor in analysis.sensor if sensor.point]
+        references += [(f"{key}: disturbance: point", load.point) for load in analysis.disturbance if load.point]
+        references += [(f"{key}: tip", analysis.tip)] if analysis.tip else []
+    references += [(f'analysis "{a.name}": points', point) for a in scene.analysis for point in a.points or ()]
     for key, reference in references:
         if reference == GROUND:
             continue
@@ -128,7 +142,8 @@ def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
 class Assembly:
     """A core `System` with the numbering that leads back from its rows to the scene.
 
-    `constraints` are in the core's order: joints and trajectories sorted for a small envelope of C M⁻¹ Cᵀ.
+    `constraints` are in the core's order: joints and trajectories sorted for a small envelope of C M⁻¹ Cᵀ. Rotors of
+    joints come after them in the core, where they are rows, too, and friction after the drives.
     """
 
     def __init__(
@@ -142,16 +157,22 @@ class Assembly:
         self.index = {body.name: i for i, body in enumerate(model.bodies)}
         self._markers: list[list[str]] = [[] for _ in model.bodies]
         self.constraints = tuple(constraints[i] for i in envelope_order([c.row for c in constraints]))
-        constraint_rows = [self._core_row(c.row) for c in self.constraints]
+        self.constraint_rows = [self._core_row(c.row) for c in self.constraints]
         drive_rows = [(self._core_row(row), size) for row, size in drives]
+        rotor_rows = [(self._core_row(row), inertia) for row, inertia in model.rotors]
+        friction_rows = [(self._core_row(row), friction) for row, friction in model.frictions]
         self.motor_rows = [self._core_row(row) for row in motors]
         self.system = _core.System(np.array(model.scene.gravity))
         for body, markers in zip(model.bodies, self._markers, strict=True):
             self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))
-        for constraint, row in zip(self.constraints, constraint_rows, strict=True):
+        for constraint, row in zip(self.constraints, self.constraint_rows, strict=True):
             self.system.add_constraint(row, constraint.target)
+        for row, inertia in rotor_rows:
+            self.system.add_rotor(row, inertia)
         for row, size in drive_rows:
             self.system.add_drive(row, size)
+        for row, friction in friction_rows:
+            self.system.add_friction(row, friction.viscous, friction.coulomb, friction.speed)
         for load in model.modal_loads:
             self.system.add_modal_drive(self.index[load.body], load.vector, load.size)
         self.system.finish()

@@ -155,6 +155,7 @@ def _outcome(analysis: Analysis, inversion: Inversion, seconds: float) -> Outcom
     how = "two-point problem" if is_unstable(inversion.linearisation.zeros[0]).any() else "integrated forward"
     return Outcome(
         analysis, servo.driven, times[:reached], run.q[:reached], run.v[:reached], run.a[:reached],
-        run.multipliers[:reached], run.tau[:reached], None, run.residual[:reached], inversion.status,
+        run.multipliers[:reached, : len(servo.driven.constraints)], run.tau[:reached], None,
+        run.residual[:reached], inversion.status,
         len(inversion.curve.x) - 1, 0, inversion.iterations, seconds, Choice("collocation", how), inversion=inversion,
     )  # fmt: skip

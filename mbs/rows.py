@@ -9,7 +9,7 @@ import numpy as np
 from . import _core
 from .mechanism_records import Joint, Trajectory
 from .record_types import GROUND, split_point
-from .scene_records import Scene
+from .scene_records import Scene, SceneKeys
 
 FRAME = ""  # instead of a point's name: the frame of the body itself
 
@@ -81,7 +81,7 @@ def trajectory_rows(scene: Scene, trajectory: Trajectory) -> dict[str, Row]:
     return {c: Row(f"{label}, {c}", getattr(_core.RowKind, c), ground, end) for c in trajectory.components}
 
 
-def is_open_chain(scene: Scene) -> bool:
+def is_open_chain(scene: SceneKeys) -> bool:
     """Whether the joints form trees: no joint closes a loop."""
     part_of = {name: name for name in (GROUND, *(body.name for body in scene.body))}
 
@@ -98,7 +98,7 @@ def is_open_chain(scene: Scene) -> bool:
     return True
 
 
-def motor_joints(scene: Scene) -> tuple[Joint, ...]:
+def motor_joints(scene: SceneKeys) -> tuple[Joint, ...]:
     """Joints with a motor: by default all that move in an open chain, and none in a closed loop."""
     default = is_open_chain(scene)
     return tuple(

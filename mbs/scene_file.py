@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..validation import did_you_mean, load_toml, quoted, validate
 from .analysis_records import Analysis
+from .linear_checks import linear_problems
 from .mechanism_records import Load, Trajectory
 from .record_types import GROUND
 from .scene_records import Scene, SceneKeys
@@ -148,14 +149,37 @@ def _references(scene: SceneKeys) -> Iterator[tuple[str, str]]:
     for analysis in scene.analysis:
         for body in analysis.modal or ():
             yield f'analysis "{analysis.name}": modal', body
+        for point in analysis.points or ():
+            yield f'analysis "{analysis.name}": points', point
+        if analysis.placement is not None:
+            yield f'analysis "{analysis.name}": placement.body', analysis.placement.body
     for k, load in enumerate(scene.load, 1):
         if load.point is not None:
             yield f"load no. {k}: point", load.point
+    for analysis in scene.analysis:
+        yield from _loop_references(analysis)
     for k, payload in enumerate(scene.payload, 1):
         yield f"payload no. {k}: point", payload.point
     for table, guesses in (("angles", scene.initial.angles), ("rates", scene.initial.rates)):
         for body in guesses:
             yield f"initial.{table}", body
+
+
+def _loop_references(analysis: Analysis) -> Iterator[tuple[str, str]]:
+    """Likewise, in the keys of a closed loop."""
+    key = f'analysis "{analysis.name}"'
+    for k, sensor in enumerate(analysis.sensor, 1):
+        for reference in (sensor.point, sensor.pzt, sensor.modal):
+            if reference is not None:
+                yield f"{key}: sensor no. {k}", reference
+    for k, load in enumerate(analysis.disturbance, 1):
+        if load.point is not None:
+            yield f"{key}: disturbance no. {k}: point", load.point
+    for k, controller in enumerate(analysis.controller, 1):
+        for body in getattr(controller, "bodies", ()):
+            yield f"{key}: controller no. {k}: bodies", body
+    if analysis.tip is not None:
+        yield f"{key}: tip", analysis.tip
 
 
 def _body_problems(scene: SceneKeys) -> Iterator[str]:
@@ -178,6 +202,11 @@ def _joint_references(scene: SceneKeys) -> Iterator[str]:
     joints = [joint.name for joint in scene.joint]
     uses = [(f'trajectory "{trajectory.name}": joint', trajectory.joint) for trajectory in scene.trajectory]
     uses += [(f"load no. {k}: joint", load.joint) for k, load in enumerate(scene.load, 1)]
+    for a in scene.analysis:
+        uses += [(f'analysis "{a.name}": sensor no. {k}: joint', s.joint) for k, s in enumerate(a.sensor, 1)]
+        for k, controller in enumerate(a.controller, 1):
+            gains = getattr(controller, "joints", ())
+            uses += [(f'analysis "{a.name}": controller no. {k}', name) for name in gains]
     for key, name in uses:
         if name is not None and name not in joints:
             yield f'{key}: expected one of the joints {quoted(joints)}, found "{name}"{did_you_mean(name, joints)}'
@@ -191,6 +220,11 @@ def _pzt_problems(scene: SceneKeys) -> Iterator[str]:
     for key, name in uses:
         if name in rigid:
             yield f'{key}: expected a flexible body, found "{name}", which is rigid'
+    for analysis in scene.analysis:
+        for key, body in _patches_of_loop(analysis):
+            if body not in layouts:
+                hint = did_you_mean(body, layouts)
+                yield f'{key}: expected a body with patches, {quoted(layouts)}, found "{body}"{hint}'
     for k, load in enumerate(scene.load, 1):
         if load.pzt is None or load.voltage is None:
             continue
@@ -202,6 +236,16 @@ def _pzt_problems(scene: SceneKeys) -> Iterator[str]:
                 f"load no. {k}: voltage: expected {count} expressions, one for each patch of"
                 f' "{load.pzt}", found {len(load.voltage)}'
             )
+
+
+def _patches_of_loop(analysis: Analysis) -> Iterator[tuple[str, str]]:
+    """Every (key, body) whose patches a closed loop reads or drives."""
+    for k, sensor in enumerate(analysis.sensor, 1):
+        if sensor.pzt is not None:
+            yield f'analysis "{analysis.name}": sensor no. {k}: pzt', sensor.pzt
+    for k, controller in enumerate(analysis.controller, 1):
+        for body in getattr(controller, "bodies", ()):
+            yield f'analysis "{analysis.name}": controller no. {k}: bodies', body
 
 
 def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
@@ -221,6 +265,8 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
 def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Analysis, ...]) -> Iterator[str]:
     if analysis.kind in ("pcid", "fcid", "motors-only") and not scene.trajectory:
         yield f'kind: expected at least one [[trajectory]] for "{analysis.kind}", found none'
+    if analysis.kind in ("linear", "placement"):
+        yield from linear_problems(scene, analysis, earlier)
     if analysis.actuation is None:
         return
     sources = {source.name: source for source in earlier}
@@ -242,11 +288,15 @@ def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Anal
         )
     elif analysis.end > source.end:
         yield f'end: expected at most {source.end:g}, where "{source.name}" ends, found {analysis.end:g}'
+    if analysis.kind == "closed-loop" and analysis.feed_forward == "joints+pzt" and not scene.pzt:
+        yield 'feed_forward: expected at least one [[pzt]] for "joints+pzt", found none'
     if analysis.apply == "joints+pzt" and not scene.pzt:
         yield 'apply: expected at least one [[pzt]] for "joints+pzt", found none'
     if analysis.apply == "points" and not scene.actuation_points:
         yield 'apply: expected at least one [[actuation_points]] for "points", found none'
-    if source.kind == "motors-only" and analysis.apply != "joints":
+    if source.kind == "motors-only" and analysis.feed_forward == "joints+pzt":
+        yield 'feed_forward: expected "joints" with an analysis of kind "motors-only", found "joints+pzt"'
+    if source.kind == "motors-only" and analysis.kind == "forward" and analysis.apply != "joints":
         yield f'apply: expected "joints" with an analysis of kind "motors-only", found "{analysis.apply}"'
     if analysis.apply == "trajectory" and source.kind == "fcid":
         yield (
@@ -258,6 +308,9 @@ def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Anal
 def _prescribed(scene: SceneKeys) -> Iterator[tuple[str, Trajectory | Load, Any]]:
     """Trajectories and loads with all the output times at which they are needed."""
     specified = [a for a in scene.analysis if a.kind != "forward"]
+    for analysis in scene.analysis:
+        for k, load in enumerate(analysis.disturbance, 1):
+            yield f'analysis "{analysis.name}": disturbance no. {k}', load, analysis.times
     for trajectory in scene.trajectory:
         for analysis in specified:
             yield f'trajectory "{trajectory.name}"', trajectory, np.clip(analysis.times, 0.0, analysis.end)

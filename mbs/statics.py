@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ..errors import SolveError
+from . import _core
 from .initial_state import State, with_rates
 from .model import Array, Assembly
 
@@ -19,7 +18,6 @@ LARGEST_STEP = 0.5  # relative likewise: keeps to the branch of the start
 def static_equilibrium(assembly: Assembly, start: State) -> State:
     """Solve Q(q) − C_qᵀλ = 0, C(q, 0) = 0 by Newton from `start`; returns the state (v kept on Ċ = 0).
 
-    The Jacobian is taken by central differences: convergence is to the exact residual, the slope only sets the pace.
     Raises `SolveError` where the robot has no equilibrium near the start.
     """
     system, n = assembly.system, assembly.system.coordinates
@@ -39,9 +37,8 @@ def static_equilibrium(assembly: Assembly, start: State) -> State:
         closed = np.abs(r[n:] / assembly.row_sizes).max(initial=0.0) <= TOLERANCE
         if closed and (np.abs(r[:n]).max() <= TOLERANCE * size or largest <= ROUNDING):
             return with_rates(assembly, x[:n], start.v)
-        steps = 1e-6 * np.concatenate([np.maximum(sizes, np.abs(x[:n])), np.maximum(np.abs(x[n:]), size)])
         try:
-            step = np.linalg.solve(_jacobian(lambda y: residual(y)[0], x, steps), r)
+            step = np.linalg.solve(_jacobian(assembly, x), r)
         except np.linalg.LinAlgError:
             break
         largest = float(np.abs(step[:n] / sizes).max())
@@ -54,12 +51,8 @@ def static_equilibrium(assembly: Assembly, start: State) -> State:
     )
 
 
-def _jacobian(function: Callable[[Array], Array], x: Array, steps: Array) -> Array:
-    """Central differences, column by column."""
-    columns = []
-    for i, h in enumerate(steps):
-        up, down = x.copy(), x.copy()
-        up[i] += h
-        down[i] -= h
-        columns.append((function(up) - function(down)) / (2 * h))
-    return np.column_stack(columns)
+def _jacobian(assembly: Assembly, x: Array) -> Array:
+    """Exact derivative of Q − C_qᵀλ and C with respect to (q, λ), at rest."""
+    n, rest = assembly.system.coordinates, np.zeros(assembly.system.coordinates)
+    _, _, K, C_q = _core.tangent(assembly.system, 0.0, x[:n], rest, rest, x[n:], [])
+    return np.block([[-K, -C_q.T], [C_q, np.zeros((len(C_q), len(C_q)))]])

@@ -48,6 +48,8 @@ def vibrations(assembly: Assembly, state: State) -> Vibrations:
     """The constrained vibrations about `state`, with the stiffness of the links alone (no loads, no rotation)."""
     bodies = assembly.model.bodies
     M = system_mass_matrix(assembly, state.q)
+    gradient, inertia = assembly.system.rotor_rows(state.q)
+    M += gradient.T @ (inertia[:, None] * gradient)
     K = _stiffness(assembly)
     D = _block_diagonal([block for body in bodies for block in (np.zeros((3, 3)), body.damping)])
     _, _, C_q = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))

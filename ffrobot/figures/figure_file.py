@@ -39,12 +39,15 @@ class FigureRecord(Record):
     """One figure. Axes without a range take that of the data; units stand in the labels of the axes.
 
     Kinds: "time" draws its curves over time; "path" draws (x, y) datasets against each other; "configurations" draws
-    the bodies of `analysis` at `times` (s), and its curves as paths.
+    the bodies of `analysis` at `times` (s), and its curves as paths. Of a linear `analysis`, at the first of `times`:
+    "bode" draws the frequency responses of `transfers` [input, output], "modes" the mode shapes of the robot;
+    "placement" the patches that an analysis of that kind found.
     """
 
     name: FileName
     title: str = ""
-    kind: Literal["time", "path", "configurations"] = "time"
+    kind: Literal["time", "path", "configurations", "bode", "modes", "placement"] = "time"
+    transfers: tuple[tuple[str, str], ...] = ()
     curves: tuple[Curve, ...] = ()
     analysis: str | None = None
     times: tuple[float, ...] = ()
@@ -57,7 +60,13 @@ class FigureRecord(Record):
     def _consistent(self) -> FigureRecord:
         if self.kind == "configurations" and (self.analysis is None or not self.times):
             raise ValueError('expected the keys "analysis" and "times" in kind = "configurations"')
-        if self.kind != "configurations" and not self.curves:
+        if self.kind in ("bode", "modes", "placement") and self.analysis is None:
+            raise ValueError(f'expected the key "analysis" in kind = "{self.kind}", found none')
+        if (self.kind == "bode") != bool(self.transfers):
+            raise ValueError(
+                f'expected the key "transfers" in kind = "bode" and only there, found kind = "{self.kind}"'
+            )
+        if self.kind in ("time", "path") and not self.curves:
             raise ValueError(f'expected the key "curves" in kind = "{self.kind}", found none')
         return self
 

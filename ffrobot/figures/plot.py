@@ -15,12 +15,21 @@ from ..results_file import Results
 from .body_shape import draw_mesh, draw_modes
 from .configurations import draw_configurations
 from .figure_file import FigureFile, FigureRecord, load_figures
+from .linear import draw_bode, draw_robot_modes
 from .path import draw_path
+from .placement import draw_placement
 from .standard import standard_figures
 from .style import new_axes, style
 from .time_history import draw_time_history
 
-DRAW = {"time": draw_time_history, "path": draw_path, "configurations": draw_configurations}
+DRAW = {
+    "time": draw_time_history,
+    "path": draw_path,
+    "configurations": draw_configurations,
+    "placement": draw_placement,
+}
+
+DRAW_WHOLE = {"bode": draw_bode, "modes": draw_robot_modes}  # with axes of their own
 
 # No dates and no versions: the same results give the same files.
 METADATA = {
@@ -73,6 +82,8 @@ def plot_results(results_path: Path, folder: Path, formats: Sequence[str] = FORM
 
 def draw(record: FigureRecord, results: Results) -> Figure:
     """Draw one figure."""
+    if record.kind in DRAW_WHOLE:
+        return DRAW_WHOLE[record.kind](record, results)
     picture, axes = new_axes(record.title)
     DRAW[record.kind](axes, record, results)
     if record.x_range is not None:

@@ -24,6 +24,8 @@ def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
             *_over_time(results, "joints", "moment", "moment (N·m), force (N)", "motor of joint"),
             *_over_time(results, "joints", "reaction", "reaction (N)", "reaction of joint"),
             *_voltages(results),
+            *_tip_errors(results),
+            *_linear(results),
         ]
     )
 
@@ -113,6 +115,40 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
                     curves=(Curve(data=f"{analysis}/pzt/{body}/{dataset}", label="patch"),),
                     y_label="voltage (V)",
                     limits=() if limit is None else (-limit, limit),
+                )
+
+
+def _tip_errors(results: Results) -> Iterator[FigureRecord]:
+    """Of all closed loops in one figure."""
+    curves = tuple(Curve(data=f"{a}/tip_error", label=a) for a in results.analyses if results.has(f"{a}/tip_error"))
+    if curves:
+        yield FigureRecord(name="tip_error", title="tip, distance from its place", curves=curves, y_label="error (m)")
+
+
+def _linear(results: Results) -> Iterator[FigureRecord]:
+    """Mode shapes of the robot, and the responses of points and joints to each motor and each body's first patch."""
+    for analysis in results.analyses:
+        if results.has(f"{analysis}/placement"):
+            name, title = file_name("placement", analysis), f"patches, {analysis}"
+            yield FigureRecord(name=name, title=title, kind="placement", analysis=analysis)
+        if not results.has(f"{analysis}/linear"):
+            continue
+        attributes = results.attributes(f"{analysis}/linear")
+        inputs, outputs = ([str(name) for name in attributes[key]] for key in ("input_names", "output_names"))
+        yield FigureRecord(
+            name=file_name("modes", analysis), title=f"modes, {analysis}", kind="modes", analysis=analysis
+        )
+        for source in inputs:
+            is_first = source.startswith("joint/") or (source.startswith("pzt/") and source.endswith("/1"))
+            seen = [name for name in outputs if name.startswith("point/") or name == source]
+            if is_first and seen:
+                yield FigureRecord(
+                    name=file_name("bode", analysis, source.replace("/", "_")),
+                    title=f"response to {source}, {analysis}",
+                    kind="bode",
+                    analysis=analysis,
+                    transfers=tuple((source, name) for name in seen),
+                    y_label="magnitude (m, rad per N·m, V)",
                 )
 
 

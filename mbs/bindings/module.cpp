@@ -11,5 +11,6 @@ NB_MODULE(_core, m) {
   bind_system(m);
   bind_run(m);
   bind_actuation(m);
+  bind_tangent(m);
   bind_servo(m);
 }

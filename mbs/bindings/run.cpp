@@ -1,8 +1,11 @@
 #include "core/run.h"
+#include "core/sampled.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/function.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -101,6 +104,57 @@ void bind_run(nb::module_ &m) {
       "system"_a, "group"_a, "moment"_a, "steering"_a.none(), "times"_a, "q"_a, "v"_a, "tolerance"_a, "max_steps"_a,
       "method"_a, "spectral_radius"_a, "resolver"_a.none(), "carry_on"_a, "recording"_a.none(),
       "Integrates the motion from (q, v) and reports it at `times`.");
+
+  nb::class_<Sensing>(m, "Sensing", "What sensors read of a state: rows, then modal coordinates, or their rates.")
+      .def(
+          "__init__",
+          [](Sensing *s, const System &system, const std::vector<std::pair<Row, int>> &rows,
+             const std::vector<std::tuple<std::size_t, Eigen::VectorXd, int>> &modes) {
+            std::vector<Sensing::AlongRow> along;
+            std::vector<Sensing::OfModes> of;
+            for (const auto &[row, order] : rows)
+              along.push_back({row, order});
+            for (const auto &[body, vector, order] : modes)
+              of.push_back({body, vector, order});
+            new (s) Sensing(system, std::move(along), std::move(of));
+          },
+          "system"_a, "rows"_a, "modes"_a, nb::keep_alive<1, 2>())
+      .def(
+          "read",
+          [](Sensing &s, const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a) {
+            RowMajorMatrix readings(q.rows(), s.count());
+            for (Eigen::Index i = 0; i < q.rows(); ++i)
+              readings.row(i) = s.read(q.row(i).data(), v.row(i).data(), a.row(i).data()).transpose();
+            return readings;
+          },
+          "q"_a, "v"_a, "a"_a, "Readings (T, sensors) of states (T, coordinates).");
+
+  m.def(
+      "run_sampled",
+      [](const System &system, std::vector<int> group, std::vector<bool> moment, const std::vector<double> &times,
+         const Eigen::VectorXd &q, const Eigen::VectorXd &v, double tolerance, unsigned long max_steps,
+         MethodKind method, double spectral_radius, std::size_t motors, std::vector<HeldCommands::Patches> patches,
+         const Eigen::VectorXd &first_command, Sensing &sensing, const std::vector<double> &samples, double delay,
+         const std::function<Eigen::VectorXd(std::size_t, double, const Eigen::VectorXd &)> &controller,
+         const std::function<bool(double)> &carry_on) {
+        const nb::gil_scoped_release unlocked;
+        HeldCommands commands(motors, std::move(patches));
+        commands.set(first_command);
+        ConstrainedMotion motion(system, std::move(group), std::move(moment), &commands);
+        const auto ask = [&](double t) {
+          const nb::gil_scoped_acquire locked;
+          return carry_on(t);
+        };
+        const auto command = [&](std::size_t k, double t, const Eigen::VectorXd &y) {
+          const nb::gil_scoped_acquire locked;
+          return controller(k, t, y);
+        };
+        return run_sampled(motion, times, q, v, {tolerance, max_steps, {method, spectral_radius}}, commands, sensing,
+                           {samples, delay, command}, ask);
+      },
+      "system"_a, "group"_a, "moment"_a, "times"_a, "q"_a, "v"_a, "tolerance"_a, "max_steps"_a, "method"_a,
+      "spectral_radius"_a, "motors"_a, "patches"_a, "first_command"_a, "sensing"_a, "samples"_a, "delay"_a,
+      "controller"_a, "carry_on"_a, "As run, under commands that `controller`(k, t, readings) gives at samples.");
 
   m.def("fixed_steps", &fixed_steps, "system"_a, "end"_a, "steps"_a, "q"_a, "v"_a, "method"_a, "spectral_radius"_a,
         "States after equal steps and in their middle (2 steps + 1, 2 coordinates), for convergence studies.");

@@ -20,12 +20,6 @@ using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eig
 
 namespace {
 
-void check_size(const char *name, Eigen::Index got, Eigen::Index expected) {
-  if (got != expected)
-    throw nb::value_error(
-        (std::string(name) + ": expected size " + std::to_string(expected) + ", got " + std::to_string(got)).c_str());
-}
-
 PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
                      const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
                      const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions,
@@ -54,7 +48,7 @@ std::tuple<VectorXd, VectorXd> evaluate_state(const System &system, double t, co
   Workspace w(system);
   VectorXd a(system.coordinates);
   accelerations(system, t, q.data(), v.data(), w, a.data());
-  return {a, w.lambda};
+  return {a, w.lambda.head(static_cast<Eigen::Index>(system.held))};
 }
 
 // (C, C_dot, C_q) at one state
@@ -66,7 +60,8 @@ std::tuple<VectorXd, VectorXd, MatrixXd> constraints(const System &system, doubl
   const auto m = static_cast<Eigen::Index>(system.constraints.size());
   VectorXd value(m), rate(m);
   constraint_residuals(system, t, q.data(), v.data(), w, value.data(), rate.data());
-  return {value, rate, constraint_jacobian(system, w)};
+  const auto held = static_cast<Eigen::Index>(system.held);
+  return {value.head(held), rate.head(held), constraint_jacobian(system, w)};
 }
 
 // x of N x + C_q^T nu = r, C_q x = c (iteration_matrix.h)
@@ -76,12 +71,32 @@ VectorXd newton_step(const System &system, double t, const VectorXd &q, const Ve
   y << q, v;
   check_size("y", y.size(), slope.size());
   check_size("r", r.size(), x.size());
-  check_size("c", c.size(), static_cast<Eigen::Index>(system.constraints.size()));
+  check_size("c", c.size(), static_cast<Eigen::Index>(system.held));
+  VectorXd all = VectorXd::Zero(static_cast<Eigen::Index>(system.constraints.size())); // nothing holds rotors
+  all.head(c.size()) = c;
   ConstrainedMotion motion(system, {}, {}, nullptr);
   motion.slope(t, y.data(), slope.data());
   motion.factorise(damping_factor, stiffness_factor);
-  motion.solve(r.data(), c.data(), x.data());
+  motion.solve(r.data(), all.data(), x.data());
   return x;
+}
+
+std::tuple<MatrixXd, VectorXd> rotor_rows(const System &system, const VectorXd &q) {
+  check_size("q", q.size(), system.coordinates);
+  Workspace w(system);
+  const VectorXd rest = VectorXd::Zero(q.size());
+  joint_energy(system, q.data(), rest.data(), w);
+  const auto count = static_cast<Eigen::Index>(system.constraints.size() - system.held);
+  MatrixXd gradients = MatrixXd::Zero(q.size(), count);
+  VectorXd inertia(count);
+  RowMotion motion;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Constraint &rotor = system.constraints[system.held + static_cast<std::size_t>(k)];
+    evaluate(rotor.row, w.bodies, motion);
+    jacobian(rotor.row, motion, system.bodies, w.bodies, system.first_coordinate, gradients.col(k));
+    inertia[k] = 1 / rotor.compliance;
+  }
+  return {gradients.transpose(), inertia};
 }
 
 VectorXd force_at_rest(const System &system, double t, const VectorXd &q) {
@@ -96,6 +111,7 @@ VectorXd force_at_rest(const System &system, double t, const VectorXd &q) {
 MatrixXd energies(const System &system, const MatrixXd &q, const MatrixXd &v) {
   check_size("q columns", q.cols(), system.coordinates);
   MatrixXd result = MatrixXd::Zero(q.rows(), 4);
+  Workspace w(system);
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
     const VectorXd q_i = q.row(i), v_i = v.row(i);
     for (std::size_t b = 0; b < system.bodies.size(); ++b) {
@@ -103,6 +119,9 @@ MatrixXd energies(const System &system, const MatrixXd &q, const MatrixXd &v) {
       const Energy e = energy(system.bodies[b], q_i.data() + first, v_i.data() + first, system.gravity);
       result.row(i) += Eigen::RowVector4d(e.kinetic, e.strain, e.gravitational, e.dissipated_power);
     }
+    const JointEnergy e = joint_energy(system, q_i.data(), v_i.data(), w);
+    result(i, 0) += e.kinetic;
+    result(i, 3) += e.dissipated_power;
   }
   return result;
 }
@@ -113,16 +132,17 @@ using Samples = nb::ndarray<nb::numpy, double, nb::ndim<3>>;
 Samples constraint_jacobians(const System &system, const RowMajorMatrix &q) {
   check_size("q columns", q.cols(), system.coordinates);
   Workspace w(system);
-  const auto T = static_cast<std::size_t>(q.rows()), m = system.constraints.size();
+  const auto T = static_cast<std::size_t>(q.rows()), m = system.held;
   const auto n = static_cast<std::size_t>(system.coordinates);
   auto *data = new double[T * m * n];
   nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<double *>(p); });
   const VectorXd rest = VectorXd::Zero(system.coordinates);
-  VectorXd value(static_cast<Eigen::Index>(m)), rate(value);
+  VectorXd value(static_cast<Eigen::Index>(system.constraints.size())), rate(value);
   for (std::size_t i = 0; i < T; ++i) {
     const VectorXd q_i = q.row(static_cast<Eigen::Index>(i)).transpose();
     constraint_residuals(system, 0.0, q_i.data(), rest.data(), w, value.data(), rate.data());
-    Eigen::Map<RowMajorMatrix>(data + i * m * n, value.size(), system.coordinates) = constraint_jacobian(system, w);
+    Eigen::Map<RowMajorMatrix>(data + i * m * n, static_cast<Eigen::Index>(m), system.coordinates) =
+        constraint_jacobian(system, w);
   }
   return Samples(data, {T, m, n}, owner);
 }
@@ -138,7 +158,8 @@ void bind_system(nb::module_ &m) {
       .value("x", RowKind::x)
       .value("y", RowKind::y)
       .value("angle", RowKind::angle)
-      .value("slide", RowKind::slide);
+      .value("slide", RowKind::slide)
+      .value("gear", RowKind::gear);
   nb::class_<Row>(m, "Row", "A scalar function of the motion of two markers: that of b relative to a.")
       .def(nb::init<RowKind, MarkerReference, MarkerReference, Vector2d, double>(), "kind"_a, "a"_a, "b"_a,
            "direction"_a, "offset"_a)
@@ -164,6 +185,16 @@ void bind_system(nb::module_ &m) {
           "add_constraint", [](System &s, const Row &row, const TimeFunction &f) { s.constraints.push_back({row, f}); },
           "row"_a, "target"_a)
       .def(
+          "add_rotor",
+          [](System &s, const Row &row, double inertia) { s.constraints.push_back({row, Constant(0.0), 1 / inertia}); },
+          "row"_a, "inertia"_a, "After all constraints.")
+      .def(
+          "add_friction",
+          [](System &s, const Row &row, double viscous, double coulomb, double speed) {
+            s.drives.push_back({row, Constant(0.0), {viscous, coulomb, speed}});
+          },
+          "row"_a, "viscous"_a, "coulomb"_a, "speed"_a)
+      .def(
           "add_drive", [](System &s, const Row &row, const TimeFunction &f) { s.drives.push_back({row, f}); }, "row"_a,
           "size"_a)
       .def(
@@ -180,6 +211,7 @@ void bind_system(nb::module_ &m) {
            "Accelerations (coordinates,) and multipliers (constraints,).")
       .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q.")
       .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, coordinates).")
+      .def("rotor_rows", &rotor_rows, "q"_a, "Gradients (rotors, coordinates) of the rotors' angles and inertias.")
       .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces of gravity, elasticity and drives.")
       .def("newton_step", &newton_step, "t"_a, "q"_a, "v"_a, "damping_factor"_a, "stiffness_factor"_a, "r"_a, "c"_a,
            "x of (M + damping_factor D + stiffness_factor K) x + C_q^T nu = r, C_q x = c; r on modes alone.")

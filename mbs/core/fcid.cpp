@@ -60,14 +60,15 @@ void FullyConstrained::update_jacobian() {
   for (std::size_t r = 0; r < system_.constraints.size(); ++r) {
     const Row &row = system_.constraints[r].row;
     evaluate(row, workspace_.bodies, workspace_.rows[r]);
-    gradients_.set_column(static_cast<Index>(r), row, workspace_.rows[r], workspace_.bodies);
+    if (r < system_.held)
+      gradients_.set_column(static_cast<Index>(r), row, workspace_.rows[r], workspace_.bodies);
   }
   gradients_.factorise();
 }
 
 // (R, theta) part of x += sign C_q,r^-1 rhs
 void FullyConstrained::move_frames(VectorXd &x, const VectorXd &rhs, double sign) {
-  const VectorXd step = gradients_.solve_transposed(rhs);
+  const VectorXd step = gradients_.solve_transposed(rhs.head(static_cast<Index>(system_.held)));
   for (std::size_t b = 0; b < system_.bodies.size(); ++b)
     x.segment<3>(system_.first_coordinate[b]) += sign * step.segment<3>(static_cast<Index>(3 * b));
 }
@@ -88,6 +89,20 @@ bool FullyConstrained::find_position(double t) {
     move_frames(q_, value_, -1);
   }
   return false;
+}
+
+// f_r += d mu with the moments mu = J d^T q_ddot of the rotors, which become their multipliers
+void FullyConstrained::add_rotors(VectorXd &f_r) {
+  if (system_.held == system_.constraints.size())
+    return;
+  constraint_accelerations(system_, q_.data(), a_.data(), workspace_, acceleration_.data());
+  for (std::size_t r = system_.held; r < system_.constraints.size(); ++r) {
+    const auto i = static_cast<Index>(r);
+    const double mu = workspace_.lambda[i] = acceleration_[i] / system_.constraints[r].compliance;
+    VectorXd d = VectorXd::Zero(f_r.size());
+    add_frame_gradient(system_.constraints[r].row, workspace_.rows[r], workspace_.bodies, d);
+    f_r += mu * d;
+  }
 }
 
 bool FullyConstrained::solve(double t) {
@@ -120,7 +135,8 @@ void FullyConstrained::balance(double t) {
   VectorXd f_r(static_cast<Index>(3 * system_.bodies.size()));
   for (std::size_t b = 0; b < system_.bodies.size(); ++b)
     f_r.segment<3>(static_cast<Index>(3 * b)) = f_.segment<3>(system_.first_coordinate[b]);
-  workspace_.lambda = -gradients_.solve(f_r);
+  add_rotors(f_r);
+  workspace_.lambda.head(f_r.size()) = -gradients_.solve(f_r);
   for (auto &wrench : workspace_.wrench)
     wrench.setZero();
   for (std::size_t r = 0; r < system_.constraints.size(); ++r)

@@ -55,6 +55,7 @@ private:
   bool find_position(double t);
   void move_frames(Eigen::VectorXd &x, const Eigen::VectorXd &rhs, double sign);
   void update_jacobian();
+  void add_rotors(Eigen::VectorXd &f_r);
 
   const System &system_;
   Workspace workspace_;

@@ -20,6 +20,10 @@ public:
   double error_order() const override { return 3; }
   double share(double fraction) const override { return 4 * fraction; }
   void accept(double h) override;
+  void restart() override {
+    started_ = false;
+    previous_step_ = 0;
+  }
 
   bool lands_on_outputs() const override { return true; }
   void prepare_dense(double t, const double *y, double h) override;

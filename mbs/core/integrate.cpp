@@ -34,7 +34,7 @@ double next_step(double h, double left, bool lands) {
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls,
                             const std::function<void(std::size_t, double, const double *)> &output,
-                            const std::function<bool(double)> &carry_on, Recording *recording) {
+                            const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks) {
   const auto made = make_method(controls.method, system);
   Method &method = *made;
   Eigen::VectorXd error(system.size()), y_output(system.size());
@@ -49,6 +49,16 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       recording->states.insert(recording->states.end(), y.data(), y.data() + y.size());
     }
   };
+  std::size_t next_break = 0;
+  const auto pass_breaks = [&] {
+    const std::size_t before = next_break;
+    while (breaks && next_break < breaks->times.size() && breaks->times[next_break] <= t) {
+      breaks->at(next_break, t, y.data());
+      ++next_break;
+    }
+    return next_break > before;
+  };
+  pass_breaks();
   system.slope(t, y.data(), method.first_slope());
   system.accepted(t, y.data(), method.first_slope());
   record();
@@ -79,8 +89,13 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       break;
     }
     h = std::min(h, duration);
-    const double target = method.lands_on_outputs() ? times[report.outputs] : end;
-    const double step = next_step(h, target - t, method.lands_on_outputs());
+    double target = method.lands_on_outputs() ? times[report.outputs] : end;
+    bool lands = method.lands_on_outputs();
+    if (breaks && next_break < breaks->times.size() && breaks->times[next_break] <= target) {
+      target = breaks->times[next_break];
+      lands = true;
+    }
+    const double step = next_step(h, target - t, lands);
     const double t_end = step == target - t ? target : t + step;
     constexpr double rounding = 2e-14; // what estimates see of it: shorter steps would not help
     const double regular = method.share(step / duration);
@@ -124,8 +139,14 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       break;
     }
     // Steps that were shortened to land on an output tell what the step asked for would have cost.
+    // A much shorter one, on the way to a break, tells nothing: what was found before it stands.
     const double asked = std::clamp(h, step, 2 * step);
-    h = control.after_accepted(asked, size * std::pow(asked / step, method.error_order()));
+    if (!(t == target && breaks && 2 * step < h))
+      h = control.after_accepted(asked, size * std::pow(asked / step, method.error_order()));
+    if (pass_breaks()) {
+      system.slope(t, y.data(), method.first_slope());
+      method.restart();
+    }
   }
   report.time = t;
   report.evaluations = system.evaluations();

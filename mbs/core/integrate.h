@@ -39,11 +39,19 @@ struct IntegrationControls {
   MethodChoice method;
 };
 
+// Times, ascending, at which loads jump: steps end there, and `at` is told index, time and state before the next
+// begins.
+struct Breaks {
+  std::vector<double> times;
+  std::function<void(std::size_t, double, const double *)> at;
+};
+
 // Integrates y from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
-// carry_on(t) is asked about every thousand steps. y ends at the last accepted step.
+// carry_on(t) is asked about every thousand steps. y ends at the last accepted step. `breaks` may be null.
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls,
                             const std::function<void(std::size_t, double, const double *)> &output,
-                            const std::function<bool(double)> &carry_on, Recording *recording);
+                            const std::function<bool(double)> &carry_on, Recording *recording,
+                            const Breaks *breaks = nullptr);
 
 } // namespace ffrobot

@@ -108,6 +108,10 @@ void IterationMatrix<Scalar>::factorise(const Workspace &w, const Eigen::VectorX
     const Vector3 image = mobility(bodies_[static_cast<std::size_t>(c.body)], c.k, c.l) * cs;
     *schur_.entry(c.r, c.s) += cr[0] * image[0] + cr[1] * image[1] + cr[2] * image[2];
   }
+  for (std::size_t r = system_.held; r < rows_.size(); ++r) {
+    const auto i = static_cast<Index>(r);
+    *schur_.entry(i, i) += system_.constraints[r].compliance;
+  }
   schur_.factorise();
 }
 
@@ -145,7 +149,7 @@ template <class Scalar> void IterationMatrix<Scalar>::constrain(const Scalar *x,
     }
   }
   for (std::size_t i = 0; i < rows_.size(); ++i)
-    c[i] = along_row(i);
+    c[i] = i < system_.held ? along_row(i) : Scalar(0);
 }
 
 template <class Scalar> void IterationMatrix<Scalar>::solve(const Scalar *r, const Scalar *c, Scalar *x) {

@@ -30,7 +30,7 @@ public:
   // N x + C_q^T nu = r, C_q x = c: r (coordinates) of modal forces alone, c (constraints) or null for zero.
   void solve(const Scalar *r, const Scalar *c, Scalar *x);
 
-  // c = C_q x
+  // c = C_q x, zero for rotors
   void constrain(const Scalar *x, Scalar *c);
 
 private:

@@ -35,6 +35,9 @@ public:
   // The step just made was accepted: its corrected end and last slope are those of the next step's start.
   virtual void accept(double) {}
 
+  // Loads jump here, and the first slope with them: what earlier steps tell of slopes is of no use for the next.
+  virtual void restart() {}
+
   // Whether steps have to end at output times, or there is an interpolation as good as the steps.
   virtual bool lands_on_outputs() const = 0;
 

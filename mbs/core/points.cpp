@@ -15,7 +15,7 @@ void driving_force(const System &system, const Workspace &w, const std::function
   const Index first = system.first_coordinate[body], n = system.bodies[body].modes();
   Q_a = VectorXd::Zero(3 + n);
   Q_a.tail(n) = shape_force;
-  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+  for (std::size_t r = 0; r < system.held; ++r) {
     const Row &row = system.constraints[r].row;
     if (!is_trajectory(r) || (row.a.body != static_cast<int>(body) && row.b.body != static_cast<int>(body)))
       continue;

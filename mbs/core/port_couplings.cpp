@@ -18,7 +18,7 @@ void add_terms(const Row &row, std::size_t r, bool of_b, const std::vector<Plana
     return;
   const auto body = static_cast<std::size_t>(m.body);
   for (int component = 0; component < 3; ++component) {
-    if (moves(row.kind) ? (of_b && component == 2) : component != static_cast<int>(row.kind))
+    if (moves(row.kind) ? (of_b && component == 2) : component != component_of(row.kind))
       continue;
     terms.push_back({r, body, bodies[body].rows.port(3 + 3 * m.marker + component), of_b, component});
   }

@@ -18,6 +18,7 @@ public:
   double error_order() const override { return 6; }
   double share(double fraction) const override { return 3 * fraction; }
   void accept(double h) override;
+  void restart() override { previous_step_ = 0; }
 
   bool lands_on_outputs() const override { return true; } // between steps it is of order 3 only
   void prepare_dense(double t, const double *y, double h) override;

@@ -36,6 +36,14 @@ void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMot
     motion.coefficient_a << -n, dn.dot(d);
     return;
   }
+  case RowKind::gear: {
+    const double N = row.direction.x();
+    motion.value = N * b.angle - (N - 1) * a.angle - row.offset;
+    motion.rate = N * b.angular_velocity - (N - 1) * a.angular_velocity;
+    motion.coefficient_b = N * Vector3d::UnitZ();
+    motion.coefficient_a = -(N - 1) * Vector3d::UnitZ();
+    return;
+  }
   }
 }
 

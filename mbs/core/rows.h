@@ -27,15 +27,19 @@ enum class RowKind {
   y,     // (r_b - r_a)_y, global
   angle, // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
   slide, // n . (r_b - r_a), n fixed to the section of a
+  gear,  // N alpha_b - (N - 1) alpha_a: the angle of a rotor on a that turns N times as fast as b does on a
 };
 
 // Whether the directions of such rows, and with them their coefficients below, move with the bodies.
 constexpr bool moves(RowKind kind) { return kind == RowKind::slide; }
 
+// The only coefficient (x, y, angle) that is not zero in rows that do not move.
+constexpr int component_of(RowKind kind) { return kind == RowKind::gear ? 2 : static_cast<int>(kind); }
+
 struct Row {
   RowKind kind;
   MarkerReference a, b;
-  Eigen::Vector2d direction = Eigen::Vector2d::Zero(); // of a slide, in the axes of a
+  Eigen::Vector2d direction = Eigen::Vector2d::Zero(); // of a slide, in the axes of a; of a gear (N, 0)
   double offset = 0;                                   // the row's value at its zero
 };
 

@@ -20,12 +20,15 @@ void System::finish() {
   }
   for (auto &body : bodies)
     body.marker_rows.assign(static_cast<std::size_t>(body.markers()), 0);
-  for (const auto &[row, target] : constraints)
+  held = 0;
+  for (const auto &[row, target, compliance] : constraints) {
+    held += compliance == 0;
     for (const auto *m : {&row.a, &row.b})
       if (m->body >= 0) {
         int &used = bodies[static_cast<std::size_t>(m->body)].marker_rows[static_cast<std::size_t>(m->marker)];
-        used = std::max(used, row.kind == RowKind::angle || row.kind == RowKind::slide ? 3 : 2);
+        used = std::max(used, row.kind == RowKind::x || row.kind == RowKind::y ? 2 : 3);
       }
+  }
   couplings.clear();
   envelope.clear();
   const auto count = static_cast<int>(constraints.size());
@@ -61,14 +64,14 @@ Workspace::Workspace(const System &system)
     evaluate(system.constraints[r].row, bodies, rows[r]);
 }
 
-namespace {
-
 void update_kinematics(const System &system, const double *q, const double *v, Workspace &w) {
   for (std::size_t b = 0; b < system.bodies.size(); ++b) {
     const Index i = system.first_coordinate[b];
     kinematics(system.bodies[b], q + i, v + i, w.bodies[b]);
   }
 }
+
+namespace {
 
 // The stages of a step and its projection meet the same time again and again.
 void update_targets(const System &system, double t, Workspace &w) {
@@ -88,7 +91,10 @@ void apply_drives(const System &system, double t, Workspace &w) {
     for (std::size_t d = 0; d < system.drives.size(); ++d) {
       const Drive &drive = system.drives[d];
       evaluate(drive.row, w.bodies, w.drive_rows[d]);
-      add_wrench(drive.row, w.drive_rows[d], drive.size(t).value + w.external_drive[d], w.wrench);
+      double force = drive.size(t).value + w.external_drive[d];
+      if (drive.friction.acts())
+        force -= drive.friction.resistance(w.drive_rows[d].rate);
+      add_wrench(drive.row, w.drive_rows[d], force, w.wrench);
     }
     for (std::size_t b = 0; b < system.bodies.size(); ++b)
       w.bodies[b].wrench = w.wrench[b];
@@ -109,9 +115,13 @@ void solve_multipliers(Workspace &w) {
   w.ports.set_forces(w.lambda.data(), w.bodies);
 }
 
-void assemble_schur(Workspace &w) {
+void assemble_schur(const System &system, Workspace &w) {
   w.schur.set_zero();
   w.ports.assemble(w.bodies, w.schur);
+  for (std::size_t r = system.held; r < system.constraints.size(); ++r) {
+    const auto i = static_cast<Index>(r);
+    *w.schur.entry(i, i) += system.constraints[r].compliance;
+  }
   w.schur.factorise();
 }
 
@@ -127,7 +137,7 @@ void eliminate(const System &system, double t, const double *q, const double *v,
     evaluate(system.constraints[r].row, w.bodies, w.rows[r]);
   w.ports.update(w.rows);
   update_targets(system, t, w);
-  assemble_schur(w);
+  assemble_schur(system, w);
 }
 
 } // namespace
@@ -150,17 +160,19 @@ void constraint_residuals(const System &system, double t, const double *q, const
   update_kinematics(system, q, v, w);
   update_targets(system, t, w);
   RowMotion motion;
-  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+  for (std::size_t r = 0; r < system.held; ++r) {
     evaluate(system.constraints[r].row, w.bodies, motion);
     value[r] = motion.value - w.targets[r].value;
     rate[r] = motion.rate - w.targets[r].rate;
   }
+  std::fill(value + system.held, value + system.constraints.size(), 0.0);
+  std::fill(rate + system.held, rate + system.constraints.size(), 0.0);
 }
 
 double acceleration_residual(const System &system, const double *q, const double *a, const Workspace &w) {
   double worst = 0;
   RowMotion motion;
-  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+  for (std::size_t r = 0; r < system.held; ++r) {
     const Row &row = system.constraints[r].row;
     evaluate(row, w.bodies, motion);
     double residual = motion.bias - w.targets[r].acceleration, scale = 1 + std::abs(w.targets[r].acceleration);
@@ -252,15 +264,31 @@ double project(const System &system, double t, double *q, double *v, Workspace &
 }
 
 Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w) {
-  const auto m = static_cast<Index>(system.constraints.size());
+  const auto m = static_cast<Index>(system.held);
   Eigen::MatrixXd C_q = Eigen::MatrixXd::Zero(system.coordinates, m); // transposed: gradients are columns
-  for (std::size_t r = 0; r < system.constraints.size(); ++r) {
+  for (std::size_t r = 0; r < system.held; ++r) {
     RowMotion motion;
     evaluate(system.constraints[r].row, w.bodies, motion);
     jacobian(system.constraints[r].row, motion, system.bodies, w.bodies, system.first_coordinate,
              C_q.col(static_cast<Index>(r)));
   }
   return C_q.transpose();
+}
+
+JointEnergy joint_energy(const System &system, const double *q, const double *v, Workspace &w) {
+  update_kinematics(system, q, v, w);
+  JointEnergy result;
+  RowMotion motion;
+  for (std::size_t r = system.held; r < system.constraints.size(); ++r) {
+    evaluate(system.constraints[r].row, w.bodies, motion);
+    result.kinetic += motion.rate * motion.rate / (2 * system.constraints[r].compliance);
+  }
+  for (const Drive &drive : system.drives)
+    if (drive.friction.acts()) {
+      evaluate(drive.row, w.bodies, motion);
+      result.dissipated_power += drive.friction.resistance(motion.rate) * motion.rate;
+    }
+  return result;
 }
 
 } // namespace ffrobot

@@ -9,21 +9,40 @@
 #include "core/rows.h"
 #include "core/time_function.h"
 
+#include <cmath>
 #include <limits>
 #include <vector>
 
 namespace ffrobot {
 
-// C = row - target(t) = 0
+// C = row - target(t) = 0, or, with a compliance 1/J, the kinetic energy 1/2 J row_dot^2 of a rotor.
+//
+// M q_ddot + J d d^T q_ddot with the gradient d of the row is the multiplier mu = J d^T q_ddot of one more row, with
+// -1/J on the diagonal: d^T q_ddot - mu/J = 0 beside M q_ddot + d mu = Q. C M^-1 C^T gets 1/J there and stays positive
+// definite. Nothing holds such a row: as a constraint its value and rate are 0.
 struct Constraint {
   Row row;
   TimeFunction target;
+  double compliance = 0;
+};
+
+// -(c v + tau_c tanh(v / v_s)) along a row whose rate is v: viscous and Coulomb friction, the latter smooth about rest.
+struct Friction {
+  double viscous = 0, coulomb = 0, speed = 1;
+
+  double resistance(double rate) const { return viscous * rate + coulomb * std::tanh(rate / speed); }
+  double slope(double rate) const { // of the resistance
+    const double steady = std::cosh(rate / speed);
+    return viscous + coulomb / (speed * steady * steady);
+  }
+  bool acts() const { return viscous != 0 || coulomb != 0; }
 };
 
 // Generalized force `size(t)` along a row: joint moments, point forces, with the same directions as constraints.
 struct Drive {
   Row row;
   TimeFunction size;
+  Friction friction = {};
 };
 
 // Modal forces `vector * size(t)` on one body: PZT patches.
@@ -36,7 +55,7 @@ struct ModalDrive {
 struct System {
   Eigen::Vector2d gravity = Eigen::Vector2d::Zero();
   std::vector<PlanarBody> bodies;
-  std::vector<Constraint> constraints; // ordered for a small envelope by whoever builds the system
+  std::vector<Constraint> constraints; // ordered for a small envelope by whoever builds the system, rotors last
   std::vector<Drive> drives;
   std::vector<ModalDrive> modal_drives;
 
@@ -44,6 +63,7 @@ struct System {
   std::vector<Eigen::Index> first_coordinate; // of each body in q
   Eigen::Index coordinates = 0;
   double length = 0;                  // of the bodies, in whatever unit: what positions are compared with
+  std::size_t held = 0;               // constraints that are no rotors
   std::vector<Eigen::Index> envelope; // first column of each row of C M^-1 C^T
   struct Coupling {                   // constraint rows r >= s meet on a body at markers k and l
     int r, s, body, k, l;
@@ -96,14 +116,24 @@ void static_force(const System &system, double t, const double *q, Workspace &w,
 void required_force(const System &system, double t, const double *q, const double *v, const double *a, Workspace &w,
                     double *f);
 
-// Accelerations C_ddot (constraints) for accelerations a of the coordinates. Uses kinematics, rows and targets in w.
-void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c);
+// Positions and velocities of all markers.
+void update_kinematics(const System &system, const double *q, const double *v, Workspace &w);
 
 // Acceleration of any row's value, without its target. Uses kinematics in w and the row's motion there.
 double row_acceleration(const System &system, const Row &row, const RowMotion &motion, const double *q, const double *a,
                         const Workspace &w);
 
-// C_q (constraints x coordinates), dense, at the coordinates of the last evaluation.
+// Accelerations C_ddot (constraints, rotors too) for accelerations a of the coordinates. Uses kinematics, rows and
+// targets in w.
+void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c);
+
+// C_q (held constraints x coordinates), dense, at the coordinates of the last evaluation.
 Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w);
+
+// Kinetic energy of the rotors and the power that friction takes, at the state (q, v).
+struct JointEnergy {
+  double kinetic = 0, dissipated_power = 0;
+};
+JointEnergy joint_energy(const System &system, const double *q, const double *v, Workspace &w);
 
 } // namespace ffrobot

@@ -19,6 +19,25 @@ def reference(name):
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
+def readme_table(case, first):
+    """Rows {name: [numbers]} of the table in a README whose header starts with `first`."""
+    text = (CASES / case / "README.md").read_text(encoding="utf-8")
+    table = text[text.index(f"| {first} |") :].split("\n\n")[0]
+    rows = {}
+    for line in table.splitlines()[2:]:
+        name, *cells = (cell.strip() for cell in line.strip("|").split("|"))
+        rows[name] = [float(re.sub(r"[^0-9.e+-]", "", cell) or "nan") for cell in cells]
+    return rows
+
+
+def check_table(case, first, measured, relative=0.02):
+    """Every number of the README to `relative`."""
+    expected = readme_table(case, first)
+    assert expected.keys() == measured.keys()
+    for name, numbers in expected.items():
+        np.testing.assert_allclose(measured[name], numbers, rtol=relative, err_msg=name)
+
+
 def column(group, name):
     """`points/rod.mid/deflection[1]` → that component over time."""
     dataset, index = re.fullmatch(r"([^\[]+)(?:\[(\d+)\])?", name).groups()

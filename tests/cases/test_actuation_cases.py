@@ -1,32 +1,11 @@
 """One case per capability of actuation, each through `ffrobot solve`; the tables of their READMEs hold."""
 
 import re
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-
-CASES = Path(__file__).parents[2] / "cases"
-
-
-def readme_table(case, first):
-    """Rows {name: [numbers]} of the table in a README whose header starts with `first`."""
-    text = (CASES / case / "README.md").read_text(encoding="utf-8")
-    table = text[text.index(f"| {first} |") :].split("\n\n")[0]
-    rows = {}
-    for line in table.splitlines()[2:]:
-        name, *cells = (cell.strip() for cell in line.strip("|").split("|"))
-        rows[name] = [float(re.sub(r"[^0-9.e+-]", "", cell) or "nan") for cell in cells]
-    return rows
-
-
-def check_table(case, first, measured, relative=0.02):
-    """Every number of the README to `relative`."""
-    expected = readme_table(case, first)
-    assert expected.keys() == measured.keys()
-    for name, numbers in expected.items():
-        np.testing.assert_allclose(measured[name], numbers, rtol=relative, err_msg=name)
+from checkpoints import CASES, check_table, readme_table
 
 
 def peak(values):
@@ -235,7 +214,10 @@ def test_more_patches_than_modes_saturate_as_well(solved, weights):
     assert 1e-3 < deflection["limited"] < 0.8 * deflection["motor"]
 
 
-CASE_NAMES = ["straight_slew", *(f"two_link_{name}" for name in ("fcid", "points", "patched", "split"))]
+CASE_NAMES = [
+    "straight_slew",
+    *(f"two_link_{name}" for name in ("fcid", "points", "patched", "split", "linear", "placement")),
+]
 
 
 @pytest.mark.parametrize("case", CASE_NAMES)

@@ -70,4 +70,6 @@ def oracle_of(assembly):
         [(constraint.row, constraint.target) for constraint in assembly.constraints],
         model.loads,
         [(load.body, load.vector, load.size) for load in model.modal_loads],
+        model.rotors,
+        model.frictions,
     )

@@ -79,6 +79,10 @@ def elastic_forces(body, q, v):
     return np.concatenate([np.zeros(3), -body.stiffness * q[3:] - body.damping @ v[3:]])
 
 
+def resistance(friction, rate):
+    return friction.viscous * rate + friction.coulomb * np.tanh(rate / friction.speed)
+
+
 @dataclass
 class Marker:
     """Motion (x, y, angle) of one end of a row, its Jacobian L (3, N) and acceleration where q̈ = 0."""
@@ -100,12 +104,16 @@ class RowState:
 
 
 class Mechanism:
-    """Bodies with constraints (row, target), loads (row, size) and modal loads (body name, vector, size)."""
+    """Bodies with constraints (row, target), loads (row, size) and modal loads (body name, vector, size).
 
-    def __init__(self, bodies, gravity, constraints=(), loads=(), modal_loads=()):
+    Joints as built: rotors (row, inertia), whose rate is the row's, and friction (row, Friction) along rows.
+    """
+
+    def __init__(self, bodies, gravity, constraints=(), loads=(), modal_loads=(), rotors=(), frictions=()):
         self.bodies = list(bodies)
         self.gravity = np.array(gravity)
         self.constraints, self.loads, self.modal_loads = list(constraints), list(loads), list(modal_loads)
+        self.rotors, self.frictions = list(rotors), list(frictions)
         sizes = [3 + body.n_modes for body in self.bodies]
         ends = np.cumsum(sizes)
         self.size = int(ends[-1])
@@ -121,6 +129,9 @@ class Mechanism:
         for body in self.bodies:
             i = self.columns[body.name]
             M[i, i] = mass_matrix(body, q[i])
+        for row, inertia in self.rotors:
+            gradient = self.row(row, q, np.zeros_like(q)).gradient
+            M += inertia * np.outer(gradient, gradient)
         return M
 
     def forces(self, t, q, v):
@@ -132,6 +143,12 @@ class Mechanism:
             Q[i] += elastic_forces(body, q[i], v[i]) + gravity_forces(body, q[i], self.gravity)
         for row, size in self.loads:
             Q += self.row(row, q, v).gradient * size(t)[0]
+        for row, inertia in self.rotors:
+            state = self.row(row, q, v)
+            Q -= inertia * state.bias * state.gradient
+        for row, friction in self.frictions:
+            state = self.row(row, q, v)
+            Q -= state.gradient * resistance(friction, state.rate)
         for name, vector, size in self.modal_loads:
             Q[self.columns[name]][3:] += vector * size(t)[0]
         return Q
@@ -162,6 +179,18 @@ class Mechanism:
             k = ("x", "y", "angle").index(row.kind.name)
             value = b.position[k] - a.position[k] - row.offset
             return RowState(value, b.velocity[k] - a.velocity[k], b.L[k] - a.L[k], b.convective[k] - a.convective[k])
+        if row.kind.name == "gear":
+            N = row.direction[0]
+            value, rate, gradient, bias = (
+                N * at_b - (N - 1) * at_a
+                for at_a, at_b in (
+                    (a.position[2], b.position[2]),
+                    (a.velocity[2], b.velocity[2]),
+                    (a.L[2], b.L[2]),
+                    (a.convective[2], b.convective[2]),
+                )
+            )
+            return RowState(value - row.offset, rate, gradient, bias)
         alpha, alpha_dot = a.position[2], a.velocity[2]
         n, n_alpha = rotation(alpha) @ row.direction, rotation_derivative(alpha) @ row.direction
         d, d_dot = b.position[:2] - a.position[:2], b.velocity[:2] - a.velocity[:2]
@@ -199,6 +228,9 @@ class Mechanism:
             dissipated += p_dot @ body.damping @ p_dot
             s, _ = first_moment(body, p)
             gravitational -= (body.mass * R + rotation(theta[0]) @ s) @ self.gravity
+        for row, friction in self.frictions:
+            rate = self.row(row, q, v).rate
+            dissipated += resistance(friction, rate) * rate
         return np.array([kinetic, strain, gravitational, dissipated])
 
     def momentum(self, q, v):

@@ -225,7 +225,7 @@ MISTAKES = [
     ("end = 1.0", 'end = 1.0\nintegrator = "generalized-alpha"', 'analysis "forward": actuation: expected an analysis', "again"),
     ("end = 1.0", 'end = 1.0\nshape = "zero"', 'analysis "inverse": expected the key "shape" only in kind = "fcid"', "found"),
     ('kind = "pcid"', 'kind = "fcid"', 'analysis "inverse": expected the key "shape" in kind = "fcid"', "found none"),
-    ('kind = "pcid"', 'kind = "pcd"', 'analysis "inverse": kind: expected "pcid", "fcid", "forward", "static" or', '"pcid"?'),
+    ('kind = "pcid"', 'kind = "pcd"', 'analysis "inverse": kind: expected "pcid", "fcid", "forward", ', '"pcid"?'),
     ("end = 1.0", "end = 1.0\nfactor = 0.5", 'analysis "inverse": expected the key "factor" only in kind = "motors-only"', ""),
     ('kind = "pcid"', 'kind = "motors-only"\nfactor = 0.5', 'analysis "inverse": expected the key "factor" only with', "tip"),
     ('kind = "pcid"', 'kind = "motors-only"\npre_actuation = -1', 'analysis "inverse": pre_actuation: expected a number', ""),

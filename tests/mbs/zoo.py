@@ -131,13 +131,36 @@ def stiffened(rng, **keys):
     bodies[1] = with_payload(bodies[1], "tip", mass=0.6, inertia=0.02)
     angles = {f"b{k}": 1.2 * (-0.6) ** (k - 1) for k in range(1, 4)}
     tables = {"trajectory": [tip_path("b3")], "load": LOADS, "initial": {"angles": angles}}
-    return make_model(bodies, joint=serial_joints(3), **(tables | keys))
+    return make_model(bodies, **({"joint": serial_joints(3)} | tables | keys))
 
 
 def stiffened_and_driven(rng, **keys):
     """The same with as many trajectories as degrees of freedom."""
     turn = {"name": "turn", "angle": "b3", "value": "0.4+0.2*t"}
     return stiffened(rng, **({"trajectory": [tip_path("b3"), turn]} | keys))
+
+
+def built(joints):
+    """Joints with rotors and friction, each with its own."""
+    return [
+        joint
+        if joint["type"] == "weld"
+        else joint
+        | {"gear_ratio": 3.0 + k, "rotor_inertia": 0.02 * (k + 1)}
+        | {"viscous_friction": 0.3 * k, "coulomb_friction": 0.4, "friction_speed": 0.5}
+        for k, joint in enumerate(joints)
+    ]
+
+
+def as_built(mechanism):
+    """`mechanism` with its joints as built."""
+
+    def build(rng, **keys):
+        bare = mechanism(np.random.default_rng(0))
+        joints = [joint.model_dump(exclude_unset=True) for joint in bare.scene.joint]
+        return mechanism(rng, **({"joint": built(joints)} | keys))
+
+    return build
 
 
 def random_stiffening(rng, body, size=0.05):
@@ -170,6 +193,10 @@ ALL = {
     "stiffened": stiffened,
     "stiffened, driven": stiffened_and_driven,
     "free-flying": free_flying,
+    "mixed, as built": as_built(mixed),
+    "slider-crank, as built": as_built(slider_crank),
+    "stiffened, as built": as_built(stiffened),
+    "driven, as built": as_built(stiffened_and_driven),
 }
 
 

@@ -1,0 +1,75 @@
+"""The linear models of a scene's analysis, and what is worth telling of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ...mbs.analyses import Outcome
+from ...mbs.linearisation import Linearisation
+from ..patches import PatchArray
+from .linear_model import LinearModel, linear_model
+from .modes import Reach, RobotModes, controllability, observability, robot_modes
+from .zeros import Zeros, zeros
+
+
+@dataclass(frozen=True)
+class LinearAnalysis:
+    """Linear models at the times of an analysis, with their modes, reach and zeros, one of each per time.
+
+    `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
+    (inputs, outputs): from each motor to its own joint and to each coordinate of a point, from all motors to their
+    joints (the frequencies with held joints), and to a point where there are two.
+    """
+
+    models: tuple[LinearModel, ...]
+    modes: tuple[RobotModes, ...]
+    controllable: tuple[Reach, ...]
+    observable: tuple[Reach, ...]
+    zeros: Mapping[tuple[str, ...], tuple[Zeros, ...]]
+
+
+def linear_models(outcome: Outcome, patches: Mapping[str, PatchArray]) -> tuple[LinearModel, ...]:
+    """The linear models about the rows of `outcome`."""
+    model = outcome.assembly.model
+    linearisation = Linearisation(model, outcome.q[0], outcome.analysis.points or default_points(outcome))
+    rows = zip(outcome.time, outcome.q, outcome.v, outcome.a, strict=True)
+    return tuple(linear_model(linearisation.at(float(t), q, v, a), patches) for t, q, v, a in rows)
+
+
+def analyse(models: tuple[LinearModel, ...]) -> LinearAnalysis:
+    """Modes, reach and zeros of the models."""
+    first = models[0]
+    acting = [name for name in first.input_names if not name.startswith("force/")]
+    seen = [name for name in first.output_names if not name.startswith("modal/")]
+    return LinearAnalysis(
+        models,
+        tuple(robot_modes(model) for model in models),
+        tuple(controllability(model, acting) for model in models),
+        tuple(observability(model, seen) for model in models),
+        {pair: tuple(zeros(model, *_split(pair)) for model in models) for pair in _pairs(first)},
+    )
+
+
+def default_points(outcome: Outcome) -> tuple[str, ...]:
+    """The points of trajectories; where there are none, the tips of all bodies that have one."""
+    model = outcome.assembly.model
+    points = [trajectory.point for trajectory in model.scene.trajectory if trajectory.point is not None]
+    tips = [f"{body.name}.tip" for body in model.bodies if "tip" in body.points]
+    return tuple(dict.fromkeys(points or tips))
+
+
+def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
+    """(inputs …, outputs …), as many of each."""
+    motors = [name for name in model.input_names if name.startswith("joint/")]
+    places = [name for name in model.output_names if name.startswith("point/")]
+    single = [(motor, output) for motor in motors for output in (motor, *places)]
+    together = [(*motors, *motors)] if len(motors) > 1 else []
+    if len(motors) == 2:
+        together += [(*motors, *pair) for pair in zip(places[::2], places[1::2], strict=True)]
+    return [*single, *together]
+
+
+def _split(pair: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    half = len(pair) // 2
+    return pair[:half], pair[half:]

@@ -1,0 +1,152 @@
+"""A robot as x' = A x + B u, y = C x + D u: what control design asks of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...files import write_atomically
+from ...mbs.linearisation import LinearMechanism
+from ...validation import did_you_mean, quoted
+from ..patches import PatchArray
+
+if TYPE_CHECKING:
+    import control
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Names = str | Sequence[str]
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """x = (δs, δṡ) about a configuration or one instant of a motion, frozen there; f coordinates s.
+
+    Attributes:
+        A, B, C, D: (2f, 2f), (2f, inputs), (outputs, 2f), (outputs, inputs); D = 0, since u accelerates.
+        state_names: "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
+        input_names: "joint/NAME" N·m (or N), "pzt/BODY/k" V, "force/BODY.POINT/x" N; k from 1.
+        output_names: "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k".
+        time: s.
+        mass: (f, f) of s: the metric in which coordinates of different kinds are compared.
+        transformation: ∂q/∂s (coordinates, f), which takes mode shapes to the robot.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    state_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    time: float
+    mass: Array
+    transformation: Array
+
+    @property
+    def freedom(self) -> int:
+        """Number f of independent coordinates."""
+        return len(self.mass)
+
+    @property
+    def second_order(self) -> tuple[Array, Array, Array, Array]:
+        """K̂, D̂ (f, f), inputs (f, …) and outputs (…, f) where the mass is the identity: s = L⁻ᵀ z, mass = L Lᵀ."""
+        f, L = self.freedom, np.linalg.cholesky(self.mass)
+        L_T, inverse = L.T, np.linalg.inv(L.T)
+        A_K, A_D = L_T @ self.A[f:, :f] @ inverse, L_T @ self.A[f:, f:] @ inverse
+        inputs, outputs = L_T @ self.B[f:], self.C[:, :f] @ inverse
+        return -1.0 * A_K, -1.0 * A_D, inputs, outputs
+
+    def inputs(self, names: Names) -> list[int]:
+        """Columns of B by name. Raises `InputError` for unknown ones."""
+        return _numbers("input", names, self.input_names)
+
+    def outputs(self, names: Names) -> list[int]:
+        """Rows of C by name. Raises `InputError` for unknown ones."""
+        return _numbers("output", names, self.output_names)
+
+    def frequency_response(self, omega: Array, inputs: Names, outputs: Names) -> ComplexArray:
+        """G(iω) (len(omega), outputs, inputs) at angular frequencies ω, rad/s."""
+        K, D, B, C = self.second_order
+        s = 1j * np.asarray(omega)[:, None, None]
+        X = np.linalg.solve(s**2 * np.eye(self.freedom) + s * D + K, B[None, :, self.inputs(inputs)])
+        return np.asarray(C[self.outputs(outputs)] @ X, dtype=complex)
+
+    def arrays(self) -> dict[str, Any]:
+        """Everything of the model by name, as files hold it."""
+        return dict(vars(self))
+
+    def save(self, path: Path) -> None:
+        """Write to a .npz or .mat file (MATLAB's). Raises `InputError` for another suffix."""
+        save_arrays(self.arrays(), path)
+
+    def to_control(self) -> control.StateSpace:
+        """The model as python-control's state space, "." in names made ":"; needs that package (extra "control")."""
+        import control
+
+        names = {"states": self.state_names, "inputs": self.input_names, "outputs": self.output_names}
+        allowed = {kind: [name.replace(".", ":") for name in given] for kind, given in names.items()}
+        return control.ss(self.A, self.B, self.C, self.D, **allowed)
+
+
+def linear_model(mechanism: LinearMechanism, patches: Mapping[str, PatchArray]) -> LinearModel:
+    """The state space of a linear mechanism, with the voltages of patches among its inputs."""
+    f = len(mechanism.M)
+    motors = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
+    forces = {name: column for name, column in mechanism.inputs.items() if name not in motors}
+    voltages = {
+        f"pzt/{body}/{k}": _spread(f, mechanism.modal(body), column)
+        for body, array in patches.items()
+        for k, column in enumerate(array.Phi_V.T, 1)
+    }
+    inputs = motors | voltages | forces
+    modal = {name: row for name, row in zip(mechanism.names, np.eye(f), strict=True) if name.startswith("modal/")}
+    outputs = dict(mechanism.outputs) | modal
+    columns = np.column_stack([mechanism.K, mechanism.D, *inputs.values()])
+    solved = np.linalg.solve(mechanism.M, columns)
+    A = np.block([[np.zeros((f, f)), np.eye(f)], [-solved[:, : 2 * f]]])
+    B = np.vstack([np.zeros((f, len(inputs))), solved[:, 2 * f :]])
+    C = np.array([np.concatenate([row, np.zeros(f)]) for row in outputs.values()])
+    names = (*mechanism.names, *(f"rate of {name}" for name in mechanism.names))
+    return LinearModel(
+        A, B, C, np.zeros((len(C), B.shape[1])), names, tuple(inputs), tuple(outputs),
+        mechanism.time, mechanism.M, mechanism.transformation,
+    )  # fmt: skip
+
+
+def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
+    """Write arrays, names and numbers to a .npz or .mat file. Raises `InputError` for another suffix."""
+    from io import BytesIO
+
+    content = BytesIO()
+    if path.suffix == ".npz":
+        np.savez_compressed(content, **{key: np.asarray(value) for key, value in arrays.items()})
+    elif path.suffix == ".mat":
+        from scipy.io import savemat
+
+        cells = {k: np.array(v, dtype=object) if isinstance(v, tuple) else v for k, v in arrays.items()}
+        savemat(content, cells, oned_as="column")
+    else:
+        raise InputError(f'{path}: expected a file name that ends in .npz or .mat, found "{path.name}"')
+    write_atomically(path, content.getvalue(), "linear model")
+
+
+def _spread(size: int, places: list[int], values: Array) -> Array:
+    spread = np.zeros(size)
+    spread[places] = values
+    return spread
+
+
+def _numbers(kind: str, names: Names, known: tuple[str, ...]) -> list[int]:
+    wanted = [names] if isinstance(names, str) else list(names)
+    for name in wanted:
+        if name not in known:
+            hint = did_you_mean(name, known)
+            raise InputError(f'linear model: expected an {kind} ({quoted(known)}), found "{name}"{hint}')
+    return [known.index(name) for name in wanted]

@@ -1,0 +1,237 @@
+"""Linear-quadratic regulator about the reference: gains of the sampled linear model, delay included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...mbs.linearisation import LinearMechanism, linearise
+from ...mbs.loop_records import JointPid, Lqr
+from .controllers import Setup, modal_columns, modal_estimate
+from .linear_model import LinearModel, linear_model
+from .modes import controllability, observability
+
+Array = NDArray[np.float64]
+MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion
+
+
+@dataclass(frozen=True)
+class SampledModel:
+    """x(k+1) = A x(k) + B u(k) of a model whose inputs are held, u acting after a delay.
+
+    Commands that are on their way are states behind those of the model, oldest first.
+    """
+
+    A: Array
+    B: Array
+
+
+def sampled(A: Array, B: Array, T: float, delay: float) -> SampledModel:
+    """The exact discrete model for samples every T (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3)."""
+    n, m = B.shape
+    late, fraction = divmod(delay, T)
+    waiting = int(late) + (fraction > 1e-9 * T)
+    Phi, Gamma = _held(A, B, T)
+    _, early = _held(A, B, T - fraction) if fraction > 1e-9 * T else (Phi, Gamma)
+    whole = np.zeros((n + waiting * m, n + waiting * m))
+    inputs = np.zeros((n + waiting * m, m))
+    whole[:n, :n] = Phi
+    if waiting == 0:
+        inputs[:n] = Gamma
+        return SampledModel(whole, inputs)
+    whole[n : n + (waiting - 1) * m, n + m :] = np.eye((waiting - 1) * m)
+    inputs[n + (waiting - 1) * m :] = np.eye(m)
+    if fraction <= 1e-9 * T:
+        whole[:n, n : n + m] = Gamma
+    else:  # the oldest command acts for the first part of the interval, the next one for the rest
+        rest = Gamma - early
+        whole[:n, n : n + m] = rest
+        if waiting == 1:
+            inputs[:n] = early
+        else:
+            whole[:n, n + m : n + 2 * m] = early
+    return SampledModel(whole, inputs)
+
+
+def _held(A: Array, B: Array, T: float) -> tuple[Array, Array]:
+    """e^{A T} and ∫ e^{A s} ds B over T."""
+    from scipy.linalg import expm
+
+    n, m = B.shape
+    block = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * T)
+    return block[:n, :n], block[:n, n:]
+
+
+def gains(model: SampledModel, Q: Array, R: Array) -> Array:
+    """K of u = −K x with least Σ xᵀQx + uᵀRu; Q of the states, commands on their way cost what they cost as inputs.
+
+    Raises `ValueError` where the Riccati equation has no stabilising solution.
+    """
+    from scipy.linalg import LinAlgError, solve_discrete_are
+
+    n, waiting = len(Q), (len(model.A) - len(Q)) // len(R)
+    # in the unit of what is acceptable: all weights are one
+    scale = np.concatenate([1 / np.sqrt(np.diag(Q)), *[1 / np.sqrt(np.diag(R))] * waiting])
+    unit = 1 / np.sqrt(np.diag(R))
+    A, B = model.A * scale / scale[:, None], model.B * unit / scale[:, None]
+    weight = np.diag(np.concatenate([np.ones(n), np.full(len(A) - n, 1e-9)]))
+    try:
+        X = solve_discrete_are(A, B, weight, np.eye(len(R)))
+    except LinAlgError as error:
+        raise ValueError(str(error)) from None
+    K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
+    result: Array = unit[:, None] * K / scale
+    return result
+
+
+class LqrControl:
+    """u = −K x, x the joint errors, the lowest modes of the links and their rates, and the commands on their way."""
+
+    def __init__(self, record: Lqr, setup: Setup, beside: Sequence[JointPid] = ()) -> None:
+        model = design_model(record, setup, beside if record.inputs == "patches" else ())
+        motors = [] if record.inputs == "patches" else [f"joint/{name}" for name in setup.model.motors]
+        patches = {} if record.inputs == "motors" else setup.patches
+        self.inputs = [*setup.places(*motors), *(i for body in patches for i in setup.patch_places(body))]
+        names = [setup.inputs[i] for i in self.inputs]
+        self.warnings = _out_of_reach(record, setup, model, names)
+        Q, R = _weights(record, setup, model, names)
+        discrete = sampled(model.A, model.B[:, model.inputs(names)], setup.sample_time, setup.delay)
+        try:
+            self.K = gains(discrete, Q, R)
+        except ValueError as error:
+            raise InputError(
+                f"{setup.model.scene.path}: controller lqr: expected a model that motors and patches can stabilise,"
+                f" found none ({error}): {'; '.join(self.warnings) or 'more modes or other weights?'}"
+            ) from None
+        self.bandwidth = _bandwidth(model.A, discrete.A - discrete.B @ self.K, setup.sample_time)
+        self.values, self.rates, differences = _estimates(record, setup, model)
+        self.differences = differences / setup.sample_time
+        self.reference, self.f = setup.reference, model.freedom
+        self.x = np.zeros(len(discrete.A))
+        self.before: Array | None = None
+        self.size = len(setup.inputs)
+
+    def __call__(self, k: int, y: Array) -> Array:
+        """Commands at sample k."""
+        e = y - self.reference[k]
+        change = e - (e if self.before is None else self.before)
+        self.before = e
+        x, f = self.x, self.f
+        x[:f] = self.values @ e
+        x[f : 2 * f] = self.rates @ e + self.differences @ change
+        command = -self.K @ x
+        if len(x) > 2 * f:
+            x[2 * f : -len(command)] = x[2 * f + len(command) :]
+            x[-len(command) :] = command
+        u = np.zeros(self.size)
+        u[self.inputs] = command
+        return u
+
+
+def _bandwidth(A: Array, closed: Array, T: float) -> float:
+    """The fastest of the model's motions that feedback changes: whose discrete pole moves."""
+    poles = np.linalg.eigvals(A)
+    moved = np.abs(np.exp(poles * T)[:, None] - np.linalg.eigvals(closed)).min(axis=1) > MOVED
+    return float(np.abs(poles[moved]).max(initial=0.0))
+
+
+def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> LinearModel:
+    """About the reference at `time`, links with their lowest modes: the higher ones are left out (truncated).
+
+    Joints that other controllers hold are held by springs and dampers, as if these neither sampled nor waited.
+    """
+    source = setup.source
+    i = int(np.argmin(np.abs(source.time - record.time)))
+    mechanism = linearise(setup.model, float(source.time[i]), source.q[i], source.v[i], source.a[i])
+    keep = [j for j, name in enumerate(mechanism.names) if _is_kept(name, record.modes)]
+    patches = {name: replace(a, Phi_V=a.Phi_V[: record.modes]) for name, a in setup.patches.items()}
+    mechanism = _restricted(mechanism, keep)
+    for pid in beside:
+        for joint in pid.joints:
+            along = mechanism.inputs[f"joint/{joint}"]
+            spring, damper = pid.proportional.get(joint, 0.0), pid.derivative.get(joint, 0.0)
+            mechanism = replace(
+                mechanism,
+                K=mechanism.K + spring * np.outer(along, along),
+                D=mechanism.D + damper * np.outer(along, along),
+            )
+    return linear_model(mechanism, patches)
+
+
+def _is_kept(name: str, modes: int) -> bool:
+    kind, _, rest = name.partition("/")
+    return kind != "modal" or int(rest.rpartition("/")[2]) <= modes
+
+
+def _restricted(mechanism: LinearMechanism, keep: Sequence[int]) -> LinearMechanism:
+    """With only these of its coordinates."""
+    block, chosen = np.ix_(keep, keep), list(keep)
+    return replace(
+        mechanism,
+        M=mechanism.M[block],
+        D=mechanism.D[block],
+        K=mechanism.K[block],
+        inputs={name: column[chosen] for name, column in mechanism.inputs.items()},
+        outputs={name: row[chosen] for name, row in mechanism.outputs.items()},
+        transformation=mechanism.transformation[:, chosen],
+        transformation_rate=mechanism.transformation_rate[:, chosen],
+        force=mechanism.force[chosen],
+        names=tuple(mechanism.names[i] for i in chosen),
+    )
+
+
+def _weights(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequence[str]) -> tuple[Array, Array]:
+    """Q and R (diagonal); pᵀp/m is the mean square of a link's deflection."""
+    values, rates = [], []
+    for name in model.state_names[: model.freedom]:
+        kind, body, *rest = name.split("/")
+        if kind != "modal":
+            values.append(record.angle**-2)
+            rates.append(record.rate**-2)
+            continue
+        link = setup.model.body(body)
+        weight = 1 / (link.mass * (record.deflection * (link.length or 1.0)) ** 2)
+        values.append(weight)
+        rates.append(weight / link.stiffness[int(rest[0]) - 1])
+    cost = [record.moment if name.startswith("joint/") else record.voltage for name in inputs]
+    return np.diag([*values, *rates]), np.diag(np.array(cost) ** -2.0)
+
+
+def _estimates(record: Lqr, setup: Setup, model: LinearModel) -> tuple[Array, Array, Array]:
+    """(f, outputs) that give coordinates, measured rates, and rates by differences (times T)."""
+    values, rates, differences = np.zeros((3, model.freedom, len(setup.outputs)))
+    names = list(model.state_names[: model.freedom])
+    for joint in setup.model.motors:
+        i = names.index(f"joint/{joint}")
+        values[i, setup.columns(f"joint/{joint}")] = 1.0
+        rates[i, setup.columns(f"joint/{joint}/rate")] = 1.0
+    for body in setup.model.bodies:
+        rows = np.array([i for i, name in enumerate(names) if name.startswith(f"modal/{body.name}/")], dtype=int)
+        if not rows.size or (record.sensor == "pzt" and body.name not in setup.patches):
+            continue
+        m = len(rows)
+        estimate = modal_estimate(record.sensor, setup, body.name, m)
+        values[np.ix_(rows, modal_columns(record.sensor, setup, body.name, m, ""))] = estimate
+        if record.sensor == "pzt":
+            differences[np.ix_(rows, modal_columns(record.sensor, setup, body.name, m))] = estimate
+        else:
+            rates[np.ix_(rows, modal_columns(record.sensor, setup, body.name, m))] = estimate
+    return values, rates, differences
+
+
+def _out_of_reach(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequence[str]) -> tuple[str, ...]:
+    """Modes that no input of the design reaches, or no sensor sees."""
+    lost = controllability(model, list(inputs)).lost
+    lines = [f"LQR: uncontrollable: {', '.join(lost)}"] if lost else []
+    seen = [f"joint/{name}" for name in setup.model.motors]
+    seen += [name for name in model.output_names if name.startswith("modal/") and _is_read(record, setup, name)]
+    hidden = observability(model, seen).lost
+    return (*lines, *([f"LQR: unobservable: {', '.join(hidden)}"] if hidden else []))
+
+
+def _is_read(record: Lqr, setup: Setup, name: str) -> bool:
+    return record.sensor == "ideal" or name.split("/")[1] in setup.patches

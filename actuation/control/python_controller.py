@@ -1,0 +1,63 @@
+"""A user's own controller: a function in a Python file that is given the setup and returns what is asked at samples.
+
+    def controller(setup):                 # actuation.control.controllers.Setup
+        gamma = setup.columns("joint/O")   # where readings are in y, by name
+        tau = setup.places("joint/O")      # where commands are in u
+
+        def at_sample(k, y):               # sample number, readings (outputs,)
+            u = np.zeros(len(setup.inputs))
+            u[tau] = 100 * (setup.reference[k, gamma] - y[gamma])
+            return u                       # added to setup.feed_forward[k], then cut at the limits
+
+        return at_sample
+
+It reads the sensors that the scene gives.
+"""
+
+from __future__ import annotations
+
+import runpy
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, SolveError
+from .controllers import Setup
+
+Array = NDArray[np.float64]
+
+
+class PythonControl:
+    """Calls what `factory` makes, and checks what it returns. Raises `SolveError` where that fails."""
+
+    bandwidth = 0.0
+
+    def __init__(self, factory: Callable[[Setup], Callable[[int, Array], Array]], setup: Setup, label: str) -> None:
+        self.label, self.size = label, len(setup.inputs)
+        self.act = factory(setup)
+
+    def __call__(self, k: int, y: Array) -> Array:
+        """What the user's function commands at sample k."""
+        try:
+            u = np.asarray(self.act(k, y), dtype=float)
+        except Exception as error:  # the user's code may raise anything
+            raise SolveError(f"{self.label}: sample {k}: {type(error).__name__}: {error}") from error
+        if u.shape != (self.size,) or not np.isfinite(u).all():
+            raise SolveError(
+                f"{self.label}: sample {k}: expected {self.size} finite commands, found shape {u.shape}: {u}"
+            )
+        return u
+
+
+def load_function(reference: str) -> Callable[[Setup], Callable[[int, Array], Array]]:
+    """The function of "FILE.py:FUNCTION". Raises `InputError` where the file fails or does not have it."""
+    path, _, name = reference.rpartition(":")
+    try:
+        found = runpy.run_path(path)
+    except Exception as error:
+        raise InputError(f"{path}: controller: {type(error).__name__}: {error}") from error
+    if not callable(found.get(name)):
+        raise InputError(f'{path}: controller: expected the function "{name}", found none')
+    function: Callable[[Setup], Callable[[int, Array], Array]] = found[name]
+    return function

@@ -1,0 +1,126 @@
+"""The mechanism with rigid links: what joint accelerations take, as computed torque needs it at every sample."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...mbs import _core
+from ...mbs.analyses import Outcome
+from ...mbs.initial_state import undeformed_state
+from ...mbs.loop_records import ComputedTorque
+from ...mbs.model import ZERO, Assembly, Constraint, Model
+from ...mbs.planar_body import PlanarBody, PlanarPoint
+from .controllers import Setup
+
+Array = NDArray[np.float64]
+TOLERANCE, MOST_ITERATIONS = 1e-10, 20
+
+
+class RigidArm:
+    """τ(γ, γ̇, γ̈) of all motors with rigid links, by the equations of motion of the core, rotors and friction too.
+
+    The motors' moments are the multipliers of γ = γ(t), affine in γ̈: one evaluation with γ̈ = 0, one for each motor.
+    Raises `InputError` where the motors do not fit the mechanism.
+    """
+
+    def __init__(self, model: Model) -> None:
+        if len(model.motors) != model.rigid_freedom:
+            raise InputError(
+                f"{model.scene.path}: controller: expected motors that fit the mechanism ({model.rigid_freedom} of"
+                f" them), found {len(model.motors)}"
+            )
+        rigid = replace(model, bodies=tuple(_rigid(body) for body in model.bodies), modal_loads=(), loads=())
+        self._at_rest = self._assembly(rigid, None)
+        self._moved = [self._assembly(rigid, name).system for name in model.motors]
+        names = [c.owner if c.component == "motor" else "" for c in self._at_rest.constraints]
+        self._motors = np.array([names.index(name) for name in model.motors])
+        self._q = undeformed_state(self._at_rest).q
+
+    @staticmethod
+    def _assembly(model: Model, accelerated: str | None) -> Assembly:
+        one = _core.TimeFunction.polynomial(np.array([0.0, 1.0]), np.array([[0.5, 0.0, 0.0]]))
+        motors = [
+            Constraint(row, one if name == accelerated else ZERO, name, "motor", is_trajectory=False)
+            for name, row in model.motors.items()
+        ]
+        # joint angles of the initial guess are met by no target: `_place` moves the arm to the angles it is asked for
+        return Assembly(model, [*model.joints, *motors])
+
+    def place(self, gamma: Array) -> tuple[Array, Array]:
+        """Coordinates q and C_q at joint angles gamma, by Newton from the last place."""
+        system, q = self._at_rest.system, self._q.copy()
+        rest = np.zeros_like(q)
+        for _ in range(MOST_ITERATIONS):
+            C, _, C_q = system.constraints(0.0, q, rest)
+            C[self._motors] -= gamma
+            q -= np.linalg.solve(C_q, C)
+            if np.abs(C).max() < TOLERANCE:
+                break
+        self._q = q
+        return q, C_q
+
+    def angles(self, source: Outcome) -> Array:
+        """Joint angles (motors,) at the start of an analysis, its links taken as straight."""
+        frames = source.q[0][source.assembly.rigid_coordinates]
+        q = np.zeros_like(self._q)
+        q[self._at_rest.rigid_coordinates] = frames
+        C = self._at_rest.system.constraints(0.0, q, np.zeros_like(q))[0]
+        angles: Array = C[self._motors]
+        return angles
+
+    def terms(self, gamma: Array, gamma_dot: Array) -> tuple[Array, Array]:
+        """M (motors, motors) and h (motors,) of τ = M γ̈ + h."""
+        q, C_q = self.place(gamma)
+        rates = np.zeros(len(C_q))
+        rates[self._motors] = gamma_dot
+        v = np.linalg.solve(C_q, rates)
+        h = -self._at_rest.system.evaluate(0.0, q, v)[1][self._motors]
+        M = np.column_stack([-system.evaluate(0.0, q, v)[1][self._motors] - h for system in self._moved])
+        return M, h
+
+    def moments(self, gamma: Array, gamma_dot: Array, gamma_ddot: Array) -> Array:
+        """τ (motors,) N·m."""
+        M, h = self.terms(gamma, gamma_dot)
+        tau: Array = M @ gamma_ddot + h
+        return tau
+
+
+def _rigid(body: PlanarBody) -> PlanarBody:
+    """The undeformed body."""
+    none = np.zeros(0)
+    points = {name: PlanarPoint(at.position, np.zeros((2, 0)), none) for name, at in body.points.items()}
+    empty = np.zeros((0, 0))
+    return replace(
+        body, stiffness=none, damping=empty, S_bar=np.zeros((2, 0)), h=none, j=none, S_tilde=empty, m_xy=empty,
+        points=MappingProxyType(points), modal_transform=empty, stiffening=None,
+    )  # fmt: skip
+
+
+class ComputedTorqueControl:
+    """Moments for γ̈_ref + 2 ζ ω ė + ω² e with rigid links (Craig, Introduction to Robotics, sec. 10.4).
+
+    They replace the moments of the feed-forward, which are taken off.
+    """
+
+    def __init__(self, record: ComputedTorque, setup: Setup, arm: RigidArm) -> None:
+        motors = list(setup.model.motors)
+        self.arm, self.bandwidth = arm, record.bandwidth
+        self.gains = record.bandwidth**2, 2 * record.damping_ratio * record.bandwidth
+        self.values = setup.columns(*(f"joint/{name}" for name in motors))
+        self.rates = setup.columns(*(f"joint/{name}/rate" for name in motors))
+        self.reference, self.feed_forward = setup.reference, setup.feed_forward
+        self.accelerations = np.gradient(self.reference[:, self.rates], setup.times, axis=0, edge_order=2)
+
+    def __call__(self, k: int, y: Array) -> Array:
+        """Commands at sample k."""
+        r, m = self.reference[k], len(self.values)
+        e, e_dot = r[self.values] - y[self.values], r[self.rates] - y[self.rates]
+        wanted = self.accelerations[k] + self.gains[0] * e + self.gains[1] * e_dot
+        u: Array = np.zeros_like(self.feed_forward[k])
+        u[:m] = self.arm.moments(y[self.values], y[self.rates], wanted) - self.feed_forward[k, :m]
+        return u

@@ -1,0 +1,91 @@
+"""Readings of sensors and commands of actuators by name, as linear models name them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mbs import _core
+from ...mbs.loop_records import PERMITTIVITY, Sensor
+from ...mbs.model import Assembly, Model
+from ...mbs.rows import End, Row, joint_coordinate
+from ..patches import PatchArray
+
+Array = NDArray[np.float64]
+ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One reading.
+
+    `name`: "joint/NAME", "point/BODY.POINT/x" or y, "pzt/BODY/k", "modal/BODY/k" (k from 1), with "/rate" or
+    "/acceleration" behind it where that is read. Either `row` is read, or `vector` . p of `body`; `order` counts
+    derivatives, `resolution` and `noise` are those of `Sensor`.
+    """
+
+    name: str
+    order: int
+    resolution: float
+    noise: float
+    row: Row | None = None
+    body: str = ""
+    vector: Array = field(default_factory=lambda: np.zeros(0))
+
+
+def input_names(model: Model, patches: Mapping[str, PatchArray]) -> tuple[str, ...]:
+    """Names of all commands: motor moments "joint/NAME", then patch voltages "pzt/BODY/k"."""
+    voltages = [f"pzt/{body}/{k}" for body, array in patches.items() for k in range(1, len(array.edges) + 1)]
+    return tuple([f"joint/{name}" for name in model.motors] + voltages)
+
+
+def signals(model: Model, patches: Mapping[str, PatchArray], sensor: Sensor) -> Iterator[Signal]:
+    """The readings of one sensor of the scene."""
+    order, ending = ORDERS[sensor.measure], "" if sensor.measure == "value" else f"/{sensor.measure}"
+    quality = sensor.resolution, sensor.noise
+    if sensor.joint is not None:
+        joint = next(joint for joint in model.scene.joint if joint.name == sensor.joint)
+        row = joint_coordinate(model.scene, joint)
+        yield Signal(f"joint/{sensor.joint}{ending}", order, *quality, row)
+    elif sensor.point is not None:
+        body, _, point = sensor.point.partition(".")
+        for axis in ("x", "y"):
+            row = Row(f'sensor on "{sensor.point}"', getattr(_core.RowKind, axis), End(None), End(body, point))
+            yield Signal(f"point/{sensor.point}/{axis}{ending}", order, *quality, row)
+    elif sensor.pzt is not None:
+        for k, vector in enumerate(volts_per_modal_coordinate(patches[sensor.pzt], sensor.capacitance), 1):
+            yield Signal(f"pzt/{sensor.pzt}/{k}", order, *quality, body=sensor.pzt, vector=vector)
+    elif sensor.modal is not None:
+        for k, vector in enumerate(np.eye(model.body(sensor.modal).n_modes), 1):
+            yield Signal(f"modal/{sensor.modal}/{k}{ending}", order, *quality, body=sensor.modal, vector=vector)
+
+
+def volts_per_modal_coordinate(patches: PatchArray, capacitance: float | None = None) -> Array:
+    """Voltage (k, n) of each patch per modal coordinate: its charge c [φ'(x2) − φ'(x1)] over its capacitance.
+
+    By reciprocity the charge of a rotation is the moment of a voltage, c (Lee and Moon, J. Appl. Mech. 57, 1990). The
+    capacitance of a patch is ε w l/t_p of each layer; one that also drives the link is read through a bridge, which
+    leaves this voltage (Dosch, Inman and Garcia, J. Intell. Mater. Syst. Struct. 3, 1992).
+    """
+    layout = patches.layout
+    faces = 2 if layout.face == "both" else 1
+    own = faces * layout.layers * PERMITTIVITY * layout.width * layout.length / layout.thickness
+    volts: Array = (patches.moment_per_volt * patches.turn).T / (own if capacitance is None else capacitance)
+    return volts
+
+
+def merged(given: Sequence[Signal], needed: Sequence[Signal]) -> tuple[Signal, ...]:
+    """The sensors of the scene, and ideal ones for what controllers need besides; rows first, as the core has them."""
+    by_name = {signal.name: signal for signal in needed} | {signal.name: signal for signal in given}
+    return tuple(sorted(by_name.values(), key=lambda signal: signal.row is None))
+
+
+def sensing(assembly: Assembly, read: Sequence[Signal]) -> _core.Sensing:
+    """What reads these signals in the core; the motor rows of `assembly` are those of the signals along rows."""
+    orders = [signal.order for signal in read if signal.row is not None]
+    along = list(zip(assembly.motor_rows, orders, strict=True))
+    modal = [(assembly.index[s.body], s.vector, s.order) for s in read if s.row is None]
+    return _core.Sensing(assembly.system, along, modal)

@@ -1,0 +1,44 @@
+"""Joints as they are built: rotors behind gears, friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from . import _core
+from .rows import Row, joint_coordinate
+from .scene_records import Scene
+
+
+@dataclass(frozen=True)
+class Friction:
+    """−(c γ̇ + τ_c tanh(γ̇/γ̇_s)) on the coordinate γ of a joint: `viscous` c (N·m·s), `coulomb` τ_c (N·m), γ̇_s."""
+
+    viscous: float
+    coulomb: float
+    speed: float
+
+
+def joint_rotors(scene: Scene) -> Iterator[tuple[Row, float]]:
+    """Rows whose rate u is that of a rotor, and the inertia J of its kinetic energy ½ J u².
+
+    A rotor on the first body a of a joint turns at N α̇_b − (N − 1) α̇_a behind a gear of ratio N (Spong 1987 neglects
+    the part of α̇_a: his approximation is N² J γ̇²/2). The angles are those of the joint's coordinate: of sections or of
+    frames. Where prismatic, the way along the axis takes the mass J N² with it; the turning of a is left out.
+    """
+    for joint in scene.joint:
+        if not joint.rotor_inertia:
+            continue
+        row, N = joint_coordinate(scene, joint), joint.gear_ratio
+        if joint.type == "prismatic":
+            yield row, joint.rotor_inertia * N**2
+        else:
+            yield Row(f'rotor of joint "{joint.name}"', _core.RowKind.gear, row.a, row.b, (N, 0.0)), joint.rotor_inertia
+
+
+def joint_frictions(scene: Scene) -> Iterator[tuple[Row, Friction]]:
+    """The joint coordinates on which friction acts."""
+    for joint in scene.joint:
+        if joint.viscous_friction or joint.coulomb_friction:
+            friction = Friction(joint.viscous_friction, joint.coulomb_friction, joint.friction_speed)
+            yield joint_coordinate(scene, joint), friction

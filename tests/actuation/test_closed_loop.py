@@ -1,0 +1,338 @@
+"""Sampled control: against exact discrete models of rigid arms, closed forms of links, and what goes wrong."""
+
+import runpy
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_are
+
+from ffrobot.actuation.control.closed_loop import run_closed_loop
+from ffrobot.actuation.control.lqr import gains, sampled
+from ffrobot.actuation.control.rigid_arm import RigidArm
+from ffrobot.actuation.control.signals import volts_per_modal_coordinate
+from ffrobot.errors import InputError, SolveError
+from ffrobot.figures.standard import standard_figures
+from ffrobot.mbs.analyses import run_pcid
+from ffrobot.mbs.scene_file import make_scene
+from ffrobot.results import results_image
+from ffrobot.results_file import Results
+from ffrobot.solution import prepare, solve
+
+INERTIA, T = 0.5, 0.01
+ROD = {"mass": 2.0, "inertia": 2.0 / 12, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
+ARM = {"O": {"joint": "O", "value": "0.4+0.9*sin(2*t)"}, "A": {"joint": "A", "value": "-1.1+0.7*cos(3*t)"}}
+PID = {"kind": "joint-pid", "proportional": {"O": 20.0}, "derivative": {"O": 4.0}}
+
+
+def loop(name="loop", **keys):
+    return {"name": name, "kind": "closed-loop", "actuation": "inverse", "sample_time": T} | keys
+
+
+def wheel(*analyses, joint=None, target="0", bodies=(), joints=(), gravity=(0.0, 0.0), **keys):
+    """A wheel about O that is to stand still, or to follow `target`: I γ̈ = u, the simplest plant."""
+    body = {"mass": 1.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0], "rim": [0.3, 0.0]}}
+    revolute = {"name": "O", "type": "revolute", "between": ["ground", "w.root"]} | (joint or {})
+    inverse = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": T, "tolerance": 1e-9}
+    return make_scene(
+        name="wheel", gravity=gravity, body=[{"name": "w", "rigid": body}, *bodies], joint=[revolute, *joints],
+        trajectory=[{"name": "stand", "joint": "O", "value": target}], analysis=[inverse, *analyses], **keys,
+    )  # fmt: skip
+
+
+def blow(force=5.0, until=0.1):
+    return [{"point": "w.rim", "y": f"where(t <= {until}, {force}, 0)"}]
+
+
+def two_rods(*analyses, **keys):
+    joints = [
+        {"name": "O", "type": "revolute", "between": ["ground", "a.root"]} | keys.pop("first", {}),
+        {"name": "A", "type": "revolute", "between": ["a.tip", "b.root"]} | keys.pop("second", {}),
+    ]
+    inverse = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.01, "tolerance": 1e-8}
+    return make_scene(
+        name="rods", gravity=[0.0, -9.81], body=[{"name": "a", "rigid": ROD}, {"name": "b", "rigid": ROD}],
+        joint=joints, trajectory=[{"name": name} | path for name, path in ARM.items()],
+        initial={"angles": {"a": 0.4, "b": 0.0}}, analysis=[inverse, *analyses], **keys,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.004, T, 2.5 * T])
+@pytest.mark.parametrize("resolution", [0.0, 1e-4])
+def test_a_sampled_loop_is_its_exact_discrete_model(delay, resolution):
+    """x(k+1) = A x(k) + B u with the commands that are on their way as states; a start off the reference by a rate."""
+    scene = wheel(
+        loop(controller=[PID], delay=delay, sensor=[{"joint": "O", "resolution": resolution}]),
+        initial={"rates": {"w": 0.0}},
+    )
+    solution = prepare(scene)
+    inverse, analysis = scene.analysis
+    source = run_pcid(solution.model, inverse, True, lambda _: True)
+    source.v[0, 2] = 0.3  # the run starts from here
+    start, source.v[1:, 2] = 0.3, 0.0
+    outcome, record = run_closed_loop(solution.model, analysis, source, {}, lambda _: True)
+    assert outcome.status == "completed"
+
+    A, B = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1 / INERTIA]])
+    model = sampled(A, B, T, delay)
+    x = np.zeros(len(model.A))
+    x[1] = start
+    reference, y = record.reference, np.zeros((len(record.time), 2))
+    for k in range(len(record.time)):
+        y[k] = x[:2]
+        if resolution:
+            y[k, 0] = np.round(y[k, 0] / resolution) * resolution
+        e = reference[k] - y[k]
+        x = model.A @ x + model.B[:, 0] * (20.0 * e[0] + 4.0 * e[1])
+    np.testing.assert_allclose(record.readings, y, atol=1e-7 * np.abs(y).max())
+    assert np.abs(record.readings[:, 0]).max() > 1e-3
+
+
+def test_commands_stop_at_the_limits_of_the_motors():
+    outcomes = solve(wheel(loop(controller=[PID], disturbance=blow()), joint={"moment_limit": 0.5}))
+    record = outcomes.loops["loop"]
+    assert np.abs(record.commands).max() == 0.5 == record.metrics.peak_moment
+    assert np.abs(record.wanted).max() > 0.6
+    cut = (np.abs(record.wanted) > 0.5).any(axis=1).mean()
+    assert record.metrics.saturated == cut > 0
+
+
+def test_noise_is_that_of_the_seed():
+    def readings(seed):
+        sensor = [{"joint": "O", "measure": "rate", "noise": 0.02}, {"joint": "O"}]
+        scene = wheel(loop(sensor=sensor, seed=seed))
+        record = solve(scene).loops["loop"]
+        return record.readings[:, record.outputs.index("joint/O/rate")]
+
+    first, again, other = readings(1), readings(1), readings(2)
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 0.01
+    assert np.std(first) == pytest.approx(0.02, rel=0.3)  # 50 samples
+
+
+def test_the_points_accelerometer_feels_the_blow():
+    """F = 5 N at the rim, 0.3 m from O: a_y = r (F r)/I as long as the wheel has hardly turned."""
+    sensor = [{"point": "w.rim", "measure": "acceleration"}]
+    record = solve(wheel(loop(sensor=sensor, disturbance=blow()))).loops["loop"]
+    column = record.outputs.index("point/w.rim/y/acceleration")
+    assert record.readings[1, column] == pytest.approx(0.3 * 5.0 * 0.3 / INERTIA, rel=1e-3)
+    assert record.readings[20, column] == pytest.approx(0.0, abs=0.2)
+
+
+def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
+    built = {"gear_ratio": 30.0, "rotor_inertia": 1e-3, "viscous_friction": 0.2, "coulomb_friction": 0.5}
+    solution = solve(two_rods(first=built, second=built))
+    inverse = solution.outcomes["inverse"]
+    t = inverse.time
+    gamma = np.column_stack([0.4 + 0.9 * np.sin(2 * t), -1.1 + 0.7 * np.cos(3 * t)])
+    rate = np.column_stack([1.8 * np.cos(2 * t), -2.1 * np.sin(3 * t)])
+    acceleration = np.column_stack([-3.6 * np.sin(2 * t), -6.3 * np.cos(3 * t)])
+    arm = RigidArm(solution.model)
+    moments = np.array([arm.moments(*state) for state in zip(gamma, rate, acceleration, strict=True)])
+    np.testing.assert_allclose(moments, inverse.tau, atol=1e-8 * np.abs(inverse.tau).max())
+
+
+def test_computed_torque_follows_without_any_feed_forward_better_the_faster_it_samples():
+    def error(sample_time):
+        control = [{"kind": "computed-torque", "bandwidth": 20.0}]
+        scene = two_rods(loop(controller=control, sample_time=sample_time, feed_forward="none", tip="b.tip"))
+        return solve(scene).loops["loop"].metrics.tip_error_max
+
+    coarse, fine = error(0.01), error(0.0025)
+    assert coarse < 0.05
+    assert fine < coarse / 3.5  # first order in the sample time
+
+
+def test_lqr_gains_are_those_of_scipy():
+    A, B = np.array([[0.0, 1.0], [-4.0, -0.1]]), np.array([[0.0], [2.0]])
+    Q, R = np.diag([100.0, 1.0]), np.array([[0.04]])
+    model = sampled(A, B, T, 0.0)
+    X = solve_discrete_are(model.A, model.B, Q, R)
+    expected = np.linalg.solve(R + model.B.T @ X @ model.B, model.B.T @ X @ model.A)
+    np.testing.assert_allclose(gains(model, Q, R), expected, rtol=1e-9)
+
+
+def test_lqr_damps_the_wheel_as_its_own_model_says():
+    control = [{"kind": "lqr", "angle": 0.01, "rate": 0.1, "moment": 1.0}]
+    scene = wheel(loop(controller=control, delay=0.015, disturbance=blow(until=0.1)))
+    record = solve(scene).loops["loop"]
+    assert record.metrics.verdict == "stable"
+    assert np.abs(record.readings[-1, 0]) < 0.05 * np.abs(record.readings[:, 0]).max()
+    assert not [line for line in record.warnings if "LQR" in line]
+
+
+def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import numpy as np\n\n"
+        "def controller(setup):\n"
+        "    y_O, y_rate = setup.columns('joint/O', 'joint/O/rate')\n"
+        "    (u_O,) = setup.places('joint/O')\n"
+        "    def at_sample(k, y):\n"
+        "        u, e = np.zeros(len(setup.inputs)), setup.reference[k] - y\n"
+        "        u[u_O] = 20.0 * e[y_O] + 4.0 * e[y_rate]\n"
+        "        return u\n"
+        "    return at_sample\n"
+    )
+    sensor = [{"joint": "O"}, {"joint": "O", "measure": "rate"}]
+    mine = {"kind": "python", "python": f"{file}:controller"}
+    itself = {"kind": "python", "python": runpy.run_path(str(file))["controller"]}
+    loops = [
+        loop("itself", controller=[itself], sensor=sensor, disturbance=blow()),
+        loop("theirs", controller=[PID], sensor=sensor, disturbance=blow()),
+        loop("mine", controller=[mine], sensor=sensor, disturbance=blow()),
+    ]
+    solution = solve(wheel(*loops))
+    theirs, own = solution.loops["theirs"], solution.loops["mine"]
+    np.testing.assert_allclose(own.commands, theirs.commands, atol=1e-12)
+    np.testing.assert_array_equal(solution.loops["itself"].commands, own.commands)
+    assert np.abs(own.commands).max() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("body", "error", "expected"),
+    [
+        ("return np.zeros(3)", SolveError, "sample 0: expected 1 finite commands"),
+        ("return y[99]", SolveError, "sample 0: IndexError"),
+        ("return np.full(1, np.nan)", SolveError, "finite"),
+    ],
+)
+def test_what_a_users_function_does_wrong_is_said(tmp_path, body, error, expected):
+    file = tmp_path / "mine.py"
+    file.write_text(f"import numpy as np\ndef controller(setup):\n    def act(k, y):\n        {body}\n    return act\n")
+    with pytest.raises(error, match=expected):
+        solve(wheel(loop(controller=[{"kind": "python", "python": f"{file}:controller"}])))
+
+
+def test_unstable_gains_are_reported_and_the_results_kept():
+    """Derivative gain beyond 2 I/T: every sample overshoots. The run after it is made all the same."""
+    wild = {"kind": "joint-pid", "proportional": {"O": 1.0}, "derivative": {"O": 3 * INERTIA / T}}
+    scene = wheel(loop("wild", controller=[wild], disturbance=blow(until=0.02)), loop("calm", controller=[PID]))
+    solution = solve(scene)
+    wild, calm = solution.loops["wild"], solution.loops["calm"]
+    growth = np.abs(wild.readings[-5:]).max() / np.abs(wild.readings[:5]).max()
+    assert wild.metrics.verdict == "diverges" or growth > 1e3
+    assert calm.metrics.verdict == "stable"
+    results = Results.from_image(results_image(solution), scene.path)
+    assert results.has("wild/control/commands")
+    assert results.attributes("calm/control")["verdict"] == "stable"
+    assert len(results.time("calm/control/commands")) == len(results["calm/control/readings"]) == 50
+    (figure,) = [figure for figure in standard_figures(results) if figure.name == "tip_error"]
+    assert [curve.label for curve in figure.curves] == ["wild", "calm"]
+
+
+def test_slow_sampling_is_warned_of():
+    stiff = {"kind": "joint-pid", "proportional": {"O": 5000.0}}
+    record = solve(wheel(loop(controller=[stiff]))).loops["loop"]
+    assert any("sampling at 100 Hz is slow" in line for line in record.warnings)
+    assert not solve(wheel(loop(controller=[PID]))).loops["loop"].warnings
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({"delay": 0.6}, "expected a delay shorter than the run"),
+        ({"sample_time": 0.7}, "expected a sample_time of at most the run"),
+        ({"sensor": [{"point": "w.rimm"}]}, 'found "w.rimm".*did you mean'),
+        ({"sensor": [{"joint": "P"}]}, 'expected one of the joints "O", found "P"'),
+        ({"sensor": [{"pzt": "w"}]}, "expected a body with patches"),
+        ({"sensor": [{"joint": "O", "measure": "acceleration"}]}, "measure"),
+        ({"controller": [{"kind": "joint-pid", "proportional": {"B": 1.0}}]}, 'found "B"'),
+        ({"controller": [{"kind": "pid"}]}, "joint-pid"),
+        ({"controller": [{"kind": "python", "python": "nowhere.py:f"}]}, "expected an existing file"),
+        ({"controller": [{"kind": "python", "python": "nowhere.py"}]}, "FILE.py:FUNCTION"),
+        ({"feed_forward": "joints+pzt"}, "feed_forward"),
+        ({"apply": "joints"}, '"feed_forward"'),
+        ({"tip": "w.tpi"}, "w.tpi"),
+        ({"disturbance": [{"joint": "O", "moment": "1"}]}, "disturbances at points"),
+    ],
+)
+def test_bad_keys_are_refused(keys, expected):
+    with pytest.raises(InputError, match=expected):
+        prepare(wheel(loop(**keys)))
+
+
+def test_keys_of_a_closed_loop_are_refused_elsewhere():
+    with pytest.raises(InputError, match='expected the key "delay" only in kind = "closed-loop"'):
+        make_scene(
+            name="x", gravity=[0.0, 0.0], body=[{"name": "a", "rigid": ROD}],
+            analysis=[{"name": "f", "kind": "forward", "end": 1.0, "output_step": 0.1, "delay": 0.1}],
+        )  # fmt: skip
+
+
+PATCHES = {
+    "body": "link", "count": 10, "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12,
+}  # fmt: skip
+
+
+def held_link(link, *analyses, **keys):
+    """A cantilever whose root a rotor holds like a wall, sagging; its tip is hit for 2 ms."""
+    inverse = {"name": "inverse", "kind": "fcid", "shape": "static", "end": 0.4, "output_step": 5e-4}
+    hit = [{"point": "link.tip", "y": "where(t < 0.002, 20*sin(pi*t/0.002), 0)"}]
+    joint = {"name": "O", "type": "revolute", "between": ["ground", "link.root"], "rotor_inertia": 1e4}
+    return make_scene(
+        name="held", gravity=[0.0, -9.81], body=[{"name": "link", "link": str(link)}], joint=[joint],
+        trajectory=[{"name": "stand", "joint": "O", "value": "0"}], pzt=[PATCHES | keys.pop("pzt", {})],
+        analysis=[inverse, *(analysis | {"disturbance": hit, "tolerance": 1e-6} for analysis in analyses)], **keys,
+    )  # fmt: skip
+
+
+def decay(solution, name):
+    """Damping ratio and amplitude of the lowest mode after the hit, from the envelope of its vibration."""
+    outcome = solution.outcomes[name]
+    p = outcome.q[:, 3] - solution.outcomes["inverse"].q[:, 3]
+    omega = np.sqrt(solution.model.body("link").stiffness[0])
+    envelope = np.hypot(p, outcome.v[:, 3] / omega)
+    ring = (outcome.time > 0.01) & (envelope > 0.02 * envelope.max())
+    return -np.polyfit(outcome.time[ring], np.log(envelope[ring]), 1)[0] / omega
+
+
+@pytest.mark.parametrize("sensor", ["ideal", "pzt"])
+def test_patches_add_the_damping_that_is_asked_for(link_file, sensor):
+    control = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": sensor}
+    link = link_file("cantilever3", count=3)
+    scene = held_link(link, loop(sample_time=1e-4, controller=[control]), loop("free", sample_time=1e-4))
+    solution = solve(scene)
+    assert abs(decay(solution, "free")) < 1e-4
+    assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
+
+
+def test_all_integrators_go_from_sample_to_sample_alike(link_file):
+    """Loads jump at every sample: methods that look back must not look across."""
+    control = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05, "sensor": "ideal"}
+    names = ["dop853", "dopri5", "radau", "generalized-alpha"]
+    loops = [loop(name, integrator=name, sample_time=2e-3, controller=[control]) for name in names]
+    solution = solve(held_link(link_file("cantilever3", count=3), *loops))
+    first = solution.outcomes["dop853"].q
+    sag = solution.outcomes["inverse"].q
+    for name in names[1:]:
+        assert solution.outcomes[name].status == "completed"
+        assert np.abs(solution.outcomes[name].q - first).max() < 1e-3 * np.abs(first - sag).max(), name
+
+
+def test_lqr_names_the_modes_out_of_reach():
+    """A second wheel that hangs on its own, without motor and sensor: it swings with √(m g d/(I + m d²))."""
+    pendulum = {"mass": 1.0, "inertia": 0.3, "center": [0.1, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.2, 0.0]}}
+    scene = wheel(
+        loop(controller=[{"kind": "lqr", "moment": 1.0}], disturbance=blow()),
+        bodies=[{"name": "p", "rigid": pendulum}], gravity=[0.0, -9.81], initial={"angles": {"p": -np.pi / 2}},
+        joints=[{"name": "P", "type": "revolute", "between": ["ground", "p.root"], "motor": False,
+                 "viscous_friction": 0.1}],
+    )  # fmt: skip
+    frequency = np.sqrt(9.81 * 0.1 / 0.31) / (2 * np.pi)
+    lines = solve(scene).loops["loop"].warnings
+    for word in ("uncontrollable", "unobservable"):
+        assert any(word in line and f"({frequency:.4g} Hz)" in line for line in lines), lines
+
+
+def test_a_patch_reads_the_charge_of_its_bending(link_file):
+    """A force at the tip of a cantilever turns its sections by F (L x − x²/2)/(E I)."""
+    array = prepare(held_link(link_file("cantilever10"), loop())).patches["link"]
+    solution = prepare(held_link(link_file("cantilever10"), loop()))
+    link = solution.model.body("link")
+    EI = 2.068427e11 * 0.025 * 0.015**3 / 12
+    p = link.points["tip"].translation[1] / link.stiffness
+    turn = np.diff(array.edges - array.edges**2 / 2, axis=1)[:, 0] / EI
+    capacitance = 1e-7
+    expected = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2 * turn / capacitance
+    volts = volts_per_modal_coordinate(array, capacitance) @ p  # of ten modes: patches at the ends miss the others
+    np.testing.assert_allclose(volts, expected, atol=2e-2 * expected.max())

@@ -1,0 +1,144 @@
+"""Linear models of robots against closed forms, Rayleigh quotients and python-control."""
+
+import numpy as np
+import pytest
+from links import arm, arm_links, ritz_link
+from mechanisms import make_model, revolute
+from scipy.io import loadmat
+from scipy.optimize import brentq
+
+from ffrobot.actuation.control.linear_model import linear_model
+from ffrobot.actuation.control.modes import controllability, observability, robot_modes
+from ffrobot.actuation.control.zeros import zeros
+from ffrobot.errors import InputError
+from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.linearisation import linearise
+from ffrobot.mbs.model import Assembly
+from ffrobot.mbs.planar_body import with_payload
+
+EI, MASS, LENGTH = 30.0, 1.5, 0.8
+RATE = np.sqrt(EI / (MASS * LENGTH**3))  # ω = λ² times this
+CLAMPED = np.array([1.8751040687, 4.6940911330, 7.8547574382])  # of cos λ cosh λ = −1
+
+
+def at_rest(model, points=("link2.tip",)):
+    q = undeformed_state(Assembly(model, model.joints)).q
+    return linear_model(linearise(model, 0.0, q, 0 * q, 0 * q, points), {})
+
+
+def hub_and_beam(ratio, modes=8, damping_ratio=0.0):
+    """A beam on a motor whose rotor has `ratio` times ρA L³ of inertia; no gravity."""
+    link = ritz_link("arm", "cantilever", LENGTH, MASS, EI, modes, damping_ratio, extra=6)
+    link = with_payload(link, "root", 0.0, ratio * MASS * LENGTH**2)
+    model = make_model([link], gravity=(0.0, 0.0), joint=[revolute("hub", "ground", "arm.root")])
+    return at_rest(model, ("arm.tip",))
+
+
+def roots(function, count, step=0.01):
+    x = np.arange(0.5, 20.0, step)
+    y = function(x)
+    return np.array(
+        [brentq(function, a, a + step) for a, u, v in zip(x[:-1], y[:-1], y[1:], strict=True) if u * v < 0][:count]
+    )
+
+
+@pytest.mark.parametrize("ratio", [0.01, 0.1, 1.0, 10.0])
+def test_poles_are_those_of_a_beam_on_a_hub(ratio):
+    """sin λ cosh λ − cos λ sinh λ + (J/ρAL³) λ³ (1 + cos λ cosh λ) = 0, from w(0) = 0, EI w'' = −J ω² w' there."""
+
+    def characteristic(x):
+        return np.sin(x) * np.cosh(x) - np.cos(x) * np.sinh(x) + ratio * x**3 * (1 + np.cos(x) * np.cosh(x))
+
+    frequency = robot_modes(hub_and_beam(ratio)).frequency * 2 * np.pi / RATE
+    assert frequency[0] == 0.0
+    np.testing.assert_allclose(np.sqrt(frequency[1:4]), roots(characteristic, 3), rtol=2e-5)
+
+
+def test_zeros_at_the_hub_are_the_clamped_frequencies():
+    found = zeros(hub_and_beam(0.1), "joint/hub", "joint/hub")
+    assert found.minimum_phase
+    assert len(found.values) == 2 * 8
+    np.testing.assert_allclose(np.sqrt(np.abs(found.values[:6:2].imag) / RATE), CLAMPED, rtol=1e-8)
+
+
+def test_zeros_at_the_tip_are_real_pairs():
+    """sin λ + sinh λ = 0 with λ = (1 + i) x, that is tan x = −tanh x: s = ±2x² RATE, whatever the hub."""
+    x = roots(lambda x: np.sin(x) * np.cosh(x) + np.cos(x) * np.sinh(x), 2)
+    for ratio in (0.1, 1.0):
+        errors = []
+        for modes in (4, 8, 16):
+            found = zeros(hub_and_beam(ratio, modes), "joint/hub", "point/arm.tip/y")
+            assert not found.minimum_phase
+            errors.append(np.abs(np.sort(found.unstable.real)[:2] / RATE / (2 * x**2) - 1).max())
+        assert errors[0] > 4 * errors[1] > 16 * errors[2]
+        assert errors[2] < 1e-3
+        assert "non-minimum phase" in found.describe()
+
+
+def test_damping_ratios_of_a_clamped_link_are_those_of_its_modes():
+    """A hub as heavy as the ground."""
+    modes = robot_modes(hub_and_beam(1e7, damping_ratio=0.03))
+    np.testing.assert_allclose(modes.damping_ratio[1:5], 0.03, rtol=1e-4)
+    assert np.isnan(modes.damping_ratio[0])
+
+
+def test_frequencies_are_rayleigh_quotients():
+    """ω² = strain energy of the shape over its kinetic energy as a velocity; and the shapes keep joints closed."""
+    model = arm(arm_links(modes=4), gravity=(0.0, 0.0))
+    q = undeformed_state(Assembly(model, model.joints)).q
+    modes = robot_modes(at_rest(model))
+    system = Assembly(model, model.joints).system
+    C_q = system.constraints(0.0, q, 0 * q)[2]
+    assert list(modes.frequency[:2]) == [0.0, 0.0]
+    for frequency, motion in zip(modes.frequency[2:], modes.motion[2:].real, strict=True):
+        assert np.abs(C_q @ motion).max() < 1e-10
+        p_only = motion.copy()
+        p_only[Assembly(model, model.joints).rigid_coordinates] = 0.0
+        kinetic, strain = system.energies(q[None], motion[None])[0, 0], system.energies(p_only[None], 0 * q[None])[0, 1]
+        assert 2 * np.pi * frequency == pytest.approx(np.sqrt(strain / kinetic), rel=1e-9)
+
+
+def test_frequency_response_of_python_control_is_the_same(tmp_path):
+    control = pytest.importorskip("control")
+    model = hub_and_beam(0.1, damping_ratio=0.02)
+    omega = np.array([0.5, 7.0, 60.0, 400.0])
+    wanted = model.frequency_response(omega, ["joint/hub"], ["point/arm.tip/y", "joint/hub"])
+    system = model.to_control()
+    assert system.input_labels[0] == "joint/hub"
+    rows = [system.output_labels.index(name) for name in ("point/arm:tip/y", "joint/hub")]
+    got = np.array([system(1j * w) for w in omega])[:, rows, :1]
+    np.testing.assert_allclose(got, wanted, rtol=1e-8, atol=1e-12)
+    path = tmp_path / "model.npz"
+    model.save(path)
+    stored = np.load(path)
+    again = control.ss(stored["A"], stored["B"], stored["C"], stored["D"])
+    np.testing.assert_allclose(again(60j), system(60j), rtol=1e-12)
+
+
+def test_mat_file_names_its_columns(tmp_path):
+    model = hub_and_beam(0.1)
+    model.save(tmp_path / "model.mat")
+    stored = loadmat(tmp_path / "model.mat", squeeze_me=True)
+    np.testing.assert_array_equal(stored["A"], model.A)
+    assert list(stored["input_names"]) == list(model.input_names)
+    with pytest.raises(InputError, match=r"expected a file name that ends in .npz or .mat"):
+        model.save(tmp_path / "model.txt")
+
+
+def test_modes_without_reach_are_named():
+    """One motor cannot stop two free joints, and a stretched arm's tip does not move along it, to first order."""
+    model = at_rest(arm(gravity=(0.0, 0.0)))
+    assert controllability(model, ["joint/O", "joint/A"]).lost == ()
+    assert controllability(model, "joint/O").lost == ("mode 1 (0 Hz)", "mode 2 (0 Hz)")
+    assert observability(model, "joint/O").lost == ("mode 1 (0 Hz)", "mode 2 (0 Hz)")
+    straight = arm(gravity=(0.0, 0.0), initial={"angles": {"link1": 0.0, "link2": 0.0}}, trajectory=())
+    along = observability(at_rest(straight), "point/link2.tip/x")
+    assert len(along.lost) == model.freedom
+
+
+def test_unknown_names_are_refused():
+    model = hub_and_beam(0.1, modes=2)
+    with pytest.raises(InputError, match=r'expected an input .*"force/arm.tip/x".* found "joint/hubb"'):
+        zeros(model, "joint/hubb", "joint/hub")
+    with pytest.raises(InputError, match="expected as many inputs as outputs, found 1 and 2"):
+        zeros(model, "joint/hub", ["joint/hub", "point/arm.tip/y"])

@@ -1,0 +1,111 @@
+"""Placement of patches: against gramians, closed forms of beams, and exhaustive search."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mechanisms import make_model, revolute
+from scipy.linalg import solve_continuous_lyapunov
+
+from ffrobot.actuation.control.linear_model import linear_model
+from ffrobot.actuation.control.placement import held_modes, place
+from ffrobot.actuation.patches import patch_array
+from ffrobot.errors import InputError
+from ffrobot.mbs.actuator_records import PztLayout
+from ffrobot.mbs.control_records import Placement
+from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.linearisation import linearise
+from ffrobot.mbs.model import Assembly
+from ffrobot.mbs.planar_body import from_modal_body
+
+SCENE = Path("scene.toml")
+
+
+@pytest.fixture(scope="module")
+def arm(cantilever):
+    """One link on a motor: (modal body, planar body, linear model)."""
+    modal = cantilever(6)
+    planar = from_modal_body("arm", modal)
+    model = make_model([planar], gravity=(0.0, 0.0), joint=[revolute("hub", "ground", "arm.root")])
+    q = undeformed_state(Assembly(model, model.joints)).q
+    return modal, planar, linear_model(linearise(model, 0.0, q, 0 * q, 0 * q), {})
+
+
+def layout(**keys):
+    return PztLayout(body="arm", length=0.05, width=0.025, thickness=7.5e-4, modulus=63e9, d31=1.1e-10, **keys)
+
+
+def placed(arm, count, F_p=None, **keys):
+    modal, planar, model = arm
+    wanted = Placement(body="arm", count=count, **keys)
+    return place(SCENE, wanted, layout(count=count), modal, planar, None if F_p is not None else model, F_p)
+
+
+def test_held_modes_are_those_of_the_clamped_link(arm):
+    _, planar, model = arm
+    reach = held_modes(model, planar, 3)
+    np.testing.assert_allclose(reach.frequency, np.sqrt(planar.stiffness[:3]) / (2 * np.pi), rtol=1e-9)
+    np.testing.assert_allclose(reach.share, 1.0, rtol=1e-9)
+
+
+def test_one_patch_for_the_first_mode_sits_at_the_clamp(arm):
+    """Curvature of a cantilever's first mode is largest there."""
+    found = placed(arm, 1, modes=1)
+    assert found.best.centers == pytest.approx([0.025])
+    assert found.best.value == pytest.approx(1.0)
+    assert found.even.centers == pytest.approx([0.5])
+    assert found.best.value > found.even.value
+    assert found.method == "all sets"
+
+
+def test_reach_is_what_the_gramian_grows_with(arm):
+    """Diagonal of the controllability gramian of the lightly damped modes: Σ b²/(4 ζ ω) in velocity coordinates."""
+    modal, planar, _ = arm
+    found = placed(arm, 2, modes=3)
+    ratios = []
+    for centers in (found.best.centers, found.even.centers):
+        B = patch_array(SCENE, layout(centers=tuple(centers), allocation="least-squares"), modal, planar).Phi_V
+        omega, n = np.sqrt(planar.stiffness), planar.n_modes
+        A = np.block([[np.zeros((n, n)), np.diag(omega)], [-np.diag(omega), -np.diag(2e-4 * omega)]])
+        gramian = solve_continuous_lyapunov(A, -np.vstack([0 * B, B]) @ np.vstack([0 * B, B]).T)
+        ratios.append(np.diag(gramian)[n : n + 3])
+    np.testing.assert_allclose(found.best.reach / found.even.reach, ratios[0] / ratios[1], rtol=1e-3)
+
+
+@pytest.mark.parametrize("measure", ["worst", "mean", "product"])
+def test_evolution_finds_what_exhaustive_search_finds(arm, measure):
+    exhaustive = placed(arm, 3, modes=4, measure=measure)
+    evolved = placed(arm, 3, modes=4, measure=measure, most_sets=10)
+    assert (exhaustive.method, evolved.method) == ("all sets", "evolution")
+    np.testing.assert_allclose(evolved.best.centers, exhaustive.best.centers)
+    assert exhaustive.best.value > exhaustive.even.value
+
+
+@pytest.mark.parametrize("count", [2, 5, 10])
+def test_patches_stay_on_the_link_and_off_each_other(arm, count):
+    centers = placed(arm, count, modes=2, spacing=0.03, most_sets=2000).best.centers
+    assert centers[0] >= 0.025 - 1e-12
+    assert centers[-1] <= 0.975 + 1e-12
+    assert np.diff(centers).min(initial=1.0) >= 0.05 - 1e-12
+
+
+def test_voltages_over_a_path(arm):
+    """Forces of the first mode alone: one patch at the clamp takes the least voltage; two patches share it."""
+    _, planar, _ = arm
+    F_p = np.outer(np.sin(np.linspace(0.0, 3.0, 50)), np.eye(planar.n_modes)[0])
+    one = placed(arm, 1, F_p, criterion="voltage", modes=1)
+    assert one.best.centers == pytest.approx([0.025])
+    assert one.largest_voltage[0] == pytest.approx(-one.best.value)
+    assert one.largest_voltage[0] < one.largest_voltage[1]
+    two = placed(arm, 2, F_p, criterion="voltage", modes=1)
+    assert two.best.centers == pytest.approx([0.025, 0.075])
+    assert two.largest_voltage[0] < one.largest_voltage[0]
+
+
+def test_what_cannot_be_placed_is_refused(arm):
+    with pytest.raises(InputError, match="expected patches that fit beside each other"):
+        placed(arm, 21)
+    with pytest.raises(InputError, match=r"placement.modes: expected at most 6, found 7"):
+        placed(arm, 2, modes=7)
+    with pytest.raises(InputError, match=r"placement.modes: expected at most 2, found 3"):
+        placed(arm, 2, np.zeros((3, 6)), criterion="voltage", modes=3)

@@ -1,0 +1,134 @@
+"""Linear analyses through the command line: results, summary, export; and what is refused."""
+
+import numpy as np
+import pytest
+
+from ffrobot.control_results import read_linear
+from ffrobot.results_file import Results
+
+SCENE = """
+name = "arm"
+gravity = [0.0, -9.81]
+
+[[body]]
+name = "arm"
+rigid = { mass = 2.0, inertia = 0.3, center = [0.5, 0.0], points = { root = [0.0, 0.0], tip = [1.0, 0.0] } }
+
+[[joint]]
+name = "hub"
+type = "revolute"
+between = ["ground", "arm.root"]
+
+[initial]
+angles = { arm = 0.5 }
+
+[[load]]
+joint = "hub"
+moment = "3.0"
+
+[[analysis]]
+name = "swing"
+kind = "forward"
+end = 0.2
+output_step = 0.1
+
+[[analysis]]
+name = "held"
+kind = "linear"
+
+[[analysis]]
+name = "along"
+kind = "linear"
+about = "swing"
+times = [0.1, 0.2]
+"""
+INERTIA, WEIGHT = 0.3 + 2.0 * 0.5**2, 2.0 * 9.81 * 0.5
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """Write the scene, parts of its text exchanged."""
+
+    def write(**edits):
+        text = SCENE
+        for old, new in edits.get("edits", {}).items():
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path / "scene.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_a_rigid_arm_held_by_its_motor_and_in_motion(ffrobot, scene):
+    """δθ̈ = (δτ + m g l sin θ δθ)/J: gravity's stiffness at the angle at which the arm is."""
+    path = scene()
+    done = ffrobot("solve", path)
+    assert done.returncode == 0, done.stderr
+    assert "held: joint/hub → joint/hub: minimum phase" in done.stdout
+    with Results(path.with_suffix(".results.h5")) as results:
+        (held,), moving = read_linear(results, "held"), read_linear(results, "along")
+        angles = results["along/bodies/arm/angle"]
+        assert results["along/linear/frequency"].shape == (2, 1)
+    for model, angle in zip([held, *moving], [0.5, *angles], strict=True):
+        np.testing.assert_allclose(model.A, [[0, 1], [WEIGHT * np.sin(angle) / INERTIA, 0]], rtol=1e-10)
+        np.testing.assert_allclose(model.B[:, 0], [0, 1 / INERTIA], rtol=1e-12)
+    assert [model.time for model in moving] == [0.1, 0.2]
+    assert held.input_names == ("joint/hub", "force/arm.tip/x", "force/arm.tip/y")
+
+
+def test_export(ffrobot, scene, tmp_path):
+    path = scene()
+    assert ffrobot("solve", path).returncode == 0
+    results = path.with_suffix(".results.h5")
+    assert ffrobot("linear", results, "-o", tmp_path / "held.npz").returncode == 0
+    assert ffrobot("linear", results, "--analysis", "along", "-o", tmp_path / "along.mat").returncode == 0
+    assert np.load(tmp_path / "held.npz")["A"].shape == (2, 2)
+    assert (tmp_path / "along.mat").stat().st_size > 0
+    missing = ffrobot("linear", results, "--analysis", "swing")
+    assert missing.returncode == 2
+    assert 'expected a linear analysis ("held", "along"), found "swing"' in missing.stderr
+
+
+MISTAKES = {
+    "unknown analysis": (
+        {'about = "swing"': 'about = "swign"'},
+        ["about: expected an earlier analysis", '"swign" (did you mean "swing"?)'],
+    ),
+    "linear about a linear one": ({'about = "swing"': 'about = "held"'}, ["about: expected", 'found "held"']),
+    "time beyond the end": (
+        {"[0.1, 0.2]": "[0.1, 0.3]"},
+        ['times: expected at most 0.2, where "swing" ends, found 0.3'],
+    ),
+    "no output time": ({"[0.1, 0.2]": "[0.15]"}, ['expected output times of "swing", every 0.1 s', "found 0.15"]),
+    "no times": ({"times = [0.1, 0.2]": ""}, ['times: expected the times of "swing"', "found none"]),
+    "times at rest": ({'about = "swing"\n': ""}, ['times: expected none about "static"']),
+    "times of a forward run": (
+        {"end = 0.2": "end = 0.2\ntimes = [0.1]"},
+        ['expected no key "times" in kind = "forward"'],
+    ),
+    "nothing to act with": ({'type = "revolute"': 'type = "revolute"\nmotor = false'}, ["expected motors or [[pzt]]"]),
+    "unknown point": (
+        {'about = "swing"': 'about = "swing"\npoints = ["arm.tpi"]'},
+        ['"arm.tpi"', 'did you mean "tip"'],
+    ),
+    "an end": (
+        {'kind = "linear"\nabout': 'kind = "linear"\nend = 1.0\nabout'},
+        ['expected no key "end" in kind = "linear"'],
+    ),
+    "placement without patches": (
+        {'kind = "linear"\nabout': 'kind = "placement"\nplacement = { body = "arm" }\nabout'},
+        ["placement.body: expected a body with patches, none"],
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_bad_input(ffrobot, scene, mistake):
+    edits, expected = MISTAKES[mistake]
+    done = ffrobot("solve", scene(edits=edits))
+    assert done.returncode == 2
+    for part in expected:
+        assert part in done.stderr
+    assert 'analysis "' in done.stderr

@@ -1,0 +1,207 @@
+"""Rotors behind gears and friction in joints: closed forms, energy, and the same equations written out densely."""
+
+import numpy as np
+import pytest
+from links import ANGLES, arm, arm_links
+from mechanisms import always, forward, make_model, pcid, relative, revolute
+from test_balances import OUTPUT_STEP, energy_and_losses
+from test_rigid_limit import rod
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.analyses import run_forward, run_pcid, run_static
+from ffrobot.mbs.analysis_records import Analysis
+from ffrobot.mbs.fcid import run_fcid
+from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.mechanism_records import RigidBody
+from ffrobot.mbs.model import ZERO, Assembly
+from ffrobot.mbs.motors_only import run_motors_only
+from ffrobot.mbs.observation import joint_forces
+from ffrobot.mbs.planar_body import from_rigid_body
+from ffrobot.mbs.steering import Equipment, actuation_source
+from ffrobot.mbs.vibration import mass_matrix
+
+G = 9.81
+AT_REST = {"state": "static", "angles": ANGLES}
+GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
+FRICTION = {"viscous_friction": 0.3, "coulomb_friction": 0.5, "friction_speed": 0.05}
+
+
+def geared_arm(links=None, first=GEARED, second=GEARED, **keys):
+    joints = [
+        revolute("O", "ground", "link1.root", **first),
+        revolute("A", "link1.tip", "link2.root", **second),
+    ]
+    return arm(links, joint=joints, **keys)
+
+
+def test_swing_of_a_pendulum_with_a_geared_rotor():
+    """A small swing from rest is a cosine with ω² = (m g L/2)/(m L²/3 + N² J)."""
+    L, m, J, N, angle = 0.7, 2.0, 3e-3, 9.0, 1e-4
+    model = make_model(
+        [rod("a", L, m)],
+        joint=[revolute("O", "ground", "a.root", gear_ratio=N, rotor_inertia=J)],
+        initial={"angles": {"a": -np.pi / 2 + angle}},
+    )
+    omega = np.sqrt(m * G * L / 2 / (m * L**2 / 3 + N**2 * J))
+    outcome = run_forward(model, forward(end=2.0, tolerance=1e-9), None, {}, always)
+    swing = outcome.q[:, 2] + np.pi / 2
+    assert np.abs(swing - angle * np.cos(omega * outcome.time)).max() < 1e-7 * angle
+
+
+@pytest.mark.parametrize("motors", ["section", "frame"])
+def test_accelerations_are_those_of_the_whole_mass_matrix(motors):
+    """M + Σ J d dᵀ with d from the rates of the rotors, inverted as it stands, against one more row for each rotor."""
+    rng = np.random.default_rng(3)
+    model = geared_arm(trajectory=[], motors=motors)
+    bare = geared_arm(first={}, second={}, trajectory=[], motors=motors)
+    assembly, without = Assembly(model, model.joints), Assembly(bare, bare.joints)
+    n = assembly.system.coordinates
+    state = undeformed_state(assembly)
+    modes = np.setdiff1d(np.arange(n), assembly.rigid_coordinates)
+    q = state.q.copy()
+    q[modes] += 0.01 * rng.standard_normal(len(modes))
+    v = rng.standard_normal(n)
+    M = np.zeros((n, n))
+    for body, first in zip(model.bodies, assembly.first, strict=True):
+        block = slice(first, first + 3 + body.n_modes)
+        M[block, block] = mass_matrix(body, q[block])
+    d, J = assembly.system.rotor_rows(q)
+    turning = d @ v  # rates of the rotors: the second's are those of sections (or frames) of both links
+    link1, link2 = (slice(f, f + 3 + b.n_modes) for b, f in zip(model.bodies, assembly.first, strict=True))
+    rate1, rate2 = v[link1][2], v[link2][2]
+    if motors == "section":
+        rate1_root = rate1 + model.bodies[0].points["root"].rotation @ v[link1][3:]
+        rate1 += model.bodies[0].points["tip"].rotation @ v[link1][3:]
+        rate2 += model.bodies[1].points["root"].rotation @ v[link2][3:]
+    else:
+        rate1_root = rate1
+    np.testing.assert_allclose(turning, [60 * rate1_root, 60 * rate2 - 59 * rate1], rtol=1e-12)
+
+    _, _, C_q = assembly.system.constraints(0.0, q, v)
+    a_bare, lambda_bare = without.system.evaluate(0.0, q, v)
+    Q = M @ a_bare + C_q.T @ lambda_bare
+    m = len(C_q)
+    gamma = C_q @ a_bare
+    whole = np.block([[M + d.T @ (J[:, None] * d), C_q.T], [C_q, np.zeros((m, m))]])
+    expected = np.linalg.solve(whole, np.concatenate([Q, gamma]))
+    a, lambda_ = assembly.system.evaluate(0.0, q, v)
+    assert relative(a, expected[:n]) < 1e-10
+    assert relative(lambda_, expected[n:]) < 1e-10
+
+
+def test_geared_two_link_arm_needs_the_moments_of_spong():
+    """Spong, Modeling and control of elastic joint robots (1987), in the limit of stiff joints: rods with rotors.
+
+    τ_1 gets J₁N₁² α̈_1 and, since the second rotor sits on the first link, J₂(α̈_1 + N₂ γ̈_2); τ_2 J₂N₂(α̈_1 + N₂ γ̈_2).
+    """
+    J1, N1, J2, N2 = 3e-3, 20.0, 1e-3, 15.0
+
+    def inverse(first, second, kind="pcid"):
+        model = make_model(
+            [rod("a", 0.8, 3.0), rod("b", 0.6, 2.0)],
+            joint=[revolute("O", "ground", "a.root", **first), revolute("A", "a.tip", "b.root", **second)],
+            trajectory=[
+                {"name": "first", "joint": "O", "value": "0.4+0.9*sin(2*t)"},
+                {"name": "second", "joint": "A", "value": "-1.1+0.7*cos(3*t)"},
+            ],
+            initial={"angles": {"a": 0.4, "b": 0.0}},
+        )
+        if kind == "fcid":
+            return run_fcid(model, Analysis(name="i", kind="fcid", shape="zero", end=1.0, output_step=0.01))
+        return run_pcid(model, pcid(tolerance=1e-9), False, always)
+
+    for kind in ("pcid", "fcid"):
+        bare = inverse({}, {}, kind)
+        geared = inverse({"gear_ratio": N1, "rotor_inertia": J1}, {"gear_ratio": N2, "rotor_inertia": J2}, kind)
+        t = bare.time
+        alpha, gamma = -3.6 * np.sin(2 * t), -6.3 * np.cos(3 * t)
+        rotor = J2 * (alpha + N2 * gamma)
+        for joint, expected in (("O", J1 * N1**2 * alpha + rotor), ("A", N2 * rotor)):
+            added = joint_forces(geared, joint).motor - joint_forces(bare, joint).motor
+            assert relative(added, expected) < 1e-9, (kind, joint)
+
+
+def test_motors_alone_carry_rotors_and_friction_along():
+    """Inverse dynamics with motors only, applied to the flexible arm, brings its tip along the path."""
+    model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION, initial=AT_REST)
+    servo = Analysis(name="servo", kind="motors-only", end=1.0, output_step=0.01)
+    source = run_motors_only(model, servo, always)
+    replay = forward(actuation="servo", apply="joints", tolerance=1e-7)
+    outcome = run_forward(model, replay, source, Equipment(), always)
+    assert source.q.shape == outcome.q.shape
+    assert relative(outcome.q, source.q) < 1e-5
+
+
+def test_friction_takes_the_energy_that_is_missing():
+    tolerance = 1e-8
+    model = geared_arm(
+        arm_links(), GEARED | FRICTION, GEARED | FRICTION, trajectory=[],
+        initial={"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 2.0}},
+    )  # fmt: skip
+    outcome = run_forward(model, forward(output_step=OUTPUT_STEP, tolerance=tolerance), None, {}, always)
+    total, losses = energy_and_losses(outcome)
+    assert losses > 0.1
+    assert abs(losses + total[-1] - total[0]) < 10 * tolerance * np.ptp(total)
+
+
+@pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
+def test_implicit_integrators_agree_with_explicit_ones(integrator):
+    keys = {"trajectory": [], "initial": {"angles": {"link1": 0.3, "link2": 1.0}}}
+    model = geared_arm(arm_links(), GEARED | FRICTION, GEARED | FRICTION, **keys)
+    reference = run_forward(model, forward(end=0.3, tolerance=1e-8, integrator="dop853"), None, {}, always)
+    outcome = run_forward(model, forward(end=0.3, tolerance=1e-5, integrator=integrator), None, {}, always)
+    assert outcome.status == "completed"
+    assert relative(outcome.q, reference.q) < 1e-4
+
+
+def test_inverse_moments_carry_out_the_motion_with_rotors_and_friction():
+    """Motor moments and modal forces of the partially constrained run bring the tip along its path, forwards again."""
+    model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION)
+    source = run_pcid(model, pcid(tolerance=1e-8, end=0.4), True, always)
+    assert np.abs(joint_forces(source, "O").motor).max() > 1.0
+    assembly = Assembly(model, model.joints, [(row, ZERO) for row in model.motors.values()])
+    actuators = [_core.Motors(0, np.full(2, np.inf))]
+    actuators += [
+        _core.Patches(i, _core.Allocation(np.eye(2), np.eye(2), np.eye(2), np.full(2, np.inf), np.ones(2)))
+        for i in range(2)
+    ]
+    run = _core.run(
+        assembly.system, assembly.groups, assembly.moments, _core.Actuation(actuation_source(source), actuators),
+        source.time.tolist(), source.q[0], source.v[0], 1e-8, 0, _core.MethodKind.dop853, 0.8, None, always, None,
+    )  # fmt: skip
+    assert relative(run.q, source.q) < 1e-5
+
+
+def test_a_prismatic_joint_moves_the_reflected_mass():
+    """A slider of mass m on rails, pulled by F: ẍ = F/(m + J N²)."""
+    J, N = 2e-3, 30.0
+    slider = from_rigid_body("s", RigidBody(mass=0.4, inertia=0.01, center=(0.0, 0.0), points={"pin": (0.0, 0.0)}))
+    rail = {"name": "rail", "type": "prismatic", "between": ("ground", "s.pin"), "axis": (1.0, 0.0)}
+    model = make_model(
+        [slider], joint=[rail | {"gear_ratio": N, "rotor_inertia": J}], load=[{"point": "s.pin", "x": "3.0"}]
+    )
+    outcome = run_forward(model, forward(), None, {}, always)
+    np.testing.assert_allclose(outcome.a[:, 0], 3.0 / (0.4 + J * N**2), rtol=1e-12)
+
+
+def test_equilibrium_knows_neither_rotors_nor_friction():
+    keys = {"analysis": (Analysis(name="static", kind="static"),), "motors": "section"}
+    with_them = run_static(geared_arm(None, GEARED | FRICTION, GEARED | FRICTION, **keys), keys["analysis"][0])
+    without = run_static(geared_arm(None, {}, {}, **keys), keys["analysis"][0])
+    np.testing.assert_allclose(with_them.q, without.q, atol=1e-12)
+    np.testing.assert_allclose(with_them.tau, without.tau, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({"rotor_inertia": -1.0}, "greater than or equal to 0"),
+        ({"gear_ratio": 0.0}, "greater than 0"),
+        ({"friction_speed": 0.1}, "only beside coulomb_friction"),
+        ({"type": "weld", "viscous_friction": 1.0}, "in a weld"),
+    ],
+)
+def test_bad_keys_are_refused(keys, expected):
+    joint = revolute("O", "ground", "a.root") | keys
+    with pytest.raises(ValueError, match=expected):
+        make_model([rod("a", 1.0, 1.0)], joint=[joint])

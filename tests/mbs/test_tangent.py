@@ -1,0 +1,135 @@
+"""The exact tangent of the equations of motion against differences of the readable ones: they close in with h²."""
+
+import numpy as np
+import pytest
+import zoo
+from mechanisms import assemble, oracle_of, random_state, relative
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.model import Assembly
+
+T = 0.37
+STEP = 2e-3
+
+
+def differences(function, x, h):
+    """Central differences of `function` in every entry of x, column by column."""
+    return np.column_stack([(function(x + h * e) - function(x - h * e)) / (2 * h) for e in np.eye(len(x))])
+
+
+def assert_derivative(got, function, x):
+    """`got` is the limit of central differences, and these have order 2 where they do not meet it at once."""
+    wide, narrow = (differences(function, x, h) for h in (STEP, STEP / 2))
+    extrapolated = (4 * narrow - wide) / 3
+    size = max(np.abs(extrapolated).max(), 1.0)
+    errors = [np.abs(d - got).max() / size for d in (wide, narrow)]
+    assert relative(got, extrapolated, size) < 1e-8
+    if errors[0] > 1e-9:
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.fixture(params=[name for name in zoo.ALL if not name.startswith("chain") or name == "chain of 3"])
+def case(request):
+    assembly = assemble(zoo.build(request.param))
+    rng = np.random.default_rng(1)
+    q, v = random_state(rng, assembly.system.coordinates)
+    a, multipliers = rng.standard_normal(len(q)), rng.standard_normal(len(assembly.constraints))
+    return assembly, oracle_of(assembly), (q, v, a), multipliers
+
+
+def test_tangent_is_the_derivative_of_the_equations_of_motion(case):
+    assembly, oracle, (q, v, a), multipliers = case
+    M, D, K, C_q = _core.tangent(assembly.system, T, q, v, a, multipliers, [])
+
+    def residual(q, v):
+        forces = oracle.mass_matrix(q) @ a - oracle.forces(T, q, v)
+        return forces + oracle.constraint_values(T, q, v)[2].T @ multipliers
+
+    assert relative(M, oracle.mass_matrix(q)) < 1e-14
+    assert relative(C_q, oracle.constraint_values(T, q, v)[2]) < 1e-14
+    assert_derivative(D, lambda v: residual(q, v), v)
+    assert_derivative(K, lambda q: residual(q, v), q)
+
+
+def test_tangents_of_rows_are_the_derivatives_of_their_accelerations(case):
+    assembly, oracle, (q, v, a), _ = case
+    rows = [(c.row, core) for c, core in zip(assembly.constraints, assembly.constraint_rows, strict=True)]
+    by_acceleration, by_velocity, by_position = _core.row_tangents(assembly.system, [r for _, r in rows], q, v, a)
+
+    def accelerations(q, v):
+        return np.array([state.gradient @ a + state.bias for state in (oracle.row(row, q, v) for row, _ in rows)])
+
+    assert relative(by_acceleration, np.array([oracle.row(row, q, v).gradient for row, _ in rows])) < 1e-14
+    assert_derivative(by_velocity, lambda v: accelerations(q, v), v)
+    assert_derivative(by_position, lambda q: accelerations(q, v), q)
+
+
+def test_external_drives_take_part():
+    """A force along a slide, whose direction turns with the configuration."""
+    assembly = assemble(zoo.build("mixed", load=[{"joint": "j3", "moment": "2.0"}]))
+    q, v = random_state(np.random.default_rng(3), assembly.system.coordinates)
+    zero, none = np.zeros_like(q), np.zeros(len(assembly.constraints))
+    given = _core.tangent(assembly.system, T, q, v, zero, none, [])[2]
+    cancelled = _core.tangent(assembly.system, T, q, v, zero, none, [-2.0])[2]
+    free = _core.tangent(assemble(zoo.build("mixed")).system, T, q, v, zero, none, [])[2]
+    assert np.abs(given - free).max() > 0.1
+    assert relative(cancelled, free) < 1e-14
+
+
+def reduced_force(assembly, oracle, near, t):
+    """Generalized forces on s = (motor coordinates, p) that a motion (s, ṡ, s̈) with closed joints needs."""
+    rows = [c.row for c in assembly.constraints] + list(assembly.model.motors.values())
+    modes = np.setdiff1d(np.arange(oracle.size), assembly.rigid_coordinates)
+    held, k = len(assembly.constraints), len(assembly.model.motors)
+
+    def split(s):
+        return np.concatenate([np.zeros(held), s[:k], s[k:]])
+
+    def gradients(q, v):
+        states = [oracle.row(row, q, v) for row in rows]
+        values = np.array([state.value for state in states])
+        G = np.vstack([[state.gradient for state in states], np.eye(oracle.size)[modes]])
+        bias = np.concatenate([[state.bias for state in states], np.zeros(len(modes))])
+        return np.concatenate([values, q[modes]]), G, bias
+
+    def force(s, s_dot, s_ddot):
+        q = near.copy()
+        for _ in range(5):  # s is near: Newton doubles the digits each time
+            values, G, _ = gradients(q, np.zeros_like(q))
+            q -= np.linalg.solve(G, values - split(s))
+        _, G, _ = gradients(q, np.zeros_like(q))
+        v = np.linalg.solve(G, split(s_dot))
+        _, _, bias = gradients(q, v)
+        a = np.linalg.solve(G, split(s_ddot) - bias)
+        H = np.linalg.solve(G, np.eye(len(G))[:, held:])
+        return H.T @ (oracle.mass_matrix(q) @ a - oracle.forces(t, q, v)), (q, v, a)
+
+    values = gradients(near, np.zeros_like(near))[0][held:]
+    return values, force
+
+
+@pytest.mark.parametrize("name", ["mixed backwards", "slider-crank", "loaded", "stiffened"])
+def test_reduction_is_the_derivative_of_the_equations_in_independent_coordinates(name):
+    """About a motion far from equilibrium, so that every term with Ḣ and Ḧ counts."""
+    model = zoo.build(name)
+    assembly = Assembly(model, model.joints, model.loads, list(model.motors.values()))
+    rng = np.random.default_rng(4)
+    near = undeformed_state(assembly).q
+    modes = np.setdiff1d(np.arange(len(near)), assembly.rigid_coordinates)
+    near[modes] += 0.1 * rng.standard_normal(len(modes))
+    s, force = reduced_force(assembly, oracle_of(assembly), near, T)
+    s_dot, s_ddot = rng.standard_normal((2, len(s)))
+    expected, (q, v, a) = force(s, s_dot, s_ddot)
+    linear = _core.reduce(assembly.system, assembly.motor_rows, T, q, v, a, 1)
+    assert relative(linear.force, expected) < 1e-10
+    assert_derivative(linear.M, lambda x: force(s, s_dot, x)[0], s_ddot)
+    assert_derivative(linear.D, lambda x: force(s, x, s_ddot)[0], s_dot)
+    assert_derivative(linear.K, lambda x: force(x, s_dot, s_ddot)[0], s)
+
+
+def test_reduction_refuses_rows_that_do_not_fit():
+    assembly = assemble(zoo.build("chain of 2"))
+    q = np.zeros(assembly.system.coordinates)
+    with pytest.raises(ValueError, match="expected 6 constraints and independent rows, got 8"):
+        _core.reduce(assembly.system, assembly.motor_rows, T, q, q, q, 1)
