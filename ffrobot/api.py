@@ -17,26 +17,38 @@ if TYPE_CHECKING:
 AnyPath = str | PathLike[str]
 
 
-def solve(scene: Scene | AnyPath, output: AnyPath | None = None, watcher: Watcher | None = None) -> Results:
+def solve(
+    scene: Scene | AnyPath, output: AnyPath | None = None, watcher: Watcher | None = None, *, resume: bool = False
+) -> Results:
     """Run the analyses of a scene, or of a scene file, and return the results: `ffrobot solve`.
 
     They are written to `output` where one is given, and kept in memory otherwise. `watcher` is told how it goes.
+    `resume` goes on with a run that was stopped, from `output`; functions of Python have to be the same then.
     Raises `InputError` for anything wrong with the scene, `SolveError` where an analysis does not reach its end; what
     was computed until then is in `output` all the same.
     """
+    from .errors import InputError
     from .files import check_output
     from .mbs.scene_records import Scene
     from .results import FORMAT, results_image, write_results
     from .results_file import Results
+    from .resume import how_to_go_on
+    from .resume import resume as run_on
     from .solution import solve as run
 
     if output is not None:
         check_output(Path(output), FORMAT)
-    solution = run(scene if isinstance(scene, Scene) else Path(scene), watcher)
+    elif resume:
+        raise InputError("solve: resume: expected the output of the run that was stopped, found none")
+    scene = scene if isinstance(scene, Scene) else Path(scene)
+    solution = run_on(scene, Path(output), watcher) if output is not None and resume else run(scene, watcher)
+    if solution is None:
+        assert output is not None
+        return Results(output)
     if output is not None:
         write_results(solution, Path(output))
     for outcome in solution.outcomes.values():
-        outcome.check_completed()
+        outcome.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if output is not None else "")
     if output is not None:
         return Results(output)
     return Results.from_image(results_image(solution), solution.scene.path)

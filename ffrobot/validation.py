@@ -129,7 +129,7 @@ _EXPECTED = {
 def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any]) -> _Problem:
     """Where pydantic's `item` is in the user's file, and what is wrong there, in the user's terms."""
     kind, loc, context = item["type"], item["loc"], item.get("ctx", {})
-    key = _key_path(loc, data, kind)
+    key = key_path(loc, data, kind)
     if kind == "value_error":
         return _Problem(key, str(context["error"]), "")
     if kind == "extra_forbidden":
@@ -163,7 +163,7 @@ def _show(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "…"
 
 
-def _key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str) -> str:
+def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
     """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass").
 
     Parts that name the alternative of a union rather than a key of the file are left out.

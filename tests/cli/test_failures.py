@@ -114,6 +114,7 @@ def test_ctrl_c_keeps_what_was_computed(two_link_copy, ffrobot):
     assert process.returncode == 1
     assert b"Traceback" not in shown
     assert b"(interrupted): stopped on request" in shown
+    assert b"ffrobot solve scene.toml --resume" in shown
     assert " of 1000 " in summary
     with h5py.File(folder / "scene.results.h5") as file:
         group = file["inverse"]
