@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .fe_models.link import LinkOutcome
@@ -61,11 +61,17 @@ def load_scene(path: AnyPath) -> Scene:
     return load_scene(Path(path))
 
 
-def make_link(path: AnyPath, output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
-    """Compute the modal body of a link file unless it is up to date: `ffrobot link`. See `fe_models.link`."""
-    from .fe_models.link import make_link
+def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
+    """Compute the modal body of a link unless it is up to date: `ffrobot link`. See `fe_models.link`.
 
-    return make_link(Path(path), None if output is None else Path(output), force)
+    `link` is a link file or a dictionary of its keys, whose modal body goes to the user's cache without `output`.
+    """
+    from .fe_models.link import make_link
+    from .fe_models.link_file import LinkTable
+    from .validation import plain
+
+    source = LinkTable(plain(link), Path("<link made in Python>")) if isinstance(link, Mapping) else Path(link)
+    return make_link(source, None if output is None else Path(output), force)
 
 
 def read_modal_body(path: AnyPath) -> ModalBody:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
-from ..validation import InputFile, Record, quoted
+from ..fe_models.link_file import LinkSource, LinkTable
+from ..fe_models.link_records import BeamLink, SolidLink
+from ..validation import InputFile, Record, existing_file, quoted
 from ._core import TimeFunction
 from .record_types import (
     GROUND,
@@ -44,15 +47,29 @@ class RigidBody(Record):
         return inertia
 
 
+def _link(value: object, info: ValidationInfo) -> LinkSource:
+    if isinstance(value, str):
+        return existing_file(Path(value), info)
+    if not isinstance(value, dict):
+        raise ValueError(f"expected the name of a link file in quotes or a table of its keys, found {value!r}")
+    name, path = info.data.get("name", "?"), info.context["path"] if info.context else Path("scene")
+    return LinkTable({"name": name, **value}, path.with_name(f'{path.name}: body "{name}": link'))
+
+
+LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | BeamLink | SolidLink)]
+
+
 class Body(Record):
-    """A link file (stage 1 runs when needed), a modal body file, or a rigid body.
+    """A link file or a table of its keys (stage 1 runs when needed), a modal body file, or a rigid body.
+
+    The `name` in a table of a link's keys is the body's where it is left out.
 
     `modes` of a flexible body: how many of the lowest that move in the plane; the others are represented by their
     static flexibility. "auto" takes as many as the tolerances of the analyses need; the default is all.
     """
 
     name: Name
-    link: InputFile | None = None
+    link: LinkInput | None = None
     modal: InputFile | None = None
     rigid: RigidBody | None = None
     modes: Literal["auto"] | Annotated[int, Field(ge=0)] | None = None

@@ -108,7 +108,7 @@ def test_ctrl_c_keeps_what_was_computed(two_link_copy, ffrobot):
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
     began = time.monotonic()
-    shown += _read_until(terminal, b"on request")
+    shown += _read_until(terminal, b"--resume")
     summary, _ = process.communicate(timeout=30)
     assert time.monotonic() - began < 5.0
     assert process.returncode == 1
