@@ -10,7 +10,7 @@ from pydantic import Field, PlainValidator, ValidationInfo, field_validator, mod
 from ..fe_models.link_file import LinkSource, LinkTable
 from ..fe_models.link_records import BeamLink, SolidLink
 from ..validation import InputFile, Record, existing_file, quoted
-from ._core import TimeFunction
+from ._core import StateFunction, TimeFunction
 from .record_types import (
     GROUND,
     Expression,
@@ -26,6 +26,7 @@ from .record_types import (
     present,
     split_point,
 )
+from .state_forces import state_function
 
 
 class RigidBody(Record):
@@ -186,8 +187,23 @@ class Trajectory(Record):
         return present(x=self.x, y=self.y, value=self.value)
 
 
+def _state_force(value: object, info: ValidationInfo) -> StateFunction:
+    if isinstance(value, StateFunction):
+        return value
+    objects = (info.context or {}).get("objects", {})
+    if not isinstance(value, str) or value not in objects:
+        raise ValueError(f"expected a function of t, position and velocity, in scenes made in Python, found {value!r}")
+    return state_function(objects[value])
+
+
+StateForce = Annotated[StateFunction, PlainValidator(_state_force, json_schema_input_type=str)]
+
+
 class Load(Record):
-    """A given load: force (N, global axes) and moment (N·m) at a point, moment of a joint, or voltages (V)."""
+    """A given load: force (N, global axes) and moment (N·m) at a point, moment of a joint, or voltages (V).
+
+    `force` on a point, in scenes made in Python: a function of its motion, see `state_forces.state_function`.
+    """
 
     point: PointReference | None = None
     joint: str | None = None
@@ -195,13 +211,16 @@ class Load(Record):
     x: Expression | None = None
     y: Expression | None = None
     moment: Expression | None = None
+    force: StateForce | None = None
     voltage: tuple[Expression, ...] | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Load:
         subject = one_of(self, ("point", "joint", "pzt"))
-        allowed = {"point": ("x", "y", "moment"), "joint": ("moment",), "pzt": ("voltage",)}[subject]
-        only(self, subject, allowed, ("x", "y", "moment", "voltage"))
+        allowed = {"point": ("x", "y", "moment", "force"), "joint": ("moment",), "pzt": ("voltage",)}[subject]
+        found = only(self, subject, allowed, ("x", "y", "moment", "force", "voltage"))
+        if self.force is not None and len(found) > 1:
+            raise ValueError(f'expected "force" alone beside "point", found {quoted(found)}')
         return self
 
     @property

@@ -104,6 +104,7 @@ def _problems(scene: SceneKeys) -> Iterator[str]:
     yield from _joint_references(scene)
     yield from _pzt_problems(scene)
     yield from _stiffening_problems(scene)
+    yield from _disturbance_problems(scene)
     for k, analysis in enumerate(scene.analysis):
         for problem in _analysis_problems(scene, analysis, scene.analysis[:k]):
             yield f'analysis "{analysis.name}": {problem}'
@@ -249,6 +250,14 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
                 'geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link'
                 f' between its interfaces, found those of "{layout.body}"'
             )
+
+
+def _disturbance_problems(scene: SceneKeys) -> Iterator[str]:
+    for analysis in scene.analysis:
+        for k, load in enumerate(analysis.disturbance, 1):
+            if load.force is not None:
+                key = f'analysis "{analysis.name}": disturbance no. {k}: force'
+                yield f"{key}: expected expressions in t, found a function, which only a [[load]] may have"
 
 
 def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Analysis, ...]) -> Iterator[str]:
