@@ -16,11 +16,16 @@ INTRODUCTION = {
 }
 
 
+LINK_TABLES = tuple(schema("link")["$defs"])
+
+
 def write_key_tables(folder: Path) -> None:
     """Write `link_keys.md` and `scene_keys.md` into `folder`."""
     for kind, introduction in INTRODUCTION.items():
         lines = [f"# Keys of a {kind} file", "", introduction, ""]
-        lines += [line for name, record in _records(schema(kind)) for line in _section(name, record)]
+        elsewhere = LINK_TABLES if kind == "scene" else ()  # a body's link has the keys of a link file
+        records = [(name, record) for name, record in _records(schema(kind)) if name not in elsewhere]
+        lines += [line for name, record in records for line in _section(name, record)]
         (folder / f"{kind}_keys.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -49,7 +54,7 @@ def _kind(entry: dict[str, Any]) -> str:
     """What a value has to be, in words."""
     if "$ref" in entry:
         name = entry["$ref"].rpartition("/")[2]
-        return f"table [{name}](#{name.lower()})"
+        return f"table [{name}]({'link_keys.md' if name in LINK_TABLES else ''}#{name.lower()})"
     if "const" in entry:
         return f'`"{entry["const"]}"`'
     if "enum" in entry:

@@ -112,7 +112,7 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
     recording = None
     if file.has(f"{group}/recording"):
         recording = _core.Recording(
-            file[f"{group}/recording/times"].tolist(), file[f"{group}/recording/states"].tolist(),
+            file[f"{group}/recording/times"], file[f"{group}/recording/states"],
             METHODS[about["integrator"]], analysis.spectral_radius, analysis.tolerance,
         )  # fmt: skip
     return EarlierRun(

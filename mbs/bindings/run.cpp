@@ -72,9 +72,10 @@ void bind_run(nb::module_ &m) {
       .def(nb::init<>())
       .def(
           "__init__",
-          [](Recording *r, std::vector<double> times, std::vector<double> states, MethodKind method,
+          [](Recording *r, const Eigen::VectorXd &times, const Eigen::VectorXd &states, MethodKind method,
              double spectral_radius, double tolerance) {
-            new (r) Recording{std::move(times), std::move(states), {method, spectral_radius}, tolerance};
+            new (r) Recording{
+                {times.begin(), times.end()}, {states.begin(), states.end()}, {method, spectral_radius}, tolerance};
           },
           "times"_a, "states"_a, "method"_a, "spectral_radius"_a, "tolerance"_a,
           "That of an earlier run: times (N,), states (N x 2 coordinates) one after the other.")
