@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -36,6 +36,8 @@ class PatchArray:
         limit: (k,) largest voltages, V; infinite where the scene gives none.
         W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
         frequency: (n,) of the modes, Hz.
+        of_all_modes: where the `PlanarBody` has not all modes, but the patches reach all: the same patches
+            on all modes, and (n_all, n) the modal forces on these from those on the `PlanarBody`.
     """
 
     layout: PztLayout
@@ -47,6 +49,7 @@ class PatchArray:
     limit: Array
     W_sqrt: Array
     frequency: Array
+    of_all_modes: tuple[PatchArray, Array] | None = None
 
     @property
     def body(self) -> str:
@@ -103,6 +106,9 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     else:
         per_volt = np.array([moment @ turn for moment, turn in zip(moments, turns, strict=True)])
         per_volt += _pull(layout, body, edges)
+    if planar.reduction is not None:
+        whole = patch_array(scene_path, layout, body, planar.reduction.whole)
+        return _on_fewer_modes(whole, planar)
     T = planar.modal_transform
     turn, Phi_V = (np.array([turn.sum(axis=0) for turn in turns]) @ T).T, (per_volt @ T).T
     limit = np.full(len(edges), np.inf if layout.limit is None else layout.limit)
@@ -110,9 +116,31 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     return PatchArray(layout, edges, height, c, turn, Phi_V, limit, weights, frequency)
 
 
+def _on_fewer_modes(whole: PatchArray, planar: PlanarBody) -> PatchArray:
+    """The patches of `whole` on a body of which fewer modes are kept.
+
+    Where they are enough for all its modes, voltages serve all: modal forces on those left out follow from the loads on
+    the link. Otherwise they serve the modes kept, and may bend the others.
+    """
+    reduction = planar.reduction
+    assert reduction is not None
+    T, lift = reduction.T, reduction.lift
+    reaches_all = whole.Phi_V.shape[1] >= whole.Phi_V.shape[0] and not whole.unreached_modes.size
+    return replace(
+        whole,
+        turn=T.T @ whole.turn,
+        Phi_V=T.T @ whole.Phi_V,
+        W_sqrt=whole.W_sqrt @ lift,
+        frequency=np.sqrt(planar.stiffness) / (2 * np.pi),
+        of_all_modes=(whole, lift) if reaches_all else None,
+    )
+
+
 def _pull(layout: PztLayout, body: ModalBody, edges: Array) -> Array:
     """(k, n) modal forces per volt along the link: bending forwards (M > 0) is a pull above the axis, a push below."""
     side = {"+y": -1.0, "-y": 1.0}.get(layout.face or "", 0.0)
+    if not side:
+        return np.zeros((len(edges), body.mode_count))
     ends = [[body.interpolate(x).translation[0] for x in pair] for pair in edges.clip(0.0, body.length)]
     stretch: Array = np.diff(ends, axis=1)[:, 0]
     return side * layout.modulus * layout.d31 * layout.width * layout.layers * stretch
@@ -213,7 +241,7 @@ def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
 def _pieces(key: str, body: ModalBody, number: int, start: float, end: float) -> tuple[Array, Array]:
     """The stretches (m + 1,) into which a change of the link's height along y cuts a patch, and the heights (m,)."""
     x = body.stations.position[:, 0]
-    slack = 1e-9 * body.length
+    slack = min(1e-9 * body.length, 0.25 * (end - start))
     covered = np.flatnonzero((x[1:] > start + slack) & (x[:-1] < end - slack))
     heights = body.stations.height[covered]
     jump = np.abs(np.diff(heights)) / np.maximum(heights[1:], heights[:-1])

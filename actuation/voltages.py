@@ -48,8 +48,11 @@ def voltage_scale(patches: PatchArray) -> Array:
 def voltage_gain(patches: PatchArray) -> Array:
     """Voltages (k, n) per modal force without limits: Φ_V⁻¹, or those of least weighted residual.
 
-    Of many that do, the smallest relative to `voltage_scale`.
+    Of many that do, the smallest relative to `voltage_scale`; where modes are left out, those that serve them too.
     """
+    if patches.of_all_modes is not None:
+        on_all, lift = patches.of_all_modes
+        return np.asarray(voltage_gain(on_all) @ lift)
     n, k = patches.Phi_V.shape
     if k == n and not patches.unreached_modes.size:
         return np.linalg.inv(patches.Phi_V)

@@ -17,12 +17,14 @@ from ..errors import InputError
 from ..mesh.interval import graded_nodes, interval_mesh, with_points
 from .beam import R_X, U_X, FamilyModel, family_model
 from .beam_stress import beam_stresses, segments
+from .damping import damping_ratio
 from .eigen import lowest_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
-from .link_records import FAMILIES, BeamLink, Family, Link
+from .link_records import FAMILIES, BeamLink, Family
 from .lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from .modal_body import Interface, ModalBody, PictureMesh, Stations
 from .section_outline import section_outlines
+from .stages import modes_hash
 
 # Elements are not cut closer to their ends than this fraction of their length.
 SLIVER = 0.01
@@ -88,6 +90,7 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         stress=beam_stresses(link, kept, omega**2, attached),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         input_hash=input_hash,
+        modes_hash=modes_hash(link),
         ffrobot_version=__version__,
     )
 
@@ -195,11 +198,3 @@ def _interface(stations: StationSpace, fields: Floats, position: float) -> Inter
 
 def _on_axis(x: Floats) -> Floats:
     return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)
-
-
-def damping_ratio(link: Link, omega: Floats) -> Floats:
-    """(n,) ζ as given, or of Rayleigh damping D = aM + bK: ζ = a/(2ω) + bω/2."""
-    if link.damping.rayleigh is not None:
-        a, b = link.damping.rayleigh
-        return a / (2 * omega) + b * omega / 2
-    return np.broadcast_to(np.asarray(link.damping.ratio or 0.0, dtype=np.float64), omega.shape).copy()

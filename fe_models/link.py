@@ -5,27 +5,26 @@ Importing this loads no finite element library; they are loaded where a link mus
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from platformdirs import user_cache_path
 
 from ..errors import FfrobotError, SolveError
 from ..files import check_output
+from ..mesh.kept_parts import kept_path
 from ..parallel import on_first, processes
 from .link_file import read_link
 from .link_records import BeamLink, Link, SolidLink
 from .modal_body import ModalBody
-from .modal_body_file import FORMAT, FORMAT_VERSION, read_modal_body, write_modal_body
+from .modal_body_file import FORMAT, read_modal_body, write_modal_body
+from .stages import input_hash, modes_hash, restated
 
 Progress = Callable[[str], None]
-
-# To be raised whenever the same link file gives other numbers than before.
-ALGORITHM_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -36,6 +35,7 @@ class LinkOutcome:
         path: the modal body file.
         body: what it holds.
         computed: False where it was up to date.
+        reused: what of earlier runs made it quicker: "modes" or "mesh"; empty where nothing did.
         seconds: of wall time, reading and writing included.
     """
 
@@ -43,18 +43,7 @@ class LinkOutcome:
     body: ModalBody
     computed: bool
     seconds: float
-
-
-def input_hash(link: Link) -> str:
-    """SHA-256 of what a modal body depends on: the link as checked, defaults filled in, and the program's algorithm.
-
-    A part's file counts by its content. Comments, the order of keys, 1 for 1.0, dates of files change nothing.
-    """
-    record = link.model_dump(mode="json")
-    if isinstance(link, SolidLink) and link.geometry.file is not None:
-        record["geometry"]["file"] = hashlib.sha256(link.geometry.file.read_bytes()).hexdigest()
-    content = {"format": FORMAT_VERSION, "algorithm": ALGORITHM_VERSION, "link": record}
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    reused: str = ""
 
 
 def make_link(
@@ -81,14 +70,15 @@ def make_link(
     if not force and on_first(lambda: _up_to_date(path, digest) is not None):
         return LinkOutcome(path, read_modal_body(path), False, time.perf_counter() - start)
     on_first(lambda: check_output(path, FORMAT, force=force))
-    return _compute(link, link_path, path, digest, start, progress)
+    earlier = [] if force else [path, link_path.with_suffix(".h5")]
+    return _compute(link, link_path, path, digest, start, progress, earlier, force=force)
 
 
 def cached_modal_body(link_path: Path, progress: Progress | None = None) -> LinkOutcome:
     """The modal body of a link: from an up-to-date LINK.h5 beside it, else from the user's cache, else computed.
 
-    Cache entries are named by content: LINK's hash under `ffrobot/links` in the XDG cache folder. A damaged entry is
-    computed again.
+    Cache entries are named by content: hashes of its modes and of all of it, under `ffrobot/links` in the XDG cache
+    folder. A damaged entry is computed again.
 
     Raises:
         InputError: the link file is wrong.
@@ -97,11 +87,15 @@ def cached_modal_body(link_path: Path, progress: Progress | None = None) -> Link
     start = time.perf_counter()
     link = read_link(link_path)
     digest = input_hash(link)
-    path = user_cache_path("ffrobot") / "links" / f"{digest}.h5"
-    for candidate in (link_path.with_suffix(".h5"), path):
+    beside, path = link_path.with_suffix(".h5"), _cache_folder() / f"{modes_hash(link)}-{digest}.h5"
+    for candidate in (beside, path):
         if (body := _up_to_date(candidate, digest)) is not None:
             return LinkOutcome(candidate, body, False, time.perf_counter() - start)
-    return _compute(link, link_path, path, digest, start, progress, make_folder=True)
+    return _compute(link, link_path, path, digest, start, progress, [beside])
+
+
+def _cache_folder() -> Path:
+    return user_cache_path("ffrobot") / "links"
 
 
 def _compute(
@@ -111,15 +105,28 @@ def _compute(
     digest: str,
     start: float,
     progress: Progress | None,
-    make_folder: bool = False,
+    earlier: Sequence[Path],
+    *,
+    force: bool = False,
 ) -> LinkOutcome:
-    compute = _computation(link, link_path)  # on all processes: the libraries start together
+    """Make the file at `path`: of the same modes where one of `earlier` or the cache has them, unless `force`."""
+
+    def write(body: ModalBody) -> None:
+        write_modal_body(path, body, make_folder=path.parent == _cache_folder())
+
+    def from_same_modes() -> bool:
+        body = None if force else _with_same_modes(link, earlier)
+        if body is not None:
+            write(body)
+        return body is not None
+
+    if on_first(from_same_modes):
+        return LinkOutcome(path, read_modal_body(path), True, time.perf_counter() - start, "modes")
+    meshed = on_first(lambda: not force and _has_mesh(link))
+    compute = _computation(link, link_path, force)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
         return compute(link, link_path, digest, progress or _silent)
-
-    def write(body: ModalBody) -> None:
-        write_modal_body(path, body, make_folder=make_folder)
 
     if processes() > 1 and isinstance(link, BeamLink):  # too small to share out
         on_first(lambda: write(make()))
@@ -127,10 +134,28 @@ def _compute(
     else:
         body = make()
         on_first(lambda: write(body))
-    return LinkOutcome(path, body, True, time.perf_counter() - start)
+    return LinkOutcome(path, body, True, time.perf_counter() - start, "mesh" if meshed else "")
 
 
-def _computation(link: Link, link_path: Path) -> Callable[..., ModalBody]:
+def _with_same_modes(link: Link, earlier: Sequence[Path]) -> ModalBody | None:
+    """The modal body of `link` from one with the same modes, among `earlier` files and the cache."""
+    wanted = modes_hash(link)
+    for path in (*earlier, *sorted(_cache_folder().glob(f"{wanted}-*.h5"))):
+        with suppress(FfrobotError):
+            body = read_modal_body(path)
+            if body.modes_hash == wanted and (same := restated(body, link)) is not None:
+                return same
+    return None
+
+
+def _has_mesh(link: Link) -> bool:
+    """Whether the mesh of the link is kept from an earlier run."""
+    if not isinstance(link, SolidLink):
+        return False
+    return kept_path(link.geometry, link.mesh, link.interface, link.surface_patch).is_file()
+
+
+def _computation(link: Link, link_path: Path, remesh: bool) -> Callable[..., ModalBody]:
     try:
         if isinstance(link, BeamLink):
             from .beam_link import beam_modal_body
@@ -138,7 +163,7 @@ def _computation(link: Link, link_path: Path) -> Callable[..., ModalBody]:
             return beam_modal_body
         from .solid_link import solid_modal_body
 
-        return solid_modal_body
+        return partial(solid_modal_body, remesh=remesh)
     except ModuleNotFoundError as error:
         raise SolveError(
             f"{link_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "

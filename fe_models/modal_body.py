@@ -155,6 +155,7 @@ class ModalBody:
         surface_stress: (p, 6, n) stress at the points of `mesh`, as in `StressPoint`; None where not asked for.
         surface_patches: modal forces of patches outlined in the mesh; None where there are none.
         input_hash: of the link file's content.
+        modes_hash: of that part of it on which the modes depend; empty where not known.
         ffrobot_version: that made it.
 
     Raises:
@@ -184,6 +185,7 @@ class ModalBody:
     surface_stress: Floats | None = None
     surface_patches: OutlinedPatches | None = None
     input_hash: str = ""
+    modes_hash: str = ""
     ffrobot_version: str = ""
 
     def __post_init__(self) -> None:
@@ -228,9 +230,8 @@ class ModalBody:
 def _through(stations: Stations, members: Integers, x: float) -> Interface:
     """The polynomial through the stations `members`, at x (Lagrange)."""
     nodes = stations.position[members, 0]
-    weights = np.array(
-        [np.prod((x - np.delete(nodes, i)) / (node - np.delete(nodes, i))) for i, node in enumerate(nodes)]
-    )
+    others = ~np.eye(len(nodes), dtype=bool)
+    weights = np.prod((x - nodes) / (nodes[:, None] - nodes + ~others), axis=1, where=others)
     return Interface(
         weights @ stations.position[members],
         np.einsum("i,ikn->kn", weights, stations.translation[members]),

@@ -97,6 +97,7 @@ def _body(file: h5py.File) -> ModalBody:
     stations, interfaces = file["stations"], file["interfaces"]
     return ModalBody(
         **values,
+        modes_hash=_text(file.attrs.get("modes_hash", "")),
         family=tuple(_text(name) for name in file["modes/family"][()]),
         geometric_stiffness=_geometric_stiffness(file),
         interfaces={name: Interface(**_arrays(interfaces[name], Interface)) for name in interfaces},
@@ -151,16 +152,18 @@ def _image(body: ModalBody) -> bytes:
         file.attrs["format_version"] = FORMAT_VERSION
         for name in _ATTRIBUTES:
             file.attrs[name] = getattr(body, name)
+        if body.modes_hash:
+            file.attrs["modes_hash"] = body.modes_hash
         _write_arrays(file, {dataset: getattr(body, name) for name, dataset in _DATASETS.items()})
         for dataset, unit in _UNITS.items():
             file[dataset].attrs["unit"] = unit
         file["modes"].create_dataset("family", data=list(body.family), dtype=h5py.string_dtype(), track_times=False)
-        _write_arrays(file.create_group("geometric_stiffness"), body.geometric_stiffness)
-        for name, interface in body.interfaces.items():
+        _write_arrays(file.create_group("geometric_stiffness"), dict(sorted(body.geometric_stiffness.items())))
+        for name, interface in sorted(body.interfaces.items()):
             _write_arrays(file.create_group(f"interfaces/{name}"), vars(interface))
         _write_arrays(file.create_group("stations"), vars(body.stations))
         _write_arrays(file.create_group("mesh"), vars(body.mesh))
-        for name, point in body.stress.items():
+        for name, point in sorted(body.stress.items()):
             _write_arrays(file.create_group(f"stress/points/{name}"), vars(point))
         _write_arrays(file, {"stress/surface": body.surface_stress})
         if body.surface_patches is not None:

@@ -19,7 +19,8 @@ from ..mesh.compat import lagrange_element, node_map
 from ..mesh.defaults import default_order
 from ..mesh.interval import with_points
 from ..mesh.solid_mesh import SolidMesh, solid_mesh
-from .beam_link import canonical_signs, damping_ratio
+from .beam_link import canonical_signs
+from .damping import damping_ratio
 from .elasticity import MaterialMap, SolidModel, material_map, solid_model
 from .families import section_motion
 from .functionals import Averages, face_averages, section_averages
@@ -29,6 +30,7 @@ from .modal_body import Interface, ModalBody, PictureMesh, Stations
 from .solid_eigen import Mass
 from .solid_invariants import prestressed, shape_integrals
 from .solid_modes import wanted_modes
+from .stages import modes_hash
 from .stress import point_stresses, surface_stresses
 from .supports import Flexibility, RigidFace
 from .surface_patches import outlined_patches
@@ -62,15 +64,25 @@ class Places(NamedTuple):
 
 
 def solid_modal_body(
-    link: SolidLink, path: Path, input_hash: str, progress: Progress, comm: MPI.Comm = MPI.COMM_WORLD
+    link: SolidLink,
+    path: Path,
+    input_hash: str,
+    progress: Progress,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    *,
+    remesh: bool = False,
 ) -> ModalBody:
     """Compute the modal body of `link`, read from `path`; collective over `comm`, the same on all its processes.
+
+    A mesh kept from an earlier run is used unless `remesh`.
 
     Raises:
         InputError: the part cannot be meshed, a face is missing, or more modes are asked for than the mesh has.
         SolveError: the stiffness cannot be factorised, or the eigensolver did not converge.
     """
-    solid = solid_mesh(link.geometry, link.mesh, link.interface, link.surface_patch, path, comm, progress)
+    solid = solid_mesh(
+        link.geometry, link.mesh, link.interface, link.surface_patch, path, comm, progress, remesh=remesh
+    )
     progress(f"{link.name}: assembling")
     model = solid_model(solid.mesh, link.mesh.order or default_order(solid.cell), _materials(link, solid, path))
     places = _places(link, model, solid)
@@ -126,6 +138,7 @@ def solid_modal_body(
             else None
         ),
         input_hash=input_hash,
+        modes_hash=modes_hash(link),
         ffrobot_version=__version__,
     )
 

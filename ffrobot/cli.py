@@ -50,7 +50,8 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     if not is_first():
         return
     body = outcome.body
-    verb = f"computed in {outcome.seconds:.2f} s" if outcome.computed else "up to date"
+    reused = f", {outcome.reused} from an earlier run" if outcome.reused else ""
+    verb = f"computed in {outcome.seconds:.2f} s{reused}" if outcome.computed else "up to date"
     click.echo(
         f"{outcome.path}: {verb}; {body.mode_count} modes, {body.frequency[0]:.6g} … {body.frequency[-1]:.6g} Hz"
     )
@@ -250,6 +251,7 @@ def main() -> None:
         stopped = True
         signal.default_int_handler(number, frame)
 
+    LOGGER.propagate = False  # libraries give the root logger handlers of their own
     signal.signal(signal.SIGINT, stop)
     try:
         cli(standalone_mode=False)

@@ -63,7 +63,7 @@ def body_motion(results: Results, analysis: str, name: str, frames: Indices) -> 
     reached = _stacked([results[f"{points}/{label}/position"][frames] for label in labels], len(frames))
     at = (rotated(-angle[:1], reached[:1] - position[:1, None]) - deflection[:1])[0]
     along = np.argsort(at[:, 0], kind="stable")
-    modal = results[f"{group}/modal"][frames] if name in results.modal_files else None
+    modal = results.modal(analysis, name)[frames] if name in results.modal_files else None
     return BodyMotion(name, position, angle, modal, tuple(labels[i] for i in along), at[along], deflection[:, along])
 
 

@@ -17,12 +17,14 @@ from .control_results import write_linear, write_placement
 from .files import write_atomically
 from .loop_results import write_loop
 from .mbs.analyses import Outcome
+from .mbs.fewer_modes import modes_kept
 from .mbs.motors_only import is_minimum_phase, path_error
 from .mbs.observation import (
     body_motion,
     energies,
     joint_forces,
     point_motion,
+    stored_coordinates,
     trajectory_force,
     trajectory_target,
 )
@@ -54,6 +56,9 @@ def results_image(solution: Solution) -> bytes:
             group = file.create_group(name)
             _write_attributes(group, outcome)
             group.attrs["stiffening_effect"] = solution.stiffening_effects[name]
+            if solution.mode_choice is not None and name in solution.mode_choice.errors:
+                for kind, error in solution.mode_choice.errors[name].items():
+                    group.attrs[f"mode_error_{kind}"] = error
             _write_motion(group, outcome)
             _write_forces(group, outcome)
             for body_name, voltages in solution.voltages.get(name, {}).items():
@@ -99,7 +104,7 @@ def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
     group.attrs["tolerance"] = analysis.tolerance
     group.attrs["actuation"] = analysis.actuation or ""
     group.attrs["apply"] = analysis.apply or ""
-    for key in ("steps", "rejected", "evaluations", "wall_seconds", "status"):
+    for key in ("steps", "rejected", "evaluations", "wall_seconds", "status", "cause"):
         group.attrs[key] = getattr(outcome, key)
 
 
@@ -108,6 +113,13 @@ def _write_motion(group: h5py.Group, outcome: Outcome) -> None:
     for body in outcome.assembly.model.bodies:
         for key, values in vars(body_motion(outcome, body)).items():
             group[f"bodies/{body.name}/{key}"] = values
+        transform = stored_coordinates(body)
+        about = "modes of the modal body file"
+        if transform is not None:
+            group[f"bodies/{body.name}/modal_transform"] = transform
+            about = "modes of the modal body file are modal_transform times these"
+        group[f"bodies/{body.name}"].attrs["modal_coordinates"] = about
+        group[f"bodies/{body.name}"].attrs["modes_kept"] = modes_kept(body)
         for label in body.points:
             point = f"{body.name}.{label}"
             for key, values in vars(point_motion(outcome, point)).items():

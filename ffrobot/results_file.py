@@ -132,6 +132,12 @@ class Results:
         found = "another" if file.path.is_file() else "none"
         raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with, found {found}')
 
+    def modal(self, analysis: str, body: str) -> Array:
+        """P (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""
+        group = f"{analysis}/bodies/{body}"
+        p, transform = self[f"{group}/modal"], f"{group}/modal_transform"
+        return p @ self[transform].T if self.has(transform) else p
+
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`."""
         return dict(self._file[group].attrs)

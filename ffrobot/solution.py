@@ -33,7 +33,7 @@ from .mbs.fcid import run_fcid
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.motors_only import run_motors_only
-from .mbs.observation import body_motion
+from .mbs.observation import modes_of_file
 from .mbs.operating_points import operating_points
 from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
 from .mbs.record_types import split_point
@@ -41,6 +41,8 @@ from .mbs.scene_file import load_scene
 from .mbs.scene_records import Scene
 from .mbs.steering import Equipment
 from .mbs.stress import BodyStress, body_stress
+from .mode_choice import ErrorEstimate, ModeChoice, error_tolerances, levels, reported
+from .skipped import skipped as skipped_lines
 from .validation import did_you_mean, quoted
 
 Array = NDArray[np.float64]
@@ -69,6 +71,7 @@ class LoadedBody:
     modal: ModalBody | None
     path: Path | None
     computed: bool = False
+    reused: str = ""
 
     @property
     def file_hash(self) -> str:
@@ -91,6 +94,7 @@ class Solution:
         linear: linear models, by analysis; placements: of patches, likewise.
         stresses: by analysis and body, where modal body files hold modal stresses.
         seconds: wall time by stage.
+        mode_choice: where `modes = "auto"`.
         stiffened: whether geometric stiffening is in the equations.
         stiffening_effects: by analysis, the largest relative change of a mode's stiffness by the loads of the run.
         skipped: what the scene did not need, one line each.
@@ -113,12 +117,15 @@ class Solution:
     placements: dict[str, Placed] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
+    mode_choice: ModeChoice | None = None
     stiffened: bool = False
     stiffening_effects: dict[str, float] = field(default_factory=dict)
 
 
 def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     """Run every analysis of a scene or a scene file; stage 1 runs first for links that are not up to date.
+
+    With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
     So does Ctrl-C during an analysis.
@@ -127,9 +134,57 @@ def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     watcher = watcher or Watcher()
     solution = prepare(scene, watcher)
     with Interruption() as interruption:
-        if not _run_all(solution, watcher, interruption):
-            solution = _assembled(solution.scene, solution.bodies, solution.structure, solution.seconds, stiffened=True)
-            _run_all(solution, watcher, interruption)
+        if any(body.modes == "auto" for body in solution.scene.body):
+            solution = _with_enough_modes(solution, watcher, interruption)
+        else:
+            solution = _completed(solution, watcher, interruption)
+    _evaluate(solution)
+    return solution
+
+
+def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+    """The scene solved with as many modes as its tolerances need: see `mode_choice`."""
+    began = time.perf_counter()
+    tolerances = error_tolerances(solution.scene)
+    every = levels(solution.scene, _whole(solution.bodies))
+    estimate, tried, k = ErrorEstimate(), [], 0
+    while True:
+        last = time.perf_counter()
+        solution = _completed(_with_bodies(solution, every[k]), watcher, interruption)
+        tried.append(sum(body.n_modes for body in every[k].values()))
+        completed = all(outcome.status == "completed" for outcome in solution.outcomes.values())
+        if completed:
+            estimate.add({name: reported(solution, name) for name in solution.outcomes})
+        more = len(every) - 1 - k
+        if not more or interruption.requested or (completed and estimate.meets(tolerances)):
+            break
+        k = len(every) - 1 if not completed or estimate.is_hopeless(tolerances, more - 1) else k + 1
+    errors = estimate.errors if completed else {}
+    if not more:
+        errors = {name: dict.fromkeys(of, 0.0) for name, of in errors.items()}
+    highest = [
+        max(float(np.sqrt(b.stiffness.max(initial=0.0))) for b in level.values()) for level in (every[k], every[-1])
+    ]
+    choice = ModeChoice(errors, estimate.differences, tried, last - began, (highest[0], highest[1]))
+    return replace(solution, mode_choice=choice)
+
+
+def _whole(bodies: Mapping[str, LoadedBody]) -> dict[str, PlanarBody]:
+    """The planar bodies with all their modes."""
+    return {n: b.planar if b.planar.reduction is None else b.planar.reduction.whole for n, b in bodies.items()}
+
+
+def _with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Solution:
+    """The scene with some of its bodies replaced, nothing solved yet."""
+    bodies = {name: replace(b, planar=planar.get(name, b.planar)) for name, b in solution.bodies.items()}
+    return _assembled(solution.scene, bodies, solution.structure, dict(solution.seconds), solution.stiffened)
+
+
+def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+    """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
+    if not _run_all(solution, watcher, interruption):
+        solution = _assembled(solution.scene, solution.bodies, solution.structure, solution.seconds, stiffened=True)
+        _run_all(solution, watcher, interruption)
     return solution
 
 
@@ -145,17 +200,29 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             return False
         solution.stiffening_effects[analysis.name] = effect
         solution.outcomes[analysis.name] = outcome
-        _allocate(solution, outcome)
-        if analysis.kind == "linear":
-            solution.linear[analysis.name] = analyse(linear_models(outcome, solution.patches))
-        if analysis.placement is not None:
-            solution.placements[analysis.name] = _place(solution, analysis.placement, outcome)
-        solution.stresses[analysis.name] = _stresses(solution, outcome)
+        if outcome.F_p is not None:
+            solution.voltages[analysis.name] = {
+                body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
+                for body, array in solution.patches.items()
+            }
         solution.seconds[analysis.name] = time.perf_counter() - started
         _log(outcome)
         if outcome.failed:
             break
     return True
+
+
+def _evaluate(solution: Solution) -> None:
+    """What follows from the motion and forces of all analyses."""
+    for name, outcome in solution.outcomes.items():
+        started = time.perf_counter()
+        _judge_actuation(solution, outcome)
+        if outcome.analysis.kind == "linear":
+            solution.linear[name] = analyse(linear_models(outcome, solution.patches))
+        if outcome.analysis.placement is not None:
+            solution.placements[name] = _place(solution, outcome.analysis.placement, outcome)
+        solution.stresses[name] = _stresses(solution, outcome)
+        solution.seconds[name] += time.perf_counter() - started
 
 
 def _log(outcome: Outcome) -> None:
@@ -175,6 +242,8 @@ def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     bodies = {body.name: loaded for body, loaded in zip(scene.body, _load_bodies(scene, watcher), strict=True)}
     seconds = {"links and files": time.perf_counter() - began}
     structure = _add_patches(scene, bodies)
+    first = levels(scene, _whole(bodies))[0]
+    bodies = {name: replace(body, planar=first.get(name, body.planar)) for name, body in bodies.items()}
     return _assembled(scene, bodies, structure, seconds, stiffened=scene.geometric_stiffening is True)
 
 
@@ -205,7 +274,7 @@ def _assembled(
     }
     planar = [body.planar if stiffened else replace(body.planar, stiffening=None) for body in bodies.values()]
     model = build_model(scene, planar, _voltage_loads(scene, patches))
-    skipped = tuple(_skipped(scene, bodies))
+    skipped = tuple(skipped_lines(scene, bodies))
     return Solution(
         scene, model, bodies, patches, points, structure, seconds=seconds, skipped=skipped, stiffened=stiffened
     )
@@ -221,14 +290,10 @@ def _check_stiffening(scene: Scene, bodies: Mapping[str, LoadedBody], stiffened:
             )
 
 
-def _allocate(solution: Solution, outcome: Outcome) -> None:
-    """What patches and actuation points have to do for what an inverse analysis found."""
+def _judge_actuation(solution: Solution, outcome: Outcome) -> None:
+    """What patches and actuation points have to do for what an inverse analysis found, and whether they can."""
     name = outcome.analysis.name
     if outcome.F_p is not None:
-        solution.voltages[name] = {
-            body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
-            for body, array in solution.patches.items()
-        }
         if solution.patches:
             unmet = unmet_modal_forces(outcome, solution.voltages[name])
             solution.predicted_shift[name] = predicted_shift(outcome, unmet)
@@ -326,7 +391,7 @@ def _load_bodies(scene: Scene, watcher: Watcher) -> list[LoadedBody]:
             assert body.link is not None
             outcome = cached_modal_body(body.link, watcher.stage)
             planar = from_modal_body(body.name, outcome.body)
-            loaded.append(LoadedBody(planar, outcome.body, outcome.path, outcome.computed))
+            loaded.append(LoadedBody(planar, outcome.body, outcome.path, outcome.computed, outcome.reused))
     return [_with_payloads(scene, body) for body in loaded]
 
 
@@ -342,7 +407,7 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
                 f' "{payload.point}"{did_you_mean(point, planar.points)}'
             )
         planar = with_payload(planar, point, payload.mass, payload.inertia)
-    return LoadedBody(planar, body.modal, body.path, body.computed)
+    return replace(body, planar=planar)
 
 
 def _add_patches(scene: Scene, bodies: dict[str, LoadedBody]) -> dict[str, StructureEffect]:
@@ -360,7 +425,7 @@ def _add_patches(scene: Scene, bodies: dict[str, LoadedBody]) -> dict[str, Struc
 def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
     """Of the bodies whose files hold modal stresses."""
     found = {
-        name: body_stress(body.modal, body_motion(outcome, body.planar).modal)
+        name: body_stress(body.modal, modes_of_file(outcome, body.planar))
         for name, body in solution.bodies.items()
         if body.modal is not None
     }
@@ -374,16 +439,3 @@ def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> list[Moda
         if load.pzt is not None
         for k, function in enumerate(load.components.values())
     ]
-
-
-def _skipped(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[str]:
-    lines = [f"{name}: stage 1, up to date" for name, b in bodies.items() if b.modal is not None and not b.computed]
-    for name, body in bodies.items():
-        if body.modal is None:
-            continue
-        idle = body.modal.mode_count - body.planar.n_modes
-        if idle:
-            lines.append(f"{name}: {idle} of {body.modal.mode_count} modes, which do not move in the plane")
-    if not any(np.any(body.planar.damping) for body in bodies.values()):
-        lines.append("damping, which is zero")
-    return lines

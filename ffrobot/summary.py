@@ -13,9 +13,11 @@ from rich.table import Table
 from .control_summary import LINEAR_COLUMNS, PLACEMENT_COLUMNS, linear_lines, linear_table, placement_table
 from .loop_results import HEADINGS, metrics_row
 from .mbs.analyses import Outcome
+from .mbs.fewer_modes import modes_kept
 from .mbs.geometric_stiffening import NOTABLE
 from .mbs.motors_only import describe_zeros, is_minimum_phase, path_error
 from .mbs.stable_inversion import Inversion
+from .mode_choice import ModeChoice
 from .solution import Solution
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
@@ -56,6 +58,8 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
             notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
         if outcome.inversion is not None:
             notes.add_row("motors only", f"{name}: {_inversion(outcome, outcome.inversion)}")
+    if solution.mode_choice is not None:
+        notes.add_row("modes", _modes(solution, solution.mode_choice))
     for name, loop in solution.loops.items():
         for line in loop.warnings:
             notes.add_row("warning", f"{name}: {line}")
@@ -66,6 +70,30 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     console.print()
     console.print(notes)
     console.print(f"results    {path}", soft_wrap=True)
+
+
+def _modes(solution: Solution, choice: ModeChoice) -> str:
+    """How many modes were enough, and what leaving out the others costs and saves."""
+    kept = [f"{body.name}: {modes_kept(body)}" for body in solution.model.bodies if body.n_modes]
+    lines = ["; ".join(kept)]
+    for name, errors in choice.errors.items():
+        if any(errors.values()):
+            found = ", ".join(f"{kind} {error:.0e}" for kind, error in errors.items() if error)
+            lines.append(f"{name}: error of leaving out the others, estimated: {found}")
+        else:
+            lines.append(
+                f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
+            )
+    tried = ", ".join(map(str, choice.tried))
+    fewer = {body.name: body.reduction.lowest for body in solution.model.bodies if body.reduction is not None}
+    if fewer:
+        keys = ", ".join(f"modes = {lowest} for {name}" for name, lowest in fewer.items())
+        lines.append(f"the same without search: {keys}")
+    lines.append(
+        f"solved with {tried} modal coordinates, {choice.seconds:.2f} s before the last; the highest frequency is"
+        f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
+    )
+    return "\n".join(lines)
 
 
 def _inversion(outcome: Outcome, inversion: Inversion) -> str:

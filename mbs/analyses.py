@@ -12,9 +12,11 @@ import numpy as np
 from ..errors import SolveError
 from . import _core
 from .analysis_records import Analysis
+from .diagnosis import find_cause, lost_inertia
 from .initial_state import State, check_reach, undeformed_state
 from .integrators import METHODS, Choice, choose_integrator
 from .model import ZERO, Array, Assembly, Model
+from .smoothness import check_smooth
 from .statics import static_equilibrium
 from .steering import Equipment, actuation_source, applied_actuators
 
@@ -32,8 +34,8 @@ STATUS = {
     _core.IntegrationStatus.diverged: "diverged",
 }
 _ADVICE = {
-    "step underflow": "no step is small enough there: the motion turns singular (a stretched arm, a jump in a"
-    " trajectory) or the load grows without bound",
+    "step underflow": "no step is small enough there: the motion turns singular (a stretched arm, a jump in a load) or"
+    " the load grows without bound",
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
     "interrupted": "stopped on request",
     "mesh too coarse": "motors do not get close enough to the path: vibrations of the zero dynamics that are hardly"
@@ -65,6 +67,8 @@ class Outcome:
     evaluations: int
     wall_seconds: float
     integrator: Choice
+    time_reached: float | None = None  # s, the last step's, where the run ended before its end
+    cause: str = ""  # what was found wrong there
     recording: _core.Recording | None = field(default=None, repr=False)
     shape: list[list[_core.TimeFunction]] | None = field(default=None, repr=False)  # prescribed p(t), FCID only
     shape_force: Array | None = None  # (T, modes of all bodies) −λ_p, the forces that hold the shape; FCID only
@@ -91,9 +95,10 @@ class Outcome:
     def check_completed(self) -> None:
         """Raise `SolveError` with advice where the run failed."""
         if self.failed:
+            reached = self.time[-1] if self.time_reached is None else self.time_reached
             raise SolveError(
-                f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {self.time[-1]:g} s'
-                f" ({self.status}): {_ADVICE[self.status]}"
+                f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
+                f" ({self.status}): {self.cause or _ADVICE[self.status]}"
             )
 
 
@@ -104,6 +109,7 @@ def run_pcid(model: Model, analysis: Analysis, keep_recording: bool, progress: P
     """
     assembly = Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
     start = initial_state(assembly)
+    check_smooth(assembly, analysis.end)
     check_reach(assembly, undeformed_state(assembly), analysis.times)
     recording = _core.Recording() if keep_recording else None
     return _integrate(assembly, analysis, start, None, resolver_of(assembly), recording, progress)
@@ -175,6 +181,8 @@ def _integrate(
     progress: Progress,
     replayed: Choice | None = None,
 ) -> Outcome:
+    if len(analysis.times) > 1 and (cause := lost_inertia(assembly, start.q)):
+        raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
     integrator = choose_integrator(assembly, analysis, start, replayed)
     run = _core.run(
@@ -183,9 +191,11 @@ def _integrate(
         recording,
     )  # fmt: skip
     seconds = time.perf_counter() - began
-    reached, held = len(run.q), len(assembly.constraints)
+    reached, held, status = len(run.q), len(assembly.constraints), STATUS[run.status]
+    failed = status not in ("completed", "interrupted")
+    cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2))) if failed else ""
     return Outcome(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers[:, :held],
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
-        STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, integrator, recording,
+        status, run.steps, run.rejected, run.evaluations, seconds, integrator, run.time_reached, cause, recording,
     )  # fmt: skip

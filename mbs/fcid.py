@@ -18,6 +18,7 @@ from .initial_state import check_reach, undeformed_state
 from .integrators import NOT_INTEGRATED
 from .model import ZERO, Array, Assembly, Model
 from .planar_body import PlanarBody
+from .smoothness import check_smooth
 
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
 DEGREE = 5  # of that spline: accelerations are cubic between nodes
@@ -41,6 +42,7 @@ def run_fcid(model: Model, analysis: Analysis) -> Outcome:
             f'"fcid", found {len(assembly.constraints) - len(model.joints)}'
         )
     start = undeformed_state(assembly)
+    check_smooth(assembly, analysis.end)
     check_reach(assembly, start, analysis.times)
     resolver = resolver_of(assembly)
     if analysis.shape != "zero":

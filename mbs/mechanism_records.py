@@ -45,16 +45,23 @@ class RigidBody(Record):
 
 
 class Body(Record):
-    """A link file (stage 1 runs when needed), a modal body file, or a rigid body."""
+    """A link file (stage 1 runs when needed), a modal body file, or a rigid body.
+
+    `modes` of a flexible body: how many of the lowest that move in the plane; the others are represented by their
+    static flexibility. "auto" takes as many as the tolerances of the analyses need; the default is all.
+    """
 
     name: Name
     link: InputFile | None = None
     modal: InputFile | None = None
     rigid: RigidBody | None = None
+    modes: Literal["auto"] | Annotated[int, Field(ge=0)] | None = None
 
     @model_validator(mode="after")
-    def _one_source(self) -> Body:
+    def _consistent(self) -> Body:
         one_of(self, ("link", "modal", "rigid"))
+        if self.rigid is not None and self.modes is not None:
+            raise ValueError(f'expected the key "modes" only in flexible bodies, found it in a rigid one: {self.modes}')
         return self
 
 

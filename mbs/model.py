@@ -185,6 +185,23 @@ class Assembly:
         return indices
 
     @property
+    def sizes(self) -> Array:
+        """Natural size of each coordinate: a length for R, 1 rad for θ, √I for p (a link bent as much as it is long).
+
+        What is small, or a step that is long, is judged by them: units of length and mass are the user's.
+        """
+        sizes = np.empty(self.system.coordinates)
+        for first, body in zip(self.first, self.model.bodies, strict=True):
+            sizes[first : first + 3] = self.system.length, self.system.length, 1.0
+            sizes[first + 3 : first + 3 + body.n_modes] = np.sqrt(body.inertia)
+        return sizes
+
+    @property
+    def row_sizes(self) -> Array:
+        """Natural size of each constraint's value: a length, or 1 rad."""
+        return np.where(self.moments, 1.0, self.system.length)
+
+    @property
     def is_trajectory(self) -> list[bool]:
         """For each constraint, whether it belongs to C_s."""
         return [c.is_trajectory for c in self.constraints]

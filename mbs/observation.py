@@ -17,7 +17,7 @@ from .rows import End
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """Motion of a body's frame and modes, one row per output; p in the coordinates of the modal body file."""
+    """Motion of a body's frame and modes, one row per output; p as `stored_coordinates` says."""
 
     position: Array  # (T, 2) R, m
     angle: Array  # (T,) θ, rad
@@ -47,8 +47,23 @@ class JointForces:
 def body_motion(outcome: Outcome, body: PlanarBody) -> BodyMotion:
     """Motion of `body` in an analysis."""
     columns = outcome.coordinates(body.name)
-    q, v, T = outcome.q[:, columns], outcome.v[:, columns], body.modal_transform
+    q, v = outcome.q[:, columns], outcome.v[:, columns]
+    T = body.modal_transform if stored_coordinates(body) is None else np.eye(body.n_modes)
     return BodyMotion(q[:, :2], q[:, 2], q[:, 3:] @ T.T, v[:, 3:] @ T.T, v[:, :2], v[:, 2])
+
+
+def stored_coordinates(body: PlanarBody) -> Array | None:
+    """What makes p of the modal body file (n_file, n) of the coordinates that results give; None where they give p.
+
+    They give the coordinates of the equations where these are fewer than the modes of the file.
+    """
+    n_file, n = body.modal_transform.shape
+    return body.modal_transform if n < n_file else None
+
+
+def modes_of_file(outcome: Outcome, body: PlanarBody) -> Array:
+    """P (T, n_file) in the modes of the modal body file."""
+    return np.asarray(outcome.q[:, outcome.coordinates(body.name)][:, 3:] @ body.modal_transform.T)
 
 
 def point_motion(outcome: Outcome, reference: str) -> PointMotion:

@@ -55,11 +55,30 @@ class PlanarBody:
     modal_transform: Array
     length: float | None
     stiffening: GeometricStiffening | None = None  # left out of the equations where None
+    reduction: Reduction | None = None  # where it has fewer modes than move in the plane
 
     @property
     def n_modes(self) -> int:
         """Number n of modal coordinates in the equations."""
         return len(self.stiffness)
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """How a body came by fewer modes: see `fewer_modes.with_fewer_modes`.
+
+    Attributes:
+        whole: the body with all n modes that move in the plane.
+        lowest: how many of these it kept; the other coordinates stand for the rest.
+        T: (n, m) coordinates of `whole` from the m that it has, TᵀT = 1.
+        lift: (n, m) modal forces on all modes from those on the m coordinates, Tᵀ lift = 1: exact for forces that come
+            from loads at the loaded points.
+    """
+
+    whole: PlanarBody
+    lowest: int
+    T: Array
+    lift: Array
 
 
 def from_modal_body(name: str, body: ModalBody) -> PlanarBody:
@@ -171,7 +190,11 @@ def _diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:
         return body
     L_inverse = np.linalg.inv(np.linalg.cholesky(m_ff))
     stiffness, vectors = np.linalg.eigh(L_inverse @ K_ff @ L_inverse.T)
-    T = L_inverse.T @ vectors
+    return transformed(body, L_inverse.T @ vectors, stiffness)
+
+
+def transformed(body: PlanarBody, T: Array, stiffness: Array) -> PlanarBody:
+    """The body in coordinates p' with p = T p', T (n, m), in which m_ff is the identity and K_ff diag(stiffness)."""
     return replace(
         body,
         stiffness=stiffness,
@@ -194,25 +217,34 @@ def _diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:
 
 def core_arguments(body: PlanarBody, markers: list[PlanarPoint], names: list[str]) -> dict[str, Any]:
     """Arguments of `_core.System.add_body`; terms that vanish are passed as empty arrays, which the core skips."""
-    n = body.n_modes
-    size = np.sqrt(body.mass) * max((float(np.linalg.norm(m.position)) for m in markers), default=0.0)
+    n, vanishing = body.n_modes, vanishing_terms(body)
     diagonal = np.array_equal(body.damping, np.diag(np.diag(body.damping)))
+    none = np.zeros((0, 0))
     rows = [body.S_bar, body.h[None], *(np.vstack([m.translation, m.rotation]) for m in markers)]
     return {
         "mass": body.mass,
         "inertia": body.inertia,
         "first_moment": body.first_moment,
         "stiffness": body.stiffness,
-        "damping": _unless_negligible(np.diag(body.damping)[:, None] if diagonal else body.damping, 0.0),
+        "damping": none if "D_ff" in vanishing else np.diag(body.damping)[:, None] if diagonal else body.damping,
         "W": np.vstack(rows) if n else np.zeros((3 + 3 * len(markers), 0)),
-        "j": _unless_negligible(body.j, size),
-        "S_tilde": _unless_negligible(body.S_tilde, 1.0),
-        "m_xy": np.zeros((0, 0)) if np.abs(body.m_xy - np.eye(n)).max(initial=0.0) < NEGLIGIBLE else body.m_xy,
+        "j": np.zeros(0) if "j" in vanishing else body.j,
+        "S_tilde": none if "S_tilde" in vanishing else body.S_tilde,
+        "m_xy": none if "m_xy - 1" in vanishing else body.m_xy,
         "marker_positions": [m.position for m in markers],
         **geometric_stiffening.core_arguments(body.stiffening, names),
     }
 
 
-def _unless_negligible(array: Array, size: float) -> Array:
-    """The array, or an empty one of the same dimension where all of it is rounding against `size`."""
-    return array if np.abs(array).max(initial=0.0) > NEGLIGIBLE * size else np.zeros((0,) * array.ndim)
+def vanishing_terms(body: PlanarBody) -> tuple[str, ...]:
+    """Which terms of the equations are nothing but rounding for the modes of a body; none of a rigid one."""
+    if not body.n_modes:
+        return ()
+    size = np.sqrt(body.mass) * max((float(np.linalg.norm(p.position)) for p in body.points.values()), default=0.0)
+    sizes = {
+        "D_ff": (body.damping, 0.0),
+        "j": (body.j, NEGLIGIBLE * size),
+        "S_tilde": (body.S_tilde, NEGLIGIBLE),
+        "m_xy - 1": (body.m_xy - np.eye(body.n_modes), NEGLIGIBLE),
+    }
+    return tuple(name for name, (array, limit) in sizes.items() if np.abs(array).max(initial=0.0) <= limit)

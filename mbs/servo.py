@@ -73,7 +73,7 @@ def motor_owner(joint: str) -> str:
 def make_servo(model: Model, end: float, factor: float) -> Servo:
     """The equations for a path that is held before 0 and after `end`.
 
-    Raises `InputError` unless there are as many motors and specified components as degrees of freedom.
+    Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes.
     """
     for found, what in ((len(model.motors), "motors"), (len(model.trajectories), "trajectory components")):
         if found != model.rigid_freedom:
@@ -81,6 +81,11 @@ def make_servo(model: Model, end: float, factor: float) -> Servo:
                 f'{model.scene.path}: expected for kind = "motors-only" as many {what} as the mechanism has degrees of'
                 f" freedom ({model.rigid_freedom}), found {found}"
             )
+    if not any(body.n_modes for body in model.bodies):
+        raise InputError(
+            f'{model.scene.path}: expected at least one flexible body for kind = "motors-only", found only rigid ones:'
+            ' kind = "pcid" gives their motors\' forces'
+        )
     rows = list(model.motors.values())
     held = [Constraint(c.row, c.target.held(0.0, end), c.owner, c.component, True) for c in model.trajectories]
     motors = [Constraint(row, ZERO, motor_owner(name), "value", True) for name, row in model.motors.items()]

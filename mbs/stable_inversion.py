@@ -84,13 +84,22 @@ class Inversion:
 
 
 def linearise(servo: Servo, end: float) -> Linearisation:
-    """About links that follow their loads on the path as springs would: r(t, p, 0, 0) = 0."""
+    """About links that follow their loads on the path as springs would: r(t, p, 0, 0) = 0.
+
+    Raises `SolveError` where they are too soft for that.
+    """
     core, times = servo.core(), np.linspace(0.0, end, SAMPLES)
     p = rest = np.zeros((SAMPLES, len(servo.scale)))
     K = linear_dynamics(core, times, rest, rest, rest).K
     for _ in range(SHAPE_ITERATIONS):
         p = p - np.linalg.solve(K, core.residuals(times.tolist(), p, rest, rest)[:, :, None])[:, :, 0]
     dynamics = linear_dynamics(core, times, p, rest, rest)
+    lost = ~np.isfinite(dynamics.M.sum(axis=(1, 2)) + dynamics.D.sum(axis=(1, 2)) + dynamics.K.sum(axis=(1, 2)))
+    if lost.any():
+        raise SolveError(
+            f"{servo.path.model.scene.path}: motors alone cannot carry the path at t = {times[lost.argmax()]:g} s: the"
+            " links are too soft for their loads there; slow the path down"
+        )
     return Linearisation(dynamics, p, zeros(dynamics, servo.scale))
 
 
@@ -191,7 +200,8 @@ class _Solver:
 def _boundary(servo: Servo, core: _core.MotorsOnly, t: float, unstable: bool) -> Boundary:
     """No part of y − y_rest in the unstable subspace of the equilibrium at time t, or none in the rest.
 
-    An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ.
+    An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ. Undamped motions count as
+    decaying ones: at rest before the path, ringing on after it.
     """
     from scipy.linalg import schur
 

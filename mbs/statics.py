@@ -6,11 +6,13 @@ import numpy as np
 
 from ..errors import SolveError
 from . import _core
-from .initial_state import State
+from .initial_state import State, with_rates
 from .model import Array, Assembly
 
 MOST_ITERATIONS = 60
-TOLERANCE = 1e-12  # residual forces relative to the largest of their terms
+TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, positions to the size of the robot
+ROUNDING = 4e-16  # steps this small, relative to the size of the robot, are no steps
+LARGEST_STEP = 0.5  # relative likewise: keeps to the branch of the start
 
 
 def static_equilibrium(assembly: Assembly, start: State) -> State:
@@ -19,42 +21,34 @@ def static_equilibrium(assembly: Assembly, start: State) -> State:
     Raises `SolveError` where the robot has no equilibrium near the start.
     """
     system, n = assembly.system, assembly.system.coordinates
-    rest = np.zeros(n)
+    rest, sizes = np.zeros(n), assembly.sizes
 
     def residual(x: Array) -> tuple[Array, float]:
         C, _, C_q = system.constraints(0.0, x[:n], rest)
         Q, constraint_forces = system.force_at_rest(0.0, x[:n]), C_q.T @ x[n:]
-        size = max(1e-9, float(np.abs(Q).max()), float(np.abs(constraint_forces).max(initial=0.0)))
+        size = max(float(np.abs(Q).max()), float(np.abs(constraint_forces).max(initial=0.0)))
         return np.concatenate([Q - constraint_forces, C]), size
 
     _, _, C_q = system.constraints(0.0, start.q, rest)
     multipliers = np.linalg.lstsq(C_q.T, system.force_at_rest(0.0, start.q), rcond=None)[0]
-    x = np.concatenate([start.q, multipliers])
+    x, largest = np.concatenate([start.q, multipliers]), np.inf
     for _ in range(MOST_ITERATIONS):
         r, size = residual(x)
-        if np.abs(r[:n]).max() <= TOLERANCE * size and np.abs(r[n:]).max(initial=0.0) <= TOLERANCE:
-            return _with_rates(assembly, x[:n], start.v)
+        closed = np.abs(r[n:] / assembly.row_sizes).max(initial=0.0) <= TOLERANCE
+        if closed and (np.abs(r[:n]).max() <= TOLERANCE * size or largest <= ROUNDING):
+            return with_rates(assembly, x[:n], start.v)
         try:
             step = np.linalg.solve(_jacobian(assembly, x), r)
         except np.linalg.LinAlgError:
             break
-        turn = np.abs(step[:n]).max()
-        x = x - step * min(1.0, 0.5 / turn if turn else 1.0)
+        largest = float(np.abs(step[:n] / sizes).max())
+        x = x - step * min(1.0, LARGEST_STEP / largest if largest else 1.0)
         if not np.all(np.isfinite(x)):
             break
     raise SolveError(
         f"{assembly.model.scene.path}: no static equilibrium was found near the initial angles: a robot without"
         " motors or trajectories may have none there; give angles closer to it"
     )
-
-
-def _with_rates(assembly: Assembly, q: Array, v: Array) -> State:
-    """(Ṙ, θ̇) moved onto Ċ = 0 at the deformed configuration, ṗ kept."""
-    _, rate, C_q = assembly.system.constraints(0.0, q, v)
-    r = assembly.rigid_coordinates
-    v = v.copy()
-    v[r] -= np.linalg.lstsq(C_q[:, r], rate, rcond=None)[0]
-    return State(q, v)
 
 
 def _jacobian(assembly: Assembly, x: Array) -> Array:

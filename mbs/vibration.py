@@ -31,24 +31,24 @@ def mass_matrix(body: PlanarBody, q: Array) -> Array:
     theta, p = q[2], q[3:]
     c, s = np.cos(theta), np.sin(theta)
     A, A_theta = np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]])
+    s, s_p, inertia, h = body.first_moment + body.S_bar @ p, body.S_bar, body.m_xy, body.h + p @ body.S_tilde
+    if (K := body.stiffening) is not None:
+        s, s_p, inertia, h = s - 0.5 * p @ K.K_s @ p, s_p - K.K_s @ p, inertia - K.K_omega, h - K.K_h @ p
     M = np.eye(len(q))
     M[:2, :2] = body.mass * np.eye(2)
-    M[:2, 2] = M[2, :2] = A_theta @ (body.first_moment + body.S_bar @ p)
-    M[:2, 3:] = A @ body.S_bar
+    M[:2, 2] = M[2, :2] = A_theta @ s
+    M[:2, 3:] = A @ s_p
     M[3:, :2] = M[:2, 3:].T
-    M[2, 2] = body.inertia + 2 * body.j @ p + p @ body.m_xy @ p
-    M[2, 3:] = M[3:, 2] = body.h + p @ body.S_tilde
+    M[2, 2] = body.inertia + 2 * body.j @ p + p @ inertia @ p
+    M[2, 3:] = M[3:, 2] = h
     return M
 
 
 def vibrations(assembly: Assembly, state: State) -> Vibrations:
     """The constrained vibrations about `state`, with the stiffness of the links alone (no loads, no rotation)."""
     bodies = assembly.model.bodies
-    blocks = [state.q[first : first + 3 + body.n_modes] for first, body in zip(assembly.first, bodies, strict=True)]
-    M = _block_diagonal([mass_matrix(body, q) for body, q in zip(bodies, blocks, strict=True)])
-    gradient, inertia = assembly.system.rotor_rows(state.q)
-    M += gradient.T @ (inertia[:, None] * gradient)
-    K = np.concatenate([np.concatenate([np.zeros(3), body.stiffness]) for body in bodies])
+    M = system_mass_matrix(assembly, state.q)
+    K = _stiffness(assembly)
     D = _block_diagonal([block for body in bodies for block in (np.zeros((3, 3)), body.damping)])
     _, _, C_q = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))
     free = np.linalg.svd(C_q)[2][len(C_q) :].T if len(C_q) else np.eye(len(K))
@@ -60,6 +60,19 @@ def vibrations(assembly: Assembly, state: State) -> Vibrations:
     unbalanced = M @ shape * omega**2 - K[:, None] * shape  # = C_qᵀ λ
     force = np.linalg.lstsq(C_q.T, unbalanced, rcond=None)[0] if len(C_q) else np.zeros((0, len(omega)))
     return Vibrations(omega, np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega), shape, force, M)
+
+
+def _stiffness(assembly: Assembly) -> Array:
+    """Diagonal of K over all coordinates."""
+    return np.concatenate([np.concatenate([np.zeros(3), body.stiffness]) for body in assembly.model.bodies])
+
+
+def system_mass_matrix(assembly: Assembly, q: Array) -> Array:
+    """M (coordinates, coordinates) of all bodies and of the rotors in joints."""
+    blocks = zip(assembly.model.bodies, assembly.first, strict=True)
+    M = _block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
+    gradient, inertia = assembly.system.rotor_rows(q)
+    return M + gradient.T @ (inertia[:, None] * gradient)
 
 
 def _block_diagonal(blocks: list[Array]) -> Array:
@@ -74,14 +87,15 @@ def _block_diagonal(blocks: list[Array]) -> Array:
 def ringing(assembly: Assembly, state: State, modes: Vibrations) -> Array:
     """Amplitude (n,) with which each mode rings from `state` on, in the force it moves most, relative to that force.
 
-    A mode at rest follows its load; a velocity v, an acceleration a or a jerk j of its coordinate at the start is the
-    vibration v/ω, a/ω², j/ω³ about that.
+    A mode at rest follows its load and the links' static deflection under the prescribed motion; the velocity v, the
+    acceleration a or the jerk j about that with which it starts is the vibration v/ω, a/ω², j/ω³. What the robot does
+    beside following statically is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on.
     """
     system, q, v = assembly.system, state.q, state.v
     a, lambda_ = system.evaluate(0.0, q, v)
     dt = 1e-3 / modes.frequency.max(initial=1.0)
     jerk = (system.evaluate(dt, q + dt * v, v + dt * a)[0] - a) / dt
-    omega, project = modes.frequency, modes.shape.T @ modes.mass
+    omega, project = modes.frequency, (modes.shape * _stiffness(assembly)[:, None]).T / modes.frequency[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
     if not len(lambda_):
         stroke = np.abs(modes.shape).max(axis=0) * amplitude

@@ -16,6 +16,7 @@ from .cells import Floats
 from .checks import METRES, check_connected, check_quality, check_shape, oriented, straightened
 from .defaults import default_order, default_size
 from .faces import named_faces
+from .kept_parts import keep_part, kept_part, kept_path
 from .part_mesh import PartMesh
 from .records import InterfaceRecord, RectangleSection, SolidGeometry, SolidMeshRecord, SurfacePatches
 from .source import Source, source_from
@@ -24,6 +25,27 @@ from .structured import Divisions, structured_box
 Progress = Callable[[str], None]
 
 _STEP = (".step", ".stp")
+
+
+def kept_or_new(
+    geometry: SolidGeometry,
+    record: SolidMeshRecord,
+    interfaces: Sequence[InterfaceRecord],
+    patches: SurfacePatches | None,
+    path: Path,
+    progress: Progress,
+    *,
+    remesh: bool,
+) -> PartMesh:
+    """`part_mesh`, or what it made of the same part before, where gmsh would have to make it and not `remesh`."""
+    if not _is_meshed(geometry, record):
+        return part_mesh(geometry, record, interfaces, patches, path, progress)
+    kept = kept_path(geometry, record, interfaces, patches)
+    part = None if remesh else kept_part(kept)
+    if part is None:
+        part = part_mesh(geometry, record, interfaces, patches, path, progress)
+        keep_part(kept, part)
+    return part
 
 
 def part_mesh(
@@ -60,6 +82,13 @@ def part_mesh(
     return named_faces(replace(source, part=part), geometry, interfaces, patches, path)
 
 
+def _is_meshed(geometry: SolidGeometry, record: SolidMeshRecord) -> bool:
+    """Whether gmsh makes the mesh: of a shape drawn here, or a STEP file."""
+    if geometry.file is not None:
+        return _is_step(geometry.file)
+    return record.divisions is None and record.cell != "hexahedron"
+
+
 def _is_step(file: Path) -> bool:
     return file.suffix.lower() in _STEP
 
@@ -69,7 +98,7 @@ def _source(
 ) -> Source:
     file = geometry.file
     if file is None:
-        if record.divisions is not None or record.cell == "hexahedron":
+        if not _is_meshed(geometry, record):
             return Source(_box(geometry, record), {}, {})
         from .shapes import mesh_shape
 

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from ..errors import FfrobotError, InputError
 from .cells import CellName, Integers
 from .compat import create_solid_mesh, geometry_nodes
-from .part import part_mesh
+from .part import kept_or_new
 from .part_mesh import PartMesh, facet_keys
 from .records import InterfaceRecord, SolidGeometry, SolidMeshRecord, SurfacePatches
 from .surface import Surface, boundary, reference_facets, surface_of
@@ -63,6 +63,8 @@ def solid_mesh(
     path: Path,
     comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Progress | None = None,
+    *,
+    remesh: bool = False,
 ) -> SolidMesh:
     """Mesh of a solid link, distributed over `comm`.
 
@@ -74,6 +76,7 @@ def solid_mesh(
         path: the link file, named in errors.
         comm: all its processes call.
         progress: is told what is being done.
+        remesh: whether a mesh of the same part kept from an earlier run does not count.
 
     Raises:
         InputError: the part cannot be read or meshed, or a face is not there; on every process.
@@ -81,7 +84,7 @@ def solid_mesh(
     outcome: PartMesh | FfrobotError | None = None
     if comm.rank == 0:
         try:
-            outcome = part_mesh(geometry, record, interfaces, patches, path, progress or _silent)
+            outcome = kept_or_new(geometry, record, interfaces, patches, path, progress or _silent, remesh=remesh)
         except FfrobotError as error:
             outcome = error
     failure = comm.bcast(outcome if isinstance(outcome, FfrobotError) else None)

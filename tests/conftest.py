@@ -56,6 +56,14 @@ class SolvedCase:
         return rows
 
 
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory):
+    """Nothing that tests compute goes to the user's cache or comes from there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("own_cache")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def ffrobot(tmp_path_factory):
     return Command(tmp_path_factory.mktemp("cache"), Path(sys.executable).with_name("ffrobot"))

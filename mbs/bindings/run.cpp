@@ -30,6 +30,7 @@ RowMajorMatrix fixed_steps(const System &system, double end, int steps, const Ei
   RowMajorMatrix states(2 * steps + 1, y.size());
   states.row(0) = y;
   const double h = end / steps;
+  motion.plan(end);
   motion.slope(0, y.data(), method.first_slope());
   motion.accepted(0, y.data(), method.first_slope());
   for (int i = 0; i < steps; ++i) {
@@ -72,6 +73,7 @@ void bind_run(nb::module_ &m) {
   nb::class_<Run>(m, "Run", "Outputs of an analysis, one row per output time reached, and how it went.")
       .def_prop_ro("status", [](const Run &r) { return r.report.status; })
       .def_prop_ro("time_reached", [](const Run &r) { return r.report.time; })
+      .def_prop_ro("last", [](const Run &r) -> const Eigen::VectorXd & { return r.last; })
       .def_prop_ro("steps", [](const Run &r) { return r.report.steps; })
       .def_prop_ro("rejected", [](const Run &r) { return r.report.rejected; })
       .def_prop_ro("evaluations", [](const Run &r) { return r.report.evaluations; })

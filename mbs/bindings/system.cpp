@@ -205,6 +205,7 @@ void bind_system(nb::module_ &m) {
           "body"_a, "vector"_a, "size"_a)
       .def("finish", &System::finish)
       .def_ro("coordinates", &System::coordinates)
+      .def_ro("length", &System::length)
       .def_ro("first_coordinate", &System::first_coordinate)
       .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a,
            "Accelerations (coordinates,) and multipliers (constraints,).")

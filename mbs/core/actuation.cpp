@@ -6,11 +6,8 @@ using Eigen::Index;
 
 ActuationResolver::ActuationResolver(const System &system, std::vector<bool> trajectory, std::vector<Row> motors)
     : system_(system), trajectory_(std::move(trajectory)), motors_(std::move(motors)), motor_rows_(motors_.size()),
-      gradient_(system.coordinates) {
-  const auto size = static_cast<Index>(3 * system.bodies.size());
-  joint_system_ = Eigen::MatrixXd::Zero(size, size);
-  rhs_ = solution_ = Eigen::VectorXd::Zero(size);
-  lu_ = Eigen::PartialPivLU<Eigen::MatrixXd>(size);
+      joint_system_(static_cast<Index>(system.bodies.size())) {
+  rhs_ = solution_ = Eigen::VectorXd::Zero(static_cast<Index>(3 * system.bodies.size()));
   tau_ = Eigen::VectorXd::Zero(static_cast<Index>(motors_.size()));
   for (const auto &body : system.bodies) {
     F_p_.emplace_back(Eigen::VectorXd::Zero(body.modes()));
@@ -39,23 +36,22 @@ void resultant(const System &system, const Workspace &w, const std::vector<Eigen
 void ActuationResolver::resolve(const Workspace &w) {
   for (auto &wrench : wrench_)
     wrench.setZero();
-  joint_system_.setZero();
   Index column = 0;
   for (std::size_t r = 0; r < trajectory_.size(); ++r) {
     const Row &row = system_.constraints[r].row;
     if (trajectory_[r])
       add_wrench(row, w.rows[r], -w.lambda[static_cast<Index>(r)], wrench_);
     else
-      add_frame_gradient(row, w.rows[r], w.bodies, joint_system_.col(column++));
+      joint_system_.set_column(column++, row, w.rows[r], w.bodies);
   }
   for (std::size_t i = 0; i < motors_.size(); ++i) {
     evaluate(motors_[i], w.bodies, motor_rows_[i]);
-    add_frame_gradient(motors_[i], motor_rows_[i], w.bodies, joint_system_.col(column++));
+    joint_system_.set_column(column++, motors_[i], motor_rows_[i], w.bodies);
   }
   rhs_.setZero();
   resultant(system_, w, wrench_, rhs_);
-  lu_.compute(joint_system_);
-  solution_ = lu_.solve(rhs_);
+  joint_system_.factorise();
+  solution_ = joint_system_.solve(rhs_);
 
   column = 0;
   for (std::size_t r = 0; r < trajectory_.size(); ++r)

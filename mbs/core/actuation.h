@@ -1,10 +1,10 @@
 // What motors and modal forces must do in place of the forces that hold a trajectory.
 #pragma once
 
+#include "core/frame_system.h"
 #include "core/integrate.h"
 #include "core/motion.h"
 
-#include <Eigen/LU>
 #include <vector>
 
 namespace ffrobot {
@@ -32,9 +32,8 @@ private:
   std::vector<bool> trajectory_;
   std::vector<Row> motors_;
   std::vector<RowMotion> motor_rows_;
-  Eigen::VectorXd gradient_, rhs_, solution_, tau_;
-  Eigen::MatrixXd joint_system_; // columns: (R, theta) parts of the gradients of joints and motors
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  Eigen::VectorXd rhs_, solution_, tau_;
+  FrameSystem joint_system_; // columns: joints, then motors
   std::vector<Eigen::VectorXd> F_p_;
   std::vector<Eigen::Matrix3Xd> wrench_;
 };

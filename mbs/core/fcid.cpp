@@ -11,12 +11,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 FullyConstrained::FullyConstrained(const System &system, VectorXd guess)
-    : system_(system), workspace_(system), q_(std::move(guess)) {
+    : system_(system), workspace_(system), q_(std::move(guess)), gradients_(static_cast<Index>(system.bodies.size())) {
   v_ = a_ = f_ = VectorXd::Zero(system.coordinates);
   value_ = rate_ = acceleration_ = VectorXd::Zero(static_cast<Index>(system.constraints.size()));
-  const auto size = static_cast<Index>(3 * system.bodies.size());
-  gradients_ = MatrixXd::Zero(size, size);
-  lu_ = Eigen::PartialPivLU<MatrixXd>(size);
   for (const auto &body : system.bodies)
     shape_force_.emplace_back(VectorXd::Zero(body.modes()));
 }
@@ -60,19 +57,18 @@ void FullyConstrained::set_target(double t, std::size_t constraint, const Jet &t
 }
 
 void FullyConstrained::update_jacobian() {
-  gradients_.setZero();
   for (std::size_t r = 0; r < system_.constraints.size(); ++r) {
     const Row &row = system_.constraints[r].row;
     evaluate(row, workspace_.bodies, workspace_.rows[r]);
     if (r < system_.held)
-      add_frame_gradient(row, workspace_.rows[r], workspace_.bodies, gradients_.col(static_cast<Index>(r)));
+      gradients_.set_column(static_cast<Index>(r), row, workspace_.rows[r], workspace_.bodies);
   }
-  lu_.compute(gradients_);
+  gradients_.factorise();
 }
 
 // (R, theta) part of x += sign C_q,r^-1 rhs
 void FullyConstrained::move_frames(VectorXd &x, const VectorXd &rhs, double sign) {
-  const VectorXd step = lu_.transpose().solve(rhs.head(gradients_.cols()));
+  const VectorXd step = gradients_.solve_transposed(rhs.head(static_cast<Index>(3 * system_.bodies.size())));
   for (std::size_t b = 0; b < system_.bodies.size(); ++b)
     x.segment<3>(system_.first_coordinate[b]) += sign * step.segment<3>(static_cast<Index>(3 * b));
 }
@@ -136,11 +132,11 @@ bool FullyConstrained::move(double t) {
 
 void FullyConstrained::balance(double t) {
   required_force(system_, t, q_.data(), v_.data(), a_.data(), workspace_, f_.data());
-  VectorXd f_r(gradients_.rows());
+  VectorXd f_r(static_cast<Index>(3 * system_.bodies.size()));
   for (std::size_t b = 0; b < system_.bodies.size(); ++b)
     f_r.segment<3>(static_cast<Index>(3 * b)) = f_.segment<3>(system_.first_coordinate[b]);
   add_rotors(f_r);
-  workspace_.lambda.head(f_r.size()) = -lu_.solve(f_r);
+  workspace_.lambda.head(f_r.size()) = -gradients_.solve(f_r);
   for (auto &wrench : workspace_.wrench)
     wrench.setZero();
   for (std::size_t r = 0; r < system_.constraints.size(); ++r)

@@ -2,9 +2,10 @@
 #pragma once
 
 #include "core/actuation.h"
+#include "core/frame_system.h"
 #include "core/system.h"
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -59,8 +60,7 @@ private:
   const System &system_;
   Workspace workspace_;
   Eigen::VectorXd q_, v_, a_, f_, value_, rate_, acceleration_;
-  Eigen::MatrixXd gradients_; // C_q,r^T: columns are (R, theta) parts of the constraints' gradients
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  FrameSystem gradients_; // C_q,r^T
   double time_ = 0;
   bool started_ = false;
   std::vector<Eigen::VectorXd> shape_force_;

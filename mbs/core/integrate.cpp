@@ -11,6 +11,15 @@ namespace {
 
 constexpr unsigned long steps_between_questions = 1000;
 
+// A step size that collapses never quite reaches rounding where noise feeds its estimates. A run that would take this
+// many times the steps it is allowed, at the pace of its last thousand, is not worth going on with.
+constexpr double hopeless = 100;
+
+// A load that jumps leaves an error in proportion to the step across it, more than that step's share of the tolerance
+// however short it is. Steps that have become so much shorter than those before may take from a reserve, all of which
+// is as much as the tolerance.
+constexpr double much_shorter = 1e-3, part_of_reserve = 0.25;
+
 // Size of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
 double next_step(double h, double left, bool lands) {
   if (h >= left)
@@ -31,7 +40,8 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
   Eigen::VectorXd error(system.size()), y_output(system.size());
   const double end = times.back(), duration = end - times.front();
   IntegrationReport report;
-  double t = times.front();
+  double t = times.front(), t_asked = t;
+  double usual_step = 0, reserve = 1; // the largest of late; in terms of the tolerance
   double h = std::min(system.initial_step(), end - t);
   const auto record = [&] {
     if (recording) {
@@ -63,12 +73,18 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       report.status = IntegrationStatus::too_many_steps;
       break;
     }
-    if ((report.steps + report.rejected) % steps_between_questions == 0 && !carry_on(t)) {
-      report.status = IntegrationStatus::interrupted;
-      break;
-    }
     const double left = end - t;
-    if (h < 1e-13 * std::max(std::abs(t), left)) {
+    bool collapsed = h < 1e-13 * std::max(std::abs(t), left);
+    if (const auto taken = report.steps + report.rejected; taken % steps_between_questions == 0) {
+      if (!carry_on(t)) {
+        report.status = IntegrationStatus::interrupted;
+        break;
+      }
+      const double most = hopeless * static_cast<double>(controls.max_steps) / steps_between_questions;
+      collapsed = collapsed || (taken > 0 && controls.max_steps && left > most * (t - t_asked));
+      t_asked = t;
+    }
+    if (collapsed) {
       report.status = IntegrationStatus::step_underflow;
       break;
     }
@@ -82,7 +98,9 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     const double step = next_step(h, target - t, lands);
     const double t_end = step == target - t ? target : t + step;
     constexpr double rounding = 2e-14; // what estimates see of it: shorter steps would not help
-    const double share = std::max(controls.tolerance * method.share(step / duration), rounding);
+    const double regular = method.share(step / duration);
+    const double part = step < much_shorter * usual_step ? std::max(regular, part_of_reserve * reserve) : regular;
+    const double share = std::max(controls.tolerance * part, rounding);
     double size = NAN;
     if (method.step(t, y.data(), step, share) && method.correct(t_end)) {
       system.slope(t_end, method.end(), method.last_slope());
@@ -95,6 +113,9 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       continue;
     }
     ++report.steps;
+    usual_step = std::max(step, 0.8 * usual_step);
+    if (part > regular)
+      reserve -= size * part;
     bool dense = false;
     for (; report.outputs < times.size() && times[report.outputs] <= t_end; ++report.outputs) {
       if (times[report.outputs] == t_end) {

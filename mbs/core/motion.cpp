@@ -28,12 +28,14 @@ ConstrainedMotion::ConstrainedMotion(const System &system, std::vector<int> grou
       damping_.segment(first, body.modes()) = body.damping;
     else if (body.damping.cols() > 1)
       damping_.segment(first, body.modes()) = body.damping.diagonal();
-    for (const auto &position : body.marker_positions)
-      length_ = std::max(length_, position.norm());
     frequency_.push_back(body.stiffness.cwiseSqrt());
   }
-  if (length_ == 0)
-    length_ = 1;
+}
+
+// Floors of what errors are compared with follow from the motion itself, not from a second and a meter: a robot that
+// takes an hour for its path gets it as precise as one that takes a second.
+void ConstrainedMotion::plan(double duration) {
+  rate_ = std::max(1 / duration, std::sqrt(system_.gravity.norm() / system_.length));
 }
 
 void ConstrainedMotion::slope(double t, const double *y, double *dy) {
@@ -55,7 +57,7 @@ double ConstrainedMotion::state_size(const double *y, const double *e) const {
     const Index i = system_.first_coordinate[b], modes = system_.bodies[b].modes();
     const double *d = e + i, *d_dot = e + n + i;
     const BodyPeaks &peak = body_peaks_[b];
-    size = std::max({size, std::hypot(d[0], d[1]) / length_, std::abs(d[2]),
+    size = std::max({size, std::hypot(d[0], d[1]) / system_.length, std::abs(d[2]),
                      std::hypot(d_dot[0], d_dot[1]) / peak.velocity, std::abs(d_dot[2]) / peak.angular_velocity});
     if (modes > 0) {
       // Velocities of the modes as what they are of the body's, and as the deflections that they turn into. A robot at
@@ -103,7 +105,7 @@ double ConstrainedMotion::error_size(double t, const double *y, const double *e)
     return size;
   shifted_ = VectorMap(y, 2 * n) + VectorMap(e, 2 * n);
   slope(t, shifted_.data(), shifted_slope_.data());
-  const auto length_of = [&](std::size_t g) { return group_is_moment_[g] ? length_ : 1.0; };
+  const auto length_of = [&](std::size_t g) { return group_is_moment_[g] ? system_.length : 1.0; };
   double largest = 0; // or what little would move the bodies, where nothing has happened yet
   for (std::size_t b = 0; b < system_.bodies.size(); ++b)
     largest += system_.bodies[b].mass * body_peaks_[b].acceleration;
@@ -133,16 +135,18 @@ Eigen::VectorXd ConstrainedMotion::applied_modal_force(std::size_t b) const {
 
 void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
   const Index n = system_.coordinates;
+  const double length = system_.length;
   const auto raise = [](double &peak, double value) { peak = std::max(peak, value); };
   for (std::size_t b = 0; b < system_.bodies.size(); ++b) {
     const Index i = system_.first_coordinate[b], modes = system_.bodies[b].modes();
     const double *v = y + n + i, *a = dy + n + i;
     BodyPeaks &peak = body_peaks_[b];
-    // floors: a hundredth of a length (a radian) per second; the vibration that the accelerations would start
-    raise(peak.velocity, std::max(std::hypot(v[0], v[1]), 0.01 * length_));
-    raise(peak.angular_velocity, std::max(std::abs(v[2]), 0.01));
-    raise(peak.acceleration, std::max({std::hypot(a[0], a[1]), system_.gravity.norm(), 0.01 * length_}));
-    raise(peak.angular_acceleration, std::max(std::abs(a[2]), peak.acceleration / length_));
+    // floors: a hundredth of a length (a radian) in the time that counts; the vibration that accelerations would start
+    const double slow = 0.01 * rate_;
+    raise(peak.velocity, std::max(std::hypot(v[0], v[1]), slow * length));
+    raise(peak.angular_velocity, std::max(std::abs(v[2]), slow));
+    raise(peak.acceleration, std::max({std::hypot(a[0], a[1]), system_.gravity.norm(), slow * rate_ * length}));
+    raise(peak.angular_acceleration, std::max(std::abs(a[2]), peak.acceleration / length));
     peak.modal_acceleration = std::max(peak.modal_acceleration, std::sqrt(system_.bodies[b].mass) * peak.acceleration);
     if (modes > 0) {
       const auto &omega = frequency_[b];
@@ -150,10 +154,9 @@ void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
       // where nothing has happened yet: a thousandth of what the acceleration would do to the softest mode
       const double force = std::sqrt(system_.bodies[b].mass) * peak.acceleration;
       applied_ = applied_modal_force(b).cwiseQuotient(omega); // may hold the links straight: p stays zero then
-      raise(peak.modal,
-            std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
-                      applied_.cwiseQuotient(omega).norm(), 1e-3 * force / std::pow(omega.minCoeff(), 2), 1e-12}));
-      raise(peak.modal_velocity, std::max({p_dot.norm(), p_ddot.cwiseQuotient(omega).norm(), applied_.norm(), 1e-12,
+      raise(peak.modal, std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
+                                  applied_.cwiseQuotient(omega).norm(), 1e-3 * force / std::pow(omega.minCoeff(), 2)}));
+      raise(peak.modal_velocity, std::max({p_dot.norm(), p_ddot.cwiseQuotient(omega).norm(), applied_.norm(),
                                            std::sqrt(system_.bodies[b].mass) * peak.velocity}));
     }
   }
@@ -177,6 +180,16 @@ void ConstrainedMotion::constraint_values(double t, const double *y, double *val
   constraint_residuals(system_, t, y, y + system_.coordinates, workspace_, value, rate);
 }
 
+// Whether every motion that the constraints allow has positive kinetic energy, at the last evaluation. Geometric
+// stiffening takes p^T K_omega p off m_thetatheta: more, for a link bent far, than its modes leave. M has then a
+// negative pivot, and is still positive on C_q v = 0 just where C M^-1 C^T has as many (Sylvester's law of inertia).
+bool ConstrainedMotion::has_inertia() const {
+  Index negative = 0;
+  for (const auto &state : workspace_.bodies)
+    negative += (state.D_inverse.array() < 0).count();
+  return negative == 0 || negative == workspace_.schur.negative_pivots();
+}
+
 // Small deformations end long before the mean square of a body's deflection, p^T p / m, is that of its radius.
 bool ConstrainedMotion::is_sensible(const double *y) const {
   for (std::size_t b = 0; b < system_.bodies.size(); ++b) {
@@ -184,11 +197,11 @@ bool ConstrainedMotion::is_sensible(const double *y) const {
     if (!(VectorMap(y + system_.first_coordinate[b] + 3, body.modes()).squaredNorm() <= body.inertia))
       return false;
   }
-  return true;
+  return has_inertia();
 }
 
 double ConstrainedMotion::initial_step() const {
-  double fastest = 1;
+  double fastest = rate_;
   for (const auto &omega : frequency_)
     if (omega.size())
       fastest = std::max(fastest, omega.maxCoeff());

@@ -23,6 +23,9 @@ public:
   // moment[i]: whether constraint i carries a moment. steering may be null.
   ConstrainedMotion(const System &system, std::vector<int> group, std::vector<bool> moment, Steering *steering);
 
+  // How long the motion will last: what is slow or small is judged by it. Before the first accepted().
+  void plan(double duration);
+
   Eigen::Index size() const override { return 2 * system_.coordinates; }
   void slope(double t, const double *y, double *dy) override;
   bool correct(double t, double *y) override;
@@ -54,13 +57,14 @@ private:
   std::vector<int> group_;
   std::vector<bool> group_is_moment_;
   Steering *steering_;
-  double length_ = 0;                      // of the system: what positions are compared with
+  double rate_ = 1;                        // 1/s: rates far below it do not count
   std::vector<Eigen::VectorXd> frequency_; // of each body's modes, rad/s
   Eigen::VectorXd stiffness_, damping_;    // diagonals over all coordinates
   std::unique_ptr<IterationMatrix<double>> real_;
   std::unique_ptr<IterationMatrix<Complex>> complex_;
 
   double state_size(const double *y, const double *e) const; // error_size without multipliers
+  bool has_inertia() const;
   void measure_groups(const Eigen::VectorXd &lambda, Eigen::VectorXd &size) const;
 
   // peaks so far

@@ -25,6 +25,7 @@ void ActuationSource::resolve() {
 
 RecordedMotion::RecordedMotion(const System &system, const Recording &recording)
     : motion_(system, {}, {}, nullptr), recording_(recording) {
+  motion_.plan(recording.times.back() - recording.times.front());
   constexpr int remembered = 4;
   for (int i = 0; i < remembered; ++i)
     cache_.push_back({static_cast<std::size_t>(-1), make_method(recording.method, motion_)});
@@ -62,7 +63,7 @@ RecordedActuation::RecordedActuation(const System &system, const Recording &reco
     : ActuationSource(system, std::move(is_trajectory), std::move(resolver)), system_(system),
       motion_(system, recording), workspace_(system), y_(2 * system.coordinates), a_(system.coordinates) {}
 
-void RecordedActuation::evaluate(double t) {
+void RecordedActuation::find(double t) {
   motion_.state(t, y_.data());
   accelerations(system_, t, y_.data(), y_.data() + system_.coordinates, workspace_, a_.data());
   q_ = y_.head(system_.coordinates);
@@ -75,7 +76,7 @@ FullyConstrainedActuation::FullyConstrainedActuation(const System &system, std::
     : ActuationSource(system, std::move(is_trajectory), std::move(resolver)), system_(system),
       motion_(system, std::move(guess)), shape_(std::move(shape)) {}
 
-void FullyConstrainedActuation::evaluate(double t) {
+void FullyConstrainedActuation::find(double t) {
   motion_.set_shape(t, shape_);
   motion_.solve(t); // was found at all output times before; a failure in between shows as a step that is refused
   resolve();

@@ -7,6 +7,7 @@
 #include "core/method.h"
 #include "core/motion.h"
 
+#include <limits>
 #include <optional>
 
 namespace ffrobot {
@@ -16,8 +17,13 @@ class ActuationSource {
 public:
   virtual ~ActuationSource() = default;
 
-  // Everything below is that of time t afterwards.
-  virtual void evaluate(double t) = 0;
+  // Everything below is that of time t afterwards. Costs nothing where it is already: stages of a step and outputs
+  // meet.
+  void evaluate(double t) {
+    if (t != time_)
+      find(t);
+    time_ = t;
+  }
 
   virtual const System &system() const = 0;
   virtual const Workspace &workspace() const = 0; // kinematics, multipliers
@@ -31,9 +37,11 @@ protected:
   // resolver: empty where the motors do not fit the mechanism; then neither tau nor modal forces are asked for.
   ActuationSource(const System &system, std::vector<bool> is_trajectory, std::optional<ActuationResolver> resolver);
 
+  virtual void find(double t) = 0;
   void resolve(); // tau and F_p from the workspace
 
 private:
+  double time_ = std::numeric_limits<double>::quiet_NaN();
   std::vector<bool> is_trajectory_;
   std::optional<ActuationResolver> resolver_;
   Eigen::VectorXd tau_;
@@ -66,12 +74,13 @@ public:
   RecordedActuation(const System &system, const Recording &recording, std::vector<bool> is_trajectory,
                     std::optional<ActuationResolver> resolver);
 
-  void evaluate(double t) override;
   const System &system() const override { return system_; }
   const Workspace &workspace() const override { return workspace_; }
   const Eigen::VectorXd &q() const override { return q_; }
 
 private:
+  void find(double t) override;
+
   const System &system_;
   RecordedMotion motion_;
   Workspace workspace_;
@@ -84,13 +93,14 @@ public:
   FullyConstrainedActuation(const System &system, std::vector<ModalShape> shape, Eigen::VectorXd guess,
                             std::vector<bool> is_trajectory, std::optional<ActuationResolver> resolver);
 
-  void evaluate(double t) override;
   const System &system() const override { return system_; }
   const Workspace &workspace() const override { return motion_.workspace(); }
   const Eigen::VectorXd &q() const override { return motion_.q(); }
   const std::vector<Eigen::VectorXd> &shape_force() const override { return motion_.shape_force(); }
 
 private:
+  void find(double t) override;
+
   const System &system_;
   FullyConstrained motion_;
   std::vector<ModalShape> shape_;

@@ -72,10 +72,12 @@ Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen
   Eigen::VectorXd y(2 * q.size());
   y << q, v;
   Run result;
+  motion.plan(times.back() - times.front());
   result.report = integrate(
       motion, times, y, controls, [&](std::size_t i, double t, const double *state) { evaluate(i, t, state); },
       carry_on, recording);
   result.outputs = evaluate.take(result.report.outputs);
+  result.last = y;
   return result;
 }
 

@@ -22,6 +22,7 @@ struct Outputs {
 struct Run {
   IntegrationReport report;
   Outputs outputs;
+  Eigen::VectorXd last; // (q, q_dot) at report.time
 };
 
 // Integrates `motion` from (q, v) over `times`. `resolver` and `recording` may be null.

@@ -10,9 +10,13 @@ using Eigen::Index;
 void System::finish() {
   first_coordinate.clear();
   coordinates = 0;
+  length = 0;
   for (const auto &body : bodies) {
     first_coordinate.push_back(coordinates);
     coordinates += body.coordinates();
+    length = std::max(length, std::sqrt(body.inertia / body.mass)); // markers may all lie at the origin
+    for (const auto &position : body.marker_positions)
+      length = std::max(length, position.norm());
   }
   for (auto &body : bodies)
     body.marker_rows.assign(static_cast<std::size_t>(body.markers()), 0);

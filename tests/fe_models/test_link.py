@@ -74,7 +74,7 @@ def test_a_run_prints_nothing_and_repeats_bit_for_bit(link_file, tmp_path):
     code = f"""
 from pathlib import Path
 from ffrobot.fe_models.link import make_link
-make_link(Path({str(path)!r}), Path({str(tmp_path / "again.h5")!r}))
+make_link(Path({str(path)!r}), Path({str(tmp_path / "again.h5")!r}), force=True)
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (result.stdout, result.stderr) == ("", "")

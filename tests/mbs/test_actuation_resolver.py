@@ -11,7 +11,8 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.initial_state import undeformed_state
 
 DOP853 = _core.MethodKind.dop853
-OPEN = ["chain of 2", "chain of 3", "chain of 6", "backwards", "mixed", "mixed backwards", "tree", "loaded"]
+LONG = "chain of 24"  # its frames' system is sparse
+OPEN = ["chain of 2", "chain of 3", "chain of 6", LONG, "backwards", "mixed", "mixed backwards", "tree", "loaded"]
 CLOSED = ["four-bar", "slider-crank"]
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from links import arm, arm_links, quintic, ritz_link
+from links import TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, relative, revolute
 from numpy.polynomial import Polynomial
 
-from ffrobot.errors import InputError
+from ffrobot.errors import InputError, SolveError
 from ffrobot.mbs import stable_inversion
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analyses import run_forward
@@ -234,6 +234,31 @@ def test_too_few_trajectory_components_are_refused():
         run_motors_only(model, motors_only(), always)
 
 
+def test_rigid_arms_are_sent_to_pcid():
+    with pytest.raises(InputError, match=r'at least one flexible body.*kind = "pcid"'):
+        run_motors_only(single_link(quintic(0, 0.1), modes=0), motors_only(), always)
+
+
+def in_a_hurry(EI):
+    """The arm of the other tests, softer, and its path in 0.3 s instead of one."""
+    path = {"name": "tip", "point": "link2.tip", "x": quintic(TIP[0], 0.4, 0.3), "y": quintic(TIP[1], 1.5, 0.3)}
+    return arm(arm_links(EI=EI), trajectory=[path])
+
+
+def test_path_that_bends_the_links_too_much_ends_with_advice(monkeypatch):
+    monkeypatch.setattr(stable_inversion, "MOST_INTERVALS", 200)
+    outcome = run_motors_only(in_a_hurry(EI=5.0), motors_only(end=0.3), always)
+    assert outcome.status == "inversion not converged"
+    assert len(outcome.time) > 30  # what the last iteration had
+    with pytest.raises(SolveError, match="slow the path down"):
+        outcome.check_completed()
+
+
+def test_links_too_soft_for_their_path_are_named():
+    with pytest.raises(SolveError, match=r"motors alone cannot carry the path at t = 0\.\d+ s.*too soft"):
+        run_motors_only(in_a_hurry(EI=3.0), motors_only(end=0.3), always)
+
+
 def test_failed_inversion_keeps_what_it_found(monkeypatch):
     """A mesh that may not get fine enough: status, advice, and the motion as far as it was found."""
     monkeypatch.setattr(stable_inversion, "MOST_INTERVALS", 80)
@@ -241,5 +266,5 @@ def test_failed_inversion_keeps_what_it_found(monkeypatch):
     assert outcome.status == "mesh too coarse"
     assert len(outcome.time) > 100
     assert np.all(np.isfinite(outcome.tau))
-    with pytest.raises(Exception, match="add damping, leave out high modes"):
+    with pytest.raises(SolveError, match="add damping, leave out high modes"):
         outcome.check_completed()

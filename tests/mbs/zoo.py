@@ -181,7 +181,7 @@ def free_flying(rng, **keys):
 
 
 ALL = {
-    **{f"chain of {count}": lambda rng, count=count, **keys: chain(rng, count, **keys) for count in range(1, 7)},
+    **{f"chain of {count}": lambda rng, count=count, **keys: chain(rng, count, **keys) for count in (*range(1, 7), 24)},
     "backwards": backwards,
     "mixed": mixed,
     "mixed backwards": mixed_backwards,

@@ -1,0 +1,86 @@
+"""What of a link file which part of stage 1 depends on, and modal bodies from earlier ones with the same modes.
+
+| part | depends on |
+|---|---|
+| mesh (solids that gmsh meshes: `mesh.kept_parts`) | geometry, mesh, places of interfaces, outlined patches |
+| modes, invariants, prestress | the mesh; material, theory, reference condition, attached masses, `[modes]` |
+| damping ratios, modal stresses, name | the modes; `[damping]`, `[stress]`, `name` |
+
+NumPy only: no finite element library is needed where the modes stay.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..mesh.kept_parts import geometry_content
+from .damping import damping_ratio
+from .link_records import BeamLink, Link, SolidLink
+from .lumped_masses import lumps
+from .modal_body import ModalBody, StressPoint
+from .modal_body_file import FORMAT_VERSION
+
+# To be raised whenever the same link file gives other numbers than before.
+ALGORITHM_VERSION = 2
+
+_AFTER_THE_MODES = ("name", "damping", "stress")
+
+
+def input_hash(link: Link) -> str:
+    """SHA-256 of what a modal body depends on: the link as checked, defaults filled in, and the program's algorithm.
+
+    A part's file counts by its content. Comments, the order of keys, 1 for 1.0, dates of files change nothing.
+    """
+    return _digest(_content(link))
+
+
+def modes_hash(link: Link) -> str:
+    """SHA-256 of what the modes and their invariants depend on."""
+    return _digest({key: value for key, value in _content(link).items() if key not in _AFTER_THE_MODES})
+
+
+def _content(link: Link) -> dict[str, Any]:
+    record = link.model_dump(mode="json")
+    if isinstance(link, SolidLink):
+        record["geometry"] = geometry_content(link.geometry)
+    return record
+
+
+def _digest(record: Mapping[str, Any]) -> str:
+    content = {"format": FORMAT_VERSION, "algorithm": ALGORITHM_VERSION, "link": record}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def restated(body: ModalBody, link: Link) -> ModalBody | None:
+    """The modal body of `link` from one with the same modes; None where that has not all that `link` asks for."""
+    stress = _stresses(body, link)
+    if stress is None or (link.stress.surface and body.surface_stress is None):
+        return None
+    return replace(
+        body,
+        name=link.name,
+        damping_ratio=damping_ratio(link, np.sqrt(np.diag(body.stiffness))),
+        stress=stress,
+        surface_stress=body.surface_stress if link.stress.surface else None,
+        input_hash=input_hash(link),
+    )
+
+
+def _stresses(body: ModalBody, link: Link) -> dict[str, StressPoint] | None:
+    """Of a beam they follow from its stations; of a solid, which needs its mesh for them, those there are."""
+    if not link.stress.points:
+        return {}
+    if isinstance(link, BeamLink):
+        from .beam_stress import beam_stresses  # loads SciPy
+
+        return beam_stresses(link, body.stations, np.diag(body.stiffness), lumps(link.interface, body.interfaces))
+    known = {tuple(point.position): point for point in body.stress.values()}
+    if not known.keys() >= set(link.stress.points.values()):
+        return None
+    return {name: known[position] for name, position in link.stress.points.items()}

@@ -1,0 +1,91 @@
+"""Meshes that gmsh made, kept in the user's cache: a link that changes in anything but its shape is not meshed again.
+
+An entry is named by the content of the keys that define the mesh, the part's file among them. NumPy only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zipfile
+from collections.abc import Sequence
+from contextlib import suppress
+from io import BytesIO
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from platformdirs import user_cache_path
+
+from ..errors import SolveError
+from ..files import write_atomically
+from .cells import CELLS, CellName
+from .part_mesh import PartMesh
+from .records import InterfaceRecord, SolidGeometry, SolidMeshRecord, SurfacePatches
+
+# To be raised whenever the same keys make another mesh.
+MESH_VERSION = 1
+
+_ARRAYS = ("points", "cells", "cell_tag", "facets", "facet_tag")
+_NAMES = ("regions", "faces")
+_WITHOUT_INFLUENCE = {"coupling", "mass", "inertia"}  # of an interface on the mesh
+
+
+def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
+    """The keys of `[geometry]`, the content of a part's file in place of its name."""
+    record = geometry.model_dump(mode="json")
+    if geometry.file is not None:
+        record["file"] = hashlib.sha256(geometry.file.read_bytes()).hexdigest()
+    return record
+
+
+def kept_path(
+    geometry: SolidGeometry,
+    record: SolidMeshRecord,
+    interfaces: Sequence[InterfaceRecord],
+    patches: SurfacePatches | None,
+) -> Path:
+    """Where in the cache the mesh of a part is, or would be."""
+    content = {
+        "version": MESH_VERSION,
+        "geometry": geometry_content(geometry),
+        "suffix": geometry.file.suffix.lower() if geometry.file is not None else "",
+        "mesh": record.model_dump(mode="json"),
+        "interfaces": [item.model_dump(mode="json", exclude=_WITHOUT_INFLUENCE) for item in interfaces],
+        "patches": patches and patches.model_dump(mode="json"),
+    }
+    digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return user_cache_path("ffrobot") / "meshes" / f"{digest}.npz"
+
+
+def kept_part(path: Path) -> PartMesh | None:
+    """The mesh kept at `path`; None where there is none, or it is damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if str(file["cell"]) not in CELLS:
+                return None
+            names = {key: dict(zip(map(str, file[key]), map(int, file[f"{key}_tag"]), strict=True)) for key in _NAMES}
+            return PartMesh(
+                cell=cast(CellName, str(file["cell"])),
+                degree=int(file["degree"]),
+                regions=names["regions"],
+                faces=names["faces"],
+                **{key: file[key] for key in _ARRAYS},
+            )
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def keep_part(path: Path, part: PartMesh) -> None:
+    """Keep a mesh at `path`; a cache that cannot be written does no harm."""
+    arrays: dict[str, Any] = {key: getattr(part, key) for key in _ARRAYS} | {"cell": part.cell, "degree": part.degree}
+    for key in _NAMES:
+        tags = getattr(part, key)
+        arrays |= {
+            key: np.array(list(tags), dtype=np.str_),
+            f"{key}_tag": np.array(list(tags.values()), dtype=np.int32),
+        }
+    image = BytesIO()
+    np.savez(image, **arrays)
+    with suppress(SolveError):
+        write_atomically(path, image.getvalue(), "mesh", make_folder=True)

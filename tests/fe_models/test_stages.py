@@ -1,0 +1,161 @@
+"""Of stage 1 only that part is done again which depends on what changed."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from ffrobot.fe_models.link import cached_modal_body, make_link
+from ffrobot.fe_models.link_file import read_link
+from ffrobot.fe_models.stages import input_hash, modes_hash
+from ffrobot.mesh.kept_parts import kept_part, kept_path
+
+FINITE_ELEMENTS = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl")
+
+SOLID = """
+name = "bar"
+[material]
+youngs_modulus = 70e9
+poissons_ratio = 0.33
+density = 2700.0
+[geometry]
+kind = "solid"
+length = 0.2
+section = { shape = "circle", diameter = 0.02 }
+[mesh]
+size = 0.02
+order = 1
+[reference]
+condition = "cantilever"
+[modes]
+count = 3
+[damping]
+ratio = 0.01
+[stress]
+points = { top = [0.1, 0.005, 0.0], root = [0.01, 0.0, 0.0] }
+"""
+
+
+@pytest.fixture
+def solid(tmp_path):
+    path = tmp_path / "bar.toml"
+    path.write_text(SOLID)
+
+    def change(old, new):
+        assert old in path.read_text()
+        path.write_text(path.read_text().replace(old, new))
+        return path
+
+    return path, change
+
+
+def told(path):
+    """What stage 1 says it does, and the outcome."""
+    lines = []
+    return lines, make_link(path, progress=lines.append)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"[reference]": "[stress]\npoints = { middle = [0.5, 0.004, 0.0] }\n[reference]"},
+        {'"link1"': '"arm"'},
+        {"[reference]": "[damping]\nrayleigh = [0.5, 1e-5]\n[reference]"},
+    ],
+    ids=["stress points", "name", "damping"],
+)
+def test_what_follows_from_the_modes_needs_no_eigenproblem(link_file, cache, change):
+    """Beams: the same numbers as from scratch, without any finite element library."""
+    make_link(link_file())
+    path = link_file(replace=change)
+    code = f"""
+import sys
+from pathlib import Path
+from ffrobot.fe_models.link import make_link
+outcome = make_link(Path({str(path)!r}))
+print(outcome.computed, outcome.reused, [m for m in {FINITE_ELEMENTS} if m in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "True modes []\n"
+    quick = path.with_suffix(".h5").read_bytes()
+    assert not make_link(path).computed
+    assert make_link(path, force=True).reused == ""
+    assert path.with_suffix(".h5").read_bytes() == quick
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"count = 10": "count = 11"}, {'"simply-supported"': '"cantilever"'}, {"density = 7850": "density = 7851"}],
+    ids=["count", "reference", "density"],
+)
+def test_modes_are_made_again_where_they_change(link_file, cache, change):
+    first = make_link(link_file())
+    again = make_link(link_file(replace=change))
+    assert (again.computed, again.reused) == (True, "")
+    assert again.body.modes_hash != first.body.modes_hash
+
+
+def test_the_cache_gives_modes_to_every_link_that_has_the_same(link_file, cache):
+    cached_modal_body(link_file())
+    other = cached_modal_body(link_file(name="link2"))
+    assert (other.computed, other.reused, other.body.name) == (True, "modes", "link2")
+    assert not cached_modal_body(link_file(name="link2")).computed
+
+
+def test_files_without_the_hash_of_their_modes_are_still_read(link_file, cache):
+    import h5py
+
+    path = link_file()
+    with h5py.File(make_link(path).path, "r+") as file:
+        del file.attrs["modes_hash"]
+    assert not make_link(path).computed
+    assert make_link(link_file(replace={'"link1"': '"arm"'}), path.with_suffix(".h5")).reused == ""
+
+
+def test_solids_keep_their_mesh_and_their_modes(solid, cache):
+    path, change = solid
+    lines, first = told(path)
+    assert "meshing" in lines
+    assert first.reused == ""
+    for old, new in (("count = 3", "count = 4"), ('"cantilever"', '"simply-supported"')):
+        lines, outcome = told(change(old, new))
+        assert "meshing" not in lines
+        assert "bar: solving for the modes" in lines
+        assert outcome.reused == "mesh"
+    before = outcome.body
+    lines, outcome = told(change("root = [", "low = ["))
+    assert lines == []
+    assert outcome.reused == "modes"
+    np.testing.assert_array_equal(outcome.body.stress["low"].stress, before.stress["root"].stress)
+    lines, outcome = told(change("0.1, 0.005", "0.11, 0.005"))  # the stress there is not known
+    assert "bar: solving for the modes" in lines
+    lines, outcome = told(change("size = 0.02", "size = 0.021"))
+    assert "meshing" in lines
+    lines = []
+    assert make_link(path, force=True, progress=lines.append).reused == ""
+    assert "meshing" in lines
+
+
+def test_a_kept_mesh_gives_the_same_modal_body_and_a_damaged_one_is_made_again(solid, cache):
+    path, change = solid
+    make_link(path)
+    link = read_link(change("count = 3", "count = 2"))
+    kept = kept_path(link.geometry, link.mesh, link.interface, link.surface_patch)
+    assert kept_part(kept).faces.keys() >= {"root", "tip"}
+    quick = told(path)[1].path.read_bytes()
+    kept.write_bytes(kept.read_bytes()[:999])
+    assert kept_part(kept) is None
+    path.with_suffix(".h5").unlink()
+    lines, outcome = told(path)
+    assert "meshing" in lines
+    assert kept_part(kept) is not None
+    assert outcome.path.read_bytes() == quick
+
+
+def test_hashes_of_solids_follow_their_part(solid):
+    path, change = solid
+    before = read_link(path)
+    after = read_link(change("ratio = 0.01", "ratio = 0.02"))
+    assert modes_hash(after) == modes_hash(before)
+    assert input_hash(after) != input_hash(before)

@@ -1,0 +1,69 @@
+"""Bodies with fewer modes: what they keep exactly, whatever is left out."""
+
+import numpy as np
+import pytest
+from links import arm, ritz_link
+
+from ffrobot.mbs.fewer_modes import interface_loads, loaded_points, with_fewer_modes
+from ffrobot.mbs.vibration import mass_matrix
+
+POINTS = ["root", "tip"]
+
+
+@pytest.fixture(params=["cantilever", "simply-supported"])
+def whole(request):
+    return ritz_link("link", request.param, modes=8, extra=1, damping_ratio=0.01, stiffening=True)
+
+
+@pytest.mark.parametrize("lowest", [0, 1, 3])
+def test_what_is_left_out_keeps_its_static_flexibility(whole, lowest):
+    def flexibility(body):
+        B_T = np.vstack([np.vstack([body.points[name].translation, body.points[name].rotation]) for name in POINTS]).T
+        return B_T.T @ (B_T / body.stiffness[:, None])
+
+    body = with_fewer_modes(whole, lowest, POINTS)
+    assert lowest < body.n_modes <= lowest + 2  # of a cantilever tip force and moment, of a supported beam two moments
+    np.testing.assert_allclose(flexibility(body), flexibility(whole), rtol=0, atol=1e-10 * flexibility(whole).max())
+    np.testing.assert_array_equal(body.stiffness[:lowest], whole.stiffness[:lowest])
+    assert np.all(np.diff(body.stiffness) > 0)
+
+
+def test_the_coordinates_are_orthonormal_and_uncoupled(whole):
+    body = with_fewer_modes(whole, 3, POINTS)
+    T = body.reduction.T
+    np.testing.assert_allclose(T.T @ T, np.eye(body.n_modes), atol=1e-12)
+    K = T.T @ np.diag(whole.stiffness) @ T
+    np.testing.assert_allclose(K, np.diag(body.stiffness), rtol=0, atol=1e-11 * body.stiffness[-1])
+    assert np.all(T[np.abs(T).argmax(axis=0), np.arange(body.n_modes)] > 0)  # the same sign on every machine
+
+
+def test_equations_are_those_of_the_body_restricted_to_fewer_shapes(whole):
+    body = with_fewer_modes(whole, 3, POINTS)
+    p = 1e-3 * np.random.default_rng(1).normal(size=body.n_modes)
+    T = np.zeros((3 + whole.n_modes, 3 + body.n_modes))
+    T[:3, :3], T[3:, 3:] = np.eye(3), body.reduction.T
+    q = np.concatenate([[0.3, -0.2, 0.7], p])
+    np.testing.assert_allclose(mass_matrix(body, q), T.T @ mass_matrix(whole, T @ q) @ T, atol=1e-12)
+    np.testing.assert_allclose(body.damping, body.reduction.T.T @ whole.damping @ body.reduction.T, atol=1e-12)
+    K_tip, K_of_all = (of.stiffening.K_points["tip"][0] for of in (body, whole))
+    np.testing.assert_allclose(p @ K_tip @ p, (T @ q)[3:] @ K_of_all @ (T @ q)[3:], rtol=1e-12)
+
+
+def test_modal_forces_of_loads_are_known_on_the_modes_left_out(whole):
+    body = with_fewer_modes(whole, 2, POINTS)
+    T, lift = body.reduction.T, body.reduction.lift
+    B_T = interface_loads(whole, POINTS)
+    np.testing.assert_allclose(lift @ T.T @ B_T, B_T, atol=1e-11)
+    np.testing.assert_allclose(T.T @ lift, np.eye(body.n_modes), atol=1e-11)
+
+
+def test_nothing_is_done_where_nothing_is_saved(whole):
+    assert with_fewer_modes(whole, 6, POINTS) is whole
+    assert with_fewer_modes(whole, 99, POINTS) is whole
+    assert with_fewer_modes(whole, 4, []).n_modes == 4
+
+
+def test_loads_count_where_something_acts():
+    scene = arm(load=[{"point": "link1.mid", "y": "1.0"}]).scene
+    assert loaded_points(scene, "link1") == ["root", "tip", "mid"]
+    assert loaded_points(scene, "link2") == ["root", "tip"]

@@ -1,0 +1,81 @@
+"""Closed loops of rods or flexible links, runs of them, and what they keep."""
+
+import numpy as np
+from links import arm, ritz_link
+from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
+from test_rigid_limit import rod
+
+from ffrobot.mbs.analyses import run_forward, run_pcid
+from ffrobot.mbs.mechanism_records import RigidBody
+from ffrobot.mbs.observation import energies
+from ffrobot.mbs.planar_body import from_rigid_body
+
+CRANK, ROD = 0.2, 0.5
+
+
+def inverse(model, **keys):
+    return run_pcid(model, pcid(**keys), False, always)
+
+
+def free_run(model, **keys):
+    return run_forward(model, forward(**keys), None, {}, always)
+
+
+def pendulum(links=None, **keys):
+    """The two-link arm without motors."""
+    return arm(links, trajectory=[], initial={"angles": {"link1": -1.2, "link2": -1.0}}, **keys)
+
+
+def reaching(x, y="0", angles=(-0.7, 0.7), **keys):
+    """The two-link arm with its tip at x(t), y(t); stretched at a distance of 2."""
+    initial = {"angles": dict(zip(("link1", "link2"), angles, strict=True))}
+    return arm(trajectory=[{"name": "tip", "point": "link2.tip", "x": x, "y": y}], initial=initial, **keys)
+
+
+def slider_crank(trajectory=None, *, flexible=True, angle=0.9, **initial):
+    """Crank and rod in one line at x = 0.7 and 0.3; `trajectory` drives slider or crank."""
+    joints = [
+        revolute("O", "ground", "crank.root", motor=True),
+        revolute("A", "crank.tip", "rod.root"),
+        revolute("B", "rod.tip", "slider.pin"),
+        {"name": "rail", "type": "prismatic", "between": ("ground", "slider.pin"), "axis": (1.0, 0.0)},
+    ]
+    slider = from_rigid_body("slider", RigidBody(mass=0.4, inertia=0.01, center=(0, 0), points={"pin": (0, 0)}))
+    flexible_rod = ritz_link("rod", "simply-supported", ROD, 1.5, damping_ratio=0.01)
+    bodies = [rod("crank", CRANK, 1.0), flexible_rod if flexible else rod("rod", ROD, 1.5), slider]
+    angles = {"crank": angle, "rod": -np.arcsin(CRANK * np.sin(angle) / ROD)}
+    paths = [] if trajectory is None else [trajectory]
+    return make_model(bodies, joint=joints, trajectory=paths, initial={"angles": angles, **initial})
+
+
+def through_dead_centre(speed):
+    """The slider's way for a crank that turns evenly, from 0.9 rad through 0."""
+    phi = f"(0.9-{speed}*t)"
+    return {"name": "slider", "point": "slider.pin", "x": f"{CRANK}*cos{phi}+sqrt({ROD**2}-{CRANK**2}*sin{phi}**2)"}
+
+
+def parallelogram(cranks=2, *, flexible=True, angle=0.9, trajectory=()):
+    """Cranks of length 1 side by side under one coupler: two move freely, a third fits only as long as the others."""
+    names = ("left", "right", "mid")[:cranks]
+    feet = {"left": (0.0, 0.0), "right": (1.0, 0.0), "mid": (0.5, 0.0)}
+    heads = {"left": "top.root", "right": "top.tip", "mid": "top.mid"}
+    make = (lambda name: ritz_link(name, "simply-supported")) if flexible else (lambda name: rod(name, 1.0, 1.0))
+    joints = [revolute(f"{name} foot", "ground", f"{name}.root", at=feet[name]) for name in names]
+    joints += [revolute(f"{name} head", f"{name}.tip", heads[name]) for name in names]
+    angles = dict.fromkeys(names, angle) | {"top": 0.0}
+    bodies = [make(name) for name in (*names, "top")]
+    return make_model(bodies, joint=joints, trajectory=trajectory, initial={"angles": angles})
+
+
+def energy_drift(outcome):
+    """Largest change of total energy, relative to the swing of the kinetic energy."""
+    parts = energies(outcome)
+    total = parts["kinetic"] + parts["strain"] + parts["gravitational"]
+    return np.abs(total - total[0]).max() / np.ptp(parts["kinetic"])
+
+
+def momentum_drift(outcome):
+    """Largest change of linear or angular momentum, relative to the largest."""
+    mechanism = oracle_of(outcome.assembly)
+    momentum = np.array([mechanism.momentum(q, v) for q, v in zip(outcome.q, outcome.v, strict=True)])
+    return np.abs(momentum - momentum[0]).max() / np.abs(momentum).max()

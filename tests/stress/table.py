@@ -1,0 +1,74 @@
+"""The table of what was tried, the limit found and how failure is reported: rows in a file, and the page of them."""
+
+import math
+from pathlib import Path
+
+ROWS = Path(__file__).with_name("table.json")
+PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
+
+SAME = 10.0  # factor within which numbers of another machine count as the same
+ROUNDING = 1e-13
+
+HEAD = """# Stability
+
+Where the solver was pushed until it broke: what was tried, what was found, how it ends. `tests/stress` runs every row
+and compares; lengths in m, times in s. The page is written by the tests:
+
+    pytest tests/stress                        what every change is tested with
+    pytest tests/stress --long                 the rows marked with a star as well, some minutes
+    pytest tests/stress --long --write-table   writes this page from what was found
+
+Units of length, mass and time are the user's: nothing is compared with a meter, a kilogram or a second. A run that does
+not reach its end keeps its results up to there; the attributes `status` and `cause` of the results file say how and
+why it ended, as does the message.
+"""
+
+
+class Table:
+    """Rows by what was tried."""
+
+    current = None
+
+    def __init__(self, rows):
+        self.rows = rows
+        self.recorded = set()
+        Table.current = self
+
+    def record(self, group, tried, found, reported, measured, *, is_long, write):
+        row = {"group": group, "found": found, "reported": reported, "long": is_long}
+        row["measured"] = {key: float(f"{float(value):.2g}") for key, value in measured.items()}
+        self.recorded.add(tried)
+        if write:
+            self.rows[tried] = row
+            return
+        known = self.rows.get(tried)
+        assert known is not None, f"not in {ROWS.name}: {tried}; pytest tests/stress --write-table"
+        assert row | {"measured": {}} == known | {"measured": {}}
+        for key, value in row["measured"].items():
+            assert same(value, known["measured"][key]), (
+                f"{tried}: {key}: {value}, in the table {known['measured'][key]}"
+            )
+
+
+def same(one, other):
+    if max(abs(one), abs(other)) <= ROUNDING:
+        return True
+    return one * other > 0 and abs(math.log(one / other)) < math.log(SAME)
+
+
+def number(value):
+    if value == 0 or 1e-3 <= abs(value) < 1e6:
+        return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
+    return f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")
+
+
+def render(rows):
+    groups = dict.fromkeys(row["group"] for row in rows.values())
+    page = [HEAD]
+    for group in sorted(groups):
+        page += [f"\n## {group}\n", "| tried | found | how it ends |", "|---|---|---|"]
+        for tried, row in sorted(rows.items()):
+            if row["group"] == group:
+                found = row["found"].format(**{key: number(value) for key, value in row["measured"].items()})
+                page.append(f"| {tried}{' *' if row['long'] else ''} | {found} | {row['reported']} |")
+    return "\n".join(page) + "\n"

@@ -1,0 +1,114 @@
+"""Scenes at random: what holds for every mechanism holds for each of them."""
+
+import numpy as np
+import zoo
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from links import arm, quintic, ritz_link
+from mechanisms import always, assemble, forward, oracle_of, pcid, random_state, relative
+from test_forward import FULL
+
+from ffrobot.mbs.analyses import run_forward, run_pcid
+
+GROUP = "Random scenes"
+SCENES = 40
+random_scenes = settings(
+    max_examples=SCENES, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+)
+T = 0.37
+
+
+@st.composite
+def systems(draw):
+    """Any mechanism of the zoo with bodies, state and gravity of its own, and the size of its deformation."""
+    name = draw(st.sampled_from(sorted(zoo.ALL)))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    gravity = tuple(draw(st.lists(st.floats(-20, 20), min_size=2, max_size=2)))
+    assembly = assemble(zoo.ALL[name](rng, gravity=gravity))
+    q, v = random_state(rng, assembly.system.coordinates, modal=draw(st.sampled_from([1e-6, 0.01, 0.1])))
+    return assembly, q, v * draw(st.sampled_from([0.0, 1.0, 30.0]))
+
+
+@random_scenes
+@given(systems())
+def test_accelerations_are_those_of_the_equations(system):
+    """Against the augmented system M q̈ + C_qᵀ λ = Q, C_q q̈ = γ, by its residual: conditioning is the scene's."""
+    assembly, q, v = system
+    a, lambda_ = assembly.system.evaluate(T, q, v)
+    oracle = oracle_of(assembly)
+    _, _, C_q = assembly.system.constraints(T, q, v)
+    M, Q = oracle.mass_matrix(q), oracle.forces(T, q, v)
+    size = max(np.abs(M @ a).max(), np.abs(C_q.T @ lambda_).max(initial=0.0), np.abs(Q).max())
+    assert np.abs(M @ a + C_q.T @ lambda_ - Q).max() < 1e-10 * size
+
+
+@random_scenes
+@given(systems())
+def test_jacobians_are_derivatives(system):
+    """C_q against central differences of C."""
+    assembly, q, v = system
+    core, h = assembly.system, 1e-5
+    _, _, C_q = core.constraints(T, q, v)
+    if not len(C_q):
+        return
+    columns = [
+        (core.constraints(T, q + h * e, v)[0] - core.constraints(T, q - h * e, v)[0]) / (2 * h) for e in np.eye(len(q))
+    ]
+    assert relative(np.array(columns).T, C_q) < 1e-8
+
+
+@random_scenes
+@given(systems())
+def test_power_is_the_rate_of_energy(system):
+    """d(energy)/dt along the motion = power of loads and constraint forces − dissipation, at any state.
+
+    By central differences along q + v s + a s²/2; forces and rows from the readable equations.
+    """
+    assembly, q, v = system
+    a, lambda_ = assembly.system.evaluate(T, q, v)
+    oracle, h = oracle_of(assembly), 1e-6 / max(1.0, np.abs(v).max(), np.abs(a).max())
+
+    def energy(s):
+        parts = assembly.system.energies((q + s * v + s**2 / 2 * a)[None], (v + s * a)[None])[0]
+        return parts[:3].sum(), np.abs(parts[:3]).sum(), parts[3]
+
+    rate = (energy(h)[0] - energy(-h)[0]) / (2 * h)
+    _, _, C_q = assembly.system.constraints(T, q, v)
+    power = -lambda_ @ (C_q @ v) - energy(0.0)[2]
+    power += sum(oracle.row(row, q, v).rate * size(T)[0] for row, size in assembly.model.loads)
+    power += sum(v[oracle.columns[m.body]][3:] @ m.vector * m.size(T)[0] for m in assembly.model.modal_loads)
+    terms = np.abs(v) @ np.abs(oracle.mass_matrix(q) @ a) + abs(power)
+    rounding = 1e-15 * energy(0.0)[1] / h
+    assert abs(rate - power) <= 1e-5 * terms + rounding
+
+
+@settings(random_scenes, max_examples=6)
+@given(st.integers(0, 2**32 - 1))
+def test_forward_follows_inverse(seed):
+    """PCID → forward with all of the actuation: round trip, on arms of random links and ways."""
+    rng = np.random.default_rng(seed)
+    links = [
+        ritz_link(
+            name, condition, rng.uniform(0.5, 2), rng.uniform(0.3, 3), 10 ** rng.uniform(1.5, 3), damping_ratio=0.01
+        )
+        for name, condition in (("link1", "simply-supported"), ("link2", "cantilever"))
+    ]
+    first, second = rng.uniform(-1, 1), rng.uniform(0.5, 2)
+    angles = {"link1": first, "link2": first + second}
+    tip = sum(link.length * np.exp(1j * angle) for link, angle in zip(links, angles.values(), strict=True))
+    end = tip * (1 - 0.2 * rng.uniform(0, 1)) * np.exp(0.3j * rng.standard_normal())
+    path = {"name": "tip", "point": "link2.tip", "x": quintic(tip.real, end.real), "y": quintic(tip.imag, end.imag)}
+    model = arm(links, trajectory=[path], initial={"angles": angles, "state": "static"})
+    inverse = run_pcid(model, pcid(tolerance=1e-6), True, always)
+    replay = run_forward(model, forward(tolerance=1e-6, actuation="inverse", apply="joints+pzt"), inverse, FULL, always)
+    inverse.check_completed()
+    replay.check_completed()
+    assert relative(replay.q, inverse.q) < 1e-6
+
+
+def test_they_are_in_the_table(record):
+    record(
+        GROUP,
+        f"{SCENES} random mechanisms of the zoo each: equations of motion, Jacobians, power; 6 arms: PCID → forward",
+        "residuals below 1e-10, Jacobians against differences 1e-8, power 1e-5, round trip 1e-6",
+    )

@@ -1,0 +1,168 @@
+"""What a scene does not need is not computed, not imported, not stored, and the summary says so."""
+
+import subprocess
+import sys
+from io import BytesIO
+
+import h5py
+import numpy as np
+import pytest
+
+from ffrobot.fe_models.link import make_link
+from ffrobot.mbs import _core, fcid
+from ffrobot.mbs.model import Assembly
+from ffrobot.mbs.planar_body import core_arguments, vanishing_terms
+from ffrobot.mbs.scene_file import make_scene
+from ffrobot.results import results_image
+from ffrobot.solution import prepare, solve
+
+LINK = """
+name = "{name}"
+[material]
+youngs_modulus = 70e9
+poissons_ratio = 0.3
+density = 2700.0
+[geometry]
+kind = "{kind}"
+length = 0.5
+section = {{ shape = "rectangle", height = 0.01, width = 0.014 }}
+[mesh]
+{mesh}
+[reference]
+condition = "cantilever"
+[modes]
+count = {count}
+family = "{family}"
+"""
+STICK = {"mass": 0.4, "inertia": 0.01, "center": [0.25, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.5, 0.0]}}
+FAR = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl", "matplotlib", "plotly", "pandas", "sphinx")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Beams with modes in all directions and with bending alone, and a solid."""
+    folder = tmp_path_factory.mktemp("links")
+    beam, solid = "elements = 12", 'cell = "hexahedron"\norder = 1\ndivisions = [12, 2, 2]'
+    for name, kind, mesh, family, count in (
+        ("all", "beam", beam, "all", 14),
+        ("bending", "beam", beam, "in-plane-bending", 8),
+        ("solid", "solid", solid, "in-plane-bending", 8),
+    ):
+        path = folder / f"{name}.toml"
+        path.write_text(LINK.format(name=name, kind=kind, mesh=mesh, family=family, count=count))
+        make_link(path)
+    return folder
+
+
+def arm(folder, link, **keys):
+    """A rigid stick, and a link at its end whose tip goes from rest to rest."""
+    path = {"name": "path", "point": "arm.tip", "x": "0.7-0.1*(10*t**3-15*t**4+6*t**5)", "y": "0.5"}
+    tables = {
+        "name": "arm",
+        "gravity": [0.0, -9.81],
+        "body": [{"name": "stick", "rigid": STICK}, {"name": "arm", "link": f"{link}.toml"}],
+        "joint": [
+            {"name": "O", "type": "revolute", "between": ["ground", "stick.root"]},
+            {"name": "A", "type": "revolute", "between": ["stick.tip", "arm.root"]},
+        ],
+        "initial": {"state": "static", "angles": {"stick": 0.1, "arm": 1.2}},
+        "trajectory": [path],
+        "analysis": [{"name": "run", "kind": "pcid", "end": 0.1, "output_step": 0.01, "tolerance": 1e-4}],
+    }
+    return make_scene(folder=folder, **(tables | keys))
+
+
+def test_planar_scenes_have_no_coordinates_out_of_their_plane(folder):
+    """Two bodies in (R, θ) and the modes that move in the plane; the others are named."""
+    solution = solve(arm(folder, "all"))
+    families = solution.bodies["arm"].modal.family
+    in_plane = sum(family in ("in-plane-bending", "axial") for family in families)
+    assert families.count("in-plane-bending") < in_plane < len(families) == 14
+    assert solution.outcomes["run"].q.shape[1] == 3 + 3 + in_plane
+    line = next(line for line in solution.skipped if "do not move in the plane" in line)
+    assert line.startswith(f"arm: {14 - in_plane} of 14 modes")
+    assert f"{families.count('out-of-plane-bending')} out-of-plane-bending" in line
+    assert "coordinates out of the plane" in solution.skipped
+    with h5py.File(BytesIO(results_image(solution))) as file:
+        assert file["run/bodies/arm/modal"].shape == (11, in_plane)
+        assert file["run/bodies/arm/modal_transform"].shape == (14, in_plane)
+
+
+def test_rigid_bodies_have_no_modal_blocks(folder):
+    solution = prepare(arm(folder, "bending"))
+    stick, flexible = solution.model.bodies
+    assert core_arguments(stick, [], [])["W"].shape == (3, 0)
+    assert Assembly(solution.model, solution.model.joints).system.coordinates == 3 + 3 + flexible.n_modes
+    assert "modal coordinates of stick, rigid" in solution.skipped
+
+
+def test_terms_that_vanish_are_not_multiplied(folder):
+    """Bending alone has S̃ = 0 and j = 0, axial modes beside it have not: the core gets no matrix for the former."""
+    bending, both = (prepare(arm(folder, link)) for link in ("bending", "all"))
+    n = both.model.bodies[1].n_modes
+    of_bending, of_both = (core_arguments(solution.model.bodies[1], [], []) for solution in (bending, both))
+    for term, symbol, shape in (("S_tilde", "S̃", (n, n)), ("j", "j", (n,))):
+        assert of_bending[term].size == 0
+        assert of_both[term].shape == shape
+        assert f"{symbol}, which is zero" in bending.skipped
+        assert f"{symbol}, which is zero" not in both.skipped
+    assert of_bending["damping"].size == of_bending["m_xy"].size == 0
+    assert vanishing_terms(bending.model.bodies[0]) == ()
+
+
+def test_algebraic_analyses_integrate_nothing(folder, monkeypatch):
+    def refuse(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(_core, "run", refuse)
+    assert fcid._core is _core
+    analysis = {"name": "stiff", "kind": "fcid", "shape": "static", "end": 0.1, "output_step": 0.01}
+    solution = solve(arm(folder, "bending", analysis=[analysis]))
+    outcome = solution.outcomes["stiff"]
+    assert outcome.steps == outcome.evaluations == 0
+    assert outcome.q.shape[0] == 11
+    assert np.abs(outcome.lambda_).max() > 1.0
+    assert "integration of stiff, algebraic" in solution.skipped
+
+
+def test_only_runs_that_are_replayed_are_recorded(folder):
+    run = {"kind": "pcid", "end": 0.02, "output_step": 0.01, "tolerance": 1e-4}
+    forward = {"name": "back", "kind": "forward", "actuation": "first", "apply": "joints"}
+    solution = solve(arm(folder, "bending", analysis=[run | {"name": "first"}, run | {"name": "second"}, forward]))
+    assert solution.outcomes["first"].recording is not None
+    assert solution.outcomes["second"].recording is None
+    assert not solution.stresses["first"]  # the modal body file has no modal stresses
+    assert not solution.voltages["first"]  # no patches
+
+
+def test_no_analysis_loads_finite_elements_or_plotting(folder):
+    """Every kind, links given as .toml and up to date, results written."""
+    analyses = [
+        {"name": "rest", "kind": "static"},
+        {"name": "stiff", "kind": "fcid", "shape": "static", "end": 0.02, "output_step": 0.01},
+        {"name": "run", "kind": "pcid", "end": 0.02, "output_step": 0.01, "tolerance": 1e-3},
+        {"name": "back", "kind": "forward", "actuation": "run", "apply": "joints"},
+    ]
+    body = [{"name": "stick", "rigid": STICK}, {"name": "arm", "link": "solid.toml", "modes": "auto"}]
+    (folder / "scene.toml").write_text(arm(folder, "solid", body=body, analysis=analyses).text)
+    code = f"""
+import sys
+sys.argv = ["ffrobot", "solve", {str(folder / "scene.toml")!r}]
+from ffrobot.cli import main
+main()
+print("loaded", [name for name in {FAR} if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "loaded []"
+    assert "arm: stage 1, up to date" in " ".join(done.stdout.split())
+
+
+def test_another_layout_of_patches_needs_nothing_of_stage_1(folder):
+    """The file is read as it is: neither computed nor written."""
+    patches = {"body": "arm", "length": 0.02, "width": 0.01, "thickness": 1e-3, "modulus": 63e9, "d31": 1.1e-10}
+    before = (folder / "bending.h5").stat().st_mtime_ns
+    for count in (9, 12):
+        solution = prepare(arm(folder, "bending", pzt=[patches | {"count": count}]))
+        assert not solution.bodies["arm"].computed
+        assert solution.bodies["arm"].path == folder / "bending.h5"
+    assert (folder / "bending.h5").stat().st_mtime_ns == before
