@@ -124,7 +124,7 @@ MotorsOnlyActuation::MotorsOnlyActuation(const System &driven, MotorsOnly servo,
     : ActuationSource(driven, std::move(is_motor), std::move(resolver)), system_(driven), servo_(std::move(servo)),
       shape_(std::move(shape)) {}
 
-void MotorsOnlyActuation::evaluate(double t) {
+void MotorsOnlyActuation::find(double t) {
   servo_.solve(t, shape_); // was found at all output times before; a failure in between shows as a refused step
   resolve();
 }

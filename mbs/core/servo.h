@@ -71,7 +71,7 @@ public:
   MotorsOnlyActuation(const System &driven, MotorsOnly servo, std::vector<ModalShape> shape, std::vector<bool> is_motor,
                       ActuationResolver resolver);
 
-  void evaluate(double t) override;
+  void find(double t) override;
   const System &system() const override { return system_; }
   const Workspace &workspace() const override { return servo_.motion().workspace(); }
   const Eigen::VectorXd &q() const override { return servo_.motion().q(); }
