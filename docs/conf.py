@@ -10,6 +10,7 @@ import ffrobot
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from benchmark_tables import write_benchmark_tables
 from key_tables import write_key_tables
 
 project = "ffrobot"
@@ -26,4 +27,9 @@ exclude_patterns = ["_build"]
 
 def setup(app: Any) -> None:  # noqa: ANN401 (Sphinx)
     """Write the pages that are generated, before Sphinx looks for pages."""
-    app.connect("builder-inited", lambda app: write_key_tables(Path(app.srcdir) / "reference"))
+    app.connect("builder-inited", lambda app: _write_pages(Path(app.srcdir)))
+
+
+def _write_pages(folder: Path) -> None:
+    write_key_tables(folder / "reference")
+    write_benchmark_tables(folder / "benchmarks", folder / "reference" / "measured.md")

@@ -12,6 +12,7 @@ from typing import Any
 
 import click
 
+from .bench.command import bench
 from .errors import FfrobotError
 from .logs import LOGGER, logging_options
 from .parallel import end_all, is_first, on_first
@@ -240,6 +241,9 @@ def schema(kind: str) -> None:
     from .schema import schema as schema_of
 
     click.echo(json.dumps(schema_of(kind), indent=2, ensure_ascii=False))
+
+
+cli.add_command(bench)
 
 
 def main() -> None:

@@ -205,6 +205,10 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
                 body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
                 for body, array in solution.patches.items()
             }
+        if analysis.kind == "linear":
+            solution.linear[analysis.name] = analyse(linear_models(outcome, solution.patches))
+        if analysis.placement is not None:
+            solution.placements[analysis.name] = _place(solution, analysis.placement, outcome)
         solution.seconds[analysis.name] = time.perf_counter() - started
         _log(outcome)
         if outcome.failed:
@@ -217,10 +221,6 @@ def _evaluate(solution: Solution) -> None:
     for name, outcome in solution.outcomes.items():
         started = time.perf_counter()
         _judge_actuation(solution, outcome)
-        if outcome.analysis.kind == "linear":
-            solution.linear[name] = analyse(linear_models(outcome, solution.patches))
-        if outcome.analysis.placement is not None:
-            solution.placements[name] = _place(solution, outcome.analysis.placement, outcome)
         solution.stresses[name] = _stresses(solution, outcome)
         solution.seconds[name] += time.perf_counter() - started
 

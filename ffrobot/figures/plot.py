@@ -57,8 +57,8 @@ def plot_modal_body(path: Path, folder: Path, formats: Sequence[str] = FORMATS) 
     body = read_modal_body(path)
     with style():
         return [
-            *_write(draw_mesh(body), folder, "mesh", formats),
-            *_write(draw_modes(body), folder, "modes", formats),
+            *write_figure(draw_mesh(body), folder, "mesh", formats),
+            *write_figure(draw_modes(body), folder, "modes", formats),
         ]
 
 
@@ -76,7 +76,7 @@ def plot_results(results_path: Path, folder: Path, formats: Sequence[str] = FORM
     with Results(results_path) as results, style():
         figures = load_figures(figure_file) if figure_file.is_file() else FigureFile(figure=standard_figures(results))
         for record in figures.figure:
-            written += _write(draw(record, results), folder, record.name, formats)
+            written += write_figure(draw(record, results), folder, record.name, formats)
     return written
 
 
@@ -98,7 +98,7 @@ def _check_formats(formats: Sequence[str]) -> None:
         raise InputError(f'format: expected one or several of {", ".join(METADATA)}, found "{",".join(formats)}"')
 
 
-def _write(picture: Figure, folder: Path, name: str, formats: Sequence[str]) -> list[Path]:
+def write_figure(picture: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
     """A picture in all formats."""
     paths = [folder / f"{name}.{extension}" for extension in formats]
     for path, extension in zip(paths, formats, strict=True):

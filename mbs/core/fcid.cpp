@@ -68,7 +68,7 @@ void FullyConstrained::update_jacobian() {
 
 // (R, theta) part of x += sign C_q,r^-1 rhs
 void FullyConstrained::move_frames(VectorXd &x, const VectorXd &rhs, double sign) {
-  const VectorXd step = gradients_.solve_transposed(rhs.head(static_cast<Index>(3 * system_.bodies.size())));
+  const VectorXd step = gradients_.solve_transposed(rhs.head(static_cast<Index>(system_.held)));
   for (std::size_t b = 0; b < system_.bodies.size(); ++b)
     x.segment<3>(system_.first_coordinate[b]) += sign * step.segment<3>(static_cast<Index>(3 * b));
 }

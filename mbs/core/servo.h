@@ -71,11 +71,13 @@ public:
   MotorsOnlyActuation(const System &driven, MotorsOnly servo, std::vector<ModalShape> shape, std::vector<bool> is_motor,
                       ActuationResolver resolver);
 
-  void find(double t) override;
   const System &system() const override { return system_; }
   const Workspace &workspace() const override { return servo_.motion().workspace(); }
   const Eigen::VectorXd &q() const override { return servo_.motion().q(); }
   const std::vector<Eigen::VectorXd> &shape_force() const override { return servo_.motion().shape_force(); }
+
+protected:
+  void find(double t) override;
 
 private:
   const System &system_;

@@ -62,8 +62,8 @@ struct System {
   // Derived from the above by finish()
   std::vector<Eigen::Index> first_coordinate; // of each body in q
   Eigen::Index coordinates = 0;
-  std::size_t held = 0;               // constraints that are no rotors
   double length = 0;                  // of the bodies, in whatever unit: what positions are compared with
+  std::size_t held = 0;               // constraints that are no rotors
   std::vector<Eigen::Index> envelope; // first column of each row of C M^-1 C^T
   struct Coupling {                   // constraint rows r >= s meet on a body at markers k and l
     int r, s, body, k, l;

@@ -8,23 +8,18 @@ In the ordinary test run it checks that both compute the same, once.
 """
 
 import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ffrobot.mbs import _core
+from ffrobot.bench.evaluation import evaluation_seconds
+from ffrobot.bench.hand_written import STEPS, TIME, HandWritten, general_state
 from ffrobot.mbs.analyses import run_pcid
 from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.model import Assembly
 from ffrobot.solution import prepare
 
 ROOT = Path(__file__).parents[2]
-SOURCE = Path(__file__).parent / "hand_written" / "two_link.cpp"
-STEPS = 30_000  # of the hand-written run: λ within 5e-5 of its peak
-T = 0.3
 
 
 @pytest.fixture(scope="module")
@@ -44,39 +39,7 @@ def case_folder(tmp_path_factory, ffrobot):
 @pytest.fixture(scope="module")
 def program(tmp_path_factory, two_link):
     """Runs the compiled program: lists of the numbers in each line it prints."""
-    folder = tmp_path_factory.mktemp("program")
-    binary, links = folder / "two_link", folder / "links.txt"
-    flags = ["-std=c++20", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", f"-I{ROOT / 'mbs'}"]
-    subprocess.run(["g++", *flags, "-o", binary, SOURCE], check=True)
-    links.write_text("\n".join(link_numbers(body) for body in two_link.bodies), encoding="utf-8")
-
-    def run(evaluations, steps):
-        done = subprocess.run([binary, links, str(evaluations), str(steps)], check=True, capture_output=True, text=True)
-        return [[float(number) for number in line.split()] for line in done.stdout.splitlines()]
-
-    return run
-
-
-def link_numbers(body):
-    """Mass, inertia, first moment, length, and the rows K, S̄_y, h, Φ_y of the tip."""
-    rows = [body.stiffness, body.S_bar[1], body.h, body.points["tip"].translation[1]]
-    numbers = [body.mass, body.inertia, body.first_moment[0], body.length, *np.concatenate(rows)]
-    return " ".join(repr(float(number)) for number in numbers)
-
-
-def general_state(model):
-    """The state at which the program times itself, on the constraints."""
-    assembly = Assembly(model, [*model.joints, *model.trajectories])
-    start = undeformed_state(assembly)
-    q, v, bend = start.q.copy(), np.zeros_like(start.v), 1e-4 / (1 + np.arange(20))
-    first, second = assembly.first
-    q[first + 3 : first + 13], q[second + 3 : second + 13] = bend[:10], bend[10:]
-    frames = assembly.rigid_coordinates
-    for _ in range(20):
-        C, C_dot, C_q = assembly.system.constraints(T, q, v)
-        q[frames] -= np.linalg.solve(C_q[:, frames], C)
-        v[frames] -= np.linalg.solve(C_q[:, frames], C_dot)
-    return assembly, q, v
+    return HandWritten(ROOT, two_link, tmp_path_factory.mktemp("program"))
 
 
 def tip_force(assembly, lambda_):
@@ -85,7 +48,7 @@ def tip_force(assembly, lambda_):
 
 def test_both_compute_the_same(two_link, program):
     assembly, q, v = general_state(two_link)
-    a, lambda_ = assembly.system.evaluate(T, q, v)
+    a, lambda_ = assembly.system.evaluate(TIME, q, v)
     _, (force_x, force_y, alpha, _) = program(1, 0)
     # the program takes displacements of 1e-12 m at supports for zero; forces amplify that (formulation.md, section 3)
     np.testing.assert_allclose(tip_force(assembly, lambda_), [force_x, force_y], rtol=1e-8)
@@ -93,12 +56,11 @@ def test_both_compute_the_same(two_link, program):
 
 
 def test_right_hand_side_ratio(benchmark, two_link, program):
-    assembly, q, v = general_state(two_link)
+    state = general_state(two_link)
     count = 20_000 if benchmark.enabled else 200
 
     def both():
-        general = timed(lambda: _core.time_evaluations(assembly.system, T, q, v, count)) / count
-        return general, program(count, 0)[0][0]
+        return evaluation_seconds(state, TIME, count), program.evaluation_seconds(count)
 
     rounds = 15 if benchmark.enabled else 1
     times = np.array([both() for _ in range(rounds)]).min(axis=0)
@@ -118,14 +80,6 @@ def test_pcid_ratio(benchmark, two_link, program):
     benchmark.pedantic(lambda: None, rounds=1)
     general = min(outcome.wall_seconds for outcome in outcomes)
     report(benchmark, "pcid", general, min(run[0][0] for run in hand_written))
-
-
-def timed(function):
-    import time
-
-    began = time.perf_counter()
-    function()
-    return time.perf_counter() - began
 
 
 def report(benchmark, what, general, hand_written):

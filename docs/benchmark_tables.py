@@ -1,0 +1,42 @@
+"""The page of what was measured, from the records that `ffrobot bench -o docs/benchmarks` wrote."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ffrobot.bench.record import as_text
+
+INTRODUCTION = """# What was measured
+
+Made from the records in `docs/benchmarks`; [Benchmarks](../benchmarks.md) says what the numbers mean and which command
+makes them. Seconds are those of the machine named beside them, and of how busy it was (processes that wanted to run).
+"""
+
+
+def write_benchmark_tables(folder: Path, page: Path) -> None:
+    """Write `page` with a section for every record (JSON) in `folder` and below."""
+    sections = [line for path in sorted(folder.rglob("*.json")) for line in _section(path, page)]
+    page.write_text("\n".join([INTRODUCTION, *(sections or ["No records yet."])]) + "\n", encoding="utf-8")
+
+
+def _section(path: Path, page: Path) -> Iterator[str]:
+    record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    machine = record["machine"]
+    yield from (f"## {record['title']}", "")
+    yield f"{machine['processor']}, {machine['cores']} cores, {machine['compiler']}; load {record['load']:.2g}."
+    if "verdict" in record:
+        yield from ("", f"`{json.dumps(record['verdict'])}`")
+    headings, lines = as_text(record["rows"], record["part"])
+    yield from ("", f"| {' | '.join(headings)} |", "|---" * len(headings) + "|")
+    yield from (f"| {' | '.join(line)} |" for line in lines)
+    yield ""
+    for picture in sorted(path.parent.glob("*.png")):
+        if picture.stem.startswith(_FIGURES[record["part"]]):
+            yield f"![{picture.stem}](../{picture.relative_to(page.parents[1]).as_posix()})"
+    yield ""
+
+
+_FIGURES = {"work-precision": "work_precision", "axes": "error_", "growth": "growth", "aims": "-", "peer": "-"}

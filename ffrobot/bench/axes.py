@@ -1,0 +1,96 @@
+"""Where the error of a scene comes from: mesh, number of modes, time integration; each measured, and all together."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from ..errors import FfrobotError
+from ..mbs.analysis_records import TIGHTEST_TOLERANCE, Analysis
+from ..mbs.scene_records import Scene
+from ..solution import Watcher
+from .errors import KINDS, errors
+from .links import elements_of, modes_of, refined
+from .measuring import Run, run, with_analysis
+from .precision import Row
+
+# Times the elements and the modes of the link files; the last of each stands for the exact solution.
+ELEMENTS, MODES = (0.5, 1.0, 2.0, 4.0), (0.5, 1.0, 1.5, 2.0)
+TIGHTER = 0.1  # than the scene's tolerance, where time integration must not be seen
+
+
+def measure_axes(scene: Scene, analysis: Analysis, budget: float, display: Watcher) -> list[Row]:
+    """Rows of errors along each axis; runs that fail, or take longer than `budget` (s), stay as rows without errors.
+
+    "mesh" compares with four times the elements, "modes" with twice the modes, on that mesh, "time" with a tenth of the
+    tolerance (time integration alone), "total" the scene as it is with all three: at most the sum of the others. What
+    the link files do not let change is left out: scenes of rigid or ready-made modal bodies have "time" alone.
+    """
+    tight = max(TIGHTEST_TOLERANCE, TIGHTER * analysis.tolerance)
+    rows: list[Row] = []
+    with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as name:
+        trial = _Trials(scene, analysis, budget, display, Path(name))
+        fine = ELEMENTS[-1] if trial(ELEMENTS[-1], 1.0, tight) is not None else 1.0
+        axes = {"mesh": [(f, 1.0) for f in ELEMENTS], "modes": [(fine, f) for f in MODES]}
+        for axis, factors in axes.items():
+            best = trial(*factors[-1], tight)
+            if best is not None:
+                rows += [trial.row(axis, *factor, tight, best) for factor in factors[:-1]]
+        rows.append(trial.row("time", 1.0, 1.0, analysis.tolerance, trial(1.0, 1.0, tight)))
+        everything = trial(fine, MODES[-1], tight)
+        if everything is not None:
+            rows.append(trial.row("total", 1.0, 1.0, analysis.tolerance, everything))
+    return rows
+
+
+class _Trials:
+    """Runs of one analysis with links refined; each combination once."""
+
+    def __init__(self, scene: Scene, analysis: Analysis, budget: float, display: Watcher, folder: Path) -> None:
+        self.scene, self.analysis, self.budget, self.display, self.folder = scene, analysis, budget, display, folder
+        self.done: dict[tuple[float, float, float], Run | str] = {}
+
+    def __call__(self, elements: float, modes: float, tolerance: float) -> Run | str | None:
+        """The run, why there is none, or None where the link files do not let elements or modes change."""
+        key = (elements, modes, tolerance)
+        if key not in self.done:
+            scene = self._scene(elements, modes)
+            if scene is None:
+                return None
+            self.display.stage(f"{elements:g} × elements, {modes:g} × modes, tolerance {tolerance:.0e}")
+            self.done[key] = self._run(scene, tolerance)
+        return self.done[key]
+
+    def row(self, axis: str, elements: float, modes: float, tolerance: float, best: Run | str | None) -> Row:
+        """The error of a combination against the run `best`."""
+        found, scene = self(elements, modes, tolerance), self._scene(elements, modes)
+        assert scene is not None
+        completed = isinstance(found, Run) and found.completed
+        error: dict[str, float] = {}
+        if completed and isinstance(best, Run) and isinstance(found, Run):
+            error = errors(found.histories, best.histories)
+        return {
+            "axis": axis,
+            "times": modes if axis == "modes" else elements,
+            "elements": elements_of(scene),
+            "modes": modes_of(scene),
+            "tolerance": tolerance,
+            "status": found.status if isinstance(found, Run) else "refused",
+            "against": best.status if isinstance(best, Run) else "refused",
+            "why": found if isinstance(found, str) else best if isinstance(best, str) else None,
+            "integrator": found.integrator if isinstance(found, Run) else None,
+            "seconds": found.seconds if isinstance(found, Run) else None,
+            **{f"error_{kind}": error.get(kind) for kind in KINDS},
+        }
+
+    def _scene(self, elements: float, modes: float) -> Scene | None:
+        if elements == modes == 1.0:
+            return self.scene
+        return refined(self.scene, elements, modes, self.folder)
+
+    def _run(self, scene: Scene, tolerance: float) -> Run | str:
+        name = self.analysis.name
+        try:
+            return run(with_analysis(scene, name, tolerance=tolerance), name, self.budget, self.display)
+        except FfrobotError as error:  # such as more modes than half the mesh has
+            return str(error).replace(f"{self.folder}/", "").splitlines()[0]

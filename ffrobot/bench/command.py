@@ -1,0 +1,92 @@
+"""The command line of `ffrobot bench`. Heavy imports happen inside, as in `cli`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from ..logs import logging_options
+from . import OF_A_SCENE, PARTS, PEER
+
+FILE = click.Path(path_type=Path)
+
+
+def _texts(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:
+    """The parts of a list with commas."""
+    return None if value is None else [part.strip() for part in value.split(",")]
+
+
+def _numbers(context: click.Context, parameter: click.Parameter, value: str | None) -> list[float] | None:
+    """Likewise, as numbers."""
+    try:
+        return None if value is None else [float(part) for part in value.split(",")]
+    except ValueError:
+        raise click.BadParameter(f'expected numbers with commas between them, found "{value}"') from None
+
+
+@click.command()
+@click.argument("scene_file", metavar="[SCENE.toml]", required=False, type=FILE)
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder [SCENE.bench beside the scene; ./bench].")
+@click.option("--analysis", metavar="NAME", help="Of the scene [the first that integrates].")
+@click.option("--integrators", metavar="A,B", callback=_texts, help="Which [all, and auto].")
+@click.option("--tolerances", metavar="T,T", callback=_numbers, help="Which [1e-2 … 1e-7].")
+@click.option("--repeat", metavar="N", type=click.IntRange(1), default=5, show_default=True, help="Repetitions.")
+@click.option(
+    "--budget",
+    metavar="S",
+    type=click.FloatRange(0.0, min_open=True),
+    default=20.0,
+    show_default=True,
+    help="Seconds that one run may take; longer ones stay in the tables without errors.",
+)
+@click.option(
+    "--part",
+    "parts",
+    multiple=True,
+    type=click.Choice([*PARTS, PEER]),
+    help="This part only; may be repeated [all but the peer].",
+)
+@click.option("--peer", type=click.Choice(["exudyn"]), help="Measure this program too, as part peer.")
+@click.option("--peer-python", metavar="PYTHON", type=FILE, help="Interpreter that has the peer [this one].")
+@click.option("--source", metavar="DIR", type=FILE, default=Path(), help="ffrobot's source tree [.].")
+@logging_options
+def bench(
+    scene_file: Path | None,
+    output: Path | None,
+    analysis: str | None,
+    integrators: list[str] | None,
+    tolerances: list[float] | None,
+    repeat: int,
+    budget: float,
+    parts: tuple[str, ...],
+    peer: str | None,
+    peer_python: Path | None,
+    source: Path,
+) -> None:
+    """Measure run time against error, and where the error comes from.
+
+    With a scene: one of its analyses with every integrator at every tolerance, against a reference that two integrators
+    agree on; then the error of its mesh, of its number of modes and of time integration. Without one, in ffrobot's
+    source tree: the same for the two cases of the paper, how time grows with modes, links and outputs, and ratios to
+    the two-link case written by hand. Tables as CSV and JSON, figures as PNG and PDF.
+    """
+    from ..progress import Display
+    from ..summary import summary_console
+    from .campaign import Campaign, Settings
+    from .precision import INTEGRATORS, TOLERANCES
+
+    if scene_file is not None and (peer or set(parts) - set(OF_A_SCENE)):
+        raise click.UsageError(f"of a scene, only the parts {' and '.join(OF_A_SCENE)} can be measured")
+    if scene_file is None and analysis is not None:
+        raise click.UsageError("--analysis goes with a scene")
+    settings = Settings(integrators or INTEGRATORS, tolerances or TOLERANCES, repeat, budget)
+    folder = output or (scene_file.with_suffix(".bench") if scene_file else Path("bench"))
+    with Display() as display:
+        campaign = Campaign(folder, settings, display, summary_console())
+        if scene_file is not None:
+            campaign.scene(scene_file, analysis, folder, parts or OF_A_SCENE)
+        else:
+            wanted = (*(parts or PARTS), *([PEER] if peer else []))
+            campaign.everything(source, wanted, peer_python or Path(sys.executable))

@@ -1,0 +1,81 @@
+"""The two-link case written by hand (tests/benchmarks/hand_written/two_link.cpp), compiled; needs the source tree."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, SolveError
+from ..mbs.initial_state import undeformed_state
+from ..mbs.model import Assembly, Model
+from ..mbs.planar_body import PlanarBody
+from .evaluation import State
+
+SOURCE = Path("tests/benchmarks/hand_written/two_link.cpp")
+FLAGS = ("-std=c++20", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")
+STEPS = 30_000  # of DOP853 over the second: λ within 5e-5 of its peak (core_notes.md, tests/benchmarks)
+TIME = 0.3  # s, at which both evaluate
+
+
+class HandWritten:
+    """The compiled program, with the numbers of the links of `model`.
+
+    Args:
+        repository: the source tree.
+        folder: for what is compiled.
+
+    Raises `InputError` where the source is not there, `SolveError` where it cannot be compiled.
+    """
+
+    def __init__(self, repository: Path, model: Model, folder: Path) -> None:
+        source = repository / SOURCE
+        if not source.is_file():
+            raise InputError(f"{repository}: source: expected ffrobot's source tree, found no {SOURCE} in it")
+        if shutil.which("g++") is None:
+            raise SolveError(f"{source}: needs the compiler g++, which is not installed")
+        self._binary, self._links = folder / "two_link", folder / "links.txt"
+        command: list[str | Path] = ["g++", *FLAGS, f"-I{repository / 'mbs'}", "-o", self._binary, source]
+        compiled = subprocess.run(command, capture_output=True, text=True, check=False)
+        if compiled.returncode:
+            raise SolveError(f"{source}: does not compile:\n{compiled.stderr}")
+        self._links.write_text("\n".join(link_numbers(body) for body in model.bodies), encoding="utf-8")
+
+    def __call__(self, evaluations: int, steps: int) -> list[list[float]]:
+        """Lines of numbers that it prints: its main function says which."""
+        command: list[str | Path] = [self._binary, self._links, str(evaluations), str(steps)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+        return [[float(number) for number in line.split()] for line in done.stdout.splitlines()]
+
+    def evaluation_seconds(self, evaluations: int) -> float:
+        """Of one evaluation."""
+        return self(evaluations, 0)[0][0]
+
+    def pcid_seconds(self) -> float:
+        """Of a second of inverse dynamics from the undeformed start."""
+        return self(1, STEPS)[2][0]
+
+
+def link_numbers(body: PlanarBody) -> str:
+    """Mass, inertia, first moment, length, and the rows K, S̄_y, h, Φ_y of the tip."""
+    rows = [body.stiffness, body.S_bar[1], body.h, body.points["tip"].translation[1]]
+    numbers = [body.mass, body.inertia, body.first_moment[0], body.length, *np.concatenate(rows)]
+    return " ".join(repr(float(number)) for number in numbers if number is not None)
+
+
+def general_state(model: Model) -> State:
+    """The state at which the program times itself, on the constraints: equations, q, v."""
+    assembly = Assembly(model, [*model.joints, *model.trajectories])
+    start = undeformed_state(assembly)
+    q, v = start.q.copy(), np.zeros_like(start.v)
+    bend = iter(1e-4 / (1 + np.arange(sum(body.n_modes for body in model.bodies))))
+    for first, body in zip(assembly.first, model.bodies, strict=True):
+        q[first + 3 : first + 3 + body.n_modes] = [next(bend) for _ in range(body.n_modes)]
+    frames = assembly.rigid_coordinates
+    for _ in range(20):
+        C, C_dot, C_q = assembly.system.constraints(TIME, q, v)
+        q[frames] -= np.linalg.solve(C_q[:, frames], C)
+        v[frames] -= np.linalg.solve(C_q[:, frames], C_dot)
+    return assembly, q, v

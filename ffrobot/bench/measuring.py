@@ -1,0 +1,130 @@
+"""One solve within a budget of time: what it took and what came out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ..errors import InputError
+from ..mbs.analysis_records import Analysis
+from ..mbs.scene_records import Scene
+from ..results import results_image
+from ..results_file import Results
+from ..solution import Watcher, solve
+from ..validation import did_you_mean, quoted
+from .errors import Array, histories
+
+INTEGRATED = ("pcid", "forward")
+UNLIMITED = 10**12  # steps: the budget ends a run
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run took and gave.
+
+    Attributes:
+        integrator: the one that ran; for "auto" the one chosen.
+        status: "completed", "over budget", or how the integration failed.
+        seconds: integration and outputs, of the analysis and of those whose actuation it takes.
+        histories: by kind of quantity and dataset; empty unless completed.
+        bodies: SHA-256 of the modal body file of each flexible body.
+    """
+
+    integrator: str
+    status: str
+    seconds: float
+    steps: int
+    rejected: int
+    evaluations: int
+    histories: Mapping[str, Mapping[str, Array]] = field(repr=False)
+    bodies: Mapping[str, str] = field(repr=False)
+
+    @property
+    def completed(self) -> bool:
+        """Whether it reached its end within the budget."""
+        return self.status == "completed"
+
+
+class Deadline(Watcher):
+    """Stops a solve when its analyses have run for `budget` seconds, and shows how far it is."""
+
+    def __init__(self, budget: float, display: Watcher) -> None:
+        self.budget, self.display = budget, display
+        self.began: float | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether the time is up; it counts from the first step on."""
+        return self.began is not None and time.perf_counter() - self.began > self.budget
+
+    def advance(self, t: float, end: float) -> bool:
+        """False when the time is up."""
+        self.began = self.began or time.perf_counter()
+        return self.display.advance(t, end) and not self.passed
+
+
+def find_analysis(scene: Scene, name: str | None) -> Analysis:
+    """The analysis of that name, or the first that integrates. Raises `InputError` where there is none."""
+    integrated = [analysis for analysis in scene.analysis if analysis.kind in INTEGRATED]
+    if not integrated:
+        kinds = quoted(sorted({analysis.kind for analysis in scene.analysis}))
+        raise InputError(
+            f"{scene.path}: analysis: expected one that integrates over time, pcid or forward, found {kinds}"
+        )
+    if name is None:
+        return integrated[0]
+    for analysis in scene.analysis:
+        if analysis.name != name:
+            continue
+        if analysis not in integrated:
+            raise InputError(
+                f'{scene.path}: analysis "{name}": expected one that integrates over time, pcid or forward, found'
+                f' kind = "{analysis.kind}"'
+            )
+        return analysis
+    names = [analysis.name for analysis in integrated]
+    raise InputError(
+        f'{scene.path}: analysis: expected one of {quoted(names)}, found "{name}"{did_you_mean(name, names)}'
+    )
+
+
+def with_analysis(scene: Scene, name: str, **changes: object) -> Scene:
+    """The scene with one analysis only, and the one whose actuation it takes; `changes` of keys concern both."""
+    kept: list[Analysis] = []
+    for analysis in reversed(scene.analysis):
+        if analysis.name == name or any(later.actuation == analysis.name for later in kept):
+            alike = changes if analysis.kind in INTEGRATED else {}
+            kept.append(analysis.model_copy(update={"max_steps": UNLIMITED, **alike}))
+    return scene.model_copy(update={"analysis": tuple(reversed(kept))})
+
+
+def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool = True) -> Run:
+    """Solve `scene`, which has the analysis `name` last, within `budget` (s). Histories only where `keep`.
+
+    Raises `InputError` for anything wrong with the scene, `SolveError` where no state is found, `KeyboardInterrupt`
+    after Ctrl-C.
+    """
+    deadline = Deadline(budget, display)
+    solution = solve(scene, deadline)
+    outcomes = list(solution.outcomes.values())
+    last = outcomes[-1]
+    status = last.status
+    if status == "interrupted":
+        if not deadline.passed:
+            raise KeyboardInterrupt
+        status = "over budget"
+    found: dict[str, dict[str, Array]] = {}
+    if keep and status == "completed":
+        with Results.from_image(results_image(solution), scene.path) as results:
+            found = histories(results, name)
+    return Run(
+        last.integrator.name,
+        status,
+        sum(outcome.wall_seconds for outcome in outcomes),
+        sum(outcome.steps for outcome in outcomes),
+        sum(outcome.rejected for outcome in outcomes),
+        sum(outcome.evaluations for outcome in outcomes),
+        found,
+        {name: body.file_hash for name, body in solution.bodies.items() if body.path},
+    )

@@ -1,0 +1,139 @@
+"""`ffrobot bench` on a scene of a user: tables, figures, errors that fall with the tolerance, refusals."""
+
+import csv
+import json
+import re
+
+import pytest
+
+from ffrobot import InputError
+from ffrobot.cli import cli
+
+LINK = """
+name = "arm"
+material = { youngs_modulus = 70e9, density = 2700.0 }
+geometry = { kind = "beam", length = 0.5, section = { shape = "rectangle", height = 0.01, width = 0.02 } }
+mesh = { elements = 4 }
+reference = { condition = "cantilever" }
+modes = { count = 2, family = "in-plane-bending" }
+"""
+SCENE = """
+name = "arm"
+gravity = [0.0, -9.81]
+body = [{ name = "arm", link = "arm.toml" }]
+joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"] }]
+trajectory = [{ name = "lift", point = "arm.tip", y = "0.1*sin(t)" }]
+pzt = [{ body = "arm", count = 2, length = 0.1, width = 0.02, thickness = 1e-3, modulus = 63e9, d31 = 110e-12 }]
+
+[[analysis]]
+name = "held"
+kind = "static"
+
+[[analysis]]
+name = "inverse"
+kind = "pcid"
+end = 0.02
+output_step = 0.001
+"""
+RUN = ("--tolerances", "1e-3,1e-6", "--integrators", "dopri5,dop853", "--repeat", "2")
+INTEGRATES = "expected one that integrates over time, pcid or forward, found"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bench")
+    (folder / "arm.toml").write_text(LINK, encoding="utf-8")
+    (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(ffrobot, folder):
+    run = ffrobot("bench", "scene.toml", *RUN, cwd=folder)
+    assert run.returncode == 0, run.stderr
+    return folder / "scene.bench"
+
+
+def read(path):
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def error(row, kind):
+    return float(row[f"error_{kind}"])
+
+
+def test_errors_fall_with_the_tolerance(done):
+    rows = read(done / "work_precision.csv")
+    assert [row["status"] for row in rows] == ["completed"] * 4
+    for loose, tight in zip(rows[::2], rows[1::2], strict=True):
+        assert (loose["integrator"], loose["tolerance"]) == (tight["integrator"], "0.001")
+        assert int(tight["evaluations"]) > int(loose["evaluations"])
+        for kind in ("displacement", "force", "moment", "voltage"):
+            assert error(tight, kind) < 1e-2 * error(loose, kind)
+            assert error(tight, kind) < 1e-5
+
+
+def test_record_says_on_what_and_against_what(done):
+    record = json.loads((done / "work_precision.json").read_text(encoding="utf-8"))
+    assert record["machine"]["cores"] >= 1
+    assert "-O3" in record["machine"]["compiler"]
+    assert record["reference"]["integrator"] != record["reference"]["other"]
+    assert max(record["reference"]["error"].values()) < 1e-6
+    assert len(record["inputs"]["bodies"]["arm"]) == 64
+    assert [row["repetitions"] for row in record["rows"]] == [2] * 4
+
+
+def test_sources_of_error_add_up(done):
+    rows = {(row["axis"], row["times"]): row for row in read(done / "axes.csv")}
+    own = [rows["mesh", "1"], rows["modes", "1"], rows["time", "1"]]
+    # frequencies are of order 4, the slopes of modes between nodes, on which patches work, of order 2 to 3
+    for kind, factor in {"displacement": 8, "force": 8, "voltage": 3}.items():
+        assert error(rows["mesh", "2"], kind) < error(rows["mesh", "1"], kind) / factor
+        assert error(rows["total", "1"], kind) < 1.05 * sum(error(row, kind) for row in own)
+    assert error(rows["modes", "1.5"], "displacement") < error(rows["modes", "1"], "displacement")
+
+
+def test_figures(done):
+    kinds = ("displacement", "force", "moment", "voltage")
+    for name in (*(f"work_precision_{kind}" for kind in kinds), "error_mesh", "error_modes"):
+        assert (done / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert (done / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_runs_over_budget_stay_in_the_table(ffrobot, folder):
+    run = ("--tolerances", "1e-6", "--integrators", "dop853,generalized-alpha", "--budget", "0.03")  # 40 000 steps
+    assert ffrobot("bench", "scene.toml", *run, "--part", "work-precision", "-o", "short", cwd=folder).returncode == 0
+    explicit, implicit = read(folder / "short" / "work_precision.csv")
+    assert (explicit["status"], explicit["repetitions"]) == ("completed", "5")
+    assert (implicit["status"], implicit["repetitions"], implicit["error_force"]) == ("over budget", "1", "")
+
+
+MISTAKES = {
+    "unknown analysis": (["--analysis", "inverze"], 'scene.toml: analysis: expected one of "inverse", found "inverze"'),
+    "analysis at rest": (["--analysis", "held"], f'scene.toml: analysis "held": {INTEGRATES} kind = "static"'),
+    "unknown integrator": (["--integrators", "dop583"], 'found "dop583" (did you mean "dop853"?)'),
+    "tolerance": (["--tolerances", "1e-3,2"], "--tolerances: expected numbers from 1e-10 to below 1, found 2"),
+    "output": (["-o", "arm.toml"], "arm.toml: output: expected a folder, found a file"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "named"), MISTAKES.values(), ids=MISTAKES)
+def test_refused(folder, monkeypatch, arguments, named):
+    monkeypatch.chdir(folder)
+    before = sorted(folder.rglob("*"))
+    with pytest.raises(InputError, match=re.escape(named)):
+        cli(["bench", "scene.toml", *arguments], standalone_mode=False)
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_nothing_to_integrate_is_refused(tmp_path, refused):
+    (tmp_path / "arm.toml").write_text(LINK, encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(SCENE[: SCENE.index('[[analysis]]\nname = "inverse"')], encoding="utf-8")
+    assert f'scene.toml: analysis: {INTEGRATES} "static"' in refused(tmp_path, "bench", "scene.toml")
+
+
+def test_the_paper_needs_the_source_tree(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="--source: expected ffrobot's source tree"):
+        cli(["bench"], standalone_mode=False)
