@@ -5,6 +5,7 @@ import pytest
 from links import ANGLES, TIP, arm, arm_links
 from mechanisms import always, assemble, pcid, relative
 
+from ffrobot.errors import SolveError
 from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import run_pcid
 from ffrobot.mbs.analysis_records import TIGHTEST_TOLERANCE
@@ -156,6 +157,15 @@ def test_a_run_ends_at_max_steps_and_says_so():
     assert outcome.status == "too many steps"
     assert outcome.steps + outcome.rejected == 100
     assert 0 < outcome.time[-1] < 1
+
+
+def test_generalized_alpha_says_that_a_tolerance_is_beyond_it():
+    """Fast from the start, forces small at first: steps of order 2 would have to be shorter than rounding lets them."""
+    path = {"name": "tip", "point": "link2.tip", "x": f"{TIP[0]!r}-0.12*sin(100*t)", "y": f"{TIP[1]!r}"}
+    model = arm(gravity=(0.0, 0.0), trajectory=[path])
+    analysis = pcid(end=0.2, tolerance=1e-8, integrator="generalized-alpha")
+    with pytest.raises(SolveError, match=r"1e-08 is below what generalized-alpha reaches here.*loosen the tolerance"):
+        run_pcid(model, analysis, False, always).check_completed()
 
 
 def test_a_run_stops_when_asked_to():
