@@ -21,9 +21,9 @@ METHODS = {
 
 # What the rule is made of, measured on the two-link case (26 coordinates; tests/benchmarks): step size times frequency
 # at which DOP853 is stable, and at which both resolve a vibration to a tolerance of 1e-4; time of a step of Radau IIA
-# in steps of DOP853, alone and where a replay of actuation is most of an evaluation; part of the tolerance below which a
-# vibration need not be resolved. DOPRI5 never wins by more than the clock scatters: undamped, its steps have to be five
-# times as short as those of DOP853 (it is stable up to 1.0), damped at most three times.
+# in steps of DOP853, alone and where a replay of actuation is most of an evaluation; part of the tolerance below which
+# a vibration need not be resolved. DOPRI5 never wins by more than clocks scatter: undamped, its steps have to be five
+# times as short as those of DOP853 (it is stable up to 1.0), damped nearly three times.
 STABLE = 4.8
 RESOLVED_DOP853, RESOLVED_RADAU = 1.25, 0.34
 COST_OF_RADAU, COST_OF_RADAU_STEERED = 2.4, 1.4

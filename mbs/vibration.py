@@ -85,9 +85,7 @@ def _block_diagonal(blocks: list[Array]) -> Array:
     return matrix
 
 
-def ringing(
-    assembly: Assembly, state: State, modes: Vibrations, steering: _core.Steering | None = None
-) -> Array:
+def ringing(assembly: Assembly, state: State, modes: Vibrations, steering: _core.Steering | None = None) -> Array:
     """Amplitude (n,) with which each mode rings from `state` on, in the force it moves most, relative to that force.
 
     A mode at rest follows its load and the links' static deflection under the prescribed motion; the velocity v, the
