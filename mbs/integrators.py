@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -21,13 +22,13 @@ METHODS = {
 
 # What the rule is made of, measured on the two-link case (26 coordinates; tests/benchmarks): step size times frequency
 # at which DOP853 is stable, and at which both resolve a vibration to a tolerance of 1e-4; time of a step of Radau IIA
-# in steps of DOP853, alone and where a replay of actuation is most of an evaluation; part of the tolerance below which
-# a vibration need not be resolved. DOPRI5 never wins by more than clocks scatter: undamped, its steps have to be five
-# times as short as those of DOP853 (it is stable up to 1.0), damped nearly three times.
+# in steps of DOP853, alone and where a replay of actuation is most of an evaluation; parts of the tolerance below which
+# both need not resolve a vibration, Radau since it damps it away. DOPRI5 never wins by more than clocks scatter:
+# undamped, its steps have to be five times as short as those of DOP853 (it is stable up to 1.0), damped nearly three.
 STABLE = 4.8
 RESOLVED_DOP853, RESOLVED_RADAU = 1.25, 0.34
 COST_OF_RADAU, COST_OF_RADAU_STEERED = 2.4, 1.4
-NEGLIGIBLE = 0.1
+NEGLIGIBLE_DOP853, NEGLIGIBLE_RADAU = 0.1, 0.6
 
 MOST_COORDINATES = 600  # beyond them the eigenproblem takes longer than many a run
 MANY_PERIODS = 1e5
@@ -66,11 +67,12 @@ def choose_integrator(
     if not len(modes.frequency):
         return Choice("dop853", "nothing vibrates")
     excited = ringing(assembly, start, modes, steering)
-    top, ringing_phase = modes.frequency[-1], _ringing_phase(modes.frequency, modes.damping_ratio, excited, analysis)
-    scale = analysis.tolerance / 1e-4
-    explicit = max(analysis.end * top / STABLE, ringing_phase / (RESOLVED_DOP853 * scale ** (1 / 8)))
-    implicit = max(len(analysis.times), ringing_phase / (RESOLVED_RADAU * scale ** (1 / 5)))
-    rings = excited > NEGLIGIBLE * analysis.tolerance
+    top, scale = modes.frequency[-1], analysis.tolerance / 1e-4
+    phase = partial(_ringing_phase, modes.frequency, modes.damping_ratio, excited, analysis.end)
+    explicit = phase(NEGLIGIBLE_DOP853 * analysis.tolerance) / (RESOLVED_DOP853 * scale ** (1 / 8))
+    implicit = phase(NEGLIGIBLE_RADAU * analysis.tolerance) / (RESOLVED_RADAU * scale ** (1 / 5))
+    explicit, implicit = max(analysis.end * top / STABLE, explicit), max(len(analysis.times), implicit)
+    rings = excited > analysis.tolerance
     felt = f"{modes.frequency[rings].max():.3g} rad/s" if rings.any() else "no frequency"
     reason = f"vibrations up to {top:.3g} rad/s, ringing above the tolerance up to {felt}"
     cost = COST_OF_RADAU if steering is None else COST_OF_RADAU_STEERED
@@ -87,13 +89,12 @@ def beyond_order(choice: Choice, analysis: Analysis) -> str:
     )
 
 
-def _ringing_phase(omega: Array, damping_ratio: Array, excited: Array, analysis: Analysis) -> float:
-    """∫ ω dt (rad) over the run, ω the highest frequency that still rings above the tolerance."""
+def _ringing_phase(omega: Array, damping_ratio: Array, excited: Array, end: float, threshold: float) -> float:
+    """∫ ω dt (rad) up to `end`, ω the highest frequency that still rings above the threshold."""
     phase, covered = 0.0, 0.0
-    threshold = NEGLIGIBLE * analysis.tolerance
     for i in np.flatnonzero(excited > threshold)[::-1]:
         decay = damping_ratio[i] * omega[i]
-        lasts = analysis.end if decay <= 0 else min(analysis.end, float(np.log(excited[i] / threshold)) / decay)
+        lasts = end if decay <= 0 else min(end, float(np.log(excited[i] / threshold)) / decay)
         phase += float(omega[i]) * max(0.0, lasts - covered)
         covered = max(covered, lasts)
     return phase
