@@ -18,7 +18,7 @@ constexpr double hopeless = 100;
 // What is an error once, not at every step, may take from a reserve, all of which is as much as the tolerance. A load
 // that jumps leaves an error in proportion to the step across it, more than that step's share of the tolerance however
 // short it is: steps that have become so much shorter than those before may take from the reserve. Vibrations below the
-// tolerance that a step damps away are gone after it: methods that do so may, and begin with the longest step there is.
+// tolerance that a step damps away are gone after it: methods that do so begin with the longest step there is, and may.
 constexpr double much_shorter = 1e-3, part_of_reserve = 0.25;
 
 // Size of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
@@ -43,6 +43,7 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
   IntegrationReport report;
   double t = times.front(), t_asked = t;
   double usual_step = 0, reserve = 1; // the largest of late; in terms of the tolerance
+  bool settles = method.damps();      // vibrations of the start
   double h = method.damps() ? end - t : std::min(system.initial_step(), end - t);
   const auto record = [&] {
     if (recording) {
@@ -100,12 +101,12 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     const double t_end = step == target - t ? target : t + step;
     constexpr double rounding = 2e-14; // what estimates see of it: shorter steps would not help
     const double regular = method.share(step / duration);
-    const bool once = method.damps() || step < much_shorter * usual_step;
+    const bool once = settles || step < much_shorter * usual_step;
     const double part = once ? std::max(regular, part_of_reserve * reserve) : regular;
     const double share = std::max(controls.tolerance * part, rounding);
     const double regular_share = std::max(controls.tolerance * regular, rounding);
     double size = NAN;
-    if (method.step(t, y.data(), step, method.damps() ? regular_share : share) && method.correct(t_end)) {
+    if (method.step(t, y.data(), step, settles ? regular_share : share) && method.correct(t_end)) {
       system.slope(t_end, method.end(), method.last_slope());
       const double damping = method.estimate(step, error);
       size = system.error_size(t_end, method.end(), error.data()) * damping / share;
@@ -117,10 +118,12 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     }
     ++report.steps;
     usual_step = std::max(step, 0.8 * usual_step);
-    if (part > regular && (!method.damps() || size * share > regular_share))
+    if (part > regular && (!settles || size * share > regular_share))
       reserve -= size * part;
-    if (method.damps())
+    if (settles) {
       size *= share / regular_share; // the steps after this one should do without the reserve
+      settles = size > 1;
+    }
     bool dense = false;
     for (; report.outputs < times.size() && times[report.outputs] <= t_end; ++report.outputs) {
       if (times[report.outputs] == t_end) {
