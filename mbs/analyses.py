@@ -14,7 +14,7 @@ from . import _core
 from .analysis_records import Analysis
 from .diagnosis import find_cause, lost_inertia
 from .initial_state import State, check_reach, undeformed_state
-from .integrators import METHODS, Choice, choose_integrator
+from .integrators import METHODS, Choice, beyond_order, choose_integrator
 from .model import ZERO, Array, Assembly, Model
 from .smoothness import check_smooth
 from .statics import static_equilibrium
@@ -133,7 +133,7 @@ def run_forward(
     assembly = Assembly(model, model.joints, [*((row, ZERO) for row in rows), *loads])
     steering = _core.Actuation(actuation_source(source), actuators)
     start = State(source.q[0].copy(), source.v[0].copy())  # bodies and their order are the same
-    return _integrate(assembly, analysis, start, steering, None, None, progress, source.integrator)
+    return _integrate(assembly, analysis, start, steering, None, None, progress)
 
 
 def as_long_as(source: Outcome, analysis: Analysis) -> Analysis:
@@ -179,12 +179,11 @@ def _integrate(
     resolver: _core.ActuationResolver | None,
     recording: _core.Recording | None,
     progress: Progress,
-    replayed: Choice | None = None,
 ) -> Outcome:
     if len(analysis.times) > 1 and (cause := lost_inertia(assembly, start.q)):
         raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
-    integrator = choose_integrator(assembly, analysis, start, replayed)
+    integrator = choose_integrator(assembly, analysis, start, steering)
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, steering, analysis.times.tolist(), start.q, start.v,
         analysis.tolerance, analysis.max_steps, METHODS[integrator.name], analysis.spectral_radius, resolver, progress,
@@ -194,6 +193,8 @@ def _integrate(
     reached, held, status = len(run.q), len(assembly.constraints), STATUS[run.status]
     failed = status not in ("completed", "interrupted")
     cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2))) if failed else ""
+    if status == "step underflow" and not cause:
+        cause = beyond_order(integrator, analysis)
     return Outcome(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers[:, :held],
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
