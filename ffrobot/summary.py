@@ -13,6 +13,7 @@ from rich.table import Table
 from .control_summary import LINEAR_COLUMNS, PLACEMENT_COLUMNS, linear_lines, linear_table, placement_table
 from .loop_results import HEADINGS, metrics_row
 from .mbs.analyses import Outcome
+from .mbs.compliant_joints import unresolved_gears
 from .mbs.fewer_modes import modes_kept
 from .mbs.geometric_stiffening import NOTABLE
 from .mbs.motors_only import describe_zeros, is_minimum_phase, path_error
@@ -58,6 +59,8 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
             notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
         if outcome.inversion is not None:
             notes.add_row("motors only", f"{name}: {_inversion(outcome, outcome.inversion)}")
+        for line in unresolved_gears(outcome.gears):
+            notes.add_row("warning", f"{name}: {line}")
     if solution.mode_choice is not None:
         notes.add_row("modes", _modes(solution, solution.mode_choice))
     for name, loop in solution.loops.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -12,13 +12,14 @@ import numpy as np
 from ..errors import SolveError
 from . import _core
 from .analysis_records import Analysis
+from .compliant_joints import GearMotion, check_applied, drive_sizes, with_compliance, with_rotors
 from .diagnosis import find_cause, lost_inertia
 from .initial_state import State, check_reach, undeformed_state
 from .integrators import METHODS, Choice, choose_integrator
 from .model import ZERO, Array, Assembly, Model
 from .smoothness import check_smooth
 from .statics import static_equilibrium
-from .steering import Equipment, actuation_source, applied_actuators
+from .steering import Equipment, actuation_source, applied_actuators, motor_limits
 
 if TYPE_CHECKING:
     from .stable_inversion import Inversion
@@ -73,6 +74,7 @@ class Outcome:
     shape: list[list[_core.TimeFunction]] | None = field(default=None, repr=False)  # prescribed p(t), FCID only
     shape_force: Array | None = None  # (T, modes of all bodies) −λ_p, the forces that hold the shape; FCID only
     inversion: Inversion | None = field(default=None, repr=False)  # motors-only alone
+    gears: Mapping[str, GearMotion] = field(default_factory=dict)  # by joint: inverse analyses with gears that give
 
     def coordinates(self, body: str) -> slice:
         """Columns of (R, θ, p) of a body in q, v and a."""
@@ -122,7 +124,11 @@ def run_forward(
     equipment: Equipment,
     progress: Progress,
 ) -> Outcome:
-    """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one."""
+    """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one.
+
+    Where gears give, motors turn them, with the moments at the outputs of `source` and splines between these.
+    """
+    model = with_compliance(model)
     if source is None:
         assembly = Assembly(model, model.joints, model.loads)
         return _integrate(assembly, analysis, initial_state(assembly), None, None, None, progress)
@@ -130,9 +136,15 @@ def run_forward(
     if source.inversion is not None:
         loads = source.inversion.servo.loads
     rows, actuators = applied_actuators(model, analysis, source, equipment)
-    assembly = Assembly(model, model.joints, [*((row, ZERO) for row in rows), *loads])
-    steering = _core.Actuation(actuation_source(source), actuators)
-    start = State(source.q[0].copy(), source.v[0].copy())  # bodies and their order are the same
+    sizes, moved = [ZERO] * len(rows), with_rotors(source, model)
+    if model.gears:
+        check_applied(model, analysis)
+        limits = motor_limits(model)
+        sizes = drive_sizes(source, limits if analysis.limits else np.full_like(limits, np.inf))
+        actuators = actuators[1:]  # without the motors
+    assembly = Assembly(model, model.joints, [*zip(rows, sizes, strict=True), *loads])
+    steering = _core.Actuation(actuation_source(source), actuators) if actuators else None
+    start = State(moved.q[0].copy(), moved.v[0].copy())  # bodies and their order are the same
     return _integrate(assembly, analysis, start, steering, None, None, progress, source.integrator)
 
 

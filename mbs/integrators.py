@@ -52,6 +52,8 @@ def choose_integrator(assembly: Assembly, analysis: Analysis, start: State, sour
         return Choice(analysis.integrator, "asked for")
     if len(analysis.times) == 1:
         return Choice("dop853", "nothing to integrate")
+    if assembly.model.gears:
+        return Choice("dop853", "springs in joints are not among the stiff forces of implicit integrators")
     if source is not None and source.name not in METHODS:
         return Choice("dop853", f"the actuation of {analysis.actuation} is solved anew at every stage")
     if source is not None:
