@@ -46,12 +46,15 @@ PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, 
   return body;
 }
 
-// (a, lambda) at one state
-std::tuple<VectorXd, VectorXd> evaluate_state(const System &system, double t, const VectorXd &q, const VectorXd &v) {
+// (a, lambda) at one state; steering may be null
+std::tuple<VectorXd, VectorXd> evaluate_state(const System &system, double t, const VectorXd &q, const VectorXd &v,
+                                              Steering *steering) {
   check_size("q", q.size(), system.coordinates);
   check_size("v", v.size(), system.coordinates);
   Workspace w(system);
   VectorXd a(system.coordinates);
+  if (steering)
+    steering->steer(t, w);
   accelerations(system, t, q.data(), v.data(), w, a.data());
   return {a, w.lambda.head(static_cast<Eigen::Index>(system.held))};
 }
@@ -126,6 +129,7 @@ MatrixXd energies(const System &system, const MatrixXd &q, const MatrixXd &v) {
     }
     const JointEnergy e = joint_energy(system, q_i.data(), v_i.data(), w);
     result(i, 0) += e.kinetic;
+    result(i, 1) += e.strain;
     result(i, 3) += e.dissipated_power;
   }
   return result;
@@ -215,6 +219,12 @@ void bind_system(nb::module_ &m) {
           },
           "row"_a, "viscous"_a, "coulomb"_a, "speed"_a)
       .def(
+          "add_spring",
+          [](System &s, const Row &motor, const Row &joint, double stiffness, double damping) {
+            s.springs.push_back({motor, joint, stiffness, damping});
+          },
+          "motor"_a, "joint"_a, "stiffness"_a, "damping"_a)
+      .def(
           "add_drive", [](System &s, const Row &row, const TimeFunction &f) { s.drives.push_back({row, f}); }, "row"_a,
           "size"_a)
       .def(
@@ -233,7 +243,7 @@ void bind_system(nb::module_ &m) {
       .def_ro("coordinates", &System::coordinates)
       .def_ro("length", &System::length)
       .def_ro("first_coordinate", &System::first_coordinate)
-      .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a,
+      .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a, "steering"_a = nb::none(),
            "Accelerations (coordinates,) and multipliers (constraints,).")
       .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q.")
       .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, coordinates).")
