@@ -67,8 +67,9 @@ def test_pages_need_no_network(site):
     """Scripts (MathJax, too), styles and pictures are part of the site."""
     for page in site.rglob("*.html"):
         text = page.read_text(encoding="utf-8")
-        needed = re.findall(r'<(?:script|img)\b[^>]*\bsrc="([^"]+)"|<link\b[^>]*rel="stylesheet"[^>]*href="([^"]+)"', text)
-        files = ["".join(found).partition("?")[0] for found in needed]
+        needed = re.findall(r'<(?:script|img)\b[^>]*\bsrc="([^"]+)"', text)
+        needed += re.findall(r'<link\b[^>]*rel="stylesheet"[^>]*href="([^"]+)"', text)
+        files = [name.partition("?")[0] for name in needed]
         missing = [name for name in files if not (page.parent / name).exists()]
         assert not missing, page.name
     assert 'src="_static/mathjax/' in (site / "theory.html").read_text(encoding="utf-8")
