@@ -76,7 +76,7 @@ def _check_count(size: float, metres: float, where: str) -> None:
         side = volume ** (1 / 3) * metres / size
         raise InputError(
             f"{where}: expected a mesh.size that fits the part, found {metres:.3g} m for the volume of a cube of"
-            f" {side:.3g} m: about {count:.2g} tetrahedra. Is it drawn in another unit (unit = \"mm\")?"
+            f' {side:.3g} m: about {count:.2g} tetrahedra. Is it drawn in another unit (unit = "mm")?'
         )
 
 
