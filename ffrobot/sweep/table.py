@@ -39,8 +39,7 @@ def print_table(
         shown = shown[:-1]
     table = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False)
     for header in ("run", *keys, "status", *shown):
-        side = "left" if header == "status" else "right"
-        table.add_column(_broken(header), justify=side, min_width=_width(header))
+        table.add_column(_broken(header), justify="left" if header == "status" else "right", min_width=_width(header))
     for row in rows:
         values = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in row.values]
         found = [f"{row.quantities[name]:.4g}" if name in row.quantities else "" for name in shown]
