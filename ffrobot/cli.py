@@ -23,13 +23,13 @@ FILE = click.Path(path_type=Path)
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="ffrobot")
 def cli() -> None:
-    r"""What motors and piezoelectric patches must do so that a flexible robot follows its path.
+    """What motors and piezoelectric patches must do so that a flexible robot follows its path.
 
     \b
     Stage 1:  ffrobot link  LINK.toml   finite elements → modal body file
     Stage 2:  ffrobot solve SCENE.toml  modal bodies → moments and voltages
     Then:     ffrobot info, ffrobot plot, ffrobot view, ffrobot report
-    """
+    """  # noqa: D301 (click wants the backspace itself)
 
 
 @cli.command()
@@ -208,7 +208,7 @@ def sweep(
     keep: bool,
     output: Path | None,
 ) -> None:
-    r"""Solve a scene many times with some of its keys varied; one table of all runs, failed ones too.
+    """Solve a scene many times with some of its keys varied; one table of all runs, failed ones too.
 
     \b
     --vary links.link1.geometry.section.height=0.01:0.03:9   a key of a body's link file, 9 values
@@ -218,7 +218,7 @@ def sweep(
 
     Entries of lists of tables go by their name or body. The same command takes up a sweep that was stopped. Runs go
     side by side with -j on one machine, and on several under mpirun, where the first process hands them out.
-    """
+    """  # noqa: D301 (click wants the backspace itself)
     from .progress import Display
     from .summary import summary_console
     from .sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep
@@ -239,12 +239,12 @@ def sweep(
 @cli.command()
 @click.argument("kind", type=click.Choice(["link", "scene"]))
 def schema(kind: str) -> None:
-    r"""Print the JSON schema of link or scene files, for editors.
+    """Print the JSON schema of link or scene files, for editors.
 
     \b
     ffrobot schema scene > scene.schema.json
     and, as the first line of a scene file:  #:schema ./scene.schema.json
-    """
+    """  # noqa: D301 (click wants the backspace itself)
     import json
 
     from .schema import schema as schema_of

@@ -26,6 +26,8 @@ from .validation import did_you_mean
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from .actuation.control.linear_model import LinearModel
+
 Array = NDArray[np.float64]
 
 COLUMN = re.compile(r"(?P<dataset>.*?)\[(?P<column>\d+)\]")
@@ -137,6 +139,12 @@ class Results:
         group = f"{analysis}/bodies/{body}"
         p, transform = self[f"{group}/modal"], f"{group}/modal_transform"
         return p @ self[transform].T if self.has(transform) else p
+
+    def linear(self, analysis: str) -> tuple[LinearModel, ...]:
+        """The linear models of an analysis of kind "linear", one for each of its times."""
+        from .control_results import read_linear
+
+        return read_linear(self, analysis)
 
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`."""
