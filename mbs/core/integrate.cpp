@@ -70,6 +70,7 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     usual_step = checkpoint->stepping[1];
     reserve = checkpoint->stepping[2];
     control.go_on(checkpoint->stepping[3], checkpoint->stepping[4]);
+    settles = checkpoint->stepping[5] != 0;
     system.gather(checkpoint->gathered);
     system.slope(t, y.data(), method.first_slope());
     report.outputs = checkpoint->outputs;
@@ -170,7 +171,8 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     }
   }
   if (checkpoint) {
-    const Eigen::Vector<double, 5> stepping(h, usual_step, reserve, control.previous_step(), control.previous_error());
+    Eigen::VectorXd stepping(6);
+    stepping << h, usual_step, reserve, control.previous_step(), control.previous_error(), settles;
     *checkpoint = {t, y, stepping, system.gathered(), report.outputs};
   }
   report.time = t;
