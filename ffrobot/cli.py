@@ -67,29 +67,38 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     type=FILE,
     help="Where to write [SCENE.results.h5 beside the input].",
 )
+@click.option("--resume", is_flag=True, help="Go on with a run that was stopped, from its results file.")
 @logging_options
-def solve(scene_file: Path, output: Path | None) -> None:
+def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
     """Run the analyses of a scene (stage 2).
 
     Links given as .toml are taken through stage 1 first where they are not up to date. Prints a summary: time per
     stage, steps, constraint violation, and the largest voltage against its limit.
+
+    Ctrl-C keeps what was computed; --resume goes on from there, and from the start where there are no results yet.
     """
     from .files import check_output
     from .progress import Display
     from .results import FORMAT, write_results
+    from .resume import how_to_go_on
+    from .resume import resume as resume_scene
     from .solution import solve as solve_scene
     from .summary import print_summary, summary_console
 
     path = output or scene_file.with_suffix(".results.h5")
     check_output(path, FORMAT)
     with Display() as display:
-        solution = solve_scene(scene_file, display)
+        solution = resume_scene(scene_file, path, display) if resume else solve_scene(scene_file, display)
+    if solution is None:
+        click.echo(f"{path}: complete, nothing to go on with")
+        return
     began = time.perf_counter()
     write_results(solution, path)
     seconds = {**solution.seconds, "writing": time.perf_counter() - began}
     print_summary(solution, path, seconds, summary_console())
+    where = f" -o {output}" if output else ""
     for outcome in solution.outcomes.values():
-        outcome.check_completed()
+        outcome.check_completed(how_to_go_on(solution, f"ffrobot solve {scene_file}{where} --resume"))
 
 
 @cli.command()

@@ -196,7 +196,7 @@ class Results:
         outputs = len(self.time(analysis))
 
         def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
-            if not isinstance(item, h5py.Dataset) or item.shape[:1] != (outputs,):
+            if not isinstance(item, h5py.Dataset) or item.shape[:1] != (outputs,) or name.startswith("resume/"):
                 return
             values = np.asarray(item, dtype=float).reshape(outputs, -1)
             labels = [name] if item.ndim == 1 else [f"{name}[{k}]" for k in range(values.shape[1])]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import _core
 from .initial_state import State
 from .model import Array, Assembly
 from .planar_body import PlanarBody
@@ -48,8 +49,6 @@ def vibrations(assembly: Assembly, state: State) -> Vibrations:
     """The constrained vibrations about `state`, with the stiffness of the links alone (no loads, no rotation)."""
     bodies = assembly.model.bodies
     M = system_mass_matrix(assembly, state.q)
-    gradient, inertia = assembly.system.rotor_rows(state.q)
-    M += gradient.T @ (inertia[:, None] * gradient)
     K = _stiffness(assembly)
     D = _block_diagonal([block for body in bodies for block in (np.zeros((3, 3)), body.damping)])
     _, _, C_q = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))
@@ -70,9 +69,11 @@ def _stiffness(assembly: Assembly) -> Array:
 
 
 def system_mass_matrix(assembly: Assembly, q: Array) -> Array:
-    """M (coordinates, coordinates) of all bodies."""
+    """M (coordinates, coordinates) of all bodies and of the rotors in joints."""
     blocks = zip(assembly.model.bodies, assembly.first, strict=True)
-    return _block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
+    M = _block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
+    gradient, inertia = assembly.system.rotor_rows(q)
+    return M + gradient.T @ (inertia[:, None] * gradient)
 
 
 def _block_diagonal(blocks: list[Array]) -> Array:
@@ -84,7 +85,7 @@ def _block_diagonal(blocks: list[Array]) -> Array:
     return matrix
 
 
-def ringing(assembly: Assembly, state: State, modes: Vibrations) -> Array:
+def ringing(assembly: Assembly, state: State, modes: Vibrations, steering: _core.Steering | None = None) -> Array:
     """Amplitude (n,) with which each mode rings from `state` on, in the force it moves most, relative to that force.
 
     A mode at rest follows its load and the links' static deflection under the prescribed motion; the velocity v, the
@@ -92,9 +93,9 @@ def ringing(assembly: Assembly, state: State, modes: Vibrations) -> Array:
     beside following statically is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on.
     """
     system, q, v = assembly.system, state.q, state.v
-    a, lambda_ = system.evaluate(0.0, q, v)
+    a, lambda_ = system.evaluate(0.0, q, v, steering)
     dt = 1e-3 / modes.frequency.max(initial=1.0)
-    jerk = (system.evaluate(dt, q + dt * v, v + dt * a)[0] - a) / dt
+    jerk = (system.evaluate(dt, q + dt * v, v + dt * a, steering)[0] - a) / dt
     omega, project = modes.frequency, (modes.shape * _stiffness(assembly)[:, None]).T / modes.frequency[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
     if not len(lambda_):
