@@ -28,6 +28,7 @@ from .fe_models.modal_body_file import read_modal_body
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.analysis_records import Analysis
+from .mbs.compliant_joints import through_gears
 from .mbs.control_records import Placement
 from .mbs.earlier_run import EarlierRun
 from .mbs.fcid import run_fcid
@@ -344,14 +345,14 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
     if analysis.kind in ("linear", "placement"):
         return operating_points(model, analysis, solution.outcomes[analysis.source] if analysis.source else None)
     if analysis.kind == "static":
-        return run_static(model, analysis)
+        return through_gears(run_static(model, analysis))
     if analysis.kind == "fcid":
-        return run_fcid(model, analysis)
+        return through_gears(run_fcid(model, analysis))
     if analysis.kind == "motors-only":
-        return run_motors_only(model, analysis, progress)
+        return through_gears(run_motors_only(model, analysis, progress))
     if analysis.kind == "pcid":
         replayed = any(later.actuation == analysis.name for later in solution.scene.analysis)
-        return run_pcid(model, analysis, replayed, progress, earlier)
+        return through_gears(run_pcid(model, analysis, replayed, progress, earlier))
     source = solution.outcomes[analysis.actuation] if analysis.actuation else None
     if analysis.kind == "closed-loop":
         assert source is not None

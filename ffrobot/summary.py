@@ -13,6 +13,7 @@ from rich.table import Table
 from .control_summary import LINEAR_COLUMNS, PLACEMENT_COLUMNS, linear_lines, linear_table, placement_table
 from .loop_results import HEADINGS, metrics_row
 from .mbs.analyses import Outcome
+from .mbs.compliant_joints import unresolved_gears
 from .mbs.fewer_modes import modes_kept
 from .mbs.geometric_stiffening import NOTABLE
 from .mbs.motors_only import describe_zeros, is_minimum_phase, path_error
@@ -76,6 +77,7 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
     if solution.mode_choice is not None:
         yield "modes", _modes(solution, solution.mode_choice)
     warnings = [(name, line) for name, loop in solution.loops.items() for line in loop.warnings]
+    warnings += [(name, line) for name, outcome in outcomes.items() for line in unresolved_gears(outcome.gears)]
     yield from (("warning", line) for line in _alike(warnings))
     yield _stiffening(solution)
     yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import SolveError
 from . import _core
 from .analysis_records import Analysis
+from .compliant_joints import GearMotion, check_applied, drive_sizes, with_compliance, with_rotors
 from .diagnosis import find_cause, lost_inertia
 from .earlier_run import EarlierRun
 from .initial_state import State, check_reach, undeformed_state
@@ -19,7 +20,7 @@ from .integrators import METHODS, Choice, beyond_order, choose_integrator
 from .model import ZERO, Array, Assembly, Model
 from .smoothness import check_smooth
 from .statics import static_equilibrium
-from .steering import Equipment, actuation_source, applied_actuators
+from .steering import Equipment, actuation_source, applied_actuators, motor_limits
 
 if TYPE_CHECKING:
     from .stable_inversion import Inversion
@@ -75,6 +76,7 @@ class Outcome:
     shape_force: Array | None = None  # (T, modes of all bodies) −λ_p, the forces that hold the shape; FCID only
     inversion: Inversion | None = field(default=None, repr=False)  # motors-only alone
     checkpoint: _core.Checkpoint | None = field(default=None, repr=False)  # where an integration can be gone on with
+    gears: Mapping[str, GearMotion] = field(default_factory=dict)  # by joint: inverse analyses with gears that give
 
     def coordinates(self, body: str) -> slice:
         """Columns of (R, θ, p) of a body in q, v and a."""
@@ -131,8 +133,10 @@ def run_forward(
 ) -> Outcome:
     """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one.
 
+    Where gears give, motors turn them, with the moments at the outputs of `source` and splines between these.
     It goes on with an `earlier` run of the same analysis.
     """
+    model = with_compliance(model)
     if source is None:
         assembly = Assembly(model, model.joints, model.loads)
         return _integrate(assembly, analysis, initial_state(assembly), None, None, None, progress, earlier=earlier)
@@ -140,9 +144,15 @@ def run_forward(
     if source.inversion is not None:
         loads = source.inversion.servo.loads
     rows, actuators = applied_actuators(model, analysis, source, equipment)
-    assembly = Assembly(model, model.joints, [*((row, ZERO) for row in rows), *loads])
-    steering = _core.Actuation(actuation_source(source), actuators)
-    start = State(source.q[0].copy(), source.v[0].copy())  # bodies and their order are the same
+    sizes, moved = [ZERO] * len(rows), with_rotors(source, model)
+    if model.gears:
+        check_applied(model, analysis)
+        limits = motor_limits(model)
+        sizes = drive_sizes(source, limits if analysis.limits else np.full_like(limits, np.inf))
+        actuators = actuators[1:]  # without the motors
+    assembly = Assembly(model, model.joints, [*zip(rows, sizes, strict=True), *loads])
+    steering = _core.Actuation(actuation_source(source), actuators) if actuators else None
+    start = State(moved.q[0].copy(), moved.v[0].copy())  # bodies and their order are the same
     return _integrate(assembly, analysis, start, steering, None, None, progress, earlier)
 
 

@@ -83,7 +83,9 @@ class Body(Record):
         return self
 
 
-AS_BUILT = ("gear_ratio", "rotor_inertia", "viscous_friction", "coulomb_friction", "friction_speed")
+AS_BUILT = (
+    "gear_ratio", "rotor_inertia", "viscous_friction", "coulomb_friction", "friction_speed", "stiffness", "damping"
+)  # fmt: skip
 
 
 class Joint(Record):
@@ -96,6 +98,8 @@ class Joint(Record):
     As it is built: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body and turns `gear_ratio` N times as
     fast as the second does on the first (rad/m where prismatic); friction on the joint's coordinate γ,
     −(c γ̇ + τ_c tanh(γ̇/γ̇_s)): `viscous_friction` c (N·m·s), `coulomb_friction` τ_c (N·m), `friction_speed` γ̇_s (rad/s).
+    Between the gear of a motor and the second body a spring `stiffness` (N·m/rad; rigid where it is not given) and a
+    damper `damping` (N·m·s/rad): see `compliant_joints`.
     """
 
     name: Name
@@ -112,6 +116,8 @@ class Joint(Record):
     viscous_friction: NotNegative = 0.0
     coulomb_friction: NotNegative = 0.0
     friction_speed: Positive = 0.01
+    stiffness: Positive | None = None
+    damping: NotNegative = 0.0
 
     @model_validator(mode="after")
     def _consistent(self) -> Joint:
@@ -139,7 +145,18 @@ class Joint(Record):
             )
         if "friction_speed" in built and not self.coulomb_friction:
             raise ValueError('expected the key "friction_speed" only beside coulomb_friction, found it alone')
+        self._check_compliance()
         return self
+
+    def _check_compliance(self) -> None:
+        if self.stiffness is None:
+            if self.damping:
+                raise ValueError('expected the key "damping" only beside stiffness, found it alone')
+            return
+        if self.type != "revolute":
+            raise ValueError(f'expected the key "stiffness" only in revolute joints, found it in a {self.type} joint')
+        if not self.rotor_inertia:
+            raise ValueError("expected a rotor_inertia above 0 beside stiffness, found none: the rotor turns by itself")
 
 
 class Payload(Record):

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..validation import did_you_mean, quoted
 from . import _core
 from ._core import StateFunction, TimeFunction
-from .built_joints import Friction, joint_frictions, joint_rotors
+from .built_joints import Friction, Gear, joint_frictions, joint_rotors
 from .mechanism_records import Load
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
 from .record_types import GROUND, split_point
@@ -57,15 +57,21 @@ class Model:
     rotors: tuple[tuple[Row, float], ...] = ()
     frictions: tuple[tuple[Row, Friction], ...] = ()
     state_forces: tuple[tuple[End, StateFunction], ...] = ()
+    gears: tuple[Gear, ...] = ()  # that give; empty where they are taken for rigid (see `compliant_joints`)
 
     def body(self, name: str) -> PlanarBody:
         """The body of that name."""
         return next(body for body in self.bodies if body.name == name)
 
     @property
+    def links(self) -> tuple[PlanarBody, ...]:
+        """The bodies of the scene, without rotors."""
+        return self.bodies[: len(self.bodies) - len(self.gears)]
+
+    @property
     def rigid_freedom(self) -> int:
-        """Degrees of freedom of the mechanism with rigid links, counted: coordinates less joint constraints."""
-        return 3 * len(self.bodies) - len(self.joints)
+        """Degrees of freedom with rigid links and gears, counted: coordinates less joint constraints."""
+        return 3 * len(self.bodies) - len(self.joints) - len(self.gears)
 
 
 def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequence[ModalLoad] = ()) -> Model:
@@ -171,6 +177,7 @@ class Assembly:
         friction_rows = [(self._core_row(row), friction) for row, friction in model.frictions]
         state_forces = [(self._marker(end), function) for end, function in model.state_forces]
         self.motor_rows = [self._core_row(row) for row in motors]
+        spring_rows = [(self._core_row(gear.motor), self._core_row(gear.coordinate)) for gear in model.gears]
         self.system = _core.System(np.array(model.scene.gravity))
         for body, markers in zip(model.bodies, self._markers, strict=True):
             self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))
@@ -184,6 +191,8 @@ class Assembly:
             self.system.add_friction(row, friction.viscous, friction.coulomb, friction.speed)
         for marker, function in state_forces:
             self.system.add_state_force(marker, function)
+        for gear, (motor, joint) in zip(model.gears, spring_rows, strict=True):
+            self.system.add_spring(motor, joint, gear.stiffness, gear.damping)
         for load in model.modal_loads:
             self.system.add_modal_drive(self.index[load.body], load.vector, load.size)
         self.system.finish()

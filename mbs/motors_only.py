@@ -17,12 +17,12 @@ import numpy as np
 from ..errors import InputError
 from .analyses import Outcome
 from .analysis_records import Analysis
-from .fcid import spline
 from .initial_state import check_reach, undeformed_state
 from .integrators import Choice
 from .model import Array, Model
 from .servo import SINGULAR, Servo, is_unstable, make_servo
 from .stable_inversion import Inversion, Linearisation, invert, linearise
+from .time_functions import spline
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
 FACTOR_STEP = 0.02  # of the search for the largest factor

@@ -197,6 +197,15 @@ def _joint_references(scene: SceneKeys) -> Iterator[str]:
         for k, controller in enumerate(a.controller, 1):
             gains = getattr(controller, "joints", ())
             uses += [(f'analysis "{a.name}": controller no. {k}', name) for name in gains]
+    give = [joint.name for joint in scene.joint if joint.stiffness is not None]
+    for a in scene.analysis:
+        of_motors = [(f"sensor no. {k}: motor", s.motor) for k, s in enumerate(a.sensor, 1)]
+        for k, controller in enumerate(a.controller, 1):
+            if getattr(controller, "side", "joint") == "motor":
+                of_motors += [(f"controller no. {k}: side: motor", name) for name in getattr(controller, "joints", ())]
+        for key, name in of_motors:
+            if name is not None and name not in give:
+                yield f'analysis "{a.name}": {key}: expected a joint with stiffness ({quoted(give)}), found "{name}"'
     for key, name in uses:
         if name is not None and name not in joints:
             yield f'{key}: expected one of the joints {quoted(joints)}, found "{name}"{did_you_mean(name, joints)}'

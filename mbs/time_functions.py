@@ -352,6 +352,20 @@ def _numbers(path: Path, line: int, row: list[str], count: int) -> list[float]:
     return numbers
 
 
+def spline(
+    nodes: NDArray[np.float64], values: NDArray[np.float64], degree: int = 5, at_rest: bool = False
+) -> list[TimeFunction]:
+    """The interpolating splines through the columns of `values` (T, n); `at_rest` without rate at both ends."""
+    from scipy.interpolate import make_interp_spline
+
+    rest = [(m, np.zeros(values.shape[1])) for m in (1, 2)]
+    curve = make_interp_spline(nodes, values, k=degree, bc_type=(rest, rest) if at_rest else None)
+    breaks = np.unique(curve.t)
+    powers = [curve.derivative(m)(breaks[:-1]) / math.factorial(m) for m in range(degree, -1, -1)]
+    coefficients = np.ascontiguousarray(np.array(powers).transpose(2, 1, 0))  # (n, intervals, powers)
+    return [TimeFunction.polynomial(breaks, of_one) for of_one in coefficients]
+
+
 def check_domain(function: TimeFunction, times: NDArray[np.float64], describe: str, derivatives: int = 2) -> None:
     """Make sure `function` and its first `derivatives` time derivatives exist at all `times` (T,), in s.
 

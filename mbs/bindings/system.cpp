@@ -129,6 +129,7 @@ MatrixXd energies(const System &system, const MatrixXd &q, const MatrixXd &v) {
     }
     const JointEnergy e = joint_energy(system, q_i.data(), v_i.data(), w);
     result(i, 0) += e.kinetic;
+    result(i, 1) += e.strain;
     result(i, 3) += e.dissipated_power;
   }
   return result;
@@ -217,6 +218,12 @@ void bind_system(nb::module_ &m) {
             s.drives.push_back({row, Constant(0.0), {viscous, coulomb, speed}});
           },
           "row"_a, "viscous"_a, "coulomb"_a, "speed"_a)
+      .def(
+          "add_spring",
+          [](System &s, const Row &motor, const Row &joint, double stiffness, double damping) {
+            s.springs.push_back({motor, joint, stiffness, damping});
+          },
+          "motor"_a, "joint"_a, "stiffness"_a, "damping"_a)
       .def(
           "add_drive", [](System &s, const Row &row, const TimeFunction &f) { s.drives.push_back({row, f}); }, "row"_a,
           "size"_a)

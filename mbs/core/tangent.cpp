@@ -114,6 +114,21 @@ void row_tangent(const System &system, const Row &row, const double *q, const do
 
 namespace {
 
+// Springs between angles, whose gradients are constant.
+void add_springs(const System &system, const Workspace &w, Tangent &result) {
+  RowMotion motion;
+  for (const Spring &spring : system.springs) {
+    VectorXd motor = VectorXd::Zero(system.coordinates), joint = motor;
+    evaluate(spring.motor, w.bodies, motion);
+    jacobian(spring.motor, motion, system.bodies, w.bodies, system.first_coordinate, motor);
+    evaluate(spring.joint, w.bodies, motion);
+    jacobian(spring.joint, motion, system.bodies, w.bodies, system.first_coordinate, joint);
+    motor -= joint;
+    result.K.noalias() += spring.stiffness * motor * motor.transpose();
+    result.D.noalias() += spring.damping * motor * motor.transpose();
+  }
+}
+
 // Rotors, whose moments are J row_ddot along their rows, and friction, which goes with row_dot.
 void add_built_joints(const System &system, const double *q, const double *v, const double *a, Workspace &w,
                       Tangent &result) {
@@ -193,6 +208,7 @@ void tangent(const System &system, double t, const double *q, const double *v, c
     add_built_joints(system, q, v, a, w, result);
   for (const StateForce &force : system.state_forces)
     add_state_force(system, force, t, q, v, a, w, result);
+  add_springs(system, w, result);
 }
 
 } // namespace ffrobot
