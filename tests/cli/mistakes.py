@@ -29,7 +29,7 @@ MISTAKES = {
     ),
     "link in place of a scene": (
         "scene.toml",
-        {"[[analysis]]": "[geometry]"},
+        {"[[analysis]]": "[[geometry]]"},
         ["expected a scene file, found a link file", "ffrobot link"],
     ),
     "unknown key in a link": ("link2.toml", {"density": "densty"}, ["link2.toml: material.densty", '"density"']),
