@@ -44,10 +44,14 @@ InputFile = Annotated[Path, AfterValidator(existing_file)]
 """A file named by an input file, relative to it; it exists."""
 
 
+# The key that makes a file one of its kind, and the command for it.
+_KINDS = {"link file": ("geometry", "ffrobot link"), "scene file": ("analysis", "ffrobot solve")}
+
+
 def load_toml(path: Path, kind: str) -> dict[str, Any]:
     """Parse the TOML file at `path`; `kind` ("link file", "scene file") is how the error message calls it."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"{path}: {kind} not found") from None
     except OSError as error:
@@ -56,6 +60,10 @@ def load_toml(path: Path, kind: str) -> dict[str, Any]:
         raise InputError(f"{path}: cannot read the {kind}: {error}") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not a valid TOML {kind}: {error}") from None
+    for other, (key, command) in _KINDS.items():
+        if kind in _KINDS and key in data and _KINDS[kind][0] not in data:
+            raise InputError(f"{path}: expected a {kind}, found a {other} (is it for {command}?)")
+    return data
 
 
 def validate(record: type[R], data: dict[str, Any], path: Path, objects: Mapping[str, object] | None = None) -> R:

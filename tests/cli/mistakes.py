@@ -27,6 +27,11 @@ MISTAKES = {
         {"[initial]\n": "[initial]\nangels = 1\n"},
         ["initial.angels", 'did you mean "angles"?'],
     ),
+    "link in place of a scene": (
+        "scene.toml",
+        {"[[analysis]]": "[[geometry]]"},
+        ["expected a scene file, found a link file", "ffrobot link"],
+    ),
     "unknown key in a link": ("link2.toml", {"density": "densty"}, ["link2.toml: material.densty", '"density"']),
     "wrong type": (
         "scene.toml",
