@@ -36,7 +36,7 @@ def write_linear(group: h5py.Group, linear: LinearAnalysis, outcome: Outcome) ->
         group[kind] = np.array([reach.measure for reach in reaches])
         group[kind].attrs["lost"] = sorted({name for reach in reaches for name in reach.lost})
     motion = np.array([modes.motion.real for modes in linear.modes])  # (T, f, coordinates)
-    for body in outcome.assembly.model.bodies:
+    for body in outcome.assembly.model.links:
         columns = motion[:, :, outcome.coordinates(body.name)]
         group[f"modes/{body.name}/position"] = columns[:, :, :2]
         group[f"modes/{body.name}/angle"] = columns[:, :, 2]

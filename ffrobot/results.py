@@ -23,6 +23,7 @@ from .mbs.observation import (
     body_motion,
     energies,
     joint_forces,
+    motor_angle,
     point_motion,
     stored_coordinates,
     trajectory_force,
@@ -30,6 +31,7 @@ from .mbs.observation import (
 )
 from .mbs.stable_inversion import Inversion
 from .mbs.stress import BodyStress
+from .resume import write_state
 from .solution import Solution
 
 FORMAT = "ffrobot-results"
@@ -82,6 +84,7 @@ def results_image(solution: Solution) -> bytes:
                 write_loop(group, solution.loops[name])
             for body_name, stress in solution.stresses.get(name, {}).items():
                 _write_stress(group.create_group(f"stress/{body_name}"), stress)
+        write_state(file, solution)
         file.flush()
         image: bytes = file.id.get_file_image()
     return image
@@ -110,7 +113,7 @@ def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
 
 def _write_motion(group: h5py.Group, outcome: Outcome) -> None:
     group["time"] = outcome.time
-    for body in outcome.assembly.model.bodies:
+    for body in outcome.assembly.model.links:
         for key, values in vars(body_motion(outcome, body)).items():
             group[f"bodies/{body.name}/{key}"] = values
         transform = stored_coordinates(body)
@@ -151,6 +154,12 @@ def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["moment"] = forces.motor
             if "gear_ratio" in joint.model_fields_set:
                 entry["motor_moment"] = forces.motor / joint.gear_ratio
+        angle = motor_angle(outcome, joint.name)
+        if angle is not None:
+            entry["motor_angle"] = angle
+        if (gear := outcome.gears.get(joint.name)) is not None:
+            entry["gear_moment"] = gear.gear_moment
+            entry.attrs["unresolved"] = gear.unresolved
 
 
 def _write_servo(group: h5py.Group, outcome: Outcome, inversion: Inversion) -> None:

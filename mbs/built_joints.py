@@ -1,4 +1,4 @@
-"""Joints as they are built: rotors behind gears, friction."""
+"""Joints as they are built: rotors behind gears, friction, gears that give."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from . import _core
-from .rows import Row, joint_coordinate
+from .mechanism_records import Joint
+from .rows import End, Row, joint_coordinate
 from .scene_records import Scene
 
 
@@ -33,7 +34,42 @@ def joint_rotors(scene: Scene) -> Iterator[tuple[Row, float]]:
         if joint.type == "prismatic":
             yield row, joint.rotor_inertia * N**2
         else:
-            yield Row(f'rotor of joint "{joint.name}"', _core.RowKind.gear, row.a, row.b, (N, 0.0)), joint.rotor_inertia
+            yield (
+                Row(f'rotor of joint "{joint.name}"', _core.RowKind.gear, row.a, row.b, (N, N - 1)),
+                joint.rotor_inertia,
+            )
+
+
+@dataclass(frozen=True)
+class Gear:
+    """A gear that gives: between its output and the second body of `joint` sit a spring and a damper.
+
+    `motor` is the angle of the output on the first body a, θ_m = (ψ − α_a)/N with the rotor's angle ψ; `coordinate` γ
+    of the joint. The moment k (θ_m − γ) + c (θ̇_m − γ̇) drives the second body. `rotor` is a body of inertia J N² whose
+    angle is ψ/N, so that its size is that of other angles.
+    """
+
+    joint: str
+    rotor: str
+    ratio: float
+    inertia: float  # J, kg·m²
+    stiffness: float  # k, N·m/rad
+    damping: float  # c, N·m·s/rad
+    motor: Row
+    coordinate: Row
+
+
+def joint_gears(scene: Scene) -> Iterator[Gear]:
+    """The gears that give."""
+    for joint in scene.joint:
+        if joint.stiffness is not None:
+            yield _gear(scene, joint, joint.stiffness)
+
+
+def _gear(scene: Scene, joint: Joint, stiffness: float) -> Gear:
+    row, N, rotor = joint_coordinate(scene, joint), joint.gear_ratio, f"{joint.name}/rotor"
+    motor = Row(f'motor of joint "{joint.name}"', _core.RowKind.gear, row.a, End(rotor), (1.0, 1 / N))
+    return Gear(joint.name, rotor, N, joint.rotor_inertia, stiffness, joint.damping, motor, row)
 
 
 def joint_frictions(scene: Scene) -> Iterator[tuple[Row, Friction]]:

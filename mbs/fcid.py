@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,9 +18,9 @@ from .integrators import NOT_INTEGRATED
 from .model import ZERO, Array, Assembly, Model
 from .planar_body import PlanarBody
 from .smoothness import check_smooth
+from .time_functions import spline
 
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
-DEGREE = 5  # of that spline: accelerations are cubic between nodes
 
 Shape = list[list[TimeFunction]]
 """p_k(t) of each body, in the coordinates of its `PlanarBody`."""
@@ -90,18 +89,6 @@ def _static(assembly: Assembly, analysis: Analysis, guess: Array, resolver: _cor
 
 def _nodes(analysis: Analysis) -> Array:
     return np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1))
-
-
-def spline(nodes: Array, values: Array, at_rest: bool = False) -> list[TimeFunction]:
-    """The interpolating splines through the columns of `values` (T, n); `at_rest` without rate at both ends."""
-    from scipy.interpolate import make_interp_spline
-
-    rest = [(m, np.zeros(values.shape[1])) for m in (1, 2)]
-    curve = make_interp_spline(nodes, values, k=DEGREE, bc_type=(rest, rest) if at_rest else None)
-    breaks = np.unique(curve.t)
-    powers = [curve.derivative(m)(breaks[:-1]) / math.factorial(m) for m in range(DEGREE, -1, -1)]
-    coefficients = np.ascontiguousarray(np.array(powers).transpose(2, 1, 0))  # (n, intervals, powers)
-    return [TimeFunction.polynomial(breaks, of_one) for of_one in coefficients]
 
 
 def _given(scene_path: Path, bodies: Sequence[PlanarBody], analysis: Analysis) -> Shape:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .built_joints import Gear
 from .mechanism_records import Joint
 from .model import Array, Assembly, Constraint
 from .record_types import GROUND, split_point
-from .rows import End
+from .rows import FRAME, End
 
 TOLERANCE = 1e-13  # of constraints at the start, relative to the size of the robot
 SINGULAR = 1e-6  # ratio of singular values below which a configuration counts as singular
@@ -44,7 +45,29 @@ def undeformed_state(assembly: Assembly) -> State:
         raise InputError(_unreachable(assembly, 0.0, guess.q))
     if _freedom_of_constraints(assembly, 0.0, q) < SINGULAR:
         raise InputError(_singular_start(assembly, q))
-    return with_rates(assembly, q, guess.v)
+    return _unwound(assembly, with_rates(assembly, q, guess.v))
+
+
+def _unwound(assembly: Assembly, state: State) -> State:
+    """The state with rotors where their gears are not strained."""
+    q, v = state.q.copy(), state.v.copy()
+    for gear in assembly.model.gears:
+        rotor = assembly.first[assembly.index[gear.rotor]] + 2
+        q[rotor], v[rotor] = output_angle(assembly, gear, q), output_angle(assembly, gear, v)
+    return State(q, v)
+
+
+def output_angle(assembly: Assembly, gear: Gear, x: Array) -> float:
+    """γ + α_a/N, which is a rotor's angle over N where its gear is not strained; of q, or its rate of v."""
+
+    def angle(end: End) -> float:
+        if end.body is None:
+            return 0.0
+        first, body = assembly.first[assembly.index[end.body]], assembly.model.body(end.body)
+        bent = 0.0 if end.point == FRAME else body.points[end.point].rotation @ x[first + 3 : first + 3 + body.n_modes]
+        return float(x[first + 2] + bent)
+
+    return angle(gear.coordinate.b) - (1 - 1 / gear.ratio) * angle(gear.coordinate.a)
 
 
 def with_rates(assembly: Assembly, q: Array, v: Array) -> State:

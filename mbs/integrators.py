@@ -57,6 +57,8 @@ def choose_integrator(
         return Choice(analysis.integrator, "asked for")
     if len(analysis.times) == 1:
         return Choice("dop853", "nothing to integrate")
+    if assembly.model.gears:
+        return Choice("dop853", "springs in joints are not among the stiff forces of implicit integrators")
     highest = max((float(np.sqrt(body.stiffness.max(initial=0.0))) for body in assembly.model.bodies), default=0.0)
     if highest == 0.0:
         return Choice("dop853", "nothing vibrates")

@@ -29,7 +29,8 @@ class LinearMechanism:
     Attributes:
         M, D, K: (f, f).
         inputs: (f,) per unit of each motor ("joint/NAME") and force at a point ("force/BODY.POINT/x", "…/y").
-        outputs: (f,) derivatives of joint coordinates ("joint/NAME") and places of points ("point/BODY.POINT/x", …).
+        outputs: (f,) derivatives of joint coordinates ("joint/NAME"), of motors behind gears that give ("motor/NAME"),
+            and places of points ("point/BODY.POINT/x", …).
         transformation: H = ∂q/∂s (coordinates, f).
         transformation_rate: its rate along the motion: δv = H δṡ + H_dot δs.
         force: (f,) what drives the motion itself: forces along the independent rows, modal forces beside the loads.
@@ -67,7 +68,8 @@ class Linearisation:
 
     def __init__(self, model: Model, q: Array, points: Sequence[str] = ()) -> None:
         joints = {f"joint/{name}": row for name, row in _joint_coordinates(model).items()}
-        motors = {f"joint/{name}": row for name, row in model.motors.items()}
+        give = {gear.joint for gear in model.gears}
+        motors = {f"{'motor' if name in give else 'joint'}/{name}": row for name, row in model.motors.items()}
         candidates = [motors, {name: row for name, row in joints.items() if name not in motors}, _frames(model)]
         places = {f"{point}/{axis}": _place(point, axis) for point in points for axis in "xy"}
         rows = [row for group in (*candidates, joints, places) for row in group.values()]
@@ -75,7 +77,9 @@ class Linearisation:
         self.assembly = Assembly(model, model.joints, model.loads, rows)
         core = iter(self.assembly.motor_rows)
         known = [{name: next(core) for name in group} for group in (*candidates, joints, places)]
-        self._motors, self._joints, self._places = known[0], known[3], known[4]
+        self._motors = {f"joint/{name}": row for name, row in zip(model.motors, known[0].values(), strict=True)}
+        self._joints = {name: row for name, row in known[0].items() if name not in known[3]} | known[3]
+        self._places = known[4]
         independent = _choose(self.assembly, q, known[:3])
         self.independent = list(independent.values())
         modal = [f"modal/{body.name}/{k}" for body in model.bodies for k in range(1, body.n_modes + 1)]
@@ -125,7 +129,8 @@ def held_by_motors(model: Model, q: Array) -> list[Constraint]:
 def _joint_coordinates(model: Model) -> dict[str, Row]:
     """Coordinates of the joints that move, by name; a motor's is the row that it drives."""
     moving = [joint for joint in model.scene.joint if joint.type != "weld"]
-    return {joint.name: model.motors.get(joint.name) or joint_coordinate(model.scene, joint) for joint in moving}
+    rows = model.motors | {gear.joint: gear.coordinate for gear in model.gears}
+    return {joint.name: rows.get(joint.name) or joint_coordinate(model.scene, joint) for joint in moving}
 
 
 def _frames(model: Model) -> dict[str, Row]:

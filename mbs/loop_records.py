@@ -17,6 +17,7 @@ PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
 class Sensor(Record):
     """What is measured, and how well: of a joint its coordinate, of a point x and y, of patches their voltages.
 
+    `motor` names a joint with stiffness, of which the motor's angle behind its gear is read, on the first body.
     `measure` is the value, its rate, or (points) its acceleration. Readings are whole numbers of `resolution`, after
     Gaussian noise with the standard deviation `noise`, both in the unit of the reading. `modal` names a body whose
     modal coordinates are read as they are, which no sensor can. Patches read the
@@ -24,6 +25,7 @@ class Sensor(Record):
     """
 
     joint: str | None = None
+    motor: str | None = None
     point: PointReference | None = None
     pzt: str | None = None
     modal: str | None = None
@@ -34,8 +36,9 @@ class Sensor(Record):
 
     @model_validator(mode="after")
     def _consistent(self) -> Sensor:
-        subject = one_of(self, ("joint", "point", "pzt", "modal"))
+        subject = one_of(self, ("joint", "motor", "point", "pzt", "modal"))
         allowed = {"pzt": ("value",), "modal": ("value", "rate"), "joint": ("value", "rate")}
+        allowed["motor"] = allowed["joint"]
         known = allowed.get(subject, ("value", "rate", "acceleration"))
         if self.measure not in known:
             raise ValueError(f'expected one of {quoted(known)} as measure beside "{subject}", found "{self.measure}"')
@@ -55,6 +58,7 @@ class JointPid(Record):
     derivative: dict[Name, NotNegative] = Field(default_factory=dict)
     integral: dict[Name, NotNegative] = Field(default_factory=dict)
     rate: Literal["measured", "difference"] = "measured"
+    side: Literal["joint", "motor"] = "joint"  # of gears that give, on which the angles are read
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
-from ..validation import InputFile, Record, quoted
-from ._core import TimeFunction
+from ..fe_models.link_file import LinkSource, LinkTable
+from ..fe_models.link_records import BeamLink, SolidLink
+from ..validation import InputFile, Record, existing_file, quoted
+from ._core import StateFunction, TimeFunction
 from .record_types import (
     GROUND,
     Expression,
@@ -23,6 +26,7 @@ from .record_types import (
     present,
     split_point,
 )
+from .state_forces import state_function
 
 
 class RigidBody(Record):
@@ -44,15 +48,29 @@ class RigidBody(Record):
         return inertia
 
 
+def _link(value: object, info: ValidationInfo) -> LinkSource:
+    if isinstance(value, str):
+        return existing_file(Path(value), info)
+    if not isinstance(value, dict):
+        raise ValueError(f"expected the name of a link file in quotes or a table of its keys, found {value!r}")
+    name, path = info.data.get("name", "?"), info.context["path"] if info.context else Path("scene")
+    return LinkTable({"name": name, **value}, path.with_name(f'{path.name}: body "{name}": link'))
+
+
+LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | BeamLink | SolidLink)]
+
+
 class Body(Record):
-    """A link file (stage 1 runs when needed), a modal body file, or a rigid body.
+    """A link file or a table of its keys (stage 1 runs when needed), a modal body file, or a rigid body.
+
+    The `name` in a table of a link's keys is the body's where it is left out.
 
     `modes` of a flexible body: how many of the lowest that move in the plane; the others are represented by their
     static flexibility. "auto" takes as many as the tolerances of the analyses need; the default is all.
     """
 
     name: Name
-    link: InputFile | None = None
+    link: LinkInput | None = None
     modal: InputFile | None = None
     rigid: RigidBody | None = None
     modes: Literal["auto"] | Annotated[int, Field(ge=0)] | None = None
@@ -65,7 +83,9 @@ class Body(Record):
         return self
 
 
-AS_BUILT = ("gear_ratio", "rotor_inertia", "viscous_friction", "coulomb_friction", "friction_speed")
+AS_BUILT = (
+    "gear_ratio", "rotor_inertia", "viscous_friction", "coulomb_friction", "friction_speed", "stiffness", "damping"
+)  # fmt: skip
 
 
 class Joint(Record):
@@ -78,6 +98,8 @@ class Joint(Record):
     As it is built: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body and turns `gear_ratio` N times as
     fast as the second does on the first (rad/m where prismatic); friction on the joint's coordinate γ,
     −(c γ̇ + τ_c tanh(γ̇/γ̇_s)): `viscous_friction` c (N·m·s), `coulomb_friction` τ_c (N·m), `friction_speed` γ̇_s (rad/s).
+    Between the gear of a motor and the second body a spring `stiffness` (N·m/rad; rigid where it is not given) and a
+    damper `damping` (N·m·s/rad): see `compliant_joints`.
     """
 
     name: Name
@@ -94,6 +116,8 @@ class Joint(Record):
     viscous_friction: NotNegative = 0.0
     coulomb_friction: NotNegative = 0.0
     friction_speed: Positive = 0.01
+    stiffness: Positive | None = None
+    damping: NotNegative = 0.0
 
     @model_validator(mode="after")
     def _consistent(self) -> Joint:
@@ -121,7 +145,18 @@ class Joint(Record):
             )
         if "friction_speed" in built and not self.coulomb_friction:
             raise ValueError('expected the key "friction_speed" only beside coulomb_friction, found it alone')
+        self._check_compliance()
         return self
+
+    def _check_compliance(self) -> None:
+        if self.stiffness is None:
+            if self.damping:
+                raise ValueError('expected the key "damping" only beside stiffness, found it alone')
+            return
+        if self.type != "revolute":
+            raise ValueError(f'expected the key "stiffness" only in revolute joints, found it in a {self.type} joint')
+        if not self.rotor_inertia:
+            raise ValueError("expected a rotor_inertia above 0 beside stiffness, found none: the rotor turns by itself")
 
 
 class Payload(Record):
@@ -169,8 +204,23 @@ class Trajectory(Record):
         return present(x=self.x, y=self.y, value=self.value)
 
 
+def _state_force(value: object, info: ValidationInfo) -> StateFunction:
+    if isinstance(value, StateFunction):
+        return value
+    objects = (info.context or {}).get("objects", {})
+    if not isinstance(value, str) or value not in objects:
+        raise ValueError(f"expected a function of t, position and velocity, in scenes made in Python, found {value!r}")
+    return state_function(objects[value])
+
+
+StateForce = Annotated[StateFunction, PlainValidator(_state_force, json_schema_input_type=str)]
+
+
 class Load(Record):
-    """A given load: force (N, global axes) and moment (N·m) at a point, moment of a joint, or voltages (V)."""
+    """A given load: force (N, global axes) and moment (N·m) at a point, moment of a joint, or voltages (V).
+
+    `force` on a point, in scenes made in Python: a function of its motion, see `state_forces.state_function`.
+    """
 
     point: PointReference | None = None
     joint: str | None = None
@@ -178,13 +228,16 @@ class Load(Record):
     x: Expression | None = None
     y: Expression | None = None
     moment: Expression | None = None
+    force: StateForce | None = None
     voltage: tuple[Expression, ...] | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Load:
         subject = one_of(self, ("point", "joint", "pzt"))
-        allowed = {"point": ("x", "y", "moment"), "joint": ("moment",), "pzt": ("voltage",)}[subject]
-        only(self, subject, allowed, ("x", "y", "moment", "voltage"))
+        allowed = {"point": ("x", "y", "moment", "force"), "joint": ("moment",), "pzt": ("voltage",)}[subject]
+        found = only(self, subject, allowed, ("x", "y", "moment", "force", "voltage"))
+        if self.force is not None and len(found) > 1:
+            raise ValueError(f'expected "force" alone beside "point", found {quoted(found)}')
         return self
 
     @property

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..validation import did_you_mean, quoted
 from . import _core
-from ._core import TimeFunction
-from .built_joints import Friction, joint_frictions, joint_rotors
+from ._core import StateFunction, TimeFunction
+from .built_joints import Friction, Gear, joint_frictions, joint_rotors
 from .mechanism_records import Load
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
 from .record_types import GROUND, split_point
@@ -56,15 +56,22 @@ class Model:
     loads: tuple[tuple[Row, TimeFunction], ...]
     rotors: tuple[tuple[Row, float], ...] = ()
     frictions: tuple[tuple[Row, Friction], ...] = ()
+    state_forces: tuple[tuple[End, StateFunction], ...] = ()
+    gears: tuple[Gear, ...] = ()  # that give; empty where they are taken for rigid (see `compliant_joints`)
 
     def body(self, name: str) -> PlanarBody:
         """The body of that name."""
         return next(body for body in self.bodies if body.name == name)
 
     @property
+    def links(self) -> tuple[PlanarBody, ...]:
+        """The bodies of the scene, without rotors."""
+        return self.bodies[: len(self.bodies) - len(self.gears)]
+
+    @property
     def rigid_freedom(self) -> int:
-        """Degrees of freedom of the mechanism with rigid links, counted: coordinates less joint constraints."""
-        return 3 * len(self.bodies) - len(self.joints)
+        """Degrees of freedom with rigid links and gears, counted: coordinates less joint constraints."""
+        return 3 * len(self.bodies) - len(self.joints) - len(self.gears)
 
 
 def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequence[ModalLoad] = ()) -> Model:
@@ -87,6 +94,7 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
     model = Model(
         scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(load_rows(scene, scene.load)),
         tuple(joint_rotors(scene)), tuple(joint_frictions(scene)),
+        tuple(_state_forces(scene)),
     )  # fmt: skip
     named = any(joint.motor for joint in scene.joint)
     if named and trajectories and len(motors) != model.rigid_freedom:
@@ -107,6 +115,12 @@ def load_rows(scene: Scene, loads: Sequence[Load]) -> Iterator[tuple[Row, TimeFu
         elif load.point is not None:
             for component, size in load.components.items():
                 yield Row(f'load on "{load.point}"', kinds[component], End(None), End(*split_point(load.point))), size
+
+
+def _state_forces(scene: Scene) -> Iterator[tuple[End, StateFunction]]:
+    for load in scene.load:
+        if load.point is not None and load.force is not None:
+            yield End(*split_point(load.point)), load.force
 
 
 def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
@@ -161,7 +175,9 @@ class Assembly:
         drive_rows = [(self._core_row(row), size) for row, size in drives]
         rotor_rows = [(self._core_row(row), inertia) for row, inertia in model.rotors]
         friction_rows = [(self._core_row(row), friction) for row, friction in model.frictions]
+        state_forces = [(self._marker(end), function) for end, function in model.state_forces]
         self.motor_rows = [self._core_row(row) for row in motors]
+        spring_rows = [(self._core_row(gear.motor), self._core_row(gear.coordinate)) for gear in model.gears]
         self.system = _core.System(np.array(model.scene.gravity))
         for body, markers in zip(model.bodies, self._markers, strict=True):
             self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))
@@ -173,6 +189,10 @@ class Assembly:
             self.system.add_drive(row, size)
         for row, friction in friction_rows:
             self.system.add_friction(row, friction.viscous, friction.coulomb, friction.speed)
+        for marker, function in state_forces:
+            self.system.add_state_force(marker, function)
+        for gear, (motor, joint) in zip(model.gears, spring_rows, strict=True):
+            self.system.add_spring(motor, joint, gear.stiffness, gear.damping)
         for load in model.modal_loads:
             self.system.add_modal_drive(self.index[load.body], load.vector, load.size)
         self.system.finish()

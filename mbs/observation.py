@@ -9,7 +9,7 @@ import numpy as np
 from . import _core
 from .analyses import Outcome
 from .geometric_stiffening import second_order_displacement
-from .model import Array, Constraint
+from .model import Array, Assembly, Constraint
 from .planar_body import PlanarBody
 from .record_types import split_point
 from .rows import End
@@ -109,6 +109,21 @@ def joint_forces(outcome: Outcome, joint: str) -> JointForces:
     motors = list(outcome.assembly.model.motors)
     motor = outcome.tau[:, motors.index(joint)] if outcome.tau is not None and joint in motors else None
     return JointForces(reaction, moment, motor)
+
+
+def motor_angle(outcome: Outcome, joint: str) -> Array | None:
+    """θ_m (T,) of the motor of a joint whose gear gives, behind the gear; None of others."""
+    if joint in outcome.gears:
+        return outcome.gears[joint].angle
+    model = outcome.assembly.model
+    rows = [gear.motor for gear in model.gears if gear.joint == joint]
+    if not rows:
+        return None
+    assembly = Assembly(model, model.joints, (), rows)
+    angle: Array = _core.Sensing(assembly.system, [(assembly.motor_rows[0], 0)], []).read(
+        outcome.q, outcome.v, outcome.a
+    )[:, 0]
+    return angle
 
 
 def energies(outcome: Outcome) -> dict[str, Array]:

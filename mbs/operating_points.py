@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from .analyses import Outcome, run_static
 from .analysis_records import Analysis
+from .compliant_joints import through_gears, with_compliance, with_rotors
 from .initial_state import undeformed_state
 from .linearisation import held_by_motors
 from .model import Assembly, Model
@@ -27,8 +28,9 @@ def operating_points(model: Model, analysis: Analysis, source: Outcome | None) -
         if not model.trajectories and model.motors:
             start = undeformed_state(Assembly(model, model.joints))
             held = replace(model, trajectories=tuple(held_by_motors(model, start.q)))
-        outcome = run_static(held, analysis)
+        outcome = with_rotors(through_gears(run_static(held, analysis)), with_compliance(model))
         return replace(outcome, tau=None, F_p=None)
+    source = with_rotors(source, with_compliance(model))
     rows = [_row(model, analysis, source, t) for t in analysis.times]
     return replace(
         source, analysis=analysis, time=source.time[rows], q=source.q[rows], v=source.v[rows], a=source.a[rows],

@@ -37,7 +37,7 @@ class Row:
     @property
     def carries_moment(self) -> bool:
         """Whether the force along the row is a moment."""
-        return bool(self.kind == _core.RowKind.angle)
+        return bool(self.kind in (_core.RowKind.angle, _core.RowKind.gear))
 
 
 def joint_rows(scene: Scene, joint: Joint) -> tuple[Row, ...]:

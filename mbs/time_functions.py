@@ -269,7 +269,7 @@ def user_function(function: object) -> TimeFunction:
         values = np.asarray(function(t), dtype=float)
         if values.shape not in ((), (3,)):
             raise InputError(
-                f"{_name_of(function)}: expected (value, rate, acceleration), or the value of a load, found an array of"
+                f"{name_of(function)}: expected (value, rate, acceleration), or the value of a load, found an array of"
                 f" shape {values.shape} at t = {t:g} s"
             )
         value, rate, acceleration = (float(values), np.nan, np.nan) if values.ndim == 0 else map(float, values)
@@ -278,7 +278,8 @@ def user_function(function: object) -> TimeFunction:
     return TimeFunction.python(three)
 
 
-def _name_of(function: object) -> str:
+def name_of(function: object) -> str:
+    """What messages call a user's function."""
     return str(getattr(function, "__qualname__", function))
 
 
@@ -349,6 +350,20 @@ def _numbers(path: Path, line: int, row: list[str], count: int) -> list[float]:
     if len(numbers) != count or not all(map(math.isfinite, numbers)):
         raise InputError(f"{path}: line {line}: expected {count} finite numbers, found {','.join(row)!r}")
     return numbers
+
+
+def spline(
+    nodes: NDArray[np.float64], values: NDArray[np.float64], degree: int = 5, at_rest: bool = False
+) -> list[TimeFunction]:
+    """The interpolating splines through the columns of `values` (T, n); `at_rest` without rate at both ends."""
+    from scipy.interpolate import make_interp_spline
+
+    rest = [(m, np.zeros(values.shape[1])) for m in (1, 2)]
+    curve = make_interp_spline(nodes, values, k=degree, bc_type=(rest, rest) if at_rest else None)
+    breaks = np.unique(curve.t)
+    powers = [curve.derivative(m)(breaks[:-1]) / math.factorial(m) for m in range(degree, -1, -1)]
+    coefficients = np.ascontiguousarray(np.array(powers).transpose(2, 1, 0))  # (n, intervals, powers)
+    return [TimeFunction.polynomial(breaks, of_one) for of_one in coefficients]
 
 
 def check_domain(function: TimeFunction, times: NDArray[np.float64], describe: str, derivatives: int = 2) -> None:

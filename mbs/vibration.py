@@ -49,8 +49,6 @@ def vibrations(assembly: Assembly, state: State) -> Vibrations:
     """The constrained vibrations about `state`, with the stiffness of the links alone (no loads, no rotation)."""
     bodies = assembly.model.bodies
     M = system_mass_matrix(assembly, state.q)
-    gradient, inertia = assembly.system.rotor_rows(state.q)
-    M += gradient.T @ (inertia[:, None] * gradient)
     K = _stiffness(assembly)
     D = _block_diagonal([block for body in bodies for block in (np.zeros((3, 3)), body.damping)])
     _, _, C_q = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))
@@ -71,9 +69,11 @@ def _stiffness(assembly: Assembly) -> Array:
 
 
 def system_mass_matrix(assembly: Assembly, q: Array) -> Array:
-    """M (coordinates, coordinates) of all bodies."""
+    """M (coordinates, coordinates) of all bodies and of the rotors in joints."""
     blocks = zip(assembly.model.bodies, assembly.first, strict=True)
-    return _block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
+    M = _block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
+    gradient, inertia = assembly.system.rotor_rows(q)
+    return M + gradient.T @ (inertia[:, None] * gradient)
 
 
 def _block_diagonal(blocks: list[Array]) -> Array:

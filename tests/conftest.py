@@ -1,5 +1,6 @@
 """The program as a user runs it: the installed command, the cases of the repository, a cache folder of its own."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -124,8 +125,8 @@ def _copy(name, folder):
     ignored = shutil.ignore_patterns("*.h5", "*.figures")
     copy = folder / name
     shutil.copytree(CASES / name, copy, ignore=ignored)
-    if "../two_link/" in (copy / "scene.toml").read_text(encoding="utf-8"):
-        shutil.copytree(CASES / "two_link", folder / "two_link", ignore=ignored)
+    for other in set(re.findall(r'"\.\./(\w+)/', (copy / "scene.toml").read_text(encoding="utf-8"))):
+        shutil.copytree(CASES / other, folder / other, ignore=ignored)
     return copy / "scene.toml"
 
 

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from ...mbs import _core
 from ...mbs.analyses import STATUS, Outcome, Progress, as_long_as, initial_state
 from ...mbs.analysis_records import Analysis
+from ...mbs.compliant_joints import rotors_like, with_compliance, with_rotors
 from ...mbs.initial_state import State
 from ...mbs.integrators import METHODS, choose_integrator
+from ...mbs.loop_records import ComputedTorque, Lqr
 from ...mbs.model import ZERO, Assembly, Model, load_rows
 from ...mbs.steering import actuation_source, motor_limits
 from ..patches import PatchArray
@@ -100,18 +102,19 @@ def run_closed_loop(
     assert T is not None
     if source.inversion is not None:
         loads = source.inversion.servo.loads
-    inputs = input_names(model, patches)
-    needed = [s for sensor in needed_sensors(model, analysis, patches) for s in signals(model, patches, sensor)]
-    read = merged([s for sensor in analysis.sensor for s in signals(model, patches, sensor)], needed)
+    inputs, built = input_names(model, patches), with_compliance(model)
+    moved = with_rotors(source, built)
+    needed = [s for sensor in needed_sensors(model, analysis, patches) for s in signals(built, patches, sensor)]
+    read = merged([s for sensor in analysis.sensor for s in signals(built, patches, sensor)], needed)
     rows = [signal.row for signal in read if signal.row is not None]
-    drives = [*((row, ZERO) for row in model.motors.values()), *loads]
+    drives = [*((row, ZERO) for row in built.motors.values()), *loads]
     drives += load_rows(model.scene, analysis.disturbance)
-    assembly = Assembly(model, model.joints, drives, rows)
+    assembly = Assembly(built, built.joints, drives, rows)
     sensor = sensing(assembly, read)
 
     begin, duration = analysis.times[0], np.ptp(analysis.times)
     times = begin + np.arange(int(np.ceil(duration / T * (1 - 1e-12)))) * T
-    reference = _at(times, source.time, sensor.read(*(np.ascontiguousarray(x) for x in (source.q, source.v, source.a))))
+    reference = _at(times, source.time, sensor.read(*(np.ascontiguousarray(x) for x in (moved.q, moved.v, moved.a))))
     feed_forward = _feed_forward(model, analysis, source, patches, times)
     setup = Setup(
         model, patches, inputs, tuple(s.name for s in read), times, T, analysis.delay, reference, feed_forward, source
@@ -120,14 +123,14 @@ def run_closed_loop(
     limit = np.concatenate([motor_limits(model), *(array.limit for array in patches.values())])
     limit = np.full_like(limit, np.inf) if analysis.unlimited else limit
     loop = Loop(setup, read, acting, limit, analysis.seed)
-    outcome = _integrate(assembly, analysis, source, patches, sensor, loop, times, progress)
+    outcome = _integrate(assembly, analysis, moved, model, patches, sensor, loop, times, progress)
     taken = slice(loop.taken)
     held = _held(outcome.time, times[taken] + analysis.delay, loop.commands[taken], loop.first)
     outcome = replace(outcome, tau=held[:, : len(model.motors)])
     tip_error, metrics = measure(outcome, source, setup, loop, held)
     record = LoopRecord(
         inputs, setup.outputs, times[taken], loop.readings[taken], reference[taken], loop.commands[taken],
-        loop.wanted[taken], tip_error, metrics, tuple(_warnings(analysis, acting, metrics)),
+        loop.wanted[taken], tip_error, metrics, tuple(_warnings(analysis, acting, metrics, bool(built.gears))),
     )  # fmt: skip
     return outcome, record
 
@@ -136,6 +139,7 @@ def _integrate(
     assembly: Assembly,
     analysis: Analysis,
     source: Outcome,
+    rigid: Model,
     patches: Mapping[str, PatchArray],
     sensor: _core.Sensing,
     loop: Loop,
@@ -145,8 +149,8 @@ def _integrate(
     began = time.perf_counter()
     start = State(source.q[0].copy(), source.v[0].copy())
     if analysis.start == "scene":
-        model = assembly.model
-        start = initial_state(Assembly(model, [*model.joints, *model.trajectories], model.loads))
+        start = initial_state(Assembly(rigid, [*rigid.joints, *rigid.trajectories], rigid.loads))
+        start = rotors_like(assembly.model, start, source)
     integrator = choose_integrator(assembly, analysis, start)
     voltages = [(assembly.index[body], array.Phi_V) for body, array in patches.items()]
     run = _core.run_sampled(
@@ -194,10 +198,10 @@ def _feed_forward(
 
 def _found(source: Outcome, times: Array) -> tuple[Array, Array | None]:
     """τ and F_p that an inverse analysis found, at any time where it was recorded or is algebraic, else by a spline."""
+    assert source.tau is not None
     if source.recording is not None or source.shape is not None:
         tau, F_p = actuation_source(source).sample(times.tolist())
-        return tau, F_p
-    assert source.tau is not None
+        return _at(times, source.time, source.tau) if source.gears else tau, F_p
     return _at(times, source.time, source.tau), None if source.F_p is None else _at(times, source.time, source.F_p)
 
 
@@ -207,7 +211,7 @@ def _held(times: Array, since: Array, commands: Array, first: Array) -> Array:
     return np.vstack([first, commands])[which]
 
 
-def _warnings(analysis: Analysis, controllers: Sequence[Controller], metrics: Metrics) -> list[str]:
+def _warnings(analysis: Analysis, controllers: Sequence[Controller], metrics: Metrics, gears: bool) -> list[str]:
     assert analysis.sample_time is not None
     lines = [line for controller in controllers for line in getattr(controller, "warnings", ())]
     fastest = max((controller.bandwidth for controller in controllers), default=0.0)
@@ -217,6 +221,8 @@ def _warnings(analysis: Analysis, controllers: Sequence[Controller], metrics: Me
             f"sampling at {sampling / (2 * np.pi):.4g} Hz is slow for a controller that acts up to"
             f" {fastest / (2 * np.pi):.4g} Hz: expected at least {SAMPLES_PER_PERIOD} samples a period"
         )
+    if gears and any(isinstance(record, Lqr | ComputedTorque) for record in analysis.controller):
+        lines.append("the controller is designed for rigid gears, and some give")
     if metrics.verdict != "stable":
         lines.append(f"the loop {metrics.verdict}: gains too high for sampling and delay, or for the links?")
     return lines

@@ -111,12 +111,12 @@ def joint_pid(record: JointPid, setup: Setup, mobility: Array) -> LinearFeedback
     P, D, integral = (np.zeros(shape) for _ in range(3))
     bandwidth = 0.0
     for joint in record.joints:
-        (u,), (y,) = setup.places(f"joint/{joint}"), setup.columns(f"joint/{joint}")
+        (u,), (y,) = setup.places(f"joint/{joint}"), setup.columns(f"{record.side}/{joint}")
         P[u, y] = record.proportional.get(joint, 0.0)
         integral[u, y] = record.integral.get(joint, 0.0)
         gain = record.derivative.get(joint, 0.0)
         if gain and record.rate == "measured":
-            P[u, setup.columns(f"joint/{joint}/rate")] = gain
+            P[u, setup.columns(f"{record.side}/{joint}/rate")] = gain
         D[u, y] = gain
         bandwidth = max(bandwidth, float(np.sqrt(P[u, y] * mobility[u])), gain * float(mobility[u]))
     differences = D if record.rate == "difference" and D.any() else None

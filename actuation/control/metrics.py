@@ -84,7 +84,7 @@ def tip_of(outcome: Outcome) -> str:
     driven = [trajectory.point for trajectory in scene.trajectory if trajectory.point is not None]
     if driven:
         return driven[0]
-    body = outcome.assembly.model.bodies[-1]
+    body = outcome.assembly.model.links[-1]
     return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"
 
 

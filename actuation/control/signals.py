@@ -22,9 +22,9 @@ ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 class Signal:
     """One reading.
 
-    `name`: "joint/NAME", "point/BODY.POINT/x" or y, "pzt/BODY/k", "modal/BODY/k" (k from 1), with "/rate" or
-    "/acceleration" behind it where that is read. Either `row` is read, or `vector` . p of `body`; `order` counts
-    derivatives, `resolution` and `noise` are those of `Sensor`.
+    `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y, "pzt/BODY/k", "modal/BODY/k" (k from 1), with
+    "/rate" or "/acceleration" behind it where that is read. Either `row` is read, or `vector` . p of `body`; `order`
+    counts derivatives, `resolution` and `noise` are those of `Sensor`.
     """
 
     name: str
@@ -50,6 +50,8 @@ def signals(model: Model, patches: Mapping[str, PatchArray], sensor: Sensor) -> 
         joint = next(joint for joint in model.scene.joint if joint.name == sensor.joint)
         row = joint_coordinate(model.scene, joint)
         yield Signal(f"joint/{sensor.joint}{ending}", order, *quality, row)
+    elif sensor.motor is not None:
+        yield Signal(f"motor/{sensor.motor}{ending}", order, *quality, model.motors[sensor.motor])
     elif sensor.point is not None:
         body, _, point = sensor.point.partition(".")
         for axis in ("x", "y"):

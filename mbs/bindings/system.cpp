@@ -1,9 +1,14 @@
 #include "core/system.h"
 #include "core/motion.h"
 
+#include <cstdint>
+#include <functional>
+#include <tuple>
+
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/function.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -124,6 +129,7 @@ MatrixXd energies(const System &system, const MatrixXd &q, const MatrixXd &v) {
     }
     const JointEnergy e = joint_energy(system, q_i.data(), v_i.data(), w);
     result(i, 0) += e.kinetic;
+    result(i, 1) += e.strain;
     result(i, 3) += e.dissipated_power;
   }
   return result;
@@ -150,6 +156,13 @@ Samples constraint_jacobians(const System &system, const RowMajorMatrix &q) {
   return Samples(data, {T, m, n}, owner);
 }
 
+StateFunction python_force(
+    const std::function<std::tuple<double, double, double>(double, double, double, double, double)> &function) {
+  return {[function](double t, const double *position, const double *rate, double *force) {
+    std::tie(force[0], force[1], force[2]) = function(t, position[0], position[1], rate[0], rate[1]);
+  }};
+}
+
 } // namespace
 
 void bind_system(nb::module_ &m) {
@@ -169,6 +182,14 @@ void bind_system(nb::module_ &m) {
       .def_ro("kind", &Row::kind)
       .def_ro("a", &Row::a)
       .def_ro("b", &Row::b);
+
+  nb::class_<StateFunction>(m, "StateFunction", "A force of the user's, of time, position and velocity.")
+      .def_static("python", &python_force, "function"_a, "A callable of t, x, y, v_x, v_y that returns (x, y, moment).")
+      .def_static(
+          "compiled",
+          [](std::uintptr_t address) { return StateFunction{reinterpret_cast<StateFunction::Compiled>(address)}; },
+          "address"_a,
+          "Address of a C function void(double t, const double *x_y_angle, const double *rates, double *x_y_moment).");
 
   nb::class_<System>(m, "System", "Bodies, constraints and drives; call finish() once after adding them.")
       .def(
@@ -198,6 +219,12 @@ void bind_system(nb::module_ &m) {
           },
           "row"_a, "viscous"_a, "coulomb"_a, "speed"_a)
       .def(
+          "add_spring",
+          [](System &s, const Row &motor, const Row &joint, double stiffness, double damping) {
+            s.springs.push_back({motor, joint, stiffness, damping});
+          },
+          "motor"_a, "joint"_a, "stiffness"_a, "damping"_a)
+      .def(
           "add_drive", [](System &s, const Row &row, const TimeFunction &f) { s.drives.push_back({row, f}); }, "row"_a,
           "size"_a)
       .def(
@@ -206,6 +233,12 @@ void bind_system(nb::module_ &m) {
             s.modal_drives.push_back({body, vector, f});
           },
           "body"_a, "vector"_a, "size"_a)
+      .def(
+          "add_state_force",
+          [](System &s, const MarkerReference &marker, const StateFunction &function) {
+            s.state_forces.push_back({marker, function});
+          },
+          "marker"_a, "function"_a)
       .def("finish", &System::finish)
       .def_ro("coordinates", &System::coordinates)
       .def_ro("length", &System::length)

@@ -35,7 +35,8 @@ double next_step(double h, double left, bool lands) {
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls,
                             const std::function<void(std::size_t, double, const double *)> &output,
-                            const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks) {
+                            const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
+                            Checkpoint *checkpoint) {
   const auto made = make_method(controls.method, system);
   Method &method = *made;
   Eigen::VectorXd error(system.size()), y_output(system.size());
@@ -61,11 +62,23 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     return next_break > before;
   };
   pass_breaks();
-  system.slope(t, y.data(), method.first_slope());
-  system.accepted(t, y.data(), method.first_slope());
-  record();
-  output(report.outputs++, t, y.data());
   StepControl control(method.error_order());
+  if (checkpoint && checkpoint->state.size()) {
+    y = checkpoint->state;
+    t = t_asked = checkpoint->time;
+    h = checkpoint->stepping[0];
+    usual_step = checkpoint->stepping[1];
+    reserve = checkpoint->stepping[2];
+    control.go_on(checkpoint->stepping[3], checkpoint->stepping[4]);
+    system.gather(checkpoint->gathered);
+    system.slope(t, y.data(), method.first_slope());
+    report.outputs = checkpoint->outputs;
+  } else {
+    system.slope(t, y.data(), method.first_slope());
+    system.accepted(t, y.data(), method.first_slope());
+    record();
+    output(report.outputs++, t, y.data());
+  }
   if (recording) {
     recording->method = controls.method;
     recording->tolerance = controls.tolerance;
@@ -155,6 +168,10 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       system.slope(t, y.data(), method.first_slope());
       method.restart();
     }
+  }
+  if (checkpoint) {
+    const Eigen::Vector<double, 5> stepping(h, usual_step, reserve, control.previous_step(), control.previous_error());
+    *checkpoint = {t, y, stepping, system.gathered(), report.outputs};
   }
   report.time = t;
   report.evaluations = system.evaluations();

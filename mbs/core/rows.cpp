@@ -37,11 +37,11 @@ void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMot
     return;
   }
   case RowKind::gear: {
-    const double N = row.direction.x();
-    motion.value = N * b.angle - (N - 1) * a.angle - row.offset;
-    motion.rate = N * b.angular_velocity - (N - 1) * a.angular_velocity;
-    motion.coefficient_b = N * Vector3d::UnitZ();
-    motion.coefficient_a = -(N - 1) * Vector3d::UnitZ();
+    const double n_b = row.direction.x(), n_a = row.direction.y();
+    motion.value = n_b * b.angle - n_a * a.angle - row.offset;
+    motion.rate = n_b * b.angular_velocity - n_a * a.angular_velocity;
+    motion.coefficient_b = n_b * Vector3d::UnitZ();
+    motion.coefficient_a = -n_a * Vector3d::UnitZ();
     return;
   }
   }

@@ -27,7 +27,8 @@ enum class RowKind {
   y,     // (r_b - r_a)_y, global
   angle, // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
   slide, // n . (r_b - r_a), n fixed to the section of a
-  gear,  // N alpha_b - (N - 1) alpha_a: the angle of a rotor on a that turns N times as fast as b does on a
+  gear,  // n_b alpha_b - n_a alpha_a, the angle between shafts behind gears: (N, N - 1) is that of a rotor on a that turns
+         // N times as fast as b does on a
 };
 
 // Whether the directions of such rows, and with them their coefficients below, move with the bodies.
@@ -39,7 +40,7 @@ constexpr int component_of(RowKind kind) { return kind == RowKind::gear ? 2 : st
 struct Row {
   RowKind kind;
   MarkerReference a, b;
-  Eigen::Vector2d direction = Eigen::Vector2d::Zero(); // of a slide, in the axes of a; of a gear (N, 0)
+  Eigen::Vector2d direction = Eigen::Vector2d::Zero(); // of a slide, in the axes of a; of a gear (n_b, n_a)
   double offset = 0;                                   // the row's value at its zero
 };
 

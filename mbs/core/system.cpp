@@ -86,7 +86,7 @@ void update_targets(const System &system, double t, Workspace &w) {
 }
 
 void apply_drives(const System &system, double t, Workspace &w) {
-  if (!system.drives.empty()) {
+  if (!system.drives.empty() || !system.springs.empty() || !system.state_forces.empty()) {
     for (std::size_t b = 0; b < system.bodies.size(); ++b) {
       w.wrench[b].setZero();
       w.bodies[b].has_wrench = true;
@@ -98,6 +98,16 @@ void apply_drives(const System &system, double t, Workspace &w) {
       if (drive.friction.acts())
         force -= drive.friction.resistance(w.drive_rows[d].rate);
       add_wrench(drive.row, w.drive_rows[d], force, w.wrench);
+    }
+    for (const StateForce &force : system.state_forces)
+      w.wrench[static_cast<std::size_t>(force.marker.body)].col(force.marker.marker) += force(t, w.bodies);
+    RowMotion motor, joint;
+    for (const Spring &spring : system.springs) {
+      evaluate(spring.motor, w.bodies, motor);
+      evaluate(spring.joint, w.bodies, joint);
+      const double moment = spring.moment(motor, joint);
+      add_wrench(spring.motor, motor, -moment, w.wrench);
+      add_wrench(spring.joint, joint, moment, w.wrench);
     }
     for (std::size_t b = 0; b < system.bodies.size(); ++b)
       w.bodies[b].wrench = w.wrench[b];
@@ -291,6 +301,14 @@ JointEnergy joint_energy(const System &system, const double *q, const double *v,
       evaluate(drive.row, w.bodies, motion);
       result.dissipated_power += drive.friction.resistance(motion.rate) * motion.rate;
     }
+  RowMotion of_joint;
+  for (const Spring &spring : system.springs) {
+    evaluate(spring.motor, w.bodies, motion);
+    evaluate(spring.joint, w.bodies, of_joint);
+    const double twist = motion.value - of_joint.value, rate = motion.rate - of_joint.rate;
+    result.strain += 0.5 * spring.stiffness * twist * twist;
+    result.dissipated_power += spring.damping * rate * rate;
+  }
   return result;
 }
 

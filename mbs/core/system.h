@@ -7,6 +7,7 @@
 #include "core/planar_body.h"
 #include "core/port_couplings.h"
 #include "core/rows.h"
+#include "core/state_force.h"
 #include "core/time_function.h"
 
 #include <cmath>
@@ -45,6 +46,17 @@ struct Drive {
   Friction friction = {};
 };
 
+// Spring and damper of a gear: the moment k delta + c delta_dot, delta = motor - joint, pulls the motor back and the
+// joint along. Both rows are angles, which do not move with the bodies.
+struct Spring {
+  Row motor, joint;
+  double stiffness = 0, damping = 0;
+
+  double moment(const RowMotion &of_motor, const RowMotion &of_joint) const {
+    return stiffness * (of_motor.value - of_joint.value) + damping * (of_motor.rate - of_joint.rate);
+  }
+};
+
 // Modal forces `vector * size(t)` on one body: PZT patches.
 struct ModalDrive {
   int body;
@@ -57,7 +69,9 @@ struct System {
   std::vector<PlanarBody> bodies;
   std::vector<Constraint> constraints; // ordered for a small envelope by whoever builds the system, rotors last
   std::vector<Drive> drives;
+  std::vector<Spring> springs;
   std::vector<ModalDrive> modal_drives;
+  std::vector<StateForce> state_forces;
 
   // Derived from the above by finish()
   std::vector<Eigen::Index> first_coordinate; // of each body in q
@@ -130,9 +144,9 @@ void constraint_accelerations(const System &system, const double *q, const doubl
 // C_q (held constraints x coordinates), dense, at the coordinates of the last evaluation.
 Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w);
 
-// Kinetic energy of the rotors and the power that friction takes, at the state (q, v).
+// Energies of rotors and springs and the power that friction and dampers take, at the state (q, v).
 struct JointEnergy {
-  double kinetic = 0, dissipated_power = 0;
+  double kinetic = 0, strain = 0, dissipated_power = 0;
 };
 JointEnergy joint_energy(const System &system, const double *q, const double *v, Workspace &w);
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from checkpoints import check_table
+from checkpoints import check_table, readme_table
 from test_actuation_cases import peak, tip_error
 
 
@@ -14,6 +14,11 @@ def geared(solved):
 @pytest.fixture(scope="module")
 def loops(solved):
     return solved("two_link_closed_loop")
+
+
+@pytest.fixture(scope="module")
+def rest_to_rest(solved):
+    return solved("two_link_rest_to_rest")
 
 
 def test_geared_arm(geared):
@@ -33,14 +38,32 @@ def test_geared_arm_carries_out_its_moments(geared):
     assert np.trapz(energy, geared.file["inverse/time"][()]) == pytest.approx(2.72, rel=0.01)  # noqa: NPY201
 
 
-def test_closed_loops(loops):
+def check_runs(case, name):
+    """The metrics of all closed loops of a case, by run, against its README."""
     keys = ("tip_error_rms", "tip_error_max", "vibration", "residual", "peak_moment", "peak_voltage")
-    runs = [name for name in loops.file if "control" in loops.file[name]]
-    metrics = {name: loops.file[f"{name}/control"].attrs for name in runs}
+    runs = [run for run in case.file if "control" in case.file[run]]
+    metrics = {run: case.file[f"{run}/control"].attrs for run in runs}
     assert all(entry["verdict"] == "stable" for entry in metrics.values())
-    check_table("two_link_closed_loop", "run", {f"`{n}`": [entry[key] for key in keys] for n, entry in metrics.items()})
+    check_table(name, "run", {f"`{run}`": [entry[key] for key in keys] for run, entry in metrics.items()})
+    return metrics
+
+
+def test_closed_loops(loops):
+    metrics = check_runs(loops, "two_link_closed_loop")
     assert metrics["pd_patches_blow"]["residual"] < metrics["pd_blow"]["residual"] / 10
     assert metrics["lqr_blow"]["residual"] < metrics["moments_blow"]["residual"] / 1000
+
+
+def test_all_ways_along_one_path(rest_to_rest):
+    """The issue's table: by how much motors and patches within their limits beat joint moments alone."""
+    metrics = check_runs(rest_to_rest, "two_link_rest_to_rest")
+    driven_by_patches = ("pd_patches", "pd_patches_blow", "lqr", "lqr_blow")
+    assert all(metrics[run]["peak_voltage"] <= 200 for run in driven_by_patches)
+    factors = readme_table("two_link_rest_to_rest", "times less")
+    for label, key in (("rms", "tip_error_rms"), ("at the end", "residual")):
+        for way, run in (("PD and patches", "pd_patches"), ("LQR", "lqr")):
+            found = [metrics[f"{run}{blow}"][key] / metrics[f"moments{blow}"][key] for blow in ("", "_blow")]
+            np.testing.assert_allclose(1 / np.array(found), factors[f"{label}, {way}"], rtol=0.03)
 
 
 def test_closed_loops_are_told_of(loops, ffrobot):

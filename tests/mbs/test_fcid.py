@@ -11,9 +11,9 @@ from ffrobot.errors import InputError, SolveError
 from ffrobot.mbs import _core
 from ffrobot.mbs.analyses import Outcome, run_pcid
 from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.fcid import run_fcid, spline
+from ffrobot.mbs.fcid import run_fcid
 from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.time_functions import parse_expression
+from ffrobot.mbs.time_functions import parse_expression, spline
 
 OPEN = ["chain of 2", "backwards", "mixed", "mixed backwards", "tree", "loaded", "stiffened, driven"]
 WITH_PAYLOAD = ("loaded", "stiffened, driven")

@@ -1,0 +1,201 @@
+"""Gears that give: two masses and a spring, energy, the rigid limit, and motors that carry out an inverse analysis."""
+
+import numpy as np
+import pytest
+from links import ANGLES, TIP, arm, arm_links, quintic
+from mechanisms import always, forward, make_model, pcid, relative, revolute
+from scipy.integrate import simpson
+from test_balances import OUTPUT_STEP, energy_and_losses
+from test_rigid_limit import rod
+
+from ffrobot.actuation.control.linear_model import linear_model
+from ffrobot.actuation.control.modes import robot_modes
+from ffrobot.errors import InputError
+from ffrobot.mbs.analyses import run_forward, run_pcid, run_static
+from ffrobot.mbs.analysis_records import Analysis
+from ffrobot.mbs.compliant_joints import through_gears, unresolved_gears, with_compliance
+from ffrobot.mbs.linearisation import linearise
+from ffrobot.mbs.observation import joint_forces, motor_angle, point_motion
+from ffrobot.mbs.operating_points import operating_points
+from ffrobot.mbs.steering import Equipment
+
+L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
+MOTOR, LINK = J * N**2, M * L**2 / 3
+GIVES = {"gear_ratio": N, "rotor_inertia": J, "stiffness": K}
+GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0}
+RIGID = {key: GEARED[key] for key in ("gear_ratio", "rotor_inertia")}
+
+
+def pendulum(load="0", **keys):
+    """A rod in no field of gravity, turned by a motor behind a gear that gives."""
+    return make_model(
+        [rod("a", L, M)], joint=[revolute("O", "ground", "a.root", **(GIVES | keys))],
+        load=[{"joint": "O", "moment": load}], gravity=(0.0, 0.0),
+    )  # fmt: skip
+
+
+def geared_arm(first, second=None, **keys):
+    joints = [
+        revolute("O", "ground", "link1.root", **first),
+        revolute("A", "link1.tip", "link2.root", **(second or first)),
+    ]
+    return arm(arm_links(EI=300.0, modes=2, damping_ratio=0.02), joint=joints, **keys)
+
+
+def test_two_masses_turn_and_swing():
+    """A constant moment τ behind the gear: the centre of inertia turns with τ/(I_m + I), the twist goes as 1 − cos ωt.
+
+    ω² = k (1/I_m + 1/I) with I_m = J N² and I = m L²/3; the twist's mean is τ I/(I_m + I)/k.
+    """
+    tau, t = 2.0, np.linspace(0.0, 1.0, 101)
+    outcome = run_forward(pendulum(str(tau)), forward(tolerance=1e-9), None, {}, always)
+    omega, total = np.sqrt(K * (1 / MOTOR + 1 / LINK)), MOTOR + LINK
+    twist = tau * LINK / total / K * (1 - np.cos(omega * t))
+    turned = tau * t**2 / 2 / total
+    link, motor = outcome.q[:, 2], motor_angle(outcome, "O")
+    assert relative(link, turned - MOTOR / total * twist) < 1e-7
+    assert relative(motor - link, twist) < 1e-6
+
+
+def test_linear_model_has_the_closed_form_resonance_and_response():
+    model = with_compliance(pendulum(damping=C))
+    n = 6
+    mechanism = linearise(model, 0.0, *np.zeros((3, n)))
+    assert mechanism.names == ("motor/O", "joint/O")
+    robot = linear_model(mechanism, {})
+    omega, damping = np.sqrt(K * (1 / MOTOR + 1 / LINK)), C * (1 / MOTOR + 1 / LINK)
+    modes = robot_modes(robot)
+    np.testing.assert_allclose(modes.frequency, [0.0, omega / (2 * np.pi)], atol=1e-9)
+    np.testing.assert_allclose(modes.damping_ratio[1], damping / (2 * omega), rtol=1e-9)
+    w = np.array([3.0, 0.9 * omega, 40.0])
+    spring = K + 1j * w * C
+    expected = spring / (MOTOR * LINK * w**4 - (MOTOR + LINK) * w**2 * spring)
+    np.testing.assert_allclose(robot.frequency_response(w, "joint/O", "joint/O")[:, 0, 0], expected, rtol=1e-9)
+
+
+def rigid_arm(first, second, **keys):
+    """Rods under the rest-to-rest path of the flexible arm."""
+    joints = [revolute("O", "ground", "a.root", **first), revolute("A", "a.tip", "b.root", **second)]
+    path = {"name": "tip", "point": "b.tip", "x": quintic(TIP[0], 0.4), "y": quintic(TIP[1], 1.5)}
+    angles = dict(zip("ab", ANGLES.values(), strict=True))
+    tables = {"joint": joints, "trajectory": [path], "initial": {"angles": angles}}
+    return make_model([rod("a", 1.0, 1.0), rod("b", 1.0, 1.0)], **(tables | keys))
+
+
+def test_dampers_take_the_energy_that_is_missing():
+    soft = GEARED | {"stiffness": 200.0, "damping": 1.0}
+    keys = {"trajectory": [], "initial": {"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 2.0}}}
+    load = [{"joint": "O", "moment": "20*sin(10*t)"}]
+    outcome = run_forward(
+        geared_arm(soft, load=load, **keys), forward(output_step=OUTPUT_STEP, tolerance=1e-9), None, {}, always
+    )
+    total, losses = energy_and_losses(outcome)
+    motor_rate = np.gradient(motor_angle(outcome, "O"), OUTPUT_STEP, edge_order=2)
+    work = simpson(20 * np.sin(10 * outcome.time) * motor_rate, x=outcome.time)
+    assert losses > 0.3
+    assert abs(work - losses - (total[-1] - total[0])) < 1e-5 * losses
+
+
+def test_stiff_gears_approach_rigid_ones_as_one_over_their_stiffness():
+    """Under slow, smooth moments, that do not make them ring."""
+    load = [{"joint": "O", "moment": "4*sin(2*t)**4"}, {"joint": "A", "moment": "sin(2*t)**4"}]
+    keys = {"trajectory": [], "load": load, "gravity": (0.0, 0.0)}
+    run = forward(tolerance=1e-9)
+    rigid, errors = run_forward(rigid_arm(RIGID, RIGID, **keys), run, None, {}, always).q, []
+    for k in (1e4, 2e4, 4e4):
+        give = RIGID | {"stiffness": k}
+        q = run_forward(rigid_arm(give, give, **keys), run, None, {}, always).q
+        errors.append(relative(q[:, : rigid.shape[1]], rigid))
+    order = -np.diff(np.log(errors)) / np.log(2)
+    assert errors[-1] < 1e-3
+    np.testing.assert_allclose(order, 1.0, atol=0.1)
+
+
+@pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
+def test_implicit_integrators_agree_with_explicit_ones(integrator):
+    model = geared_arm(GEARED, trajectory=[], initial={"angles": {"link1": 0.3, "link2": 1.0}})
+    reference = run_forward(model, forward(end=0.2, tolerance=1e-8, integrator="dop853"), None, {}, always)
+    outcome = run_forward(model, forward(end=0.2, tolerance=1e-5, integrator=integrator), None, {}, always)
+    assert outcome.status == "completed"
+    assert relative(outcome.q, reference.q) < 1e-4
+
+
+def carried_out(model, end=1.0):
+    """Distance (T,) of the tip from its path when the motors do what the inverse analysis says; and that analysis."""
+    source = through_gears(run_pcid(model, pcid(tolerance=1e-9, end=end, output_step=0.0025), True, always))
+    replay = forward(actuation="inverse", apply="joints", tolerance=1e-9, end=end, output_step=0.0025)
+    outcome = run_forward(model, replay, source, Equipment(), always)
+    assert outcome.status == "completed"
+    tip = f"{model.links[-1].name}.tip"
+    error = point_motion(outcome, tip).position - point_motion(source, tip).position
+    return np.linalg.norm(error, axis=1), source, outcome
+
+
+def test_motor_moments_carry_out_the_path():
+    """Of one gear that gives at the ground: nothing is left out but the spline between outputs."""
+    error, source, outcome = carried_out(rigid_arm(GEARED, RIGID))
+    assert error.max() < 1e-9  # of a path of 1.4 m; measured 7e-12, and 5e-3 with rigid moments
+    assert relative(motor_angle(outcome, "O"), source.gears["O"].angle) < 1e-9
+    twist = source.gears["O"].angle - source.q[:, 2]
+    assert twist.max() > 2e-3
+    assert not list(unresolved_gears(source.gears))
+
+
+def test_a_gear_between_links_leaves_a_share_of_its_ratio():
+    """What is left out, J N δ̈ on the first link, shows: 6e-5 m, where rigid moments leave 1.2e-2."""
+    error, _, _ = carried_out(rigid_arm(GEARED, GEARED))
+    assert 1e-5 < error.max() < 1e-4
+
+
+def test_coarse_outputs_are_told_of():
+    model = rigid_arm(GEARED | {"stiffness": 30.0}, RIGID)
+    source = through_gears(run_pcid(model, pcid(tolerance=1e-6, output_step=0.05), True, always))
+    (line,) = unresolved_gears(source.gears)
+    assert "refine output_step" in line
+
+
+def test_equilibrium_winds_the_gears():
+    """About it, forces are needed along the motors alone: springs carry the links."""
+    analysis = Analysis(name="linear", kind="linear")
+    model = geared_arm(GEARED, analysis=(analysis,), trajectory=[])
+    about = operating_points(model, analysis, None)
+    rest = np.zeros(about.q.shape[1])
+    mechanism = linearise(with_compliance(model), 0.0, about.q[0], rest, rest)
+    along = [mechanism.names.index(f"motor/{joint}") for joint in "OA"]
+    assert mechanism.force[along].min() > 1.0
+    np.testing.assert_allclose(mechanism.force[along], [about.gears[joint].moment[0] for joint in "OA"], rtol=1e-9)
+    assert np.abs(np.delete(mechanism.force, along)).max() < 1e-9 * mechanism.force[along].max()
+
+
+def test_static_moments_are_those_of_the_gears():
+    analysis = Analysis(name="static", kind="static")
+    static = through_gears(run_static(geared_arm(GEARED, analysis=(analysis,)), analysis))
+    for joint in "OA":
+        np.testing.assert_allclose(static.gears[joint].gear_moment, joint_forces(static, joint).motor)
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({"stiffness": 0.0}, "greater than 0"),
+        ({"damping": 1.0}, "only beside stiffness"),
+        ({"stiffness": 1.0}, "rotor_inertia above 0"),
+        ({"stiffness": 1.0, "type": "prismatic", "axis": (1.0, 0.0), "rotor_inertia": 1.0}, "only in revolute joints"),
+        ({"stiffness": 1.0, "type": "weld"}, "in a weld"),
+    ],
+)
+def test_bad_keys_are_refused(keys, expected):
+    with pytest.raises(ValueError, match=expected):
+        make_model([rod("a", 1.0, 1.0)], joint=[revolute("O", "ground", "a.root") | keys])
+
+
+def test_what_does_not_go_is_refused():
+    with pytest.raises(InputError, match="a joint with a motor"):
+        with_compliance(pendulum(motor=False))
+    model = geared_arm(GEARED)
+    source = through_gears(run_pcid(model, pcid(end=0.1), True, always))
+    with pytest.raises(InputError, match='"joints" or "joints\\+pzt" beside joints'):
+        run_forward(model, forward(actuation="inverse", apply="trajectory", end=0.1), source, Equipment(), always)
+    loaded = geared_arm(GEARED, load=[{"joint": "O", "moment": "1"}])
+    with pytest.raises(InputError, match=r"expected no \[\[load\]\] on"):
+        through_gears(run_pcid(loaded, pcid(end=0.1), False, always))
