@@ -101,11 +101,16 @@ void IterationMatrix<Scalar>::factorise(const Workspace &w, const Eigen::VectorX
   }
   rows_ = w.rows;
   schur_.set_zero();
+  Matrix3 E;
+  const System::Coupling *at = nullptr; // E is its mobility
   for (const auto &c : system_.couplings) {
     const RowMotion &r = rows_[static_cast<std::size_t>(c.r)], &s = rows_[static_cast<std::size_t>(c.s)];
     const auto &cr = c.r_is_b ? r.coefficient_b : r.coefficient_a;
     const auto &cs = c.s_is_b ? s.coefficient_b : s.coefficient_a;
-    const Vector3 image = mobility(bodies_[static_cast<std::size_t>(c.body)], c.k, c.l) * cs;
+    if (!at || at->body != c.body || at->k != c.k || at->l != c.l)
+      E = mobility(bodies_[static_cast<std::size_t>(c.body)], c.k, c.l);
+    at = &c;
+    const Vector3 image = E * cs;
     *schur_.entry(c.r, c.s) += cr[0] * image[0] + cr[1] * image[1] + cr[2] * image[2];
   }
   for (std::size_t r = system_.held; r < rows_.size(); ++r) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace ffrobot {
 
@@ -48,6 +49,8 @@ void System::finish() {
     }
     envelope.push_back(first);
   }
+  const auto block = [](const Coupling &c) { return std::tuple(c.body, c.k, c.l); };
+  std::ranges::stable_sort(couplings, {}, block); // those between the same two markers one after the other
 }
 
 Workspace::Workspace(const System &system)

@@ -144,11 +144,29 @@ Expression::Expression(std::span<const Op> program, std::span<const double> cons
     if (op == Op::constant && used == constants.size())
       throw std::invalid_argument("expression: fewer constants than the program uses");
     program_.push_back({op, op == Op::constant ? constants[used++] : 0.0});
+    fold_constants();
   }
   if (depth != 1)
     throw std::invalid_argument("expression: expected one result, found " + std::to_string(depth));
   if (used != constants.size())
     throw std::invalid_argument("expression: more constants than the program uses");
+}
+
+// The last instruction, where all its operands are constants and its result is a number.
+void Expression::fold_constants() {
+  const auto length = operand_count(program_.back().op) + 1;
+  if (length == 1 || length > std::ssize(program_))
+    return;
+  const auto begin = program_.end() - length;
+  if (!std::all_of(begin, program_.end() - 1, [](const Instruction &i) { return i.op == Op::constant; }))
+    return;
+  Expression part;
+  part.program_.assign(begin, program_.end());
+  const Jet jet = part(0.0);
+  if (!std::isfinite(jet.value) || jet.rate != 0.0 || jet.acceleration != 0.0)
+    return;
+  program_.erase(begin, program_.end());
+  program_.push_back({Op::constant, jet.value});
 }
 
 Jet Expression::operator()(double t) const {

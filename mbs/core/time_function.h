@@ -70,6 +70,9 @@ private:
     Op op;
     double constant;
   };
+  Expression() = default;
+  void fold_constants();
+
   std::vector<Instruction> program_;
 };
 

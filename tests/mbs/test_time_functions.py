@@ -105,6 +105,12 @@ def test_abs_differentiates_forward_in_time():
     assert parse_expression("abs(-t**2)")(0.0) == (0.0, 0.0, 2.0)
 
 
+def test_constants_among_themselves_mean_what_they_do_with_t():
+    """Folded when the expression is read; the same with a zero that depends on t."""
+    folded, not_folded = (f"1 + (cos(pi/4 + {zero}) - sqrt(3 + {zero})/2)*t**(1 + {zero} + 1)" for zero in ("0", "0*t"))
+    np.testing.assert_array_equal(parse_expression(folded)(1.7), parse_expression(not_folded)(1.7))
+
+
 def test_values_outside_the_domain_are_nan_by_component():
     assert np.isnan(parse_expression("log(t)")(-1.0)).all()
     assert np.isnan(parse_expression("1/t")(0.0)).all()
