@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .analyses import Outcome
 
 DEGREE = 5
-UNRESOLVED = 0.01  # of a motor's largest moment: what every second output may change of it
+UNRESOLVED = 0.001  # of a motor's largest moment: what every second output may change of it
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,8 @@ def _gear_motion(gear: Gear, time: Array, tau: Array, gamma: Array, alpha: Array
     if len(time) > 2 * DEGREE + 1 and largest:
         coarse = tau[::2] + J * N**2 * _twist(gear, time[::2], transmitted[::2])[:, 2]
         unresolved = float(np.abs(coarse - moment[::2]).max()) / largest
-    return GearMotion(transmitted, *(gamma + twist).T, moment, unresolved)
+    angle, rate, acceleration = (gamma + twist).T
+    return GearMotion(transmitted, angle, rate, acceleration, moment, unresolved)
 
 
 def _twist(gear: Gear, time: Array, moment: Array) -> Array:
@@ -177,7 +178,12 @@ def with_rotors(source: Outcome, model: Model) -> Outcome:
             fixed = np.zeros((len(values), 2))  # the rotor's frame
             columns[order] += [fixed, (values + alpha[:, order] / gear.ratio)[:, None]]
     q, v, a = (np.hstack(parts) for parts in columns)
-    return replace(source, assembly=Assembly(model, model.joints), q=q, v=v, a=a)
+    known_rows = source.assembly.constraints
+    pins = [constraint for constraint in model.joints if constraint not in known_rows]
+    assembly = Assembly(model, [*known_rows, *pins])
+    lambda_ = np.zeros((len(q), len(assembly.constraints)))  # nothing pulls at the pins
+    lambda_[:, [assembly.constraints.index(row) for row in known_rows]] = source.lambda_
+    return replace(source, assembly=assembly, q=q, v=v, a=a, lambda_=lambda_)
 
 
 def rotors_like(model: Model, state: State, source: Outcome) -> State:

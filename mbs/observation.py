@@ -120,9 +120,8 @@ def motor_angle(outcome: Outcome, joint: str) -> Array | None:
     if not rows:
         return None
     assembly = Assembly(model, model.joints, (), rows)
-    angle: Array = _core.Sensing(assembly.system, [(assembly.motor_rows[0], 0)], []).read(
-        outcome.q, outcome.v, outcome.a
-    )[:, 0]
+    sensing = _core.Sensing(assembly.system, [(assembly.motor_rows[0], 0)], [])
+    angle: Array = sensing.read(outcome.q, outcome.v, outcome.a)[:, 0]
     return angle
 
 
