@@ -16,7 +16,8 @@ from key_tables import write_key_tables
 project = "ffrobot"
 author = "the ffrobot developers"
 version = release = ffrobot.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_click"]
+# Formulas are set by a MathJax that is part of the site: pages open without a network.
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx-mathjax-offline", "sphinx_click"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 html_theme = "furo"

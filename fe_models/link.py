@@ -18,7 +18,7 @@ from ..errors import FfrobotError, SolveError
 from ..files import check_output
 from ..mesh.kept_parts import kept_path
 from ..parallel import on_first, processes
-from .link_file import read_link
+from .link_file import LinkSource, link_path, read_link
 from .link_records import BeamLink, Link, SolidLink
 from .modal_body import ModalBody
 from .modal_body_file import FORMAT, read_modal_body, write_modal_body
@@ -47,13 +47,13 @@ class LinkOutcome:
 
 
 def make_link(
-    link_path: Path, output: Path | None = None, force: bool = False, progress: Progress | None = None
+    source: LinkSource, output: Path | None = None, force: bool = False, progress: Progress | None = None
 ) -> LinkOutcome:
     """Bring the modal body file of a link up to date.
 
     Args:
-        link_path: the link file.
-        output: where to write; LINK.h5 beside the link file if None.
+        source: the link file, or its content.
+        output: where to write; if None, LINK.h5 beside the link file, or the user's cache where there is no file.
         force: compute and overwrite in any case.
         progress: is told what is being done, one line a step.
 
@@ -64,17 +64,17 @@ def make_link(
         SolveError: the modes cannot be computed, or the file cannot be written.
     """
     start = time.perf_counter()
-    link = read_link(link_path)
-    path = output if output is not None else link_path.with_suffix(".h5")
-    digest = input_hash(link)
+    link = read_link(source)
+    digest, beside = input_hash(link), _beside(source)
+    path = output or (beside[0] if beside else _cached(link))
     if not force and on_first(lambda: _up_to_date(path, digest) is not None):
         return LinkOutcome(path, read_modal_body(path), False, time.perf_counter() - start)
     on_first(lambda: check_output(path, FORMAT, force=force))
-    earlier = [] if force else [path, link_path.with_suffix(".h5")]
-    return _compute(link, link_path, path, digest, start, progress, earlier, force=force)
+    earlier = [] if force else [path, *beside]
+    return _compute(link, link_path(source), path, digest, start, progress, earlier, force=force)
 
 
-def cached_modal_body(link_path: Path, progress: Progress | None = None) -> LinkOutcome:
+def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> LinkOutcome:
     """The modal body of a link: from an up-to-date LINK.h5 beside it, else from the user's cache, else computed.
 
     Cache entries are named by content: hashes of its modes and of all of it, under `ffrobot/links` in the XDG cache
@@ -85,13 +85,21 @@ def cached_modal_body(link_path: Path, progress: Progress | None = None) -> Link
         SolveError: the modes cannot be computed, or the cache cannot be written.
     """
     start = time.perf_counter()
-    link = read_link(link_path)
-    digest = input_hash(link)
-    beside, path = link_path.with_suffix(".h5"), _cache_folder() / f"{modes_hash(link)}-{digest}.h5"
-    for candidate in (beside, path):
+    link = read_link(source)
+    digest, beside, path = input_hash(link), _beside(source), _cached(link)
+    for candidate in (*beside, path):
         if (body := _up_to_date(candidate, digest)) is not None:
             return LinkOutcome(candidate, body, False, time.perf_counter() - start)
-    return _compute(link, link_path, path, digest, start, progress, [beside])
+    return _compute(link, link_path(source), path, digest, start, progress, beside)
+
+
+def _beside(source: LinkSource) -> list[Path]:
+    """Where `make_link` puts the modal body of a link file."""
+    return [source.with_suffix(".h5")] if isinstance(source, Path) else []
+
+
+def _cached(link: Link) -> Path:
+    return _cache_folder() / f"{modes_hash(link)}-{input_hash(link)}.h5"
 
 
 def _cache_folder() -> Path:
@@ -100,7 +108,7 @@ def _cache_folder() -> Path:
 
 def _compute(
     link: Link,
-    link_path: Path,
+    source_path: Path,
     path: Path,
     digest: str,
     start: float,
@@ -123,10 +131,10 @@ def _compute(
     if on_first(from_same_modes):
         return LinkOutcome(path, read_modal_body(path), True, time.perf_counter() - start, "modes")
     meshed = on_first(lambda: not force and _has_mesh(link))
-    compute = _computation(link, link_path, force)  # on all processes: the libraries start together
+    compute = _computation(link, source_path, force)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
-        return compute(link, link_path, digest, progress or _silent)
+        return compute(link, source_path, digest, progress or _silent)
 
     if processes() > 1 and isinstance(link, BeamLink):  # too small to share out
         on_first(lambda: write(make()))
@@ -155,7 +163,7 @@ def _has_mesh(link: Link) -> bool:
     return kept_path(link.geometry, link.mesh, link.interface, link.surface_patch).is_file()
 
 
-def _computation(link: Link, link_path: Path, remesh: bool) -> Callable[..., ModalBody]:
+def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
     try:
         if isinstance(link, BeamLink):
             from .beam_link import beam_modal_body
@@ -166,7 +174,7 @@ def _computation(link: Link, link_path: Path, remesh: bool) -> Callable[..., Mod
         return partial(solid_modal_body, remesh=remesh)
     except ModuleNotFoundError as error:
         raise SolveError(
-            f"{link_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "
+            f"{source_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "
             "install dolfinx and slepc4py (Debian: python3-dolfinx python3-slepc4py), or use a modal body file made "
             "elsewhere"
         ) from None

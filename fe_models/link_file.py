@@ -1,11 +1,17 @@
-"""The link file: read, and checked for all that one key alone cannot tell (the records check the keys)."""
+"""The link file: read, and checked for all that one key alone cannot tell (the records check the keys).
+
+Its content may stand elsewhere, as a table of a scene or a dictionary of Python.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass
 from itertools import pairwise
 from math import isclose
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -17,13 +23,38 @@ from .link_records import BeamLink, Link, Material, OrthotropicMaterial, SolidLi
 from .section_stress import contains
 
 
-def read_link(path: Path) -> Link:
-    """Read and check the link file at `path`.
+@dataclass(frozen=True)
+class LinkTable:
+    """The `keys` of a link file that stand elsewhere.
+
+    Messages call them `path`, in whose folder files are that they name.
+    """
+
+    keys: Mapping[str, Any]
+    path: Path
+
+
+LinkSource = Path | LinkTable
+"""A link file, or its content."""
+
+
+def link_path(source: LinkSource) -> Path:
+    """What messages call a link."""
+    return source.path if isinstance(source, LinkTable) else source
+
+
+def link_keys(source: LinkSource) -> dict[str, Any]:
+    """The content of a link file, unchecked. Raises `InputError` where it cannot be read."""
+    return deepcopy(dict(source.keys)) if isinstance(source, LinkTable) else load_toml(source, "link file")
+
+
+def read_link(source: LinkSource) -> Link:
+    """Read and check a link file.
 
     Raises:
         InputError: the file cannot be read, a key is unknown or missing, or a value is wrong; names file and key.
     """
-    data = load_toml(path, "link file")
+    data, path = link_keys(source), link_path(source)
     geometry = data.get("geometry")
     kind = geometry.get("kind", "beam") if isinstance(geometry, dict) else "beam"
     if kind == "solid":

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .fe_models.link import LinkOutcome
@@ -17,26 +17,38 @@ if TYPE_CHECKING:
 AnyPath = str | PathLike[str]
 
 
-def solve(scene: Scene | AnyPath, output: AnyPath | None = None, watcher: Watcher | None = None) -> Results:
+def solve(
+    scene: Scene | AnyPath, output: AnyPath | None = None, watcher: Watcher | None = None, *, resume: bool = False
+) -> Results:
     """Run the analyses of a scene, or of a scene file, and return the results: `ffrobot solve`.
 
     They are written to `output` where one is given, and kept in memory otherwise. `watcher` is told how it goes.
+    `resume` goes on with a run that was stopped, from `output`; functions of Python have to be the same then.
     Raises `InputError` for anything wrong with the scene, `SolveError` where an analysis does not reach its end; what
     was computed until then is in `output` all the same.
     """
+    from .errors import InputError
     from .files import check_output
     from .mbs.scene_records import Scene
     from .results import FORMAT, results_image, write_results
     from .results_file import Results
+    from .resume import how_to_go_on
+    from .resume import resume as run_on
     from .solution import solve as run
 
     if output is not None:
         check_output(Path(output), FORMAT)
-    solution = run(scene if isinstance(scene, Scene) else Path(scene), watcher)
+    elif resume:
+        raise InputError("solve: resume: expected the output of the run that was stopped, found none")
+    scene = scene if isinstance(scene, Scene) else Path(scene)
+    solution = run_on(scene, Path(output), watcher) if output is not None and resume else run(scene, watcher)
+    if solution is None:
+        assert output is not None
+        return Results(output)
     if output is not None:
         write_results(solution, Path(output))
     for outcome in solution.outcomes.values():
-        outcome.check_completed()
+        outcome.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if output is not None else "")
     if output is not None:
         return Results(output)
     return Results.from_image(results_image(solution), solution.scene.path)
@@ -49,11 +61,17 @@ def load_scene(path: AnyPath) -> Scene:
     return load_scene(Path(path))
 
 
-def make_link(path: AnyPath, output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
-    """Compute the modal body of a link file unless it is up to date: `ffrobot link`. See `fe_models.link`."""
-    from .fe_models.link import make_link
+def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
+    """Compute the modal body of a link unless it is up to date: `ffrobot link`. See `fe_models.link`.
 
-    return make_link(Path(path), None if output is None else Path(output), force)
+    `link` is a link file or a dictionary of its keys, whose modal body goes to the user's cache without `output`.
+    """
+    from .fe_models.link import make_link
+    from .fe_models.link_file import LinkTable
+    from .validation import plain
+
+    source = LinkTable(plain(link), Path("<link made in Python>")) if isinstance(link, Mapping) else Path(link)
+    return make_link(source, None if output is None else Path(output), force)
 
 
 def read_modal_body(path: AnyPath) -> ModalBody:

@@ -23,13 +23,13 @@ FILE = click.Path(path_type=Path)
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="ffrobot")
 def cli() -> None:
-    r"""What motors and piezoelectric patches must do so that a flexible robot follows its path.
+    """What motors and piezoelectric patches must do so that a flexible robot follows its path.
 
     \b
     Stage 1:  ffrobot link  LINK.toml   finite elements → modal body file
     Stage 2:  ffrobot solve SCENE.toml  modal bodies → moments and voltages
     Then:     ffrobot info, ffrobot plot, ffrobot view, ffrobot report
-    """
+    """  # noqa: D301 (click wants the backspace itself)
 
 
 @cli.command()
@@ -67,29 +67,38 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     type=FILE,
     help="Where to write [SCENE.results.h5 beside the input].",
 )
+@click.option("--resume", is_flag=True, help="Go on with a run that was stopped, from its results file.")
 @logging_options
-def solve(scene_file: Path, output: Path | None) -> None:
+def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
     """Run the analyses of a scene (stage 2).
 
     Links given as .toml are taken through stage 1 first where they are not up to date. Prints a summary: time per
     stage, steps, constraint violation, and the largest voltage against its limit.
+
+    Ctrl-C keeps what was computed; --resume goes on from there, and from the start where there are no results yet.
     """
     from .files import check_output
     from .progress import Display
     from .results import FORMAT, write_results
+    from .resume import how_to_go_on
+    from .resume import resume as resume_scene
     from .solution import solve as solve_scene
     from .summary import print_summary, summary_console
 
     path = output or scene_file.with_suffix(".results.h5")
     check_output(path, FORMAT)
     with Display() as display:
-        solution = solve_scene(scene_file, display)
+        solution = resume_scene(scene_file, path, display) if resume else solve_scene(scene_file, display)
+    if solution is None:
+        click.echo(f"{path}: complete, nothing to go on with")
+        return
     began = time.perf_counter()
     write_results(solution, path)
     seconds = {**solution.seconds, "writing": time.perf_counter() - began}
     print_summary(solution, path, seconds, summary_console())
+    where = f" -o {output}" if output else ""
     for outcome in solution.outcomes.values():
-        outcome.check_completed()
+        outcome.check_completed(how_to_go_on(solution, f"ffrobot solve {scene_file}{where} --resume"))
 
 
 @cli.command()
@@ -199,7 +208,7 @@ def sweep(
     keep: bool,
     output: Path | None,
 ) -> None:
-    r"""Solve a scene many times with some of its keys varied; one table of all runs, failed ones too.
+    """Solve a scene many times with some of its keys varied; one table of all runs, failed ones too.
 
     \b
     --vary links.link1.geometry.section.height=0.01:0.03:9   a key of a body's link file, 9 values
@@ -209,7 +218,7 @@ def sweep(
 
     Entries of lists of tables go by their name or body. The same command takes up a sweep that was stopped. Runs go
     side by side with -j on one machine, and on several under mpirun, where the first process hands them out.
-    """
+    """  # noqa: D301 (click wants the backspace itself)
     from .progress import Display
     from .summary import summary_console
     from .sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep
@@ -230,12 +239,12 @@ def sweep(
 @cli.command()
 @click.argument("kind", type=click.Choice(["link", "scene"]))
 def schema(kind: str) -> None:
-    r"""Print the JSON schema of link or scene files, for editors.
+    """Print the JSON schema of link or scene files, for editors.
 
     \b
     ffrobot schema scene > scene.schema.json
     and, as the first line of a scene file:  #:schema ./scene.schema.json
-    """
+    """  # noqa: D301 (click wants the backspace itself)
     import json
 
     from .schema import schema as schema_of

@@ -1,4 +1,4 @@
-"""Ctrl-C while analyses run: a request to stop that keeps what has been computed."""
+"""Ctrl-C while analyses run, or a cluster's end of time: a request to stop that keeps what has been computed."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import signal
 import threading
 from types import FrameType, TracebackType
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
 
 class Interruption:
-    """Within its context the first Ctrl-C only sets `requested`; the next one interrupts as usual.
+    """Within its context the first Ctrl-C (or SIGTERM) only sets `requested`; the next one interrupts as usual.
 
     Python would raise `KeyboardInterrupt` anywhere, in the calls from the core too, and the outputs so far were lost.
     Signals reach the main thread only: in any other the context does nothing.
@@ -20,13 +22,17 @@ class Interruption:
 
     def __enter__(self) -> Interruption:
         if self._is_main:
-            self._previous = signal.signal(signal.SIGINT, self._request)
+            self._previous = {number: signal.signal(number, self._request) for number in SIGNALS}
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
         if self._is_main:
-            signal.signal(signal.SIGINT, self._previous)
+            self._restore()
 
     def _request(self, number: int, frame: FrameType | None) -> None:
         self.requested = True
-        signal.signal(signal.SIGINT, self._previous)
+        self._restore()
+
+    def _restore(self) -> None:
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)

@@ -31,6 +31,7 @@ from .mbs.observation import (
 )
 from .mbs.stable_inversion import Inversion
 from .mbs.stress import BodyStress
+from .resume import write_state
 from .solution import Solution
 
 FORMAT = "ffrobot-results"
@@ -83,6 +84,7 @@ def results_image(solution: Solution) -> bytes:
                 write_loop(group, solution.loops[name])
             for body_name, stress in solution.stresses.get(name, {}).items():
                 _write_stress(group.create_group(f"stress/{body_name}"), stress)
+        write_state(file, solution)
         file.flush()
         image: bytes = file.id.get_file_image()
     return image

@@ -26,6 +26,8 @@ from .validation import did_you_mean
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from .actuation.control.linear_model import LinearModel
+
 Array = NDArray[np.float64]
 
 COLUMN = re.compile(r"(?P<dataset>.*?)\[(?P<column>\d+)\]")
@@ -138,6 +140,12 @@ class Results:
         p, transform = self[f"{group}/modal"], f"{group}/modal_transform"
         return p @ self[transform].T if self.has(transform) else p
 
+    def linear(self, analysis: str) -> tuple[LinearModel, ...]:
+        """The linear models of an analysis of kind "linear", one for each of its times."""
+        from .control_results import read_linear
+
+        return read_linear(self, analysis)
+
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`."""
         return dict(self._file[group].attrs)
@@ -188,7 +196,7 @@ class Results:
         outputs = len(self.time(analysis))
 
         def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
-            if not isinstance(item, h5py.Dataset) or item.shape[:1] != (outputs,):
+            if not isinstance(item, h5py.Dataset) or item.shape[:1] != (outputs,) or name.startswith("resume/"):
                 return
             values = np.asarray(item, dtype=float).reshape(outputs, -1)
             labels = [name] if item.ndim == 1 else [f"{name}[{k}]" for k in range(values.shape[1])]

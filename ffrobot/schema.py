@@ -20,6 +20,8 @@ def schema(kind: str) -> dict[str, Any]:
         from .mbs.scene_records import SceneKeys
 
         described = TypeAdapter(SceneKeys).json_schema()
+        for link in ("BeamLink", "SolidLink"):
+            described["$defs"][link]["required"].remove("name")  # that of the body
     else:
         from .fe_models.link_records import Link
 

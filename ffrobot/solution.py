@@ -30,6 +30,7 @@ from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.analysis_records import Analysis
 from .mbs.compliant_joints import through_gears
 from .mbs.control_records import Placement
+from .mbs.earlier_run import EarlierRun
 from .mbs.fcid import run_fcid
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
@@ -99,6 +100,7 @@ class Solution:
         stiffened: whether geometric stiffening is in the equations.
         stiffening_effects: by analysis, the largest relative change of a mode's stiffness by the loads of the run.
         skipped: what the scene did not need, one line each.
+        earlier: runs of analyses to go on with, from a results file: see `resume`.
     """
 
     scene: Scene
@@ -121,6 +123,7 @@ class Solution:
     mode_choice: ModeChoice | None = None
     stiffened: bool = False
     stiffening_effects: dict[str, float] = field(default_factory=dict)
+    earlier: Mapping[str, EarlierRun] = field(default_factory=dict)
 
 
 def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
@@ -133,7 +136,11 @@ def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
     watcher = watcher or Watcher()
-    solution = prepare(scene, watcher)
+    return run_analyses(prepare(scene, watcher), watcher)
+
+
+def run_analyses(solution: Solution, watcher: Watcher) -> Solution:
+    """What `solve` does with everything prepared; analyses go on from where `solution.earlier` has them."""
     with Interruption() as interruption:
         if any(body.modes == "auto" for body in solution.scene.body):
             solution = _with_enough_modes(solution, watcher, interruption)
@@ -184,9 +191,14 @@ def _with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Soluti
 def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
     """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
     if not _run_all(solution, watcher, interruption):
-        solution = _assembled(solution.scene, solution.bodies, solution.structure, solution.seconds, stiffened=True)
+        solution = stiffened(solution)
         _run_all(solution, watcher, interruption)
     return solution
+
+
+def stiffened(solution: Solution) -> Solution:
+    """The scene with geometric stiffening, nothing solved yet."""
+    return _assembled(solution.scene, solution.bodies, solution.structure, solution.seconds, stiffened=True)
 
 
 def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> bool:
@@ -324,7 +336,7 @@ def _judge_motors(solution: Solution, outcome: Outcome) -> dict[str, MotorFeasib
 
 
 def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Outcome:
-    model, end = solution.model, analysis.end
+    model, end, earlier = solution.model, analysis.end, solution.earlier.get(analysis.name)
     watcher.stage(f'analysis "{analysis.name}"')
 
     def progress(t: float) -> bool:
@@ -340,14 +352,14 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
         return through_gears(run_motors_only(model, analysis, progress))
     if analysis.kind == "pcid":
         replayed = any(later.actuation == analysis.name for later in solution.scene.analysis)
-        return through_gears(run_pcid(model, analysis, replayed, progress))
+        return through_gears(run_pcid(model, analysis, replayed, progress, earlier))
     source = solution.outcomes[analysis.actuation] if analysis.actuation else None
     if analysis.kind == "closed-loop":
         assert source is not None
         outcome, loop = run_closed_loop(model, analysis, source, solution.patches, progress)
         solution.loops[analysis.name] = loop
         return outcome
-    return run_forward(model, analysis, source, _equipment(solution), progress)
+    return run_forward(model, analysis, source, _equipment(solution), progress, earlier)
 
 
 def _place(solution: Solution, wanted: Placement, outcome: Outcome) -> Placed:

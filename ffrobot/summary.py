@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -31,48 +31,67 @@ def summary_console() -> Console:
 
 
 def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], console: Console) -> None:
-    """Tables of the analyses and voltages, wall time per stage, what was skipped, and where the results are."""
+    """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
     console.print(_analyses(solution))
     console.print("error aim: relative to the peak of each quantity; constraints: largest violation")
-    if any(solution.voltages.values()):
+    for table in _tables(solution):
         console.print()
-        console.print(_voltages(solution))
-    if solution.loops:
-        console.print()
-        console.print(_loops(solution))
+        console.print(table)
     for name in solution.feasibility:
         console.print(f"{name}: {_verdict(solution, name)}")
-    if any(solution.stresses.values()):
-        console.print()
-        console.print(_stresses(solution))
-    if solution.linear:
-        console.print()
-        console.print(linear_table(solution, _table(*LINEAR_COLUMNS)))
-    if solution.placements:
-        console.print()
-        console.print(placement_table(solution, _table(*PLACEMENT_COLUMNS)))
     for line in linear_lines(solution):
         console.print(line)
     notes = Table.grid(padding=(0, 2))
-    for name, outcome in solution.outcomes.items():
-        if outcome.analysis.integrated and outcome.analysis.integrator == "auto":
-            notes.add_row("integrator", f"{name}: {outcome.integrator.name}; {outcome.integrator.reason}")
-        if outcome.inversion is not None:
-            notes.add_row("motors only", f"{name}: {_inversion(outcome, outcome.inversion)}")
-        for line in unresolved_gears(outcome.gears):
-            notes.add_row("warning", f"{name}: {line}")
-    if solution.mode_choice is not None:
-        notes.add_row("modes", _modes(solution, solution.mode_choice))
-    for name, loop in solution.loops.items():
-        for line in loop.warnings:
-            notes.add_row("warning", f"{name}: {line}")
-    notes.add_row(*_stiffening(solution))
-    notes.add_row("wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
-    if solution.skipped:
-        notes.add_row("skipped", "; ".join(solution.skipped))
+    for title, text in _notes(solution, seconds):
+        notes.add_row(title, text)
     console.print()
     console.print(notes)
     console.print(f"results    {path}", soft_wrap=True)
+
+
+def _tables(solution: Solution) -> Iterator[Table]:
+    """What was found of each kind, where there is any."""
+    if any(solution.voltages.values()):
+        yield _voltages(solution)
+    if solution.loops:
+        yield _loops(solution)
+    if any(solution.stresses.values()):
+        yield _stresses(solution)
+    if solution.linear:
+        yield linear_table(solution, _table(*LINEAR_COLUMNS))
+    if solution.placements:
+        yield placement_table(solution, _table(*PLACEMENT_COLUMNS))
+
+
+def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    outcomes = solution.outcomes
+    chosen = {
+        name: f"{outcome.integrator.name}; {outcome.integrator.reason}"
+        for name, outcome in outcomes.items()
+        if outcome.analysis.integrated and outcome.analysis.integrator == "auto"
+    }
+    yield from (("integrator", line) for line in _alike(chosen.items()))
+    for name, outcome in outcomes.items():
+        if outcome.inversion is not None:
+            yield "motors only", f"{name}: {_inversion(outcome, outcome.inversion)}"
+    if solution.mode_choice is not None:
+        yield "modes", _modes(solution, solution.mode_choice)
+    warnings = [(name, line) for name, loop in solution.loops.items() for line in loop.warnings]
+    warnings += [(name, line) for name, outcome in outcomes.items() for line in unresolved_gears(outcome.gears)]
+    yield from (("warning", line) for line in _alike(warnings))
+    yield _stiffening(solution)
+    yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
+    if solution.skipped:
+        yield "skipped", "; ".join(solution.skipped)
+
+
+def _alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """What is said of several analyses, once for all of them."""
+    names: dict[str, list[str]] = {}
+    for name, text in lines:
+        names.setdefault(text, []).append(name)
+    for text, of in names.items():
+        yield f"{', '.join(of)}: {text}"
 
 
 def _modes(solution: Solution, choice: ModeChoice) -> str:

@@ -6,9 +6,11 @@ import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, get_args
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, ValidationInfo
 from pydantic_core import ErrorDetails
 
@@ -62,13 +64,31 @@ def validate(record: type[R], data: dict[str, Any], path: Path, objects: Mapping
     `objects` are what TOML cannot hold, by the text that stands for them in `data`; validators find them in their
     context.
     """
-    context = {"folder": path.parent, "objects": objects or {}}
+    context = {"path": path, "folder": path.parent, "objects": objects or {}}
     try:
         # By way of JSON, whose strict mode reads lists as tuples and text as paths; TOML has no types for these either.
         return record.model_validate_json(json.dumps(data, default=str), context=context)
     except ValidationError as error:
         problems = [_describe(item, record, data) for item in error.errors(include_url=False)]
         raise InputError("\n".join(f"{path}: {line}" for line in _merge(problems))) from None
+
+
+def plain(value: Any, functions: dict[str, object] | None = None) -> Any:  # noqa: ANN401 (whatever TOML may hold)
+    """`value` in the types of TOML: NumPy numbers and arrays, tuples and paths replaced, keys that are None left out.
+
+    Functions go to `functions` under the text that stands for them.
+    """
+    if isinstance(value, Mapping):
+        return {key: plain(item, functions) for key, item in value.items() if item is not None}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist(), functions)
+    if isinstance(value, list | tuple):
+        return [plain(item, functions) for item in value]
+    if functions is not None and (callable(value) or hasattr(value, "address")):
+        name = f"<{getattr(value, '__qualname__', type(value).__name__)}, function no. {len(functions) + 1}>"
+        functions[name] = value
+        return name
+    return str(value) if isinstance(value, PathLike) else value
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
@@ -129,7 +149,7 @@ _EXPECTED = {
 def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any]) -> _Problem:
     """Where pydantic's `item` is in the user's file, and what is wrong there, in the user's terms."""
     kind, loc, context = item["type"], item["loc"], item.get("ctx", {})
-    key = _key_path(loc, data, kind)
+    key = key_path(loc, data, kind)
     if kind == "value_error":
         return _Problem(key, str(context["error"]), "")
     if kind == "extra_forbidden":
@@ -163,7 +183,7 @@ def _show(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "…"
 
 
-def _key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str) -> str:
+def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
     """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass").
 
     Parts that name the alternative of a union rather than a key of the file are left out.

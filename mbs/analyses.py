@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from . import _core
 from .analysis_records import Analysis
 from .compliant_joints import GearMotion, check_applied, drive_sizes, with_compliance, with_rotors
 from .diagnosis import find_cause, lost_inertia
+from .earlier_run import EarlierRun
 from .initial_state import State, check_reach, undeformed_state
-from .integrators import METHODS, Choice, choose_integrator
+from .integrators import METHODS, Choice, beyond_order, choose_integrator
 from .model import ZERO, Array, Assembly, Model
 from .smoothness import check_smooth
 from .statics import static_equilibrium
@@ -74,6 +75,7 @@ class Outcome:
     shape: list[list[_core.TimeFunction]] | None = field(default=None, repr=False)  # prescribed p(t), FCID only
     shape_force: Array | None = None  # (T, modes of all bodies) −λ_p, the forces that hold the shape; FCID only
     inversion: Inversion | None = field(default=None, repr=False)  # motors-only alone
+    checkpoint: _core.Checkpoint | None = field(default=None, repr=False)  # where an integration can be gone on with
     gears: Mapping[str, GearMotion] = field(default_factory=dict)  # by joint: inverse analyses with gears that give
 
     def coordinates(self, body: str) -> slice:
@@ -94,18 +96,22 @@ class Outcome:
         found = self.analysis.kind == "closed-loop" and self.status in ("diverged", "step underflow")
         return self.status != "completed" and not found
 
-    def check_completed(self) -> None:
+    def check_completed(self, how_to_go_on: str = "") -> None:
         """Raise `SolveError` with advice where the run failed."""
         if self.failed:
             reached = self.time[-1] if self.time_reached is None else self.time_reached
             raise SolveError(
                 f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
-                f" ({self.status}): {self.cause or _ADVICE[self.status]}"
+                f" ({self.status}): {self.cause or _ADVICE[self.status]}{how_to_go_on}"
             )
 
 
-def run_pcid(model: Model, analysis: Analysis, keep_recording: bool, progress: Progress) -> Outcome:
+def run_pcid(
+    model: Model, analysis: Analysis, keep_recording: bool, progress: Progress, earlier: EarlierRun | None = None
+) -> Outcome:
     """Partially constrained inverse dynamics (Shaban 2022, sec. 5): C_m and C_s hold, p is free.
+
+    It goes on with an `earlier` run of the same analysis.
 
     Raises `InputError` where the trajectories cannot be followed.
     """
@@ -114,7 +120,7 @@ def run_pcid(model: Model, analysis: Analysis, keep_recording: bool, progress: P
     check_smooth(assembly, analysis.end)
     check_reach(assembly, undeformed_state(assembly), analysis.times)
     recording = _core.Recording() if keep_recording else None
-    return _integrate(assembly, analysis, start, None, resolver_of(assembly), recording, progress)
+    return _integrate(assembly, analysis, start, None, resolver_of(assembly), recording, progress, earlier=earlier)
 
 
 def run_forward(
@@ -123,15 +129,17 @@ def run_forward(
     source: Outcome | None,
     equipment: Equipment,
     progress: Progress,
+    earlier: EarlierRun | None = None,
 ) -> Outcome:
     """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one.
 
     Where gears give, motors turn them, with the moments at the outputs of `source` and splines between these.
+    It goes on with an `earlier` run of the same analysis.
     """
     model = with_compliance(model)
     if source is None:
         assembly = Assembly(model, model.joints, model.loads)
-        return _integrate(assembly, analysis, initial_state(assembly), None, None, None, progress)
+        return _integrate(assembly, analysis, initial_state(assembly), None, None, None, progress, earlier=earlier)
     analysis, loads = as_long_as(source, analysis), model.loads
     if source.inversion is not None:
         loads = source.inversion.servo.loads
@@ -145,7 +153,7 @@ def run_forward(
     assembly = Assembly(model, model.joints, [*zip(rows, sizes, strict=True), *loads])
     steering = _core.Actuation(actuation_source(source), actuators) if actuators else None
     start = State(moved.q[0].copy(), moved.v[0].copy())  # bodies and their order are the same
-    return _integrate(assembly, analysis, start, steering, None, None, progress, source.integrator)
+    return _integrate(assembly, analysis, start, steering, None, None, progress, earlier)
 
 
 def as_long_as(source: Outcome, analysis: Analysis) -> Analysis:
@@ -191,23 +199,41 @@ def _integrate(
     resolver: _core.ActuationResolver | None,
     recording: _core.Recording | None,
     progress: Progress,
-    replayed: Choice | None = None,
+    earlier: EarlierRun | None = None,
 ) -> Outcome:
+    if earlier is not None and earlier.status == "completed":
+        return _taken_over(assembly, analysis, earlier)
     if len(analysis.times) > 1 and (cause := lost_inertia(assembly, start.q)):
         raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
-    integrator = choose_integrator(assembly, analysis, start, replayed)
+    if earlier is None:
+        integrator, checkpoint = choose_integrator(assembly, analysis, start, steering), _core.Checkpoint()
+    else:
+        integrator, checkpoint, recording = earlier.integrator, earlier.checkpoint, earlier.recording
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, steering, analysis.times.tolist(), start.q, start.v,
         analysis.tolerance, analysis.max_steps, METHODS[integrator.name], analysis.spectral_radius, resolver, progress,
-        recording,
+        recording, checkpoint,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     reached, held, status = len(run.q), len(assembly.constraints), STATUS[run.status]
     failed = status not in ("completed", "interrupted")
     cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2))) if failed else ""
-    return Outcome(
+    if status == "step underflow" and not cause:
+        cause = beyond_order(integrator, analysis)
+    outcome = Outcome(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers[:, :held],
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
         status, run.steps, run.rejected, run.evaluations, seconds, integrator, run.time_reached, cause, recording,
+        checkpoint=checkpoint,
+    )  # fmt: skip
+    return outcome if earlier is None else earlier.followed_by(outcome)
+
+
+def _taken_over(assembly: Assembly, analysis: Analysis, earlier: EarlierRun) -> Outcome:
+    """The outcome of a run that had reached its end."""
+    rows: dict[str, Any] = {"tau": None, "F_p": None} | dict(earlier.rows)
+    return Outcome(
+        analysis, assembly, **rows, **earlier.counts, status=earlier.status, integrator=earlier.integrator,
+        recording=earlier.recording, checkpoint=earlier.checkpoint,
     )  # fmt: skip

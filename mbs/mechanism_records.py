@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
-from ..validation import InputFile, Record, quoted
-from ._core import TimeFunction
+from ..fe_models.link_file import LinkSource, LinkTable
+from ..fe_models.link_records import BeamLink, SolidLink
+from ..validation import InputFile, Record, existing_file, quoted
+from ._core import StateFunction, TimeFunction
 from .record_types import (
     GROUND,
     Expression,
@@ -23,6 +26,7 @@ from .record_types import (
     present,
     split_point,
 )
+from .state_forces import state_function
 
 
 class RigidBody(Record):
@@ -44,15 +48,29 @@ class RigidBody(Record):
         return inertia
 
 
+def _link(value: object, info: ValidationInfo) -> LinkSource:
+    if isinstance(value, str):
+        return existing_file(Path(value), info)
+    if not isinstance(value, dict):
+        raise ValueError(f"expected the name of a link file in quotes or a table of its keys, found {value!r}")
+    name, path = info.data.get("name", "?"), info.context["path"] if info.context else Path("scene")
+    return LinkTable({"name": name, **value}, path.with_name(f'{path.name}: body "{name}": link'))
+
+
+LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | BeamLink | SolidLink)]
+
+
 class Body(Record):
-    """A link file (stage 1 runs when needed), a modal body file, or a rigid body.
+    """A link file or a table of its keys (stage 1 runs when needed), a modal body file, or a rigid body.
+
+    The `name` in a table of a link's keys is the body's where it is left out.
 
     `modes` of a flexible body: how many of the lowest that move in the plane; the others are represented by their
     static flexibility. "auto" takes as many as the tolerances of the analyses need; the default is all.
     """
 
     name: Name
-    link: InputFile | None = None
+    link: LinkInput | None = None
     modal: InputFile | None = None
     rigid: RigidBody | None = None
     modes: Literal["auto"] | Annotated[int, Field(ge=0)] | None = None
@@ -186,8 +204,23 @@ class Trajectory(Record):
         return present(x=self.x, y=self.y, value=self.value)
 
 
+def _state_force(value: object, info: ValidationInfo) -> StateFunction:
+    if isinstance(value, StateFunction):
+        return value
+    objects = (info.context or {}).get("objects", {})
+    if not isinstance(value, str) or value not in objects:
+        raise ValueError(f"expected a function of t, position and velocity, in scenes made in Python, found {value!r}")
+    return state_function(objects[value])
+
+
+StateForce = Annotated[StateFunction, PlainValidator(_state_force, json_schema_input_type=str)]
+
+
 class Load(Record):
-    """A given load: force (N, global axes) and moment (N·m) at a point, moment of a joint, or voltages (V)."""
+    """A given load: force (N, global axes) and moment (N·m) at a point, moment of a joint, or voltages (V).
+
+    `force` on a point, in scenes made in Python: a function of its motion, see `state_forces.state_function`.
+    """
 
     point: PointReference | None = None
     joint: str | None = None
@@ -195,13 +228,16 @@ class Load(Record):
     x: Expression | None = None
     y: Expression | None = None
     moment: Expression | None = None
+    force: StateForce | None = None
     voltage: tuple[Expression, ...] | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Load:
         subject = one_of(self, ("point", "joint", "pzt"))
-        allowed = {"point": ("x", "y", "moment"), "joint": ("moment",), "pzt": ("voltage",)}[subject]
-        only(self, subject, allowed, ("x", "y", "moment", "voltage"))
+        allowed = {"point": ("x", "y", "moment", "force"), "joint": ("moment",), "pzt": ("voltage",)}[subject]
+        found = only(self, subject, allowed, ("x", "y", "moment", "force", "voltage"))
+        if self.force is not None and len(found) > 1:
+            raise ValueError(f'expected "force" alone beside "point", found {quoted(found)}')
         return self
 
     @property

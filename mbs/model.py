@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..validation import did_you_mean, quoted
 from . import _core
-from ._core import TimeFunction
+from ._core import StateFunction, TimeFunction
 from .built_joints import Friction, Gear, joint_frictions, joint_rotors
 from .mechanism_records import Load
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
@@ -56,6 +56,7 @@ class Model:
     loads: tuple[tuple[Row, TimeFunction], ...]
     rotors: tuple[tuple[Row, float], ...] = ()
     frictions: tuple[tuple[Row, Friction], ...] = ()
+    state_forces: tuple[tuple[End, StateFunction], ...] = ()
     gears: tuple[Gear, ...] = ()  # that give; empty where they are taken for rigid (see `compliant_joints`)
 
     def body(self, name: str) -> PlanarBody:
@@ -93,6 +94,7 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
     model = Model(
         scene, tuple(bodies), tuple(modal_loads), joints, trajectories, motors, tuple(load_rows(scene, scene.load)),
         tuple(joint_rotors(scene)), tuple(joint_frictions(scene)),
+        tuple(_state_forces(scene)),
     )  # fmt: skip
     named = any(joint.motor for joint in scene.joint)
     if named and trajectories and len(motors) != model.rigid_freedom:
@@ -113,6 +115,12 @@ def load_rows(scene: Scene, loads: Sequence[Load]) -> Iterator[tuple[Row, TimeFu
         elif load.point is not None:
             for component, size in load.components.items():
                 yield Row(f'load on "{load.point}"', kinds[component], End(None), End(*split_point(load.point))), size
+
+
+def _state_forces(scene: Scene) -> Iterator[tuple[End, StateFunction]]:
+    for load in scene.load:
+        if load.point is not None and load.force is not None:
+            yield End(*split_point(load.point)), load.force
 
 
 def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
@@ -167,6 +175,7 @@ class Assembly:
         drive_rows = [(self._core_row(row), size) for row, size in drives]
         rotor_rows = [(self._core_row(row), inertia) for row, inertia in model.rotors]
         friction_rows = [(self._core_row(row), friction) for row, friction in model.frictions]
+        state_forces = [(self._marker(end), function) for end, function in model.state_forces]
         self.motor_rows = [self._core_row(row) for row in motors]
         spring_rows = [(self._core_row(gear.motor), self._core_row(gear.coordinate)) for gear in model.gears]
         self.system = _core.System(np.array(model.scene.gravity))
@@ -180,6 +189,8 @@ class Assembly:
             self.system.add_drive(row, size)
         for row, friction in friction_rows:
             self.system.add_friction(row, friction.viscous, friction.coulomb, friction.speed)
+        for marker, function in state_forces:
+            self.system.add_state_force(marker, function)
         for gear, (motor, joint) in zip(model.gears, spring_rows, strict=True):
             self.system.add_spring(motor, joint, gear.stiffness, gear.damping)
         for load in model.modal_loads:

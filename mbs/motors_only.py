@@ -35,7 +35,8 @@ def run_motors_only(model: Model, analysis: Analysis, progress: Callable[[float]
     """Motion and motor forces for the trajectories, no other force acting.
 
     Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of reach,
-    and a given factor whose output is not minimum phase; `SolveError` where no equilibrium is found.
+    and a given factor whose output is not minimum phase; `SolveError` where no equilibrium or no motion is
+    found.
     """
     began = time.perf_counter()
     servo, linear = _output(model, analysis)
@@ -153,9 +154,12 @@ def _outcome(analysis: Analysis, inversion: Inversion, seconds: float) -> Outcom
     run = servo.core().outputs(times[inside].tolist(), inversion.shape, servo.resolver())
     reached = run.reached
     how = "two-point problem" if is_unstable(inversion.linearisation.zeros[0]).any() else "integrated forward"
-    return Outcome(
+    outcome = Outcome(
         analysis, servo.driven, times[:reached], run.q[:reached], run.v[:reached], run.a[:reached],
         run.multipliers[:reached, : len(servo.driven.constraints)], run.tau[:reached], None,
         run.residual[:reached], inversion.status,
         len(inversion.curve.x) - 1, 0, inversion.iterations, seconds, Choice("collocation", how), inversion=inversion,
     )  # fmt: skip
+    if not reached:  # an iteration that left the numbers: no motion to keep
+        replace(outcome, time_reached=float(inversion.curve.x[0])).check_completed()
+    return outcome

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..validation import did_you_mean, load_toml, quoted, validate
+from ..fe_models.link_file import LinkTable, read_link
+from ..validation import did_you_mean, load_toml, plain, quoted, validate
 from .analysis_records import Analysis
 from .linear_checks import linear_problems
 from .mechanism_records import Load, Trajectory
@@ -45,25 +46,10 @@ def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # n
     path = Path(folder) / MADE_IN_PYTHON
     functions: dict[str, object] = {}
     try:
-        text = tomli_w.dumps(_plain(keys, functions))
+        text = tomli_w.dumps(plain(keys, functions))
     except TypeError as error:
         raise InputError(f"{path}: expected numbers, text, lists and tables, found something else: {error}") from None
     return _scene(tomllib.loads(text), path, text, functions)
-
-
-def _plain(value: Any, functions: dict[str, object]) -> Any:  # noqa: ANN401 (whatever TOML may hold)
-    """`value` in the types of TOML; functions go to `functions` under the text that stands for them."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item, functions) for key, item in value.items() if item is not None}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist(), functions)
-    if isinstance(value, list | tuple):
-        return [_plain(item, functions) for item in value]
-    if callable(value) or hasattr(value, "address"):
-        name = f"<{getattr(value, '__qualname__', type(value).__name__)}, function no. {len(functions) + 1}>"
-        functions[name] = value
-        return name
-    return str(value) if isinstance(value, PathLike) else value
 
 
 def _scene(data: dict[str, Any], path: Path, text: str, objects: Mapping[str, object] | None = None) -> Scene:
@@ -73,6 +59,9 @@ def _scene(data: dict[str, Any], path: Path, text: str, objects: Mapping[str, ob
     problems = [f"{path}: {problem}" for problem in _problems(keys)]
     if problems:
         raise InputError("\n".join(problems))
+    for link in (body.link for body in keys.body):
+        if isinstance(link, LinkTable):
+            read_link(link)
     for describe, item, times in _prescribed(keys):
         for component, function in item.components.items():
             key = "waypoints" if isinstance(item, Trajectory) and item.waypoints is not None else component
@@ -115,6 +104,7 @@ def _problems(scene: SceneKeys) -> Iterator[str]:
     yield from _joint_references(scene)
     yield from _pzt_problems(scene)
     yield from _stiffening_problems(scene)
+    yield from _disturbance_problems(scene)
     for k, analysis in enumerate(scene.analysis):
         for problem in _analysis_problems(scene, analysis, scene.analysis[:k]):
             yield f'analysis "{analysis.name}": {problem}'
@@ -269,6 +259,14 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
                 'geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link'
                 f' between its interfaces, found those of "{layout.body}"'
             )
+
+
+def _disturbance_problems(scene: SceneKeys) -> Iterator[str]:
+    for analysis in scene.analysis:
+        for k, load in enumerate(analysis.disturbance, 1):
+            if load.force is not None:
+                key = f'analysis "{analysis.name}": disturbance no. {k}: force'
+                yield f"{key}: expected expressions in t, found a function, which only a [[load]] may have"
 
 
 def _analysis_problems(scene: SceneKeys, analysis: Analysis, earlier: tuple[Analysis, ...]) -> Iterator[str]:

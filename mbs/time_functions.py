@@ -269,7 +269,7 @@ def user_function(function: object) -> TimeFunction:
         values = np.asarray(function(t), dtype=float)
         if values.shape not in ((), (3,)):
             raise InputError(
-                f"{_name_of(function)}: expected (value, rate, acceleration), or the value of a load, found an array of"
+                f"{name_of(function)}: expected (value, rate, acceleration), or the value of a load, found an array of"
                 f" shape {values.shape} at t = {t:g} s"
             )
         value, rate, acceleration = (float(values), np.nan, np.nan) if values.ndim == 0 else map(float, values)
@@ -278,7 +278,8 @@ def user_function(function: object) -> TimeFunction:
     return TimeFunction.python(three)
 
 
-def _name_of(function: object) -> str:
+def name_of(function: object) -> str:
+    """What messages call a user's function."""
     return str(getattr(function, "__qualname__", function))
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import _core
 from .initial_state import State
 from .model import Array, Assembly
 from .planar_body import PlanarBody
@@ -84,7 +85,7 @@ def _block_diagonal(blocks: list[Array]) -> Array:
     return matrix
 
 
-def ringing(assembly: Assembly, state: State, modes: Vibrations) -> Array:
+def ringing(assembly: Assembly, state: State, modes: Vibrations, steering: _core.Steering | None = None) -> Array:
     """Amplitude (n,) with which each mode rings from `state` on, in the force it moves most, relative to that force.
 
     A mode at rest follows its load and the links' static deflection under the prescribed motion; the velocity v, the
@@ -92,9 +93,9 @@ def ringing(assembly: Assembly, state: State, modes: Vibrations) -> Array:
     beside following statically is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on.
     """
     system, q, v = assembly.system, state.q, state.v
-    a, lambda_ = system.evaluate(0.0, q, v)
+    a, lambda_ = system.evaluate(0.0, q, v, steering)
     dt = 1e-3 / modes.frequency.max(initial=1.0)
-    jerk = (system.evaluate(dt, q + dt * v, v + dt * a)[0] - a) / dt
+    jerk = (system.evaluate(dt, q + dt * v, v + dt * a, steering)[0] - a) / dt
     omega, project = modes.frequency, (modes.shape * _stiffness(assembly)[:, None]).T / modes.frequency[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
     if not len(lambda_):

@@ -10,6 +10,7 @@ import pytest
 import ffrobot
 
 ROOT = Path(__file__).parents[1]
+SECTION = {"shape": "tube", "outer": 0.02, "inner": 0.016}
 KEYS = {"time", "bodies/arm/angle", "points/arm.tip/position[0]", "joints/shoulder/moment", "energy/kinetic"}
 
 
@@ -92,9 +93,50 @@ def test_a_load_of_python_numbers(folder):
     assert moments[1] - moments[0] == pytest.approx(0.5 * 9.81 * 0.6, rel=1e-3)
 
 
+def link(folder):
+    return tomllib.loads((folder / "arm.toml").read_text(encoding="utf-8"))
+
+
+def test_link_in_the_scene_is_that_of_its_file(folder, results):
+    """Under the body's name where it has none, and in TOML as in Python."""
+    keys = link(folder) | {"geometry": {"kind": "beam", "length": np.float64(0.6), "section": SECTION}}
+    del keys["name"]
+    scene = swing(folder, body=[{"name": "arm", "link": keys}])
+    (folder / "inline.toml").write_text(scene.text, encoding="utf-8")
+    assert "[body.link.geometry" in scene.text
+    for inline in (scene, folder / "inline.toml"):
+        np.testing.assert_array_equal(
+            ffrobot.solve(inline)["inverse/joints/shoulder/moment"], results["inverse/joints/shoulder/moment"]
+        )
+
+
+def test_link_made_of_a_dictionary(folder, tmp_path):
+    made = ffrobot.make_link(link(folder), tmp_path / "arm.h5")
+    assert made.path == tmp_path / "arm.h5"
+    np.testing.assert_array_equal(made.body.frequency, ffrobot.read_modal_body(folder / "arm.h5").frequency)
+    assert not ffrobot.make_link(link(folder), tmp_path / "arm.h5").computed
+    again = [ffrobot.make_link(link(folder) | {"damping": {"ratio": 0.05}}) for _ in range(2)]
+    assert [one.computed for one in again] == [True, False]  # from the cache, by content
+    assert again[0].path == again[1].path
+    assert again[0].path.parent.name == "links"
+    with pytest.raises(ffrobot.InputError, match=r"<link made in Python>: modes\.count: expected a whole number"):
+        ffrobot.make_link(link(folder) | {"modes": {"count": "three"}})
+
+
+def test_mistakes_in_a_link_of_a_scene(folder):
+    keys = link(folder) | {"mesh": {"element": 10}}
+    with pytest.raises(ffrobot.InputError) as error:
+        swing(folder, body=[{"name": "arm", "link": keys}])
+    assert str(error.value).endswith(
+        '<scene made in Python>: body "arm": link: mesh.element: expected one of the keys elements, nodes, found an'
+        ' unknown key (did you mean "elements"?)'
+    )
+
+
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
+        ({"body": [{"name": "arm", "link": 3}]}, 'body "arm": link: expected the name of a link file in quotes or a t'),
         ({"gravitas": 1.0}, 'gravitas: expected one of the keys .*did you mean "gravity"'),
         ({"gravity": "down"}, 'gravity: expected a list, found "down"'),
         ({"body": [{"name": "arm", "link": "absent.toml"}]}, 'body "arm": link: expected an existing file'),

@@ -50,6 +50,17 @@ def test_links_of_the_cases_pass(validator, path):
     validator["link"].validate(parsed(path))
 
 
+def test_link_in_a_scene_passes(validator):
+    """Without a name, which is the body's."""
+    scene = parsed(CASES / "two_link" / "scene.toml")
+    link = parsed(CASES / "two_link" / scene["body"][0]["link"])
+    scene["body"][0]["link"] = {key: value for key, value in link.items() if key != "name"}
+    validator["scene"].validate(scene)
+    del scene["body"][0]["link"]["mesh"]
+    with pytest.raises(jsonschema.ValidationError):
+        validator["scene"].validate(scene)
+
+
 def edited(data, keys, value):
     """A copy of `data` with one entry replaced, added, or (None) left out."""
     data = copy.deepcopy(data)

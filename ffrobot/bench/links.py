@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from math import ceil
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import tomli_w
 
+from ..fe_models.link_file import link_keys, link_path
 from ..mbs.scene_records import Scene
 
 Keys = dict[str, Any]
@@ -27,12 +27,12 @@ def refined(scene: Scene, elements: float, modes: float, folder: Path) -> Scene 
     bodies = []
     for k, body in enumerate(scene.body):
         if body.link is not None:
-            keys = tomllib.loads(body.link.read_text(encoding="utf-8"))
+            keys = link_keys(body.link)
             changed |= elements != 1 and _scale_mesh(keys, elements)
             changed |= modes != 1 and _scale_modes(keys, modes)
             if "file" in keys["geometry"]:
-                keys["geometry"]["file"] = str((body.link.parent / keys["geometry"]["file"]).absolute())
-            path = folder / f"{k}_{elements:g}_{modes:g}_{body.link.name}"
+                keys["geometry"]["file"] = str((link_path(body.link).parent / keys["geometry"]["file"]).absolute())
+            path = folder / f"{k}_{elements:g}_{modes:g}_{body.name}.toml"
             path.write_text(tomli_w.dumps(keys), encoding="utf-8")
             body = body.model_copy(update={"link": path})
         bodies.append(body)
@@ -53,7 +53,7 @@ def modes_of(scene: Scene) -> str:
 
 
 def _listed(scene: Scene, table: Callable[[Keys], Keys]) -> str:
-    links = [tomllib.loads(body.link.read_text(encoding="utf-8")) for body in scene.body if body.link is not None]
+    links = [link_keys(body.link) for body in scene.body if body.link is not None]
     values = [str(value) for keys in links for key, value in table(keys).items() if key not in ("cell", "order")]
     return ", ".join(dict.fromkeys(values))
 

@@ -43,9 +43,7 @@ def report(files: Sequence[Results]) -> str:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
         from plotly.offline import get_plotlyjs, get_plotlyjs_version
     except ModuleNotFoundError as error:
-        raise SolveError(
-            f"a report needs {error.name}, which is not installed: pip install 'ffrobot[report]'"
-        ) from None
+        raise SolveError(f"a report needs {error.name}, which is not installed: pip install plotly jinja2") from None
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

@@ -43,7 +43,7 @@ def write_run(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
 
 
 def _link_of(scene_path: Path, scene: Table, key: tuple[str, ...], links: dict[str, Table]) -> Table:
-    """The content of the link file that `links.BODY.…` means, read once."""
+    """The content of the link file that `links.BODY.…` means, read once, or the table in the scene itself."""
     with_links = [body["name"] for body in scene.get("body", []) if "link" in body]
     if len(key) < 3 or key[1] not in with_links:
         found = ".".join(key)
@@ -52,7 +52,10 @@ def _link_of(scene_path: Path, scene: Table, key: tuple[str, ...], links: dict[s
             f' found "{found}"' + (did_you_mean(key[1], with_links) if len(key) > 1 else "")
         )
     if key[1] not in links:
-        path = Path(_body(scene, key[1])["link"])
+        link = _body(scene, key[1])["link"]
+        if isinstance(link, dict):
+            return link
+        path = Path(link)
         links[key[1]] = load_toml(path, "link file")
         _resolve(links[key[1]], path.parent)
     return links[key[1]]

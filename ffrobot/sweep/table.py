@@ -14,6 +14,7 @@ from ..files import write_atomically
 from .runs import Row
 
 SHOWN = 5  # quantities on the screen
+GAP = 2  # between columns
 
 
 def write_table(path: Path, keys: Sequence[str], rows: Sequence[Row]) -> None:
@@ -34,10 +35,11 @@ def print_table(
     """Keys, status and what was asked for, or a few quantities; the file at `path` has the rest."""
     quantities = [name for name in _quantities(rows) if not name.endswith((" steps", " wall_seconds"))]
     shown = quantities[:SHOWN] if not collected else [name for name in quantities if name in collected]
-    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
+    while len(shown) > 1 and sum(_width(header) + GAP for header in ("run", *keys, "status", *shown)) > console.width:
+        shown = shown[:-1]
+    table = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False)
     for header in ("run", *keys, "status", *shown):
-        width = max([8, *(len(word) for word in header.replace("/", "/ ").split())])
-        table.add_column(header.replace("/", "/ "), justify="left" if header == "status" else "right", min_width=width)
+        table.add_column(_broken(header), justify="left" if header == "status" else "right", min_width=_width(header))
     for row in rows:
         values = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in row.values]
         found = [f"{row.quantities[name]:.4g}" if name in row.quantities else "" for name in shown]
@@ -46,7 +48,18 @@ def print_table(
     for row in rows:
         if row.status != "completed":
             console.print(f"run {row.number}: {row.status}: {row.message}", soft_wrap=True)
-    console.print(f"table      {path}", soft_wrap=True)
+    more = f", with {len(quantities) - len(shown)} more quantities" if len(quantities) > len(shown) else ""
+    console.print(f"table      {path}{more}", soft_wrap=True)
+
+
+def _broken(header: str) -> str:
+    """A header in lines, broken at its slashes and blanks."""
+    return header.replace("/", "/\n").replace(" ", "\n")
+
+
+def _width(header: str) -> int:
+    """Of its column: of the longest line, and of a number."""
+    return max([8, *(len(line) for line in _broken(header).splitlines())])
 
 
 def _quantities(rows: Sequence[Row]) -> list[str]:

@@ -18,6 +18,10 @@ using namespace ffrobot;
 
 namespace {
 
+Eigen::Map<const Eigen::VectorXd> as_vector(const std::vector<double> &values) {
+  return {values.data(), static_cast<Eigen::Index>(values.size())};
+}
+
 // States (2 steps + 1, 2 coordinates) of equal steps: where they end and, by dense output, in their middle.
 RowMajorMatrix fixed_steps(const System &system, double end, int steps, const Eigen::VectorXd &q,
                            const Eigen::VectorXd &v, MethodKind kind, double spectral_radius) {
@@ -66,7 +70,32 @@ void bind_run(nb::module_ &m) {
 
   nb::class_<Recording>(m, "Recording", "The accepted steps of a run, from which its dense output can be made again.")
       .def(nb::init<>())
-      .def_prop_ro("steps", [](const Recording &r) { return r.times.size(); });
+      .def(
+          "__init__",
+          [](Recording *r, std::vector<double> times, std::vector<double> states, MethodKind method,
+             double spectral_radius, double tolerance) {
+            new (r) Recording{std::move(times), std::move(states), {method, spectral_radius}, tolerance};
+          },
+          "times"_a, "states"_a, "method"_a, "spectral_radius"_a, "tolerance"_a,
+          "That of an earlier run: times (N,), states (N x 2 coordinates) one after the other.")
+      .def_prop_ro("steps", [](const Recording &r) { return r.times.size(); })
+      .def_prop_ro("times", [](const Recording &r) { return Eigen::VectorXd(as_vector(r.times)); })
+      .def_prop_ro("states", [](const Recording &r) { return Eigen::VectorXd(as_vector(r.states)); });
+
+  nb::class_<Checkpoint>(m, "Checkpoint", "Where a run has stopped, and all that its next step depends on.")
+      .def(nb::init<>())
+      .def(
+          "__init__",
+          [](Checkpoint *c, double time, Eigen::VectorXd state, Eigen::VectorXd stepping, Eigen::VectorXd gathered,
+             std::size_t outputs) {
+            new (c) Checkpoint{time, std::move(state), std::move(stepping), std::move(gathered), outputs};
+          },
+          "time"_a, "state"_a, "stepping"_a, "gathered"_a, "outputs"_a)
+      .def_ro("time", &Checkpoint::time)
+      .def_ro("state", &Checkpoint::state)
+      .def_ro("stepping", &Checkpoint::stepping)
+      .def_ro("gathered", &Checkpoint::gathered)
+      .def_ro("outputs", &Checkpoint::outputs);
 
   nb::class_<Steering>(m, "Steering", "Steers a system from outside.");
 
@@ -91,7 +120,7 @@ void bind_run(nb::module_ &m) {
       [](const System &system, std::vector<int> group, std::vector<bool> moment, Steering *steering,
          const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double tolerance,
          unsigned long max_steps, MethodKind method, double spectral_radius, ActuationResolver *resolver,
-         const std::function<bool(double)> &carry_on, Recording *recording) {
+         const std::function<bool(double)> &carry_on, Recording *recording, Checkpoint *checkpoint) {
         const nb::gil_scoped_release unlocked;
         ConstrainedMotion motion(system, std::move(group), std::move(moment), steering);
         const auto ask = [&](double t) {
@@ -99,11 +128,11 @@ void bind_run(nb::module_ &m) {
           return carry_on(t);
         };
         return run(motion, times, q, v, {tolerance, max_steps, {method, spectral_radius}}, steering, resolver, ask,
-                   recording);
+                   recording, checkpoint);
       },
       "system"_a, "group"_a, "moment"_a, "steering"_a.none(), "times"_a, "q"_a, "v"_a, "tolerance"_a, "max_steps"_a,
-      "method"_a, "spectral_radius"_a, "resolver"_a.none(), "carry_on"_a, "recording"_a.none(),
-      "Integrates the motion from (q, v) and reports it at `times`.");
+      "method"_a, "spectral_radius"_a, "resolver"_a.none(), "carry_on"_a, "recording"_a.none(), "checkpoint"_a.none(),
+      "Integrates the motion from (q, v), or on from a checkpoint, which it moves, and reports it at `times`.");
 
   nb::class_<Sensing>(m, "Sensing", "What sensors read of a state: rows, then modal coordinates, or their rates.")
       .def(

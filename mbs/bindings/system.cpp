@@ -1,9 +1,14 @@
 #include "core/system.h"
 #include "core/motion.h"
 
+#include <cstdint>
+#include <functional>
+#include <tuple>
+
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/function.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -41,12 +46,15 @@ PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, 
   return body;
 }
 
-// (a, lambda) at one state
-std::tuple<VectorXd, VectorXd> evaluate_state(const System &system, double t, const VectorXd &q, const VectorXd &v) {
+// (a, lambda) at one state; steering may be null
+std::tuple<VectorXd, VectorXd> evaluate_state(const System &system, double t, const VectorXd &q, const VectorXd &v,
+                                              Steering *steering) {
   check_size("q", q.size(), system.coordinates);
   check_size("v", v.size(), system.coordinates);
   Workspace w(system);
   VectorXd a(system.coordinates);
+  if (steering)
+    steering->steer(t, w);
   accelerations(system, t, q.data(), v.data(), w, a.data());
   return {a, w.lambda.head(static_cast<Eigen::Index>(system.held))};
 }
@@ -148,6 +156,13 @@ Samples constraint_jacobians(const System &system, const RowMajorMatrix &q) {
   return Samples(data, {T, m, n}, owner);
 }
 
+StateFunction python_force(
+    const std::function<std::tuple<double, double, double>(double, double, double, double, double)> &function) {
+  return {[function](double t, const double *position, const double *rate, double *force) {
+    std::tie(force[0], force[1], force[2]) = function(t, position[0], position[1], rate[0], rate[1]);
+  }};
+}
+
 } // namespace
 
 void bind_system(nb::module_ &m) {
@@ -167,6 +182,14 @@ void bind_system(nb::module_ &m) {
       .def_ro("kind", &Row::kind)
       .def_ro("a", &Row::a)
       .def_ro("b", &Row::b);
+
+  nb::class_<StateFunction>(m, "StateFunction", "A force of the user's, of time, position and velocity.")
+      .def_static("python", &python_force, "function"_a, "A callable of t, x, y, v_x, v_y that returns (x, y, moment).")
+      .def_static(
+          "compiled",
+          [](std::uintptr_t address) { return StateFunction{reinterpret_cast<StateFunction::Compiled>(address)}; },
+          "address"_a,
+          "Address of a C function void(double t, const double *x_y_angle, const double *rates, double *x_y_moment).");
 
   nb::class_<System>(m, "System", "Bodies, constraints and drives; call finish() once after adding them.")
       .def(
@@ -210,11 +233,17 @@ void bind_system(nb::module_ &m) {
             s.modal_drives.push_back({body, vector, f});
           },
           "body"_a, "vector"_a, "size"_a)
+      .def(
+          "add_state_force",
+          [](System &s, const MarkerReference &marker, const StateFunction &function) {
+            s.state_forces.push_back({marker, function});
+          },
+          "marker"_a, "function"_a)
       .def("finish", &System::finish)
       .def_ro("coordinates", &System::coordinates)
       .def_ro("length", &System::length)
       .def_ro("first_coordinate", &System::first_coordinate)
-      .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a,
+      .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a, "steering"_a = nb::none(),
            "Accelerations (coordinates,) and multipliers (constraints,).")
       .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q.")
       .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, coordinates).")

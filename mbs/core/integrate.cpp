@@ -15,9 +15,10 @@ constexpr unsigned long steps_between_questions = 1000;
 // many times the steps it is allowed, at the pace of its last thousand, is not worth going on with.
 constexpr double hopeless = 100;
 
-// A load that jumps leaves an error in proportion to the step across it, more than that step's share of the tolerance
-// however short it is. Steps that have become so much shorter than those before may take from a reserve, all of which
-// is as much as the tolerance.
+// What is an error once, not at every step, may take from a reserve, all of which is as much as the tolerance. A load
+// that jumps leaves an error in proportion to the step across it, more than that step's share of the tolerance however
+// short it is: steps that have become so much shorter than those before may take from the reserve. Vibrations below the
+// tolerance that a step damps away are gone after it: methods that do so begin with the longest step there is, and may.
 constexpr double much_shorter = 1e-3, part_of_reserve = 0.25;
 
 // Size of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
@@ -34,7 +35,8 @@ double next_step(double h, double left, bool lands) {
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls,
                             const std::function<void(std::size_t, double, const double *)> &output,
-                            const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks) {
+                            const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
+                            Checkpoint *checkpoint) {
   const auto made = make_method(controls.method, system);
   Method &method = *made;
   Eigen::VectorXd error(system.size()), y_output(system.size());
@@ -42,7 +44,8 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
   IntegrationReport report;
   double t = times.front(), t_asked = t;
   double usual_step = 0, reserve = 1; // the largest of late; in terms of the tolerance
-  double h = std::min(system.initial_step(), end - t);
+  bool settles = method.damps();      // vibrations of the start
+  double h = method.damps() ? end - t : std::min(system.initial_step(), end - t);
   const auto record = [&] {
     if (recording) {
       recording->times.push_back(t);
@@ -59,11 +62,23 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     return next_break > before;
   };
   pass_breaks();
-  system.slope(t, y.data(), method.first_slope());
-  system.accepted(t, y.data(), method.first_slope());
-  record();
-  output(report.outputs++, t, y.data());
   StepControl control(method.error_order());
+  if (checkpoint && checkpoint->state.size()) {
+    y = checkpoint->state;
+    t = t_asked = checkpoint->time;
+    h = checkpoint->stepping[0];
+    usual_step = checkpoint->stepping[1];
+    reserve = checkpoint->stepping[2];
+    control.go_on(checkpoint->stepping[3], checkpoint->stepping[4]);
+    system.gather(checkpoint->gathered);
+    system.slope(t, y.data(), method.first_slope());
+    report.outputs = checkpoint->outputs;
+  } else {
+    system.slope(t, y.data(), method.first_slope());
+    system.accepted(t, y.data(), method.first_slope());
+    record();
+    output(report.outputs++, t, y.data());
+  }
   if (recording) {
     recording->method = controls.method;
     recording->tolerance = controls.tolerance;
@@ -99,10 +114,12 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     const double t_end = step == target - t ? target : t + step;
     constexpr double rounding = 2e-14; // what estimates see of it: shorter steps would not help
     const double regular = method.share(step / duration);
-    const double part = step < much_shorter * usual_step ? std::max(regular, part_of_reserve * reserve) : regular;
+    const bool once = settles || step < much_shorter * usual_step;
+    const double part = once ? std::max(regular, part_of_reserve * reserve) : regular;
     const double share = std::max(controls.tolerance * part, rounding);
+    const double regular_share = std::max(controls.tolerance * regular, rounding);
     double size = NAN;
-    if (method.step(t, y.data(), step, share) && method.correct(t_end)) {
+    if (method.step(t, y.data(), step, settles ? regular_share : share) && method.correct(t_end)) {
       system.slope(t_end, method.end(), method.last_slope());
       const double damping = method.estimate(step, error);
       size = system.error_size(t_end, method.end(), error.data()) * damping / share;
@@ -114,8 +131,12 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     }
     ++report.steps;
     usual_step = std::max(step, 0.8 * usual_step);
-    if (part > regular)
+    if (part > regular && (!settles || size * share > regular_share))
       reserve -= size * part;
+    if (settles) {
+      size *= share / regular_share; // the steps after this one should do without the reserve
+      settles = size > 1;
+    }
     bool dense = false;
     for (; report.outputs < times.size() && times[report.outputs] <= t_end; ++report.outputs) {
       if (times[report.outputs] == t_end) {
@@ -147,6 +168,10 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       system.slope(t, y.data(), method.first_slope());
       method.restart();
     }
+  }
+  if (checkpoint) {
+    const Eigen::Vector<double, 5> stepping(h, usual_step, reserve, control.previous_step(), control.previous_error());
+    *checkpoint = {t, y, stepping, system.gathered(), report.outputs};
   }
   report.time = t;
   report.evaluations = system.evaluations();

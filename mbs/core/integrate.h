@@ -18,6 +18,16 @@ struct Recording {
   double tolerance = 0;
 };
 
+// Where a run has stopped, and all that its next step depends on. Explicit methods go on as if nothing had been; what
+// implicit ones extrapolate from earlier steps is lost.
+struct Checkpoint {
+  double time = 0;
+  Eigen::VectorXd state;    // empty: the run has not begun
+  Eigen::VectorXd stepping; // step size, of late the largest, reserve, previous step and its error
+  Eigen::VectorXd gathered; // of the system
+  std::size_t outputs = 0;  // delivered
+};
+
 enum class IntegrationStatus {
   completed,
   step_underflow, // no step size meets the tolerance
@@ -48,10 +58,12 @@ struct Breaks {
 
 // Integrates y from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
 // carry_on(t) is asked about every thousand steps. y ends at the last accepted step. `breaks` may be null.
+// A `checkpoint` of an earlier call with the same `times` has the run go on from there: neither outputs nor the
+// `recording`, which has to be the same, begin again, and max_steps counts anew. It ends as that of this call.
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls,
                             const std::function<void(std::size_t, double, const double *)> &output,
                             const std::function<bool(double)> &carry_on, Recording *recording,
-                            const Breaks *breaks = nullptr);
+                            const Breaks *breaks = nullptr, Checkpoint *checkpoint = nullptr);
 
 } // namespace ffrobot

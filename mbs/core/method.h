@@ -32,6 +32,9 @@ public:
   // factors are from tests/mbs/test_integrator.py, errors against tolerances.
   virtual double share(double fraction) const = 0;
 
+  // Whether a step leaves little of vibrations that it does not resolve. They are an error once, not at every step.
+  virtual bool damps() const { return false; }
+
   // The step just made was accepted: its corrected end and last slope are those of the next step's start.
   virtual void accept(double) {}
 

@@ -164,6 +164,27 @@ void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
   multiplier_peaks_ = multiplier_peaks_.cwiseMax(group_now_);
 }
 
+Eigen::VectorXd ConstrainedMotion::gathered() const {
+  Eigen::VectorXd peaks(7 * static_cast<Index>(body_peaks_.size()) + multiplier_peaks_.size());
+  Index i = 0;
+  for (const BodyPeaks &peak : body_peaks_) {
+    peaks.segment<7>(i) << peak.velocity, peak.angular_velocity, peak.modal, peak.modal_velocity, peak.acceleration,
+        peak.angular_acceleration, peak.modal_acceleration;
+    i += 7;
+  }
+  peaks.tail(multiplier_peaks_.size()) = multiplier_peaks_;
+  return peaks;
+}
+
+void ConstrainedMotion::gather(const Eigen::VectorXd &gathered) {
+  const double *peak = gathered.data();
+  for (BodyPeaks &of : body_peaks_) {
+    of = {peak[0], peak[1], peak[2], peak[3], peak[4], peak[5], peak[6]};
+    peak += 7;
+  }
+  multiplier_peaks_ = gathered.tail(multiplier_peaks_.size());
+}
+
 void ConstrainedMotion::factorise(double damping_factor, double stiffness_factor) {
   if (!real_)
     real_ = std::make_unique<IterationMatrix<double>>(system_);

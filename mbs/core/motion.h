@@ -31,6 +31,8 @@ public:
   bool correct(double t, double *y) override;
   double error_size(double t, const double *y, const double *e) override;
   void accepted(double t, const double *y, const double *dy) override;
+  Eigen::VectorXd gathered() const override;
+  void gather(const Eigen::VectorXd &gathered) override;
   bool is_sensible(const double *y) const override;
   double initial_step() const override;
   unsigned long evaluations() const override { return workspace_.evaluations; }

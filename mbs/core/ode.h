@@ -25,6 +25,10 @@ public:
   // The run starts at, or an accepted step ended in, (t, y, dy): the state of the last error_size, if any.
   virtual void accepted(double t, const double *y, const double *dy) = 0;
 
+  // What accepted() has gathered since the start, and the same given back to a run that goes on.
+  virtual Eigen::VectorXd gathered() const = 0;
+  virtual void gather(const Eigen::VectorXd &gathered) = 0;
+
   // Whether y is still something that the equations describe; where it is not, the run ends as diverged.
   virtual bool is_sensible(const double *y) const = 0;
 

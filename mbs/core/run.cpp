@@ -67,7 +67,7 @@ Outputs OutputEvaluator::take(std::size_t reached) {
 
 Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
         const IntegrationControls &controls, Steering *steering, ActuationResolver *resolver,
-        const std::function<bool(double)> &carry_on, Recording *recording) {
+        const std::function<bool(double)> &carry_on, Recording *recording, Checkpoint *checkpoint) {
   OutputEvaluator evaluate(motion.system(), times.size(), steering, resolver);
   Eigen::VectorXd y(2 * q.size());
   y << q, v;
@@ -75,7 +75,7 @@ Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen
   motion.plan(times.back() - times.front());
   result.report = integrate(
       motion, times, y, controls, [&](std::size_t i, double t, const double *state) { evaluate(i, t, state); },
-      carry_on, recording);
+      carry_on, recording, nullptr, checkpoint);
   result.outputs = evaluate.take(result.report.outputs);
   result.last = y;
   return result;

@@ -25,10 +25,11 @@ struct Run {
   Eigen::VectorXd last; // (q, q_dot) at report.time
 };
 
-// Integrates `motion` from (q, v) over `times`. `resolver` and `recording` may be null.
+// Integrates `motion` from (q, v) over `times`. `resolver`, `recording` and `checkpoint` may be null. Where the run
+// goes on from a `checkpoint`, rows of outputs that were delivered before are left as they are: undefined.
 Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
         const IntegrationControls &controls, Steering *steering, ActuationResolver *resolver,
-        const std::function<bool(double)> &carry_on, Recording *recording);
+        const std::function<bool(double)> &carry_on, Recording *recording, Checkpoint *checkpoint);
 
 // Evaluates the reported quantities of one state into row i of `outputs` (already sized).
 class OutputEvaluator {

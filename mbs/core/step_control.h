@@ -33,6 +33,14 @@ public:
     return step * std::clamp(std::pow(target / error, 1 / order_), smallest_factor, largest_factor);
   }
 
+  // The last accepted step, with which a run goes on.
+  double previous_step() const { return previous_step_; }
+  double previous_error() const { return previous_error_; }
+  void go_on(double previous_step, double previous_error) {
+    previous_step_ = previous_step;
+    previous_error_ = previous_error;
+  }
+
 private:
   static constexpr double target = 0.25; // of the largest error allowed: leaves room for its scatter
 

@@ -83,7 +83,7 @@ void update_targets(const System &system, double t, Workspace &w) {
 }
 
 void apply_drives(const System &system, double t, Workspace &w) {
-  if (!system.drives.empty() || !system.springs.empty()) {
+  if (!system.drives.empty() || !system.springs.empty() || !system.state_forces.empty()) {
     for (std::size_t b = 0; b < system.bodies.size(); ++b) {
       w.wrench[b].setZero();
       w.bodies[b].has_wrench = true;
@@ -96,6 +96,8 @@ void apply_drives(const System &system, double t, Workspace &w) {
         force -= drive.friction.resistance(w.drive_rows[d].rate);
       add_wrench(drive.row, w.drive_rows[d], force, w.wrench);
     }
+    for (const StateForce &force : system.state_forces)
+      w.wrench[static_cast<std::size_t>(force.marker.body)].col(force.marker.marker) += force(t, w.bodies);
     RowMotion motor, joint;
     for (const Spring &spring : system.springs) {
       evaluate(spring.motor, w.bodies, motor);

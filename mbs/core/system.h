@@ -7,6 +7,7 @@
 #include "core/planar_body.h"
 #include "core/port_couplings.h"
 #include "core/rows.h"
+#include "core/state_force.h"
 #include "core/time_function.h"
 
 #include <cmath>
@@ -70,6 +71,7 @@ struct System {
   std::vector<Drive> drives;
   std::vector<Spring> springs;
   std::vector<ModalDrive> modal_drives;
+  std::vector<StateForce> state_forces;
 
   // Derived from the above by finish()
   std::vector<Eigen::Index> first_coordinate; // of each body in q

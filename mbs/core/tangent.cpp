@@ -162,6 +162,31 @@ void add_built_joints(const System &system, const double *q, const double *v, co
   }
 }
 
+// Derivatives of a state force by positions and rates are central differences: how it is made is not known here.
+void add_state_force(const System &system, const StateForce &force, double t, const double *q, const double *v,
+                     const double *a, Workspace &w, Tangent &result) {
+  constexpr double small = 1e-6;
+  const MarkerReference ground(-1, 0, Eigen::Vector2d::Zero());
+  const MarkerMotion &m = force.marker.motion(w.bodies);
+  const Vector3d position(m.position.x(), m.position.y(), m.angle);
+  const Vector3d rate(m.velocity.x(), m.velocity.y(), m.angular_velocity);
+  const Vector3d steps = small * Vector3d(system.length, system.length, 1), now = force(t, position, rate);
+  Eigen::Matrix3d by_position, by_rate;
+  RowTangents rows(3, system.coordinates);
+  const RowKind kinds[] = {RowKind::x, RowKind::y, RowKind::angle};
+  for (Index i = 0; i < 3; ++i) {
+    const Vector3d step = steps[i] * Vector3d::Unit(i);
+    by_position.col(i) = (force(t, position + step, rate) - force(t, position - step, rate)) / (2 * steps[i]);
+    by_rate.col(i) = (force(t, position, rate + step) - force(t, position, rate - step)) / (2 * steps[i]);
+    const Row row{kinds[i], ground, force.marker};
+    row_tangent(system, row, q, v, a, w, i, rows);
+    add_row_curvature(system, row, -now[i], w, result.K);
+  }
+  const MatrixXd to_coordinates = rows.by_acceleration.transpose();
+  result.D.noalias() -= to_coordinates * by_rate * rows.by_acceleration;
+  result.K.noalias() -= to_coordinates * (by_position * rows.by_acceleration + 0.5 * by_rate * rows.by_velocity);
+}
+
 } // namespace
 
 void tangent(const System &system, double t, const double *q, const double *v, const double *a, Workspace &w,
@@ -181,6 +206,8 @@ void tangent(const System &system, double t, const double *q, const double *v, c
   if (system.held < system.constraints.size() ||
       std::any_of(system.drives.begin(), system.drives.end(), [](const Drive &d) { return d.friction.acts(); }))
     add_built_joints(system, q, v, a, w, result);
+  for (const StateForce &force : system.state_forces)
+    add_state_force(system, force, t, q, v, a, w, result);
   add_springs(system, w, result);
 }
 

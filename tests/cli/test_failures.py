@@ -92,8 +92,9 @@ def test_too_many_steps(two_link_copy, ffrobot):
         assert 1 < len(file["inverse/time"]) < 21
 
 
-def test_ctrl_c_keeps_what_was_computed(two_link_copy, ffrobot):
-    """On a terminal, where the progress says when the analysis runs."""
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_keeps_what_was_computed(two_link_copy, ffrobot, number):
+    """On a terminal, where the progress says when the analysis runs; and SIGTERM, with which clusters end a job."""
     folder = two_link_copy({"scene.toml": ENDLESS})
     try:
         terminal, end = pty.openpty()
@@ -106,14 +107,15 @@ def test_ctrl_c_keeps_what_was_computed(two_link_copy, ffrobot):
     os.close(end)
     shown = _read_until(terminal, b"inverse")
     time.sleep(0.5)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     began = time.monotonic()
-    shown += _read_until(terminal, b"on request")
+    shown += _read_until(terminal, b"--resume")
     summary, _ = process.communicate(timeout=30)
     assert time.monotonic() - began < 5.0
     assert process.returncode == 1
     assert b"Traceback" not in shown
     assert b"(interrupted): stopped on request" in shown
+    assert b"ffrobot solve scene.toml --resume" in shown
     assert " of 1000 " in summary
     with h5py.File(folder / "scene.results.h5") as file:
         group = file["inverse"]

@@ -2,9 +2,11 @@
 
 import csv
 import subprocess
+import tomllib
 from math import prod
 
 import pytest
+import tomli_w
 
 HEIGHTS = "links.rod.geometry.section.diameter=0.004:0.008:3"
 MASSES = "body.crank.rigid.mass=0.03,0.04"
@@ -38,6 +40,20 @@ def test_grid_over_link_and_scene(ffrobot, short_scene):
     ]
     thin, thick = deflections(short_scene)[0], deflections(short_scene)[-1]
     assert thin > 2 * thick  # inertia loads go as d², stiffness as d⁴
+
+
+def test_keys_of_a_link_in_the_scene(ffrobot, short_scene):
+    """Instead of a link file of its own, with the same results."""
+    assert ffrobot("sweep", short_scene, "--vary", HEIGHTS).returncode == 0
+    expected = deflections(short_scene)
+    text = short_scene.read_text(encoding="utf-8")
+    scene = tomllib.loads(text)
+    scene["body"][1]["link"] = tomllib.loads((short_scene.parent / scene["body"][1]["link"]).read_text("utf-8"))
+    inline = short_scene.with_name("inline.toml")
+    inline.write_text(tomli_w.dumps(scene), encoding="utf-8")
+    done = ffrobot("sweep", inline, "--vary", HEIGHTS)
+    assert done.returncode == 0, done.stderr
+    assert deflections(inline) == expected
 
 
 def test_what_is_varied_is_what_is_solved(ffrobot, short_scene, tmp_path):

@@ -61,3 +61,15 @@ def test_pages_are_reached_from_the_first(site):
     pages = {path.relative_to(site).as_posix() for path in site.rglob("*.html")} - {"genindex.html", "search.html"}
     start = (site / "index.html").read_text(encoding="utf-8")
     assert pages - {"index.html"} <= set(re.findall(r'href="([^"#]+\.html)"', start))
+
+
+def test_pages_need_no_network(site):
+    """Scripts (MathJax, too), styles and pictures are part of the site."""
+    for page in site.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        needed = re.findall(r'<(?:script|img)\b[^>]*\bsrc="([^"]+)"', text)
+        needed += re.findall(r'<link\b[^>]*rel="stylesheet"[^>]*href="([^"]+)"', text)
+        files = [name.partition("?")[0] for name in needed]
+        missing = [name for name in files if not (page.parent / name).exists()]
+        assert not missing, page.name
+    assert 'src="_static/mathjax/' in (site / "theory.html").read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ def reported(name):
     v = start.v + np.random.default_rng(0).standard_normal(len(start.v))
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, None, [0.0, 1e-6], start.q, v, 1e-6, 1,
-        _core.MethodKind.dop853, 0.8, None, always, None,
+        _core.MethodKind.dop853, 0.8, None, always, None, None,
     )  # fmt: skip
     return assembly.system, run
 

@@ -26,7 +26,7 @@ def resolved(assembly, seed=0):
     resolver = _core.ActuationResolver(assembly.system, assembly.is_trajectory, assembly.motor_rows)
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, None, [0.0, 1e-6], q, v, 1e-6, 1, DOP853, 0.8,
-        resolver, always, None,
+        resolver, always, None, None,
     )  # fmt: skip
     assert run.residual[0].max() < 1e-12
     return run.q[0], run.v[0], run.multipliers[0], run.tau[0], run.F_p[0]

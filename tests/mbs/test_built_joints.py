@@ -167,7 +167,7 @@ def test_inverse_moments_carry_out_the_motion_with_rotors_and_friction():
     ]
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, _core.Actuation(actuation_source(source), actuators),
-        source.time.tolist(), source.q[0], source.v[0], 1e-8, 0, _core.MethodKind.dop853, 0.8, None, always, None,
+        source.time.tolist(), source.q[0], source.v[0], 1e-8, 0, _core.MethodKind.dop853, 0.8, None, always, None, None,
     )  # fmt: skip
     assert relative(run.q, source.q) < 1e-5
 

@@ -101,7 +101,6 @@ def test_recordings_of_other_integrators_are_replayed(model, integrator):
     analysis = forward(tolerance=1e-5, actuation="inverse", apply="joints+pzt")
     outcome = run_forward(model, analysis, inverse, FULL, always)
     assert outcome.status == "completed"
-    assert outcome.integrator.name == integrator
     assert departure(inverse, outcome).max() < 1e-5
 
 

@@ -288,3 +288,9 @@ def test_curved_hexahedra_of_20_nodes_are_refused(solid, mesh_part, tmp_path):
 def test_keys_that_a_ready_mesh_leaves_no_use_for_are_refused(solid, mesh_part, tmp_path):
     with pytest.raises(InputError, match=r"mesh.size: expected none, since part.msh is a mesh, found 0.1"):
         mesh_part(solid(file=write_mesh(tmp_path / "part.msh"), unit="mm"), size=0.1)
+
+
+def test_a_size_for_another_unit_is_refused_at_once(solid, mesh_part, step_file):
+    geometry = solid(file=step_file(lambda cad: cad.addBox(0, -20, -5, 300, 40, 10)), length=0.3)
+    with pytest.raises(InputError, match=r"mesh\.size that fits the part, found 0\.012 m .* another unit"):
+        mesh_part(geometry, size=0.012)

@@ -214,5 +214,5 @@ def test_report_needs_no_matplotlib(two_link, tmp_path):
 def test_what_is_not_installed_is_named(two_link, tmp_path, monkeypatch, missing):
     monkeypatch.setitem(sys.modules, missing, None)
     monkeypatch.delitem(sys.modules, "plotly.offline", raising=False)
-    with pytest.raises(SolveError, match=rf"a report needs {missing}.*pip install 'ffrobot\[report\]'"):
+    with pytest.raises(SolveError, match=rf"a report needs {missing}.*pip install plotly jinja2"):
         write_report([two_link.folder / "scene.results.h5"], tmp_path / "r.html")

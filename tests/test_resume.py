@@ -1,0 +1,173 @@
+"""Runs that were stopped go on from their results file as if they had never been."""
+
+import h5py
+import numpy as np
+import pytest
+
+import ffrobot
+from ffrobot.solution import Watcher
+
+END = 0.08
+SHORT = {"end = 1.0": f"end = {END}"}
+
+
+class Stops(Watcher):
+    """Stops the run of one analysis at its time t."""
+
+    def __init__(self, analysis, t):
+        self.analysis, self.t, self.stages, self.asked = analysis, t, [], []
+
+    def stage(self, title):
+        self.stages.append(title)
+
+    def advance(self, t, end):
+        self.asked.append((self.stages[-1], t))
+        return self.analysis not in self.stages[-1] or t < self.t
+
+
+@pytest.fixture
+def arm(case_copy, ffrobot, monkeypatch):
+    """The two-link case, shorter, with texts replaced."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
+
+    def copy(**edits):
+        scene = case_copy("two_link")
+        edit(scene, SHORT | edits)
+        return scene
+
+    return copy
+
+
+def edit(scene, replacements):
+    text = scene.read_text(encoding="utf-8")
+    for old, new in replacements.items():
+        assert old in text, old
+        text = text.replace(old, new)
+    scene.write_text(text, encoding="utf-8")
+
+
+def stop(scene, analysis, t):
+    watcher = Stops(analysis, t)
+    with pytest.raises(ffrobot.SolveError, match="interrupted") as error:
+        ffrobot.solve(scene, scene.with_suffix(".h5"), watcher)
+    return str(error.value)
+
+
+def go_on(scene, watcher=None):
+    return ffrobot.solve(scene, scene.with_suffix(".h5"), watcher, resume=True)
+
+
+def differences(results, expected):
+    """Of all histories of both, largest difference over largest value."""
+    assert results.analyses == expected.analyses
+    for analysis in expected.analyses:
+        found, wanted = results.columns(analysis), expected.columns(analysis)
+        assert found.keys() == wanted.keys()
+        for name, values in wanted.items():
+            assert found[name].shape == values.shape
+            yield name, np.abs(found[name] - values).max() / (np.abs(values).max() or 1.0)
+
+
+@pytest.mark.parametrize("stopped", ["inverse", "forward"])
+def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
+    """To the last bit but for constraint residuals: the explicit methods go on with the same step."""
+    scene = arm()
+    expected = ffrobot.solve(scene)
+    message = stop(scene, stopped, 0.03)
+    with h5py.File(scene.with_suffix(".h5")) as file:
+        reached = file[stopped]["resume/checkpoint"].attrs["time"]
+        outputs = len(file[stopped]["time"])
+    assert 0.03 <= reached < END
+    assert message.endswith(f"solve(…, resume=True) goes on from t = {reached:.9g} s")
+    watcher = Stops("none", END)
+    results = go_on(scene, watcher)
+    assert watcher.asked[0] == (f'analysis "{stopped}"', reached)
+    for name, difference in differences(results, expected):
+        assert difference < 1e-12 or name.startswith("constraint_violation"), name
+    for analysis in ("inverse", "forward"):
+        for key in ("steps", "rejected", "status"):
+            assert results.attributes(analysis)[key] == expected.attributes(analysis)[key]
+    assert 1 < outputs < len(expected.time(stopped))
+    assert not results.has(f"{stopped}/resume")
+
+
+@pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
+def test_implicit_methods_go_on_within_the_tolerance(arm, integrator):
+    tolerance = 1e-3
+    keys = f'tolerance = {tolerance}\nintegrator = "{integrator}"\nmax_steps = 50'
+    scene = arm(**{"tolerance = 1e-7": keys, f"end = {END}": "end = 0.02"})
+    inverse_alone(scene)
+    with pytest.raises(ffrobot.SolveError, match="too many steps"):
+        go_on(scene)
+    edit(scene, {"max_steps = 50": "max_steps = 100_000"})
+    expected = ffrobot.solve(scene)
+    found = dict(differences(go_on(scene), expected))
+    for name in ("joints/O/moment", "joints/A/moment", "trajectories/tip/force[0]", "pzt/link1/required_voltage[4]"):
+        assert 0.0 < found[name] < tolerance, name
+
+
+def inverse_alone(scene):
+    text = scene.read_text(encoding="utf-8")
+    scene.write_text(text[: text.index("# The same moments and voltages")], encoding="utf-8")
+
+
+def test_max_steps_may_be_raised_and_count_anew(arm):
+    scene = arm(**{"tolerance = 1e-7": "tolerance = 1e-7\nmax_steps = 800"})
+    inverse_alone(scene)
+    for _ in range(2):
+        with pytest.raises(ffrobot.SolveError, match=r"raise max_steps.*goes on from t = 0\.0"):
+            go_on(scene)  # from the start where there is nothing to go on with
+    edit(scene, {"max_steps = 800": "max_steps = 100_000"})
+    results = go_on(scene)
+    assert max(difference for _, difference in differences(results, ffrobot.solve(scene))) < 1e-12
+    watcher = Stops("none", END)
+    assert repr(go_on(scene, watcher)) == repr(results)
+    assert watcher.asked == []  # complete: nothing was run
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "change"),
+    [
+        ("scene.toml", "tolerance = 1e-7", "tolerance = 1e-6", 'the scene (analysis "inverse": tolerance)'),
+        ("scene.toml", "limit = 200.0", "limit = 250.0", 'the scene (pzt "link1": limit)'),
+        ("link2.toml", "2.068427e11", "2.1e11", 'the modal body of "link2"'),
+        ("path.csv", "1,1.5", "1,1.4", "the waypoints path.csv"),
+    ],
+)
+def test_input_that_has_changed(arm, file, old, new, change):
+    scene = arm()
+    text = scene.read_text(encoding="utf-8").replace("max_steps", "")
+    start = text.index("x = ")
+    end = text.index("[[pzt]]")
+    (scene.parent / "path.csv").write_text("t,x,y\n0,1.5,0.8660254\n1,1.5,0.8660254\n", encoding="utf-8")
+    text = text[:start] + 'waypoints = "path.csv"\n' + text[end:]
+    scene.write_text(text.replace("tolerance = 1e-7", "max_steps = 5\ntolerance = 1e-7"), encoding="utf-8")
+    with pytest.raises(ffrobot.SolveError):
+        go_on(scene)
+    edit(scene.parent / file, {old: new})
+    with pytest.raises(ffrobot.InputError, match="resume: expected results of the same input") as error:
+        go_on(scene)
+    assert f"found that {change} has changed" in str(error.value)
+
+
+def test_on_the_command_line(arm, ffrobot):
+    scene = arm(**{"tolerance = 1e-7": "tolerance = 1e-7\nmax_steps = 3000"})
+    inverse_alone(scene)
+    command = ["solve", "scene.toml", "-o", "r.h5", "--resume"]
+    messages = [ffrobot(*command, cwd=scene.parent) for _ in range(3)]
+    assert [done.returncode for done in messages] == [1, 0, 0]
+    assert "; ffrobot solve scene.toml -o r.h5 --resume goes on from t = 0.0" in messages[0].stderr
+    assert messages[2].stdout == "r.h5: complete, nothing to go on with\n"
+
+
+def test_other_kinds_and_searches_for_modes_start_again(arm):
+    scene = arm(**{'link = "link1.toml"': 'link = "link1.toml"\nmodes = "auto"'})
+    inverse_alone(scene)
+    assert 'resume=True) runs "inverse" again from its start' in stop(scene, "inverse", 0.0)
+    results = go_on(scene)
+    assert results.attributes("inverse")["status"] == "completed"
+
+
+def test_needs_a_file():
+    with pytest.raises(ffrobot.InputError, match="resume: expected the output of the run"):
+        ffrobot.solve("scene.toml", resume=True)

@@ -1,0 +1,141 @@
+"""Forces of the user's that depend on how a point moves: springs and dampers to the ground."""
+
+import ctypes
+import subprocess
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import ffrobot
+
+K, C, MASS = 40.0, 0.8, 2.0
+SPRING = """
+void spring(double t, const double *x_y_angle, const double *rates, double *f) {
+  f[0] = -40.0 * (x_y_angle[0] - 0.6) - 0.8 * rates[0];
+  f[1] = -40.0 * x_y_angle[1] - 0.8 * rates[1];
+  f[2] = 0.0;
+}
+"""
+ANCHOR = np.array([0.6, 0.0])
+
+
+def spring(t, position, velocity):
+    return -K * (position - ANCHOR) - C * velocity
+
+
+@pytest.fixture(scope="module")
+def compiled_spring(tmp_path_factory):
+    """What `numba.cfunc` returns, as far as it is looked at."""
+    folder = tmp_path_factory.mktemp("compiled")
+    (folder / "spring.c").write_text(SPRING, encoding="utf-8")
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", "spring.so", "spring.c"], cwd=folder, check=True)
+    library = ctypes.CDLL(str(folder / "spring.so"))
+    return SimpleNamespace(library=library, address=ctypes.cast(library.spring, ctypes.c_void_p).value)
+
+
+def scene(force, *, joint, analysis, link=None, load=(), **keys):
+    rod = {"mass": MASS, "inertia": 0.1, "center": [0.3, 0.0], "points": {"root": [0, 0], "tip": [0.6, 0]}}
+    return ffrobot.make_scene(
+        name="sprung",
+        gravity=keys.pop("gravity", [0.0, 0.0]),
+        body=[{"name": "arm"} | ({"link": link} if link else {"rigid": rod})],
+        joint=[joint],
+        load=[{"point": "arm.tip", "force": force}, *load],
+        analysis=[{"output_step": 0.01} | analysis],
+        **keys,
+    )
+
+
+HINGE = {"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}
+SLIDE = {"name": "O", "type": "prismatic", "between": ["ground", "arm.root"], "axis": [0.0, 1.0], "motor": False}
+FREE = {"name": "free", "kind": "forward", "end": 1.0, "tolerance": 1e-9}
+LINK = {
+    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "circle", "diameter": 0.01}},
+    "mesh": {"elements": 4},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 2, "family": "in-plane-bending"},
+}
+
+
+def test_mass_on_spring_and_damper():
+    """On a vertical slide, constant load g: y = −(m g / k)(1 − exp(−ζ ω t)(cos ω_d t + ζ ω / ω_d sin ω_d t))."""
+    results = ffrobot.solve(scene(spring, joint=SLIDE, analysis=FREE, gravity=[0.0, -9.81]))
+    t, decay = results.time("free"), C / (2 * MASS)
+    omega = np.sqrt(K / MASS - decay**2)
+    y = -(MASS * 9.81 / K) * (1 - np.exp(-decay * t) * (np.cos(omega * t) + decay / omega * np.sin(omega * t)))
+    np.testing.assert_allclose(results["free/points/arm.tip/position"][:, 1], y, atol=1e-8)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_compiled_is_python(compiled_spring, integrator):
+    """On a flexible link that is swung by its hinge and pulled back."""
+    angles = {"initial": {"angles": {"arm": 0.5}}}
+    analysis = {"name": "free", "kind": "forward", "end": 0.02, "output_step": 0.002, "integrator": integrator}
+    runs = [
+        ffrobot.solve(scene(force, joint=HINGE, link=LINK, analysis=analysis, **angles))
+        for force in (spring, compiled_spring)
+    ]
+    by_python, by_core = (run["free/points/arm.tip/position"] for run in runs)
+    np.testing.assert_allclose(by_core, by_python, rtol=1e-12)
+    assert np.ptp(by_core[:, 1]) > 1e-3  # it moves
+
+
+def test_moment_that_it_asks_of_the_motor():
+    """Held at an angle γ the hinge feels the spring: τ = −(r × F), F = −k (tip − anchor)."""
+    hold = {"name": "turn", "joint": "O", "value": "0.4"}
+    results = ffrobot.solve(
+        scene(spring, joint=HINGE, trajectory=[hold], analysis={"name": "held", "kind": "pcid", "end": 0.1})
+    )
+    tip = 0.6 * np.array([np.cos(0.4), np.sin(0.4)])
+    force = -K * (tip - ANCHOR)
+    moment = results["held/joints/O/moment"]
+    np.testing.assert_allclose(moment, -(tip[0] * force[1] - tip[1] * force[0]), rtol=1e-10)
+
+
+def test_moment_of_the_function_is_that_of_a_load():
+    """The third number is a moment on the section."""
+    hold = {"name": "turn", "joint": "O", "value": "0.4"}
+    analysis = {"name": "held", "kind": "pcid", "end": 0.1}
+    with_moment = scene(lambda t, x, v: (0.0, 0.0, 3.0 + t), joint=HINGE, trajectory=[hold], analysis=analysis)
+    moment = ffrobot.solve(with_moment)["held/joints/O/moment"]
+    np.testing.assert_allclose(moment, -3.0 - np.linspace(0.0, 0.1, 11), rtol=1e-12)
+
+
+def test_static_equilibrium_and_linear_model(compiled_spring):
+    """A slide sags by m g / k, and stays there; it vibrates with ω² = k / m and damping c / m."""
+    static = {"initial": {"state": "static"}, "gravity": [0.0, -9.81]}
+    sagged = ffrobot.solve(scene(compiled_spring, joint=SLIDE, analysis=FREE, **static))
+    np.testing.assert_allclose(sagged["free/points/arm.tip/position"][:, 1], -MASS * 9.81 / K, rtol=1e-10)
+    about = {"name": "rest", "kind": "linear", "output_step": None}
+    results = ffrobot.solve(scene(compiled_spring, joint=SLIDE | {"motor": True}, analysis=about))
+    eigenvalues = np.linalg.eigvals(results["rest/linear/A"][0])
+    decay = C / (2 * MASS)
+    np.testing.assert_allclose(np.sort(eigenvalues.real), [-decay, -decay], rtol=1e-6)
+    np.testing.assert_allclose(np.abs(eigenvalues), np.sqrt(K / MASS), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("force", "complaint"),
+    [
+        ("3*t", "load no. 1: force: expected a function of t, position and velocity, in scenes made in Python, found "),
+        (SimpleNamespace(address="here"), "expected a function of t, position and velocity, found "),
+    ],
+)
+def test_what_is_no_function(force, complaint):
+    with pytest.raises(ffrobot.InputError) as error:
+        scene(force, joint=HINGE, analysis=FREE)
+    assert complaint in str(error.value)
+
+
+def test_stands_alone():
+    with pytest.raises(ffrobot.InputError, match='expected "force" alone beside "point", found "x", "force"'):
+        scene(spring, joint=HINGE, analysis=FREE, load=[{"point": "arm.tip", "x": "1", "force": spring}])
+
+
+def test_wrong_returns_and_errors_come_through():
+    with pytest.raises(ffrobot.InputError, match=r"<lambda>: expected a force \(x, y\), or \(x, y, moment\), found"):
+        ffrobot.solve(scene(lambda t, x, v: 1.0, joint=HINGE, analysis=FREE))
+    with pytest.raises(ZeroDivisionError):
+        ffrobot.solve(scene(lambda t, x, v: (1 / 0, 0.0), joint=HINGE, analysis=FREE))
