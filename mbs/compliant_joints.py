@@ -91,7 +91,7 @@ def _rotor(model: Model, gear: Gear) -> PlanarBody:
 
 
 def through_gears(outcome: Outcome) -> Outcome:
-    """An inverse analysis or equilibrium with the moments of motors behind gears that give instead of rigid ones.
+    """An inverse analysis or equilibrium with what motors must do behind gears that give.
 
     With the rigid rotor's angle ψ = N γ + α_a the gear transmits τ_s = τ − J N ψ̈. The twist δ = θ_m − γ follows from
     k δ + c δ̇ = τ_s as a quintic spline through the outputs, and the motor's moment is τ_s + J N (ψ̈ + N δ̈). Left out is
@@ -106,13 +106,12 @@ def through_gears(outcome: Outcome) -> Outcome:
                 f'{outcome.assembly.model.scene.path}: analysis "{outcome.analysis.name}": expected no [[load]] on'
                 f' joints with stiffness in kind = "{outcome.analysis.kind}", found one on "{gear.joint}"'
             )
-    tau, motions = outcome.tau.copy(), dict[str, GearMotion]()
+    motions = dict[str, GearMotion]()
     for gear in gears:
         m = list(outcome.assembly.model.motors).index(gear.joint)
         gamma, alpha = _angles(outcome, gear)
-        motions[gear.joint] = motion = _gear_motion(gear, outcome.time, outcome.tau[:, m], gamma, alpha)
-        tau[:, m] = motion.moment
-    return replace(outcome, tau=tau, gears=motions)
+        motions[gear.joint] = _gear_motion(gear, outcome.time, outcome.tau[:, m], gamma, alpha)
+    return replace(outcome, gears=motions)
 
 
 def _angles(outcome: Outcome, gear: Gear) -> tuple[Array, Array]:
@@ -200,9 +199,10 @@ def rotors_like(model: Model, state: State, source: Outcome) -> State:
 
 def drive_sizes(source: Outcome, limit: Array) -> list[_core.TimeFunction]:
     """The moments of motors between the outputs of `source`, cut at `limit` (motors,): a function of time for each."""
-    assert source.tau is not None
-    cut = np.clip(source.tau, -limit, limit)
-    return spline(source.time, cut, 1 if np.any(cut != source.tau) else DEGREE)
+    tau = source.motor_moments
+    assert tau is not None
+    cut = np.clip(tau, -limit, limit)
+    return spline(source.time, cut, 1 if np.any(cut != tau) else DEGREE)
 
 
 def check_applied(model: Model, analysis: Analysis) -> None:

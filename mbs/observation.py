@@ -107,7 +107,8 @@ def joint_forces(outcome: Outcome, joint: str) -> JointForces:
             case _core.RowKind.angle:
                 moment = force
     motors = list(outcome.assembly.model.motors)
-    motor = outcome.tau[:, motors.index(joint)] if outcome.tau is not None and joint in motors else None
+    moments = outcome.motor_moments
+    motor = moments[:, motors.index(joint)] if moments is not None and joint in motors else None
     return JointForces(reaction, moment, motor)
 
 
