@@ -140,15 +140,16 @@ def judge_patches(
 
 def judge_motors(outcome: Outcome, joints: dict[str, Joint]) -> dict[str, MotorFeasibility]:
     """Peaks of every motor against its limits."""
-    assert outcome.tau is not None
+    moments = outcome.motor_moments
+    assert moments is not None
     rates = motor_rates(outcome)
     judged = {}
     for k, name in enumerate(outcome.assembly.model.motors):
-        joint, moment, speed = joints[name], np.abs(outcome.tau[:, k]), np.abs(rates[:, k])
+        joint, moment, speed = joints[name], np.abs(moments[:, k]), np.abs(rates[:, k])
         limits = [
             np.inf if limit is None else limit for limit in (joint.moment_limit, joint.speed_limit, joint.power_limit)
         ]
-        power = np.abs(outcome.tau[:, k] * rates[:, k])
+        power = np.abs(moments[:, k] * rates[:, k])
         beyond = np.any([values > limit for values, limit in zip((moment, speed, power), limits, strict=True)], axis=0)
         judged[name] = MotorFeasibility(
             float(moment.max()), limits[0], float(speed.max()), limits[1], float(power.max()), limits[2],

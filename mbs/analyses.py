@@ -91,6 +91,15 @@ class Outcome:
         return slice(first, first + self.assembly.model.bodies[i].n_modes)
 
     @property
+    def motor_moments(self) -> Array | None:
+        """`tau`, but where gears give what their motors must do: (T, motors) N·m."""
+        if self.tau is None or not self.gears:
+            return self.tau
+        motors = enumerate(self.assembly.model.motors)
+        columns = [self.gears[joint].moment if joint in self.gears else self.tau[:, k] for k, joint in motors]
+        return np.column_stack(columns)
+
+    @property
     def failed(self) -> bool:
         """Whether the run did not do what it was for; that a closed loop diverges is a finding."""
         found = self.analysis.kind == "closed-loop" and self.status in ("diverged", "step underflow")

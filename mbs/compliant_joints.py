@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .analyses import Outcome
 
 DEGREE = 5
-UNRESOLVED = 0.01  # of a motor's largest moment: what every second output may change of it
+UNRESOLVED = 0.001  # of a motor's largest moment: what every second output may change of it
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def _rotor(model: Model, gear: Gear) -> PlanarBody:
 
 
 def through_gears(outcome: Outcome) -> Outcome:
-    """An inverse analysis or equilibrium with the moments of motors behind gears that give instead of rigid ones.
+    """An inverse analysis or equilibrium with what motors must do behind gears that give.
 
     With the rigid rotor's angle ψ = N γ + α_a the gear transmits τ_s = τ − J N ψ̈. The twist δ = θ_m − γ follows from
     k δ + c δ̇ = τ_s as a quintic spline through the outputs, and the motor's moment is τ_s + J N (ψ̈ + N δ̈). Left out is
@@ -106,13 +106,12 @@ def through_gears(outcome: Outcome) -> Outcome:
                 f'{outcome.assembly.model.scene.path}: analysis "{outcome.analysis.name}": expected no [[load]] on'
                 f' joints with stiffness in kind = "{outcome.analysis.kind}", found one on "{gear.joint}"'
             )
-    tau, motions = outcome.tau.copy(), dict[str, GearMotion]()
+    motions = dict[str, GearMotion]()
     for gear in gears:
         m = list(outcome.assembly.model.motors).index(gear.joint)
         gamma, alpha = _angles(outcome, gear)
-        motions[gear.joint] = motion = _gear_motion(gear, outcome.time, outcome.tau[:, m], gamma, alpha)
-        tau[:, m] = motion.moment
-    return replace(outcome, tau=tau, gears=motions)
+        motions[gear.joint] = _gear_motion(gear, outcome.time, outcome.tau[:, m], gamma, alpha)
+    return replace(outcome, gears=motions)
 
 
 def _angles(outcome: Outcome, gear: Gear) -> tuple[Array, Array]:
@@ -137,7 +136,8 @@ def _gear_motion(gear: Gear, time: Array, tau: Array, gamma: Array, alpha: Array
     if len(time) > 2 * DEGREE + 1 and largest:
         coarse = tau[::2] + J * N**2 * _twist(gear, time[::2], transmitted[::2])[:, 2]
         unresolved = float(np.abs(coarse - moment[::2]).max()) / largest
-    return GearMotion(transmitted, *(gamma + twist).T, moment, unresolved)
+    angle, rate, acceleration = (gamma + twist).T
+    return GearMotion(transmitted, angle, rate, acceleration, moment, unresolved)
 
 
 def _twist(gear: Gear, time: Array, moment: Array) -> Array:
@@ -177,7 +177,12 @@ def with_rotors(source: Outcome, model: Model) -> Outcome:
             fixed = np.zeros((len(values), 2))  # the rotor's frame
             columns[order] += [fixed, (values + alpha[:, order] / gear.ratio)[:, None]]
     q, v, a = (np.hstack(parts) for parts in columns)
-    return replace(source, assembly=Assembly(model, model.joints), q=q, v=v, a=a)
+    known_rows = source.assembly.constraints
+    pins = [constraint for constraint in model.joints if constraint not in known_rows]
+    assembly = Assembly(model, [*known_rows, *pins])
+    lambda_ = np.zeros((len(q), len(assembly.constraints)))  # nothing pulls at the pins
+    lambda_[:, [assembly.constraints.index(row) for row in known_rows]] = source.lambda_
+    return replace(source, assembly=assembly, q=q, v=v, a=a, lambda_=lambda_)
 
 
 def rotors_like(model: Model, state: State, source: Outcome) -> State:
@@ -194,9 +199,10 @@ def rotors_like(model: Model, state: State, source: Outcome) -> State:
 
 def drive_sizes(source: Outcome, limit: Array) -> list[_core.TimeFunction]:
     """The moments of motors between the outputs of `source`, cut at `limit` (motors,): a function of time for each."""
-    assert source.tau is not None
-    cut = np.clip(source.tau, -limit, limit)
-    return spline(source.time, cut, 1 if np.any(cut != source.tau) else DEGREE)
+    tau = source.motor_moments
+    assert tau is not None
+    cut = np.clip(tau, -limit, limit)
+    return spline(source.time, cut, 1 if np.any(cut != tau) else DEGREE)
 
 
 def check_applied(model: Model, analysis: Analysis) -> None:

@@ -107,7 +107,8 @@ def joint_forces(outcome: Outcome, joint: str) -> JointForces:
             case _core.RowKind.angle:
                 moment = force
     motors = list(outcome.assembly.model.motors)
-    motor = outcome.tau[:, motors.index(joint)] if outcome.tau is not None and joint in motors else None
+    moments = outcome.motor_moments
+    motor = moments[:, motors.index(joint)] if moments is not None and joint in motors else None
     return JointForces(reaction, moment, motor)
 
 
@@ -120,9 +121,8 @@ def motor_angle(outcome: Outcome, joint: str) -> Array | None:
     if not rows:
         return None
     assembly = Assembly(model, model.joints, (), rows)
-    angle: Array = _core.Sensing(assembly.system, [(assembly.motor_rows[0], 0)], []).read(
-        outcome.q, outcome.v, outcome.a
-    )[:, 0]
+    sensing = _core.Sensing(assembly.system, [(assembly.motor_rows[0], 0)], [])
+    angle: Array = sensing.read(outcome.q, outcome.v, outcome.a)[:, 0]
     return angle
 
 

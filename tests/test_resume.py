@@ -98,6 +98,18 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped, keys):
     assert not results.has(f"{stopped}/resume")
 
 
+@pytest.mark.parametrize("stopped", ["inverse", "forward"])
+def test_runs_behind_gears_that_give_go_on(arm, stopped):
+    between = 'between = ["link1.tip", "link2.root"]'
+    gear = "gear_ratio = 50.0\nrotor_inertia = 1e-4\nstiffness = 5e3\ndamping = 5.0"
+    scene = arm(**{between: f"{between}\n{gear}"})
+    expected = ffrobot.solve(scene)
+    stop(scene, stopped, 0.03)
+    found = dict(differences(go_on(scene), expected))
+    assert found["joints/A/motor_angle"] < 1e-12
+    assert found["joints/A/moment"] < 1e-12
+
+
 @pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
 def test_implicit_methods_go_on_within_the_tolerance(arm, integrator):
     tolerance = 1e-3

@@ -24,9 +24,9 @@ def needed_sensors(model: Model, analysis: Analysis, patches: Mapping[str, Patch
     for record in analysis.controller:
         if isinstance(record, JointPid):
             for joint in record.joints:
-                yield Sensor(**{record.side: joint})
+                yield Sensor.model_validate({record.side: joint})
                 if joint in record.derivative and record.rate == "measured":
-                    yield Sensor(**{record.side: joint}, measure="rate")
+                    yield Sensor.model_validate({record.side: joint, "measure": "rate"})
         elif not isinstance(record, PythonController | ModalVelocity):
             for joint in model.motors:
                 yield Sensor(joint=joint)

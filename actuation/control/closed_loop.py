@@ -198,11 +198,12 @@ def _feed_forward(
 
 def _found(source: Outcome, times: Array) -> tuple[Array, Array | None]:
     """τ and F_p that an inverse analysis found, at any time where it was recorded or is algebraic, else by a spline."""
-    assert source.tau is not None
-    if source.recording is not None or source.shape is not None:
-        tau, F_p = actuation_source(source).sample(times.tolist())
-        return _at(times, source.time, source.tau) if source.gears else tau, F_p
-    return _at(times, source.time, source.tau), None if source.F_p is None else _at(times, source.time, source.F_p)
+    moments, F_p = source.motor_moments, source.F_p
+    assert moments is not None
+    if source.recording is None and source.shape is None:
+        return _at(times, source.time, moments), None if F_p is None else _at(times, source.time, F_p)
+    tau, F_p = actuation_source(source).sample(times.tolist())
+    return _at(times, source.time, moments) if source.gears else tau, F_p
 
 
 def _held(times: Array, since: Array, commands: Array, first: Array) -> Array:

@@ -4,7 +4,7 @@ import runpy
 
 import numpy as np
 import pytest
-from scipy.linalg import solve_discrete_are
+from scipy.linalg import expm, solve_discrete_are
 
 from ffrobot.actuation.control.closed_loop import run_closed_loop
 from ffrobot.actuation.control.lqr import gains, sampled
@@ -51,7 +51,7 @@ def two_rods(*analyses, **keys):
     inverse = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.01, "tolerance": 1e-8}
     return make_scene(
         name="rods", gravity=[0.0, -9.81], body=[{"name": "a", "rigid": ROD}, {"name": "b", "rigid": ROD}],
-        joint=joints, trajectory=[{"name": name} | path for name, path in ARM.items()],
+        joint=joints, trajectory=[{"name": name} | path for name, path in keys.pop("paths", ARM).items()],
         initial={"angles": {"a": 0.4, "b": 0.0}}, analysis=[inverse, *analyses], **keys,
     )  # fmt: skip
 
@@ -336,3 +336,50 @@ def test_a_patch_reads_the_charge_of_its_bending(link_file):
     expected = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2 * turn / capacitance
     volts = volts_per_modal_coordinate(array, capacitance) @ p  # of ten modes: patches at the ends miss the others
     np.testing.assert_allclose(volts, expected, atol=2e-2 * expected.max())
+
+
+GIVES = {"gear_ratio": 50.0, "rotor_inertia": 1e-4, "stiffness": 2e3, "damping": 1.0}
+ON_MOTORS = {"kind": "joint-pid", "side": "motor", "proportional": {"O": 200.0}, "derivative": {"O": 10.0}}
+
+
+def test_gears_that_give_are_wound_at_the_start():
+    """Rods that stand still under gravity: the feed-forward holds them, and no controller has anything to do."""
+    still = {"O": {"joint": "O", "value": "0.4"}, "A": {"joint": "A", "value": "-1.1"}}
+    scene = two_rods(
+        loop(controller=[ON_MOTORS]), loop("from_scene", controller=[ON_MOTORS], start="scene"),
+        first=GIVES, second=GIVES, paths=still,
+    )  # fmt: skip
+    solution = solve(scene)
+    for name in ("loop", "from_scene"):
+        record = solution.loops[name]
+        assert record.tip_error.max() < 1e-9
+        assert np.abs(record.readings - record.reference).max() < 1e-9
+        assert "motor/O" in record.outputs
+
+
+def test_a_motor_behind_a_spring_is_its_two_masses():
+    """P on the motor of a free wheel: γ of a step in the reference rate against the two masses, sampled finely."""
+    I_m, k, c, P, D, T_fine = 1e-4 * 50.0**2, 2e3, 1.0, 200.0, 10.0, 1e-4
+    scene = wheel(
+        loop(controller=[ON_MOTORS], sample_time=T_fine, disturbance=blow(), feed_forward="none"), joint=GIVES
+    )
+    solution = solve(scene)
+    outcome = solution.outcomes["loop"]
+    # x = (θ_m, γ, rates); the blow is a moment of 5 N times 0.3 m on the wheel for 0.1 s, which turns by little
+    M, K = np.diag([I_m, INERTIA]), np.array([[k + P, -k], [-k, k]])
+    damping = np.array([[c + D, -c], [-c, c]])
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, damping)]])
+    b = np.array([0.0, 0.0, 0.0, 5.0 * 0.3 / INERTIA])
+    settled = np.linalg.solve(A, b)
+    t = outcome.time
+    x = np.array([expm(A * min(s, 0.1)) @ settled - settled for s in t])
+    x = np.array([expm(A * max(s - 0.1, 0.0)) @ row for s, row in zip(t, x, strict=True)])
+    assert np.abs(outcome.q[:, 2] - x[:, 1]).max() < 5e-3 * np.abs(x[:, 1]).max()
+
+
+@pytest.mark.parametrize(
+    "keys", [{"controller": [ON_MOTORS]}, {"sensor": [{"motor": "O"}]}, {"sensor": [{"motor": "P"}]}]
+)
+def test_motors_are_read_behind_gears_that_give_alone(keys):
+    with pytest.raises(InputError, match="expected a joint with stiffness"):
+        wheel(loop(**keys))

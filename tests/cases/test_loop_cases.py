@@ -1,5 +1,7 @@
 """Joints as built and closed loops, each through `ffrobot solve`; the tables of their READMEs hold."""
 
+import re
+
 import numpy as np
 import pytest
 from checkpoints import check_table, readme_table
@@ -14,6 +16,17 @@ def geared(solved):
 @pytest.fixture(scope="module")
 def loops(solved):
     return solved("two_link_closed_loop")
+
+
+@pytest.fixture(scope="module")
+def compliant(solved):
+    return solved("compliant_arm")
+
+
+@pytest.fixture(scope="module")
+def rigid_gears(solved):
+    """The compliant arm without its springs, nor the loops that need them."""
+    return solved("compliant_arm", lambda text: re.sub(r"(stiffness|damping) = .*\n", "", text).partition("# PD of")[0])
 
 
 @pytest.fixture(scope="module")
@@ -38,14 +51,37 @@ def test_geared_arm_carries_out_its_moments(geared):
     assert np.trapz(energy, geared.file["inverse/time"][()]) == pytest.approx(2.72, rel=0.01)  # noqa: NPY201
 
 
-def check_runs(case, name):
-    """The metrics of all closed loops of a case, by run, against its README."""
-    keys = ("tip_error_rms", "tip_error_max", "vibration", "residual", "peak_moment", "peak_voltage")
+METRICS = ("tip_error_rms", "tip_error_max", "vibration", "residual", "peak_moment", "peak_voltage")
+
+
+def check_runs(case, name, keys=METRICS):
+    """The metrics of all closed loops of a case, by run; those of stable ones against its README."""
     runs = [run for run in case.file if "control" in case.file[run]]
     metrics = {run: case.file[f"{run}/control"].attrs for run in runs}
-    assert all(entry["verdict"] == "stable" for entry in metrics.values())
-    check_table(name, "run", {f"`{run}`": [entry[key] for key in keys] for run, entry in metrics.items()})
+    stable = {run: entry for run, entry in metrics.items() if entry["verdict"] == "stable"}
+    check_table(name, "run", {f"`{run}`": [entry[key] for key in keys] for run, entry in stable.items()})
     return metrics
+
+
+def test_compliant_arm(compliant, rigid_gears):
+    frequencies, largest = {}, {}
+    for gears, case in (("as built", compliant), ("rigid", rigid_gears)):
+        frequencies[gears] = case.file["frequencies/linear/frequency"][0][2:6]
+    check_table("compliant_arm", "gears", frequencies, relative=1e-3)
+    for joint in "OA":
+        group, rigid = (case.file[f"inverse/joints/{joint}"] for case in (compliant, rigid_gears))
+        largest[joint] = [peak(group["gear_moment"]), peak(group["moment"]), peak(rigid["moment"])]
+        np.testing.assert_allclose(group["motor_moment"][()] * 100, group["moment"][()])
+    check_table("compliant_arm", "joint", largest)
+    assert tip_error(compliant.file, "forward", "inverse") == pytest.approx(3.9e-6, rel=0.1)
+
+
+def test_motors_and_joints_as_places_of_encoders(compliant):
+    """High gains on the far side of a spring drive the mode in which motor and link turn against each other."""
+    metrics = check_runs(compliant, "compliant_arm", ("tip_error_rms", "tip_error_max", "vibration"))
+    assert metrics["firm_motor"]["verdict"] == "stable"
+    assert metrics["firm_joint"]["verdict"] == "diverges"
+    assert set(metrics["firm_motor"]["outputs"]) == {"motor/O", "motor/A", "motor/O/rate", "motor/A/rate"}
 
 
 def test_closed_loops(loops):

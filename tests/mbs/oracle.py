@@ -180,9 +180,9 @@ class Mechanism:
             value = b.position[k] - a.position[k] - row.offset
             return RowState(value, b.velocity[k] - a.velocity[k], b.L[k] - a.L[k], b.convective[k] - a.convective[k])
         if row.kind.name == "gear":
-            N = row.direction[0]
+            n_b, n_a = row.direction
             value, rate, gradient, bias = (
-                N * at_b - (N - 1) * at_a
+                n_b * at_b - n_a * at_a
                 for at_a, at_b in (
                     (a.position[2], b.position[2]),
                     (a.velocity[2], b.velocity[2]),
