@@ -69,7 +69,8 @@ def make_link(
     path = output or (beside[0] if beside else _cached(link))
     if not force and on_first(lambda: _up_to_date(path, digest) is not None):
         return LinkOutcome(path, read_modal_body(path), False, time.perf_counter() - start)
-    on_first(lambda: check_output(path, FORMAT, force=force))
+    if path.parent != _cache_folder():
+        on_first(lambda: check_output(path, FORMAT, force=force))
     earlier = [] if force else [path, *beside]
     return _compute(link, link_path(source), path, digest, start, progress, earlier, force=force)
 

@@ -8,7 +8,6 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
@@ -55,10 +54,11 @@ class Results:
     def from_image(cls, image: bytes, path: Path) -> Results:
         """Results whose file is in memory only; messages call them `path`."""
         results = cls.__new__(cls)
-        results._open(path, BytesIO(image))
+        # not as a file of Python's: HDF5 closes what is left open at the end, when Python is no more
+        results._open(path, h5py.h5f.open_file_image(image))
         return results
 
-    def _open(self, path: Path, content: PathLike[str] | str | BytesIO) -> None:
+    def _open(self, path: Path, content: PathLike[str] | str | h5py.h5f.FileID) -> None:
         self.path = path
         try:
             self._file = h5py.File(content, "r")

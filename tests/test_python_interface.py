@@ -1,5 +1,7 @@
 """`import ffrobot`: what the command line does, in a few lines of Python."""
 
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -176,3 +178,21 @@ def test_every_public_name_is_there():
     with pytest.raises(AttributeError, match="no attribute 'sovle'"):
         ffrobot.sovle  # noqa: B018
     assert ffrobot.__version__ == tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+
+
+def test_results_may_be_left_open(tmp_path):
+    """HDF5 closes them after Python has ended."""
+    script = "import ffrobot; results = ffrobot.solve('scene.toml'); results.append = [results]"
+    rod = "{ mass = 1.0, inertia = 0.1, center = [0.3, 0.0], points = { root = [0.0, 0.0] } }"
+    (tmp_path / "scene.toml").write_text(
+        f"""
+name = "pendulum"
+gravity = [0.0, -9.81]
+body = [{{ name = "rod", rigid = {rod} }}]
+joint = [{{ name = "pin", type = "revolute", between = ["ground", "rod.root"] }}]
+analysis = [{{ name = "fall", kind = "forward", end = 0.1, output_step = 0.1 }}]
+""",
+        encoding="utf-8",
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
