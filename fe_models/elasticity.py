@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 import ufl
 from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -181,7 +182,7 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
     a, b = ufl.TrialFunction(S), ufl.TestFunction(S)
     rho = _cellwise(mesh, materials.density, materials.of_cell)
     dx = ufl.dx(metadata={"quadrature_degree": mass_degree(mesh, order)})
-    M = fem.petsc.assemble_matrix(compiled_form(rho * a * b * dx))
+    M = fem_petsc.assemble_matrix(compiled_form(rho * a * b * dx))
     M.assemble()
     mass, pattern = _scalar_mass(M)
     return SolidModel(
@@ -208,7 +209,7 @@ def stiffness_matrix(model: SolidModel, held: Sequence[Any] = ()) -> PETSc.Mat:
     K.setOption(PETSc.Mat.Option.IGNORE_LOWER_TRIANGULAR, True)
     blocks = PETSc.LGMap().create(model.local_to_global.indices, bsize=3, comm=model.comm)
     K.setLGMap(blocks, blocks)
-    fem.petsc.assemble_matrix(K, model.stiffness_form, list(held))
+    fem_petsc.assemble_matrix(K, model.stiffness_form, list(held))
     K.assemble()
     K.setOption(PETSc.Mat.Option.SPD, True)
     return K

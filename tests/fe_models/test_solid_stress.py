@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem, mesh
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -18,7 +19,7 @@ from ffrobot.fe_models.link_records import Material
 from ffrobot.fe_models.strains import locate, pulled_back
 from ffrobot.fe_models.stress import point_stresses, surface_stresses
 from ffrobot.fe_models.surface_patches import outlined_patches
-from ffrobot.mesh.compat import create_solid_mesh, lagrange_space
+from ffrobot.mesh.compat import create_solid_mesh, geometry_nodes, lagrange_space
 from ffrobot.mesh.records import SurfacePatches
 
 E, NU = 2.0e11, 0.3
@@ -82,7 +83,7 @@ def test_two_materials_and_their_border():
     space = lagrange_space(box("hexahedron"), 1, vector=True)
     domain = space.mesh
     cells = domain.topology.index_map(3).size_local
-    middles = domain.geometry.x[domain.geometry.dofmap.array.reshape(-1, 8)].mean(axis=1)
+    middles = domain.geometry.x[geometry_nodes(domain)].mean(axis=1)
     by_cell = np.where(middles[:, 0, None, None] < 0.5, C, C / 10)
     assert by_cell.shape == (cells, 6, 6)
     points = {"stiff": (0.2, 0, 0), "soft": (0.8, 0, 0), "border": (0.5, 0.01, 0.01)}
@@ -243,7 +244,7 @@ def static(space, load):
     strain = ufl.sym(ufl.grad(u))
     sigma = 2 * mu * strain + lambda_ * ufl.tr(strain) * ufl.Identity(3)
     root = fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[0], 0.0))
-    K = fem.petsc.assemble_matrix(
+    K = fem_petsc.assemble_matrix(
         fem.form(ufl.inner(sigma, ufl.sym(ufl.grad(v))) * ufl.dx), bcs=[fem.dirichletbc(np.zeros(3), root, space)]
     )
     K.assemble()
