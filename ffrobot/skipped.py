@@ -14,7 +14,7 @@ from .mbs.planar_body import PlanarBody, vanishing_terms
 from .mbs.scene_records import Scene
 
 if TYPE_CHECKING:
-    from .solution import LoadedBody
+    from .bodies import LoadedBody
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
 

@@ -1,13 +1,11 @@
-"""Stage 2 from a scene file: bodies, model, analyses, voltages."""
+"""Stage 2 from a scene file: bodies, model, analyses."""
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,41 +13,34 @@ from numpy.typing import NDArray
 
 from .actuation.control.closed_loop import LoopRecord, run_closed_loop
 from .actuation.control.linear_analysis import LinearAnalysis, analyse, linear_models
-from .actuation.control.placement import Placed, place
-from .actuation.feasibility import Feasibility, MotorFeasibility, judge_motors, judge_patches
-from .actuation.patch_structure import StructureEffect, structure_effect, with_patches
-from .actuation.patches import PatchArray, check_reach, patch_array, with_patch_count
-from .actuation.points import PointForces, PointSet, point_set, solve_point_forces, with_points
-from .actuation.prediction import predicted_shift, unmet_modal_forces
+from .actuation.control.placement import Placed
+from .actuation.feasibility import Feasibility
+from .actuation.patch_structure import StructureEffect
+from .actuation.patches import PatchArray, check_reach, patch_array
+from .actuation.points import PointForces, PointSet, point_set, with_points
 from .actuation.voltages import Voltages, allocation, solve_voltages
+from .bodies import LoadedBody, add_patches, load_bodies
 from .errors import InputError
-from .fe_models.modal_body import ModalBody
-from .fe_models.modal_body_file import read_modal_body
+from .evaluation import ALLOCATED, evaluate, place_patches
 from .interruption import Interruption
 from .mbs.analyses import Outcome, run_forward, run_pcid, run_static
 from .mbs.analysis_records import Analysis
 from .mbs.compliant_joints import through_gears
-from .mbs.control_records import Placement
 from .mbs.earlier_run import EarlierRun
 from .mbs.fcid import run_fcid
 from .mbs.geometric_stiffening import NOTABLE, estimated_effect
 from .mbs.model import ModalLoad, Model, build_model
 from .mbs.motors_only import run_motors_only
-from .mbs.observation import modes_of_file
 from .mbs.operating_points import operating_points
-from .mbs.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
-from .mbs.record_types import split_point
+from .mbs.planar_body import PlanarBody
 from .mbs.scene_file import load_scene
 from .mbs.scene_records import Scene
 from .mbs.steering import Equipment
-from .mbs.stress import BodyStress, body_stress
+from .mbs.stress import BodyStress
 from .mode_choice import ErrorEstimate, ModeChoice, error_tolerances, levels, reported
 from .skipped import skipped as skipped_lines
-from .validation import did_you_mean, quoted
 
 Array = NDArray[np.float64]
-
-ALLOCATED = ("pcid", "fcid", "static")  # kinds of analysis whose forces patches and actuation points have to meet
 
 logger = logging.getLogger(__name__)
 
@@ -63,22 +54,6 @@ class Watcher:
     def advance(self, t: float, end: float) -> bool:
         """An analysis has reached time t of `end`; False stops it."""
         return True
-
-
-@dataclass(frozen=True)
-class LoadedBody:
-    """A body of the scene: its modal body and file (None where rigid) and its planar equations."""
-
-    planar: PlanarBody
-    modal: ModalBody | None
-    path: Path | None
-    computed: bool = False
-    reused: str = ""
-
-    @property
-    def file_hash(self) -> str:
-        """SHA-256 of the modal body file; empty where rigid."""
-        return hashlib.sha256(self.path.read_bytes()).hexdigest() if self.path else ""
 
 
 @dataclass(frozen=True)
@@ -146,7 +121,7 @@ def run_analyses(solution: Solution, watcher: Watcher) -> Solution:
             solution = _with_enough_modes(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
-    _evaluate(solution)
+    evaluate(solution)
     return solution
 
 
@@ -221,21 +196,12 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         if analysis.kind == "linear":
             solution.linear[analysis.name] = analyse(linear_models(outcome, solution.patches))
         if analysis.placement is not None:
-            solution.placements[analysis.name] = _place(solution, analysis.placement, outcome)
+            solution.placements[analysis.name] = place_patches(solution, analysis.placement, outcome)
         solution.seconds[analysis.name] = time.perf_counter() - started
         _log(outcome)
         if outcome.failed:
             break
     return True
-
-
-def _evaluate(solution: Solution) -> None:
-    """What follows from the motion and forces of all analyses."""
-    for name, outcome in solution.outcomes.items():
-        started = time.perf_counter()
-        _judge_actuation(solution, outcome)
-        solution.stresses[name] = _stresses(solution, outcome)
-        solution.seconds[name] += time.perf_counter() - started
 
 
 def _log(outcome: Outcome) -> None:
@@ -252,9 +218,9 @@ def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     began = time.perf_counter()
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
-    bodies = {body.name: loaded for body, loaded in zip(scene.body, _load_bodies(scene, watcher), strict=True)}
+    bodies = {body.name: loaded for body, loaded in zip(scene.body, load_bodies(scene, watcher.stage), strict=True)}
     seconds = {"links and files": time.perf_counter() - began}
-    structure = _add_patches(scene, bodies)
+    structure = add_patches(scene, bodies)
     first = levels(scene, _whole(bodies))[0]
     bodies = {name: replace(body, planar=first.get(name, body.planar)) for name, body in bodies.items()}
     return _assembled(scene, bodies, structure, seconds, stiffened=scene.geometric_stiffening is True)
@@ -303,38 +269,6 @@ def _check_stiffening(scene: Scene, bodies: Mapping[str, LoadedBody], stiffened:
             )
 
 
-def _judge_actuation(solution: Solution, outcome: Outcome) -> None:
-    """What patches and actuation points have to do for what an inverse analysis found, and whether they can."""
-    name = outcome.analysis.name
-    if outcome.F_p is not None:
-        if solution.patches:
-            unmet = unmet_modal_forces(outcome, solution.voltages[name])
-            solution.predicted_shift[name] = predicted_shift(outcome, unmet)
-        solution.feasibility[name] = _judge(solution, outcome)
-    elif outcome.inversion is not None:
-        solution.feasibility[name] = Feasibility(_judge_motors(solution, outcome), {})
-    if outcome.analysis.kind in ALLOCATED and any(outcome.assembly.is_trajectory):
-        solution.point_forces[name] = {
-            body: solve_point_forces(points, outcome) for body, points in solution.points.items()
-        }
-
-
-def _judge(solution: Solution, outcome: Outcome) -> Feasibility:
-    """Whether motors and patches can do what an inverse analysis found."""
-    scene, name = solution.scene, outcome.analysis.name
-    patches = {}
-    for body, array in solution.patches.items():
-        loaded = solution.bodies[body]
-        assert loaded.modal is not None
-        trial = partial(with_patch_count, scene.path, array.layout, loaded.modal, loaded.planar)
-        patches[body] = judge_patches(array, solution.voltages[name][body], outcome, trial)
-    return Feasibility(_judge_motors(solution, outcome), patches)
-
-
-def _judge_motors(solution: Solution, outcome: Outcome) -> dict[str, MotorFeasibility]:
-    return judge_motors(outcome, {joint.name: joint for joint in solution.scene.joint})
-
-
 def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Outcome:
     model, end, earlier = solution.model, analysis.end, solution.earlier.get(analysis.name)
     watcher.stage(f'analysis "{analysis.name}"')
@@ -362,25 +296,6 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
     return run_forward(model, analysis, source, _equipment(solution), progress, earlier)
 
 
-def _place(solution: Solution, wanted: Placement, outcome: Outcome) -> Placed:
-    """The best places for the patches of one body, about `outcome` or over the path that it stands on."""
-    path, loaded = solution.scene.path, solution.bodies[wanted.body]
-    assert loaded.modal is not None
-    model, F_p = None, None
-    if wanted.criterion == "voltage":
-        source = solution.outcomes[str(outcome.analysis.source)]
-        if source.F_p is None:
-            raise InputError(
-                f'{path}: analysis "{outcome.analysis.name}": placement.criterion: expected motors that fit the'
-                f' mechanism for "voltage", found {len(solution.model.motors)} for {solution.model.rigid_freedom}'
-            )
-        F_p = source.F_p[:, source.modal_columns(wanted.body)]
-    else:
-        (model,) = linear_models(outcome, {})
-    layout = solution.patches[wanted.body].layout
-    return place(path, wanted, layout, loaded.modal, loaded.planar, model, F_p)
-
-
 def _equipment(solution: Solution) -> Equipment:
     """The actuators of the scene, fresh for one run."""
     return Equipment(
@@ -388,61 +303,6 @@ def _equipment(solution: Solution) -> Equipment:
         {name: allocation(array, limited=True) for name, array in solution.patches.items()},
         {name: points.actuator() for name, points in solution.points.items()},
     )
-
-
-def _load_bodies(scene: Scene, watcher: Watcher) -> list[LoadedBody]:
-    loaded = []
-    for body in scene.body:
-        if body.rigid is not None:
-            loaded.append(LoadedBody(from_rigid_body(body.name, body.rigid), None, None))
-        elif body.modal is not None:
-            modal = read_modal_body(body.modal)
-            loaded.append(LoadedBody(from_modal_body(body.name, modal), modal, body.modal))
-        else:
-            from .fe_models.link import cached_modal_body
-
-            assert body.link is not None
-            outcome = cached_modal_body(body.link, watcher.stage)
-            planar = from_modal_body(body.name, outcome.body)
-            loaded.append(LoadedBody(planar, outcome.body, outcome.path, outcome.computed, outcome.reused))
-    return [_with_payloads(scene, body) for body in loaded]
-
-
-def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
-    planar = body.planar
-    for payload in scene.payload:
-        name, point = split_point(payload.point)
-        if name != planar.name:
-            continue
-        if point not in planar.points:
-            raise InputError(
-                f'{scene.path}: payload: point: expected a point of "{name}" ({quoted(planar.points)}), found'
-                f' "{payload.point}"{did_you_mean(point, planar.points)}'
-            )
-        planar = with_payload(planar, point, payload.mass, payload.inertia)
-    return replace(body, planar=planar)
-
-
-def _add_patches(scene: Scene, bodies: dict[str, LoadedBody]) -> dict[str, StructureEffect]:
-    """Adds mass and stiffness of patches to their links where the scene asks for it."""
-    effects = {}
-    for layout in scene.pzt:
-        bare = bodies[layout.body]
-        if layout.structural and bare.modal is not None:
-            patch_array(scene.path, layout, bare.modal, bare.planar)  # refuses patches that do not fit
-            bodies[layout.body] = replace(bare, planar=with_patches(bare.planar, bare.modal, layout))
-            effects[layout.body] = structure_effect(bare.planar, bodies[layout.body].planar)
-    return effects
-
-
-def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
-    """Of the bodies whose files hold modal stresses."""
-    found = {
-        name: body_stress(body.modal, modes_of_file(outcome, body.planar))
-        for name, body in solution.bodies.items()
-        if body.modal is not None
-    }
-    return {name: stress for name, stress in found.items() if stress is not None}
 
 
 def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> list[ModalLoad]:
