@@ -28,7 +28,7 @@ enum class RowKind {
   angle, // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
   slide, // n . (r_b - r_a), n fixed to the section of a
   gear,  // n_b alpha_b - n_a alpha_a, the angle between shafts behind gears: (N, N - 1) is that of a rotor on a that
-        // turns N times as fast as b does on a
+         // turns N times as fast as b does on a
 };
 
 // Whether the directions of such rows, and with them their coefficients below, move with the bodies.

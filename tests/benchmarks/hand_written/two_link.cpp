@@ -1,5 +1,5 @@
-// The two-link case written by hand for exactly this mechanism: joint coordinates, sizes known to the compiler. What the
-// general core is measured against. Reads the numbers of the links, prints times and results.
+// The two-link case written by hand for exactly this mechanism: joint coordinates, sizes known to the compiler. What
+// the general core is measured against. Reads the numbers of the links, prints times and results.
 //
 // Link 1 is simply supported (its ends stay on the frame's x axis), link 2 a cantilever, bending only, no damping:
 // S_bar_x = 0, j = 0, S_tilde = 0, m_xy = I. Coordinates y = (theta1, theta2, p1, p2) and their rates.
@@ -79,7 +79,8 @@ void slope(const Target &at, const double *y, double *dy, double *force) {
   const double J1 = link1.inertia + a.p_p - link1.h_h;
   const double T1 = -2 * w1 * a.p_v + link1.first_moment * g1y - a.S_p * g1x - (w1_2 * a.h_p - a.h_k + link1.S_h * g1y);
 
-  // Link 2 hangs on the tip of link 1: its frame accelerates with L (theta1_ddot e_theta - theta1_dot^2 e_r). In its axes:
+  // Link 2 hangs on the tip of link 1: its frame accelerates with L (theta1_ddot e_theta - theta1_dot^2 e_r). In its
+  // axes:
   const double cd = c1 * c2 + s1 * s2, sd = s1 * c2 - c1 * s2; // of theta1 - theta2
   const double ux = -L * sd, uy = L * cd;                      // per theta1_ddot
   const double rx = -L * w1_2 * cd, ry = -L * w1_2 * sd;       // the rest
@@ -155,8 +156,7 @@ void advance(const std::array<Vector, 12> &K, const Vector &y, double h, Vector 
     out[i] = y[i] + h * ((Coefficients[j] != 0 ? Coefficients[j] * K[j][i] : 0.0) + ...);
 }
 
-template <int Stage>
-void run_stage(double t, const Vector &y, double h, std::array<Vector, 12> &K, double *force) {
+template <int Stage> void run_stage(double t, const Vector &y, double h, std::array<Vector, 12> &K, double *force) {
   static constexpr auto &row = ffrobot::Dop853Tableau::a[Stage];
   Vector stage;
   advance<row, Stage>(K, y, h, stage, std::make_index_sequence<Stage>());
@@ -193,13 +193,12 @@ void read(std::ifstream &file, Link &l) {
   l.h_h = dot(l.h, l.h), l.h_tip = dot(l.h, l.tip), l.tip_tip = dot(l.tip, l.tip);
 }
 
-double seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 } // namespace
 
-// two_link LINKS EVALUATIONS STEPS: seconds per evaluation; seconds, force and angles of a run with so many steps (0: none)
+// two_link LINKS EVALUATIONS STEPS: seconds per evaluation; seconds, force and angles of a run with so many steps (0:
+// none)
 int main(int, char **arguments) {
   std::ifstream file(arguments[1]);
   read(file, link1);
