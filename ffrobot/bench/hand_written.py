@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,27 +27,31 @@ class HandWritten:
     Args:
         repository: the source tree.
         folder: for what is compiled.
+        flags: of the compiler.
 
     Raises `InputError` where the source is not there, `SolveError` where it cannot be compiled.
     """
 
-    def __init__(self, repository: Path, model: Model, folder: Path) -> None:
+    def __init__(self, repository: Path, model: Model, folder: Path, flags: Sequence[str] = FLAGS) -> None:
         source = repository / SOURCE
         if not source.is_file():
             raise InputError(f"{repository}: source: expected ffrobot's source tree, found no {SOURCE} in it")
         if shutil.which("g++") is None:
             raise SolveError(f"{source}: needs the compiler g++, which is not installed")
         self._binary, self._links = folder / "two_link", folder / "links.txt"
-        command: list[str | Path] = ["g++", *FLAGS, f"-I{repository / 'mbs'}", "-o", self._binary, source]
+        command: list[str | Path] = ["g++", *flags, f"-I{repository / 'mbs'}", "-o", self._binary, source]
         compiled = subprocess.run(command, capture_output=True, text=True, check=False)
         if compiled.returncode:
             raise SolveError(f"{source}: does not compile:\n{compiled.stderr}")
         self._links.write_text("\n".join(link_numbers(body) for body in model.bodies), encoding="utf-8")
 
+    def command(self, evaluations: int, steps: int) -> list[str]:
+        """What runs it; its main function says what it does."""
+        return [str(self._binary), str(self._links), str(evaluations), str(steps)]
+
     def __call__(self, evaluations: int, steps: int) -> list[list[float]]:
-        """Lines of numbers that it prints: its main function says which."""
-        command: list[str | Path] = [self._binary, self._links, str(evaluations), str(steps)]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
+        """Lines of numbers that it prints."""
+        done = subprocess.run(self.command(evaluations, steps), check=True, capture_output=True, text=True)
         return [[float(number) for number in line.split()] for line in done.stdout.splitlines()]
 
     def evaluation_seconds(self, evaluations: int) -> float:
