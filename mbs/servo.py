@@ -161,8 +161,3 @@ def zeros(dynamics: LinearDynamics, scale: Array) -> NDArray[np.complex128]:
 def is_unstable(s: NDArray[np.complex128]) -> NDArray[np.bool_]:
     """Zeros in the right half plane, beyond rounding."""
     return s.real > CENTRE * np.abs(s)
-
-
-def is_undamped(s: NDArray[np.complex128]) -> NDArray[np.bool_]:
-    """Zeros on the imaginary axis, but for rounding."""
-    return np.abs(s.real) <= CENTRE * np.abs(s)
