@@ -19,6 +19,9 @@ Curves = Mapping[str, tuple[Sequence[float], Sequence[float]]]
 TIME = "seconds_min"
 
 
+MOST_TICKS = 6  # at the points themselves
+
+
 def draw_work_precision(rows: Rows, peer: Rows, title: str, folder: Path) -> list[Path]:
     """Run time against error, a figure for each kind of quantity and a curve for each integrator (and the peer)."""
     written: list[Path] = []
@@ -76,6 +79,10 @@ def _draw(curves: Curves, title: str, x_label: str, y_label: str, folder: Path, 
         axes.set_yscale("log")
         for k, (label, (x, y)) in enumerate(shown.items()):
             axes.plot(x, y, label=label, **line_style(k, len(x)))
+        values = sorted({value for x, _ in shown.values() for value in x})
+        if len(values) <= MOST_TICKS and values[-1] < 10 * values[0]:  # those between powers of ten run into each other
+            axes.set_xticks(values, [f"{value:g}" for value in values])
+            axes.set_xticks([], minor=True)
         axes.set_xlabel(x_label)
         axes.set_ylabel(y_label)
         legend(axes)
