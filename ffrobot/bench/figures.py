@@ -18,7 +18,6 @@ Curves = Mapping[str, tuple[Sequence[float], Sequence[float]]]
 # Over a curve's points at their best: a run's smallest time is what the machine can do.
 TIME = "seconds_min"
 
-
 MOST_TICKS = 6  # at the points themselves
 
 
