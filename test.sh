@@ -7,8 +7,8 @@ WITH_TEST_PACKAGES=yes source scripts/setup.sh
 # mypy needs the packages where they are once installed: ffrobot.mesh, not mesh.
 rm -rf build/types
 mkdir -p build/types/ffrobot/mbs
-ln -s "$PWD"/ffrobot/* "$PWD"/{mesh,fe_models,actuation} build/types/ffrobot/
-ln -s "$PWD"/mbs/*.py "$PWD"/.venv/lib/python3*/site-packages/ffrobot/mbs/_core.pyi build/types/ffrobot/mbs/
+ln -s "$PWD"/ffrobot/* "$PWD"/{common,mesh,fe_models,actuation} build/types/ffrobot/
+ln -s "$PWD"/mbs/{*.py,fields,scene,model,solve,analysis,quantities} "$PWD"/.venv/lib/python3*/site-packages/ffrobot/mbs/_core.pyi build/types/ffrobot/mbs/
 mapfile -t cpp < <(find mbs -name '*.h' -o -name '*.cpp')
 
 failed=()

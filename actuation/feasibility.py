@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mbs.analyses import Outcome
-from ..mbs.joint_space import motor_rates
-from ..mbs.mechanism_records import Joint
-from .patches import PatchArray
-from .voltages import Voltages, voltage_gain
+from ..mbs.analysis.analyses import Outcome
+from ..mbs.quantities.joint_space import motor_rates
+from ..mbs.scene.mechanism_records import Joint
+from .patches.patches import PatchArray
+from .patches.voltages import Voltages, voltage_gain
 
 Array = NDArray[np.float64]
 

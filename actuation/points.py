@@ -9,13 +9,13 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..fe_models.modal_body import ModalBody
 from ..mbs import _core
-from ..mbs.actuator_records import ActuationPoints
-from ..mbs.analyses import Outcome
-from ..mbs.planar_body import PlanarBody, PlanarPoint
-from ..mbs.steering import PointActuator
+from ..mbs.analysis.analyses import Outcome
+from ..mbs.analysis.replay import PointActuator
+from ..mbs.model.planar_body import PlanarBody, PlanarPoint
+from ..mbs.scene.actuator_records import ActuationPoints
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mbs.analyses import Outcome
-from ..mbs.joint_space import held_joint_motion
-from ..mbs.observation import rotated
-from .voltages import Voltages
+from ..mbs.analysis.analyses import Outcome
+from ..mbs.quantities.joint_space import held_joint_motion
+from ..mbs.quantities.observation import rotated
+from .patches.voltages import Voltages
 
 Array = NDArray[np.float64]
 

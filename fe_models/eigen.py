@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from ..errors import SolveError
+from ..common.errors import SolveError
 
 Floats = NDArray[np.float64]
 

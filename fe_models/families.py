@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .functionals import Averages
 from .link_records import FAMILIES
+from .solid.functionals import Averages
 
 Floats = NDArray[np.float64]
 

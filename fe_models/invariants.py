@@ -18,7 +18,7 @@ from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from ..mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
-from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
+from .beam.beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
 from .link_records import BeamLink
 
 Floats = NDArray[np.float64]

@@ -14,10 +14,10 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from ..errors import FfrobotError, SolveError
-from ..files import check_output
+from ..common.errors import FfrobotError, SolveError
+from ..common.files import check_output
+from ..common.parallel import on_first, processes
 from ..mesh.kept_parts import kept_path
-from ..parallel import on_first, processes
 from .link_file import LinkSource, link_path, read_link
 from .link_records import BeamLink, Link, SolidLink
 from .modal_body import ModalBody
@@ -167,10 +167,10 @@ def _has_mesh(link: Link) -> bool:
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
     try:
         if isinstance(link, BeamLink):
-            from .beam_link import beam_modal_body
+            from .beam.link import beam_modal_body
 
             return beam_modal_body
-        from .solid_link import solid_modal_body
+        from .solid.link import solid_modal_body
 
         return partial(solid_modal_body, remesh=remesh)
     except ModuleNotFoundError as error:

@@ -15,12 +15,12 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from ..errors import InputError
+from ..common.errors import InputError
+from ..common.validation import load_toml, validate
 from ..mesh.records import RectangleSection, SectionRecord, TubeSection
-from ..validation import load_toml, validate
-from .constitutive import is_stable
+from .beam.section_stress import contains
 from .link_records import BeamLink, Link, Material, OrthotropicMaterial, SolidLink
-from .section_stress import contains
+from .solid.constitutive import is_stable
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from ..common.validation import Record
 from ..mesh.records import (
     BeamGeometry,
     BeamMesh,
@@ -24,8 +25,7 @@ from ..mesh.records import (
     TubeSection,
     Vector,
 )
-from ..validation import Record
-from .section import Section, rectangle, tube
+from .beam.section import Section, rectangle, tube
 
 Family = Literal["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..mesh.records import InterfaceRecord
 from .modal_body import Interface
-from .tensors import LEVI_CIVITA
+from .solid.tensors import LEVI_CIVITA
 
 if TYPE_CHECKING:
     from .invariants import Invariants

@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..files import write_atomically
+from ..common.errors import InputError
+from ..common.files import write_atomically
 from .modal_body import Interface, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
 if TYPE_CHECKING:

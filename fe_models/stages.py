@@ -77,7 +77,7 @@ def _stresses(body: ModalBody, link: Link) -> dict[str, StressPoint] | None:
     if not link.stress.points:
         return {}
     if isinstance(link, BeamLink):
-        from .beam_stress import beam_stresses  # loads SciPy
+        from .beam.stress import beam_stresses  # loads SciPy
 
         return beam_stresses(link, body.stations, np.diag(body.stiffness), lumps(link.interface, body.interfaces))
     known = {tuple(point.position): point for point in body.stress.values()}

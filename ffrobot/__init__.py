@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .api import load_scene, make_link, plot_results, read_modal_body, solve, view_file, write_report
-    from .errors import FfrobotError, InputError, SolveError
+    from .common.errors import FfrobotError, InputError, SolveError
     from .fe_models.modal_body import ModalBody
-    from .mbs.scene_file import make_scene
-    from .mbs.scene_records import Scene
-    from .results_file import Results
+    from .mbs.scene.load import make_scene
+    from .mbs.scene.scene import Scene
+    from .results.file import Results
 
     __version__: str
 
@@ -36,13 +36,13 @@ _HOME = {
     "solve": ".api",
     "view_file": ".api",
     "write_report": ".api",
-    "FfrobotError": ".errors",
-    "InputError": ".errors",
-    "SolveError": ".errors",
+    "FfrobotError": ".common.errors",
+    "InputError": ".common.errors",
+    "SolveError": ".common.errors",
     "ModalBody": ".fe_models.modal_body",
-    "make_scene": ".mbs.scene_file",
-    "Scene": ".mbs.scene_records",
-    "Results": ".results_file",
+    "make_scene": ".mbs.scene.load",
+    "Scene": ".mbs.scene.scene",
+    "Results": ".results.file",
 }
 
 __all__ = [

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
-    from .mbs.scene_records import Scene
-    from .results_file import Results
-    from .solution import Watcher
+    from .mbs.scene.scene import Scene
+    from .results.file import Results
+    from .run.solution import Watcher
 
 AnyPath = str | PathLike[str]
 
@@ -27,14 +27,14 @@ def solve(
     Raises `InputError` for anything wrong with the scene, `SolveError` where an analysis does not reach its end; what
     was computed until then is in `output` all the same.
     """
-    from .errors import InputError
-    from .files import check_output
-    from .mbs.scene_records import Scene
-    from .results import FORMAT, results_image, write_results
-    from .results_file import Results
-    from .resume import how_to_go_on
-    from .resume import resume as run_on
-    from .solution import solve as run
+    from .common.errors import InputError
+    from .common.files import check_output
+    from .mbs.scene.scene import Scene
+    from .results.file import Results
+    from .results.write import FORMAT, results_image, write_results
+    from .run.resume import how_to_go_on
+    from .run.resume import resume as run_on
+    from .run.solution import solve as run
 
     if output is not None:
         check_output(Path(output), FORMAT)
@@ -56,7 +56,7 @@ def solve(
 
 def load_scene(path: AnyPath) -> Scene:
     """Read and validate a scene file. Raises `InputError` with a line for each wrong key."""
-    from .mbs.scene_file import load_scene
+    from .mbs.scene.load import load_scene
 
     return load_scene(Path(path))
 
@@ -66,9 +66,9 @@ def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, 
 
     `link` is a link file or a dictionary of its keys, whose modal body goes to the user's cache without `output`.
     """
+    from .common.validation import plain
     from .fe_models.link import make_link
     from .fe_models.link_file import LinkTable
-    from .validation import plain
 
     source = LinkTable(plain(link), Path("<link made in Python>")) if isinstance(link, Mapping) else Path(link)
     return make_link(source, None if output is None else Path(output), force)
@@ -86,14 +86,14 @@ def plot_results(results: AnyPath, folder: AnyPath, formats: Sequence[str] = ("p
 
     `formats` are "png", "pdf", "svg".
     """
-    from .figures.plot import plot_results
+    from .pictures.figures.plot import plot_results
 
     return plot_results(Path(results), Path(folder), formats)
 
 
 def write_report(results: Sequence[AnyPath], path: AnyPath) -> None:
     """Write one HTML page about results files: `ffrobot report`."""
-    from .report import write_report
+    from .pictures.report import write_report
 
     write_report([Path(file) for file in results], Path(path))
 
@@ -113,6 +113,6 @@ def view_file(
     `frames` outputs at most of one `analysis`, or of all; the picture at `time` (s) with deflections `scale` times as
     large. `pictures`: whether to draw them; None: where PyVista can. Returns the files written.
     """
-    from .view.view import FRAMES, Options, view_file
+    from .pictures.view.view import FRAMES, Options, view_file
 
     return view_file(Path(file), Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths

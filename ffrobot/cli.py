@@ -13,9 +13,9 @@ from typing import Any
 import click
 
 from .bench.command import bench
-from .errors import FfrobotError
-from .logs import LOGGER, logging_options
-from .parallel import end_all, is_first, on_first
+from .common.errors import FfrobotError
+from .common.parallel import end_all, is_first, on_first
+from .present.logs import LOGGER, logging_options
 
 FILE = click.Path(path_type=Path)
 
@@ -44,7 +44,7 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     dynamics needs. Nothing is computed when the output is up to date with the content of LINK.toml.
     """
     from .fe_models.link import make_link
-    from .progress import Display
+    from .present.progress import Display
 
     with Display() as display:
         outcome = make_link(link_file, output, force, display.stage)
@@ -77,13 +77,13 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
 
     Ctrl-C keeps what was computed; --resume goes on from there, and from the start where there are no results yet.
     """
-    from .files import check_output
-    from .progress import Display
-    from .results import FORMAT, write_results
-    from .resume import how_to_go_on
-    from .resume import resume as resume_scene
-    from .solution import solve as solve_scene
-    from .summary import print_summary, summary_console
+    from .common.files import check_output
+    from .present.progress import Display
+    from .present.summary import print_summary, summary_console
+    from .results.write import FORMAT, write_results
+    from .run.resume import how_to_go_on
+    from .run.resume import resume as resume_scene
+    from .run.solution import solve as solve_scene
 
     path = output or scene_file.with_suffix(".results.h5")
     check_output(path, FORMAT)
@@ -105,7 +105,7 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
 @click.argument("file", metavar="FILE.h5", type=FILE)
 def info(file: Path) -> None:
     """Say what a modal body file or a results file holds."""
-    from .info import describe
+    from .present.info import describe
 
     click.echo(describe(file))
 
@@ -115,8 +115,8 @@ def info(file: Path) -> None:
 @click.option("--analysis", metavar="NAME", help="Of this analysis only.")
 def feasibility(results_file: Path, analysis: str | None) -> None:
     """Say whether motors and patches can do what the analyses of a results file ask of them, and what would do."""
-    from .feasibility import print_feasibility
-    from .summary import summary_console
+    from .present.feasibility import print_feasibility
+    from .present.summary import summary_console
 
     print_feasibility(results_file, analysis, summary_console())
 
@@ -130,7 +130,7 @@ def plot(file: Path, output: Path | None, formats: str) -> None:
 
     Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn.
     """
-    from .figures.plot import plot_file
+    from .pictures.figures.plot import plot_file
 
     for path in plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(",")):
         click.echo(path)
@@ -149,7 +149,7 @@ def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN4
 
     Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies.
     """
-    from .view import Options, view_file
+    from .pictures.view import Options, view_file
 
     viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
     for path in viewed.paths:
@@ -166,7 +166,7 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 
     Several results files come side by side, for comparison. The page needs no network and no other file.
     """
-    from .report import write_report
+    from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
     write_report(results_files, path)
@@ -179,7 +179,7 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 @click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Where to write [RESULTS.npz].")
 def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
     """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
-    from .control_results import export_linear
+    from .results.linear import export_linear
 
     path = output or results_file.with_suffix(".npz")
     name = export_linear(results_file, analysis, path)
@@ -219,8 +219,8 @@ def sweep(
     Entries of lists of tables go by their name or body. The same command takes up a sweep that was stopped. Runs go
     side by side with -j on one machine, and on several under mpirun, where the first process hands them out.
     """  # noqa: D301 (click wants the backspace itself)
-    from .progress import Display
-    from .summary import summary_console
+    from .present.progress import Display
+    from .present.summary import summary_console
     from .sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep
 
     folder = output or scene_file.with_suffix(".sweep")

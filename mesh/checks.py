@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from ..errors import InputError
+from ..common.errors import InputError
 from .cells import Floats
 from .jacobian import SLIVER, cell_quality, jacobians, reference_nodes
 from .part_mesh import PartMesh, facet_keys

@@ -15,7 +15,7 @@ import petsc4py
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..errors import SolveError
+from ..common.errors import SolveError
 from .cells import CellName
 
 # Before dolfinx does it: PETSc's own signal handlers would answer a closed pipe or a kill with a page on debuggers.

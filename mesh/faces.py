@@ -16,8 +16,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from ..errors import InputError
-from ..validation import did_you_mean, quoted
+from ..common.errors import InputError
+from ..common.validation import did_you_mean, quoted
 from .cells import Floats, Integers
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
 from .records import InterfaceRecord, RectangleSection, SolidGeometry, SurfacePatches

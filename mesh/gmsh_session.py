@@ -15,7 +15,7 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from ..errors import InputError
+from ..common.errors import InputError
 from .cells import Floats, Integers
 from .defaults import CIRCLE, GROWTH
 from .jacobian import SLIVER, cell_quality

@@ -17,8 +17,8 @@ from typing import Any, cast
 import numpy as np
 from platformdirs import user_cache_path
 
-from ..errors import SolveError
-from ..files import write_atomically
+from ..common.errors import SolveError
+from ..common.files import write_atomically
 from .cells import CELLS, CellName
 from .part_mesh import PartMesh
 from .records import InterfaceRecord, SolidGeometry, SolidMeshRecord, SurfacePatches

@@ -12,7 +12,7 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..common.errors import InputError
 from .cells import HEXAHEDRON, Integers
 from .source import RawMesh
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..common.errors import InputError
 from .cells import Floats
 from .checks import METRES, check_connected, check_quality, check_shape, oriented, straightened
 from .defaults import default_order, default_size

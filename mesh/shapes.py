@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import gmsh
 
-from ..errors import InputError
+from ..common.errors import InputError
 from .defaults import BAR, CIRCLE, default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
 from .records import (

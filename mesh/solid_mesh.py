@@ -14,7 +14,7 @@ import numpy as np
 from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
-from ..errors import FfrobotError, InputError
+from ..common.errors import FfrobotError, InputError
 from .cells import CellName, Integers
 from .compat import create_solid_mesh, geometry_nodes
 from .part import kept_or_new

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import gmsh
 
-from ..errors import InputError
+from ..common.errors import InputError
 from .defaults import default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
 from .records import SolidMeshRecord

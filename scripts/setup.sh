@@ -162,7 +162,7 @@ PYTHON
 build_key() {
   {
     printf '%s\n' "${CXX:-}" "${CXXFLAGS:-}"
-    find ffrobot mesh fe_models mbs actuation -name '*.py' -o -name '*.pyi' | LC_ALL=C sort
+    find ffrobot common mesh fe_models mbs actuation -name '*.py' -o -name '*.pyi' | LC_ALL=C sort
     find mbs CMakeLists.txt pyproject.toml '(' -name '*.h' -o -name '*.cpp' -o -name 'CMakeLists.txt' \
       -o -name pyproject.toml ')' -print0 | LC_ALL=C sort -z | xargs -0 sha256sum
   } | digest

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from ffrobot.parallel import environment_without_mpi
+from ffrobot.common.parallel import environment_without_mpi
 
 CASES = Path(__file__).parent.parent / "cases"
 

@@ -7,13 +7,13 @@ import h5py
 import numpy as np
 import pytest
 
-from ffrobot.errors import InputError
-from ffrobot.mbs.scene_file import make_scene
-from ffrobot.mode_choice import ErrorEstimate, difference, reported
-from ffrobot.results import results_image
-from ffrobot.results_file import Results
-from ffrobot.solution import solve
-from ffrobot.summary import print_summary, summary_console
+from ffrobot.common.errors import InputError
+from ffrobot.mbs.scene.load import make_scene
+from ffrobot.present.summary import print_summary, summary_console
+from ffrobot.results.file import Results
+from ffrobot.results.write import results_image
+from ffrobot.run.mode_choice import ErrorEstimate, difference, reported
+from ffrobot.run.solution import solve
 
 CASE = Path(__file__).parents[1] / "cases" / "two_link"
 S = "(10*t**3-15*t**4+6*t**5)"  # from rest to rest with zero acceleration at both ends

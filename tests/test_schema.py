@@ -8,9 +8,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link_file import read_link
-from ffrobot.mbs.scene_file import load_scene, make_scene
+from ffrobot.mbs.scene.load import load_scene, make_scene
 from ffrobot.schema import schema
 
 CASES = Path(__file__).parents[1] / "cases"

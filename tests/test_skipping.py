@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from ffrobot.fe_models.link import make_link
-from ffrobot.mbs import _core, fcid
-from ffrobot.mbs.model import Assembly
-from ffrobot.mbs.planar_body import core_arguments, vanishing_terms
-from ffrobot.mbs.scene_file import make_scene
-from ffrobot.results import results_image
-from ffrobot.solution import prepare, solve
+from ffrobot.mbs import _core
+from ffrobot.mbs.analysis import fcid
+from ffrobot.mbs.model.model import Assembly
+from ffrobot.mbs.model.planar_body import core_arguments, vanishing_terms
+from ffrobot.mbs.scene.load import make_scene
+from ffrobot.results.write import results_image
+from ffrobot.run.solution import prepare, solve
 
 LINK = """
 name = "{name}"

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 import pytest
 from pydantic import Field
 
-from ffrobot.errors import InputError
-from ffrobot.validation import InputFile, Record, load_toml, validate
+from ffrobot.common.errors import InputError
+from ffrobot.common.validation import InputFile, Record, load_toml, validate
 
 
 class Circle(Record):

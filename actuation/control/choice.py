@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mbs.analysis_records import Analysis
-from ...mbs.loop_records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
-from ...mbs.loop_records import Controller as Record
-from ...mbs.model import Model
-from ..patches import PatchArray
+from ...mbs.model.model import Model
+from ...mbs.scene.analysis_records import Analysis
+from ...mbs.scene.loop_records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
+from ...mbs.scene.loop_records import Controller as Record
+from ..patches.patches import PatchArray
 from .controllers import Controller, Setup, joint_pid, modal_velocity
 from .python_controller import PythonControl, load_function
 from .rigid_arm import ComputedTorqueControl, RigidArm

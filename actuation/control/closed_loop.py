@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mbs import _core
-from ...mbs.analyses import STATUS, Outcome, Progress, as_long_as, initial_state
-from ...mbs.analysis_records import Analysis
-from ...mbs.compliant_joints import rotors_like, with_compliance, with_rotors
-from ...mbs.initial_state import State
-from ...mbs.integrators import METHODS, choose_integrator
-from ...mbs.loop_records import ComputedTorque, Lqr
-from ...mbs.model import ZERO, Assembly, Model, load_rows
-from ...mbs.steering import actuation_source, motor_limits
-from ..patches import PatchArray
-from ..voltages import allocation
+from ...mbs.analysis.analyses import STATUS, Outcome, Progress, as_long_as, initial_state
+from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
+from ...mbs.analysis.replay import actuation_source, motor_limits
+from ...mbs.model.model import ZERO, Assembly, Model, load_rows
+from ...mbs.scene.analysis_records import Analysis
+from ...mbs.scene.loop_records import ComputedTorque, Lqr
+from ...mbs.solve.initial_state import State
+from ...mbs.solve.integrators import METHODS, choose_integrator
+from ..patches.patches import PatchArray
+from ..patches.voltages import allocation
 from .choice import make_controller, needed_sensors
 from .controllers import Controller, Setup
 from .metrics import Metrics, measure

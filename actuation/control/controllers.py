@@ -9,13 +9,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
-from ...mbs.analyses import Outcome
-from ...mbs.loop_records import JointPid, ModalVelocity
-from ...mbs.model import Model
-from ...validation import quoted
-from ..patches import PatchArray
-from ..voltages import voltage_gain
+from ...common.errors import InputError
+from ...common.validation import quoted
+from ...mbs.analysis.analyses import Outcome
+from ...mbs.model.model import Model
+from ...mbs.scene.loop_records import JointPid, ModalVelocity
+from ..patches.patches import PatchArray
+from ..patches.voltages import voltage_gain
 from .signals import volts_per_modal_coordinate
 
 Array = NDArray[np.float64]

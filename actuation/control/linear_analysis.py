@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...mbs.analyses import Outcome
-from ...mbs.linearisation import Linearisation
-from ..patches import PatchArray
+from ...mbs.analysis.analyses import Outcome
+from ...mbs.solve.linearisation import Linearisation
+from ..patches.patches import PatchArray
 from .linear_model import LinearModel, linear_model
 from .modes import Reach, RobotModes, controllability, observability, robot_modes
 from .zeros import Zeros, zeros

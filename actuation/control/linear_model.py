@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
-from ...files import write_atomically
-from ...mbs.linearisation import LinearMechanism
-from ...validation import did_you_mean, quoted
-from ..patches import PatchArray
+from ...common.errors import InputError
+from ...common.files import write_atomically
+from ...common.validation import did_you_mean, quoted
+from ...mbs.solve.linearisation import LinearMechanism
+from ..patches.patches import PatchArray
 
 if TYPE_CHECKING:
     import control

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
-from ...mbs.linearisation import LinearMechanism, linearise
-from ...mbs.loop_records import JointPid, Lqr
+from ...common.errors import InputError
+from ...mbs.scene.loop_records import JointPid, Lqr
+from ...mbs.solve.linearisation import LinearMechanism, linearise
 from .controllers import Setup, modal_columns, modal_estimate
 from .linear_model import LinearModel, linear_model
 from .modes import controllability, observability

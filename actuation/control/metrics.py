@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mbs.analyses import Outcome
-from ...mbs.joint_space import motor_rates
-from ...mbs.observation import point_motion
+from ...mbs.analysis.analyses import Outcome
+from ...mbs.quantities.joint_space import motor_rates
+from ...mbs.quantities.observation import point_motion
 from .controllers import Setup
 
 if TYPE_CHECKING:

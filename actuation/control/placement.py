@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
-from ...mbs.actuator_records import PztLayout
-from ...mbs.control_records import Placement
-from ...mbs.planar_body import PlanarBody
-from ..patches import PatchArray, patch_array
+from ...mbs.model.planar_body import PlanarBody
+from ...mbs.scene.actuator_records import PztLayout
+from ...mbs.scene.control_records import Placement
+from ..patches.patches import PatchArray, patch_array
 from .linear_model import LinearModel
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, SolveError
+from ...common.errors import InputError, SolveError
 from .controllers import Setup
 
 Array = NDArray[np.float64]

@@ -8,13 +8,13 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ...mbs import _core
-from ...mbs.analyses import Outcome
-from ...mbs.initial_state import undeformed_state
-from ...mbs.loop_records import ComputedTorque
-from ...mbs.model import ZERO, Assembly, Constraint, Model
-from ...mbs.planar_body import PlanarBody, PlanarPoint
+from ...mbs.analysis.analyses import Outcome
+from ...mbs.model.model import ZERO, Assembly, Constraint, Model
+from ...mbs.model.planar_body import PlanarBody, PlanarPoint
+from ...mbs.scene.loop_records import ComputedTorque
+from ...mbs.solve.initial_state import undeformed_state
 from .controllers import Setup
 
 Array = NDArray[np.float64]

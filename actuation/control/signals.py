@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mbs import _core
-from ...mbs.loop_records import PERMITTIVITY, Sensor
-from ...mbs.model import Assembly, Model
-from ...mbs.rows import End, Row, joint_coordinate
-from ..patches import PatchArray
+from ...mbs.model.measures import End, Row, joint_coordinate
+from ...mbs.model.model import Assembly, Model
+from ...mbs.scene.loop_records import PERMITTIVITY, Sensor
+from ..patches.patches import PatchArray
 
 Array = NDArray[np.float64]
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}

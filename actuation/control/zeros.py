@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...common.errors import InputError
 from .linear_model import LinearModel, Names
 
 Array = NDArray[np.float64]

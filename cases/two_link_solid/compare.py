@@ -12,8 +12,8 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from ffrobot.mbs.observation import joint_forces, trajectory_force
-from ffrobot.solution import Solution, solve
+from ffrobot.mbs.quantities.observation import joint_forces, trajectory_force
+from ffrobot.run.solution import Solution, solve
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
-from ..mbs.scene_file import make_scene
-from ..mbs.scene_records import Scene
-from ..solution import Watcher, prepare
+from ..mbs.scene.load import make_scene
+from ..mbs.scene.scene import Scene
+from ..run.solution import Watcher, prepare
 from .errors import KINDS
 from .evaluation import State, evaluation_seconds
 from .hand_written import TIME, HandWritten, general_state

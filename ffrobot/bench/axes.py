@@ -5,10 +5,10 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from ..errors import FfrobotError
-from ..mbs.analysis_records import TIGHTEST_TOLERANCE, Analysis
-from ..mbs.scene_records import Scene
-from ..solution import Watcher
+from ..common.errors import FfrobotError
+from ..mbs.scene.analysis_records import TIGHTEST_TOLERANCE, Analysis
+from ..mbs.scene.scene import Scene
+from ..run.solution import Watcher
 from .errors import KINDS, errors
 from .links import elements_of, modes_of, refined
 from .measuring import Run, run, with_analysis

@@ -10,13 +10,13 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from ..errors import InputError
-from ..files import check_folder
-from ..mbs.analysis_records import TIGHTEST_TOLERANCE
-from ..mbs.scene_file import load_scene
-from ..mbs.scene_records import Scene
-from ..solution import Watcher, prepare
-from ..validation import did_you_mean, quoted
+from ..common.errors import InputError
+from ..common.files import check_folder
+from ..common.validation import did_you_mean, quoted
+from ..mbs.scene.analysis_records import TIGHTEST_TOLERANCE
+from ..mbs.scene.load import load_scene
+from ..mbs.scene.scene import Scene
+from ..run.solution import Watcher, prepare
 from . import OF_A_SCENE, PEER
 from .aims import measure_aims
 from .axes import measure_axes

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ..logs import logging_options
+from ..present.logs import logging_options
 from . import OF_A_SCENE, PARTS, PEER
 
 FILE = click.Path(path_type=Path)
@@ -72,8 +72,8 @@ def bench(
     source tree: the same for the two cases of the paper, how time grows with modes, links and outputs, and ratios to
     the two-link case written by hand. Tables as CSV and JSON, figures as PNG and PDF.
     """
-    from ..progress import Display
-    from ..summary import summary_console
+    from ..present.progress import Display
+    from ..present.summary import summary_console
     from .campaign import Campaign, Settings
     from .precision import INTEGRATORS, TOLERANCES
 

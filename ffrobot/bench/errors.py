@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..results_file import Results
+from ..results.file import Results
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mbs import _core
-from ..mbs.model import Assembly
+from ..mbs.model.model import Assembly
 
 Array = NDArray[np.float64]
 State = tuple[Assembly, Array, Array]

@@ -8,8 +8,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from ..figures.plot import write_figure
-from ..figures.style import legend, line_style, new_axes, style
+from ..pictures.figures.plot import write_figure
+from ..pictures.figures.style import legend, line_style, new_axes, style
 from .errors import KINDS
 
 Rows = Sequence[Mapping[str, Any]]

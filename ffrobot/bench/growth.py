@@ -13,12 +13,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..mbs.analyses import run_pcid
-from ..mbs.analysis_records import Analysis
-from ..mbs.model import Assembly, build_model
-from ..mbs.planar_body import PlanarBody, PlanarPoint
-from ..mbs.scene_records import Scene
-from ..solution import Watcher
+from ..mbs.analysis.analyses import run_pcid
+from ..mbs.model.model import Assembly, build_model
+from ..mbs.model.planar_body import PlanarBody, PlanarPoint
+from ..mbs.scene.analysis_records import Analysis
+from ..mbs.scene.scene import Scene
+from ..run.solution import Watcher
 from .evaluation import State, evaluation_seconds
 from .precision import Row
 

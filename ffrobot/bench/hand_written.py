@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError, SolveError
-from ..mbs.initial_state import undeformed_state
-from ..mbs.model import Assembly, Model
-from ..mbs.planar_body import PlanarBody
+from ..common.errors import InputError, SolveError
+from ..mbs.model.model import Assembly, Model
+from ..mbs.model.planar_body import PlanarBody
+from ..mbs.solve.initial_state import undeformed_state
 from .evaluation import State
 
 SOURCE = Path("tests/benchmarks/hand_written/two_link.cpp")

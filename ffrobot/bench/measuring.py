@@ -6,13 +6,13 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ..errors import InputError
-from ..mbs.analysis_records import Analysis
-from ..mbs.scene_records import Scene
-from ..results import results_image
-from ..results_file import Results
-from ..solution import Watcher, solve
-from ..validation import did_you_mean, quoted
+from ..common.errors import InputError
+from ..common.validation import did_you_mean, quoted
+from ..mbs.scene.analysis_records import Analysis
+from ..mbs.scene.scene import Scene
+from ..results.file import Results
+from ..results.write import results_image
+from ..run.solution import Watcher, solve
 from .errors import Array, histories
 
 INTEGRATED = ("pcid", "forward")

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, SolveError
-from ..mbs.scene_records import Scene
-from ..solution import Watcher
+from ..common.errors import InputError, SolveError
+from ..mbs.scene.scene import Scene
+from ..run.solution import Watcher
 from .errors import relative
 from .precision import PATIENCE, Point, Reference, Row, fastest, repeat_point
 

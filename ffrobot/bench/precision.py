@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 
-from ..errors import SolveError
-from ..mbs.analysis_records import TIGHTEST_TOLERANCE
-from ..mbs.scene_records import Scene
-from ..solution import Watcher
+from ..common.errors import SolveError
+from ..mbs.scene.analysis_records import TIGHTEST_TOLERANCE
+from ..mbs.scene.scene import Scene
+from ..run.solution import Watcher
 from .errors import KINDS, Array, errors
 from .measuring import Run, run, with_analysis
 

@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..files import write_atomically
+from ..common.files import write_atomically
 from .errors import KINDS
 from .precision import Row
 

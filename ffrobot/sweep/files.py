@@ -8,8 +8,8 @@ from typing import Any
 
 import tomli_w
 
-from ..errors import InputError
-from ..validation import did_you_mean, load_toml, quoted
+from ..common.errors import InputError
+from ..common.validation import did_you_mean, load_toml, quoted
 from .variation import Value
 
 Table = dict[str, Any]

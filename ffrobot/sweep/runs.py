@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..files import write_atomically
-from ..parallel import environment_without_mpi
-from ..results_file import Results
+from ..common.errors import InputError
+from ..common.files import write_atomically
+from ..common.parallel import environment_without_mpi
+from ..results.file import Results
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from ..files import write_atomically
+from ..common.files import write_atomically
 from .runs import Row
 
 SHOWN = 5  # quantities on the screen

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..errors import InputError
+from ..common.errors import InputError
 
 Value: TypeAlias = Any
 """What TOML may hold: a number, a text, a list …"""

@@ -1,8 +1,8 @@
-#include "core/actuators.h"
-#include "core/allocation.h"
-#include "core/fcid.h"
-#include "core/points.h"
-#include "core/replay.h"
+#include "core/actuation/actuators.h"
+#include "core/actuation/allocation.h"
+#include "core/analysis/fcid.h"
+#include "core/analysis/replay.h"
+#include "core/body/points.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>

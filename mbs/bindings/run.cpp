@@ -1,5 +1,5 @@
-#include "core/run.h"
-#include "core/sampled.h"
+#include "core/analysis/run.h"
+#include "core/analysis/sampled.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>

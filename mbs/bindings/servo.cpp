@@ -1,4 +1,4 @@
-#include "core/servo.h"
+#include "core/analysis/servo.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>

@@ -1,5 +1,5 @@
-#include "core/system.h"
-#include "core/motion.h"
+#include "core/system/system.h"
+#include "core/system/motion.h"
 
 #include <cstdint>
 #include <functional>

@@ -1,5 +1,5 @@
-#include "core/tangent.h"
-#include "core/reduction.h"
+#include "core/system/tangent.h"
+#include "core/system/reduction.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>

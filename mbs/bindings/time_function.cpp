@@ -1,4 +1,4 @@
-#include "core/time_function.h"
+#include "core/time_function/time_function.h"
 
 #include <cmath>
 #include <cstdint>

@@ -10,13 +10,13 @@ from ffrobot.actuation.control.closed_loop import run_closed_loop
 from ffrobot.actuation.control.lqr import gains, sampled
 from ffrobot.actuation.control.rigid_arm import RigidArm
 from ffrobot.actuation.control.signals import volts_per_modal_coordinate
-from ffrobot.errors import InputError, SolveError
-from ffrobot.figures.standard import standard_figures
-from ffrobot.mbs.analyses import run_pcid
-from ffrobot.mbs.scene_file import make_scene
-from ffrobot.results import results_image
-from ffrobot.results_file import Results
-from ffrobot.solution import prepare, solve
+from ffrobot.common.errors import InputError, SolveError
+from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.scene.load import make_scene
+from ffrobot.pictures.figures.standard import standard_figures
+from ffrobot.results.file import Results
+from ffrobot.results.write import results_image
+from ffrobot.run.solution import prepare, solve
 
 INERTIA, T = 0.5, 0.01
 ROD = {"mass": 2.0, "inertia": 2.0 / 12, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from ffrobot.actuation.feasibility import judge_motors
-from ffrobot.actuation.patches import patch_array, with_patch_count
+from ffrobot.actuation.patches.patches import patch_array, with_patch_count
+from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.actuation.prediction import predicted_shift, unmet_modal_forces
-from ffrobot.actuation.voltages import solve_voltages
-from ffrobot.solution import solve
+from ffrobot.run.solution import solve
 
 LIMIT = 200.0
 SCENE = """

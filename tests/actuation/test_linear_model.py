@@ -10,11 +10,11 @@ from scipy.optimize import brentq
 from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import controllability, observability, robot_modes
 from ffrobot.actuation.control.zeros import zeros
-from ffrobot.errors import InputError
-from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.linearisation import linearise
-from ffrobot.mbs.model import Assembly
-from ffrobot.mbs.planar_body import with_payload
+from ffrobot.common.errors import InputError
+from ffrobot.mbs.model.model import Assembly
+from ffrobot.mbs.model.planar_body import with_payload
+from ffrobot.mbs.solve.initial_state import undeformed_state
+from ffrobot.mbs.solve.linearisation import linearise
 
 EI, MASS, LENGTH = 30.0, 1.5, 0.8
 RATE = np.sqrt(EI / (MASS * LENGTH**3))  # ω = λ² times this

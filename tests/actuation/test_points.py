@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from ffrobot.actuation.points import point_set, with_points
-from ffrobot.errors import InputError
-from ffrobot.mbs.actuator_records import ActuationPoints
-from ffrobot.mbs.mechanism_records import RigidBody
-from ffrobot.mbs.planar_body import from_modal_body, from_rigid_body, with_payload
+from ffrobot.common.errors import InputError
+from ffrobot.mbs.model.planar_body import from_modal_body, from_rigid_body, with_payload
+from ffrobot.mbs.scene.actuator_records import ActuationPoints
+from ffrobot.mbs.scene.mechanism_records import RigidBody
 
 SCENE = Path("scene.toml")
 

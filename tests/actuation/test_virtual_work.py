@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from ffrobot.actuation.points import driving_forces
-from ffrobot.mbs.joint_space import motor_rates
-from ffrobot.mbs.observation import trajectory_force
-from ffrobot.solution import solve
+from ffrobot.mbs.quantities.joint_space import motor_rates
+from ffrobot.mbs.quantities.observation import trajectory_force
+from ffrobot.run.solution import solve
 
 SCENE = """
 name = "two_link"

@@ -15,9 +15,9 @@ import pytest
 
 from ffrobot.bench.evaluation import evaluation_seconds
 from ffrobot.bench.hand_written import STEPS, TIME, HandWritten, general_state
-from ffrobot.mbs.analyses import run_pcid
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.solution import prepare
+from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.run.solution import prepare
 
 ROOT = Path(__file__).parents[2]
 

@@ -25,11 +25,11 @@ import numpy as np
 import pytest
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.analyses import initial_state, run_pcid
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.fcid import run_fcid
-from ffrobot.mbs.model import Assembly
-from ffrobot.solution import prepare
+from ffrobot.mbs.analysis.analyses import initial_state, run_pcid
+from ffrobot.mbs.analysis.fcid import run_fcid
+from ffrobot.mbs.model.model import Assembly
+from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.run.solution import prepare
 
 INVERSE = '\n[[analysis]]\nname = "inverse"\nkind = "pcid"\nend = 1.0\noutput_step = 0.001\ntolerance = 1e-6\n'
 EVALUATIONS = 1000

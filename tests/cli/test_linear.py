@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ffrobot.control_results import read_linear
-from ffrobot.results_file import Results
+from ffrobot.results.file import Results
+from ffrobot.results.linear import read_linear
 
 SCENE = """
 name = "arm"

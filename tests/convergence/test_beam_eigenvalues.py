@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from ffrobot.errors import SolveError
-from ffrobot.fe_models.beam import family_model
+from ffrobot.common.errors import SolveError
+from ffrobot.common.validation import validate
+from ffrobot.fe_models.beam.beam import family_model
 from ffrobot.fe_models.eigen import lowest_modes
 from ffrobot.fe_models.link_records import FAMILIES, BeamLink
 from ffrobot.mesh.interval import interval_mesh
-from ffrobot.validation import validate
 
 E, NU, RHO, LENGTH = 2.068427e11, 0.3, 7850.0, 1.0
 HEIGHT, WIDTH = 0.015, 0.025

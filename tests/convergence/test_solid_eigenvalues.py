@@ -12,9 +12,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "fe_models"))
 
 from solids import body_of, model_of, write_solid
 
-from ffrobot.fe_models.beam_link import beam_modal_body
-from ffrobot.fe_models.elasticity import stiffness_matrix
+from ffrobot.fe_models.beam.link import beam_modal_body
 from ffrobot.fe_models.link_file import read_link
+from ffrobot.fe_models.solid.elasticity import stiffness_matrix
 
 FV5 = {"E": 200e9, "rho": 8000.0, "length": 10.0, "height": 2.0, "width": 2.0, "family": "all", "count": 9}
 

@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.linalg import eigh
 
-from ffrobot.fe_models.elasticity import material_map, solid_model, stiffness_matrix
 from ffrobot.fe_models.link_file import read_link
-from ffrobot.fe_models.solid_link import solid_modal_body
+from ffrobot.fe_models.solid.elasticity import material_map, solid_model, stiffness_matrix
+from ffrobot.fe_models.solid.link import solid_modal_body
 from ffrobot.mesh.solid_mesh import solid_mesh
 
 SOLID = """

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ffrobot.errors import InputError, SolveError
+from ffrobot.common.errors import InputError, SolveError
 from ffrobot.fe_models.link import make_link
 
 STEPPED = """

@@ -8,7 +8,7 @@ import time
 import h5py
 import pytest
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import cached_modal_body, input_hash, make_link
 from ffrobot.fe_models.link_file import read_link
 
@@ -56,7 +56,7 @@ def test_without_the_finite_element_libraries(link_file, missing):
     code = f"""
 import sys
 from pathlib import Path
-from ffrobot.errors import SolveError
+from ffrobot.common.errors import SolveError
 from ffrobot.fe_models.link import make_link
 sys.modules[{missing!r}] = None  # as if not installed
 try:
@@ -143,7 +143,7 @@ def test_read_only_folder(link_file, tmp_path):
     code = f"""
 import os
 from pathlib import Path
-from ffrobot.errors import FfrobotError
+from ffrobot.common.errors import FfrobotError
 from ffrobot.fe_models.link import make_link
 if os.geteuid() == 0:
     os.setgid(65534); os.setuid(65534)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link_file import read_link
 
 SEGMENTS = """

@@ -7,7 +7,7 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
 
 

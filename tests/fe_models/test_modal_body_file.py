@@ -8,11 +8,11 @@ import h5py
 import numpy as np
 import pytest
 
-from ffrobot.errors import InputError, SolveError
+from ffrobot.common.errors import InputError, SolveError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import OutlinedPatches, StressPoint
 from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
-from ffrobot.info import describe
+from ffrobot.present.info import describe
 
 
 @pytest.fixture
@@ -177,7 +177,7 @@ def test_disk_full_leaves_the_old_file_and_nothing_else(outcome):
     code = f"""
 import resource, sys
 from pathlib import Path
-from ffrobot.errors import SolveError
+from ffrobot.common.errors import SolveError
 from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
 path = Path({str(outcome.path)!r})
 body = read_modal_body(path)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from solids import body_of, write_solid
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 
 ISOTROPIC = "youngs_modulus = 206842700000.0\npoissons_ratio = 0.3\n"
 E, RHO, LENGTH = 2.0e11, 8000.0, 1.0

@@ -3,9 +3,9 @@ import numpy as np
 import pytest
 from solids import body_of, model_of, write_solid
 
-from ffrobot.errors import InputError
-from ffrobot.fe_models.solid_invariants import shape_integrals
-from ffrobot.fe_models.strain_energy import gradients
+from ffrobot.common.errors import InputError
+from ffrobot.fe_models.solid.invariants import shape_integrals
+from ffrobot.fe_models.solid.strain_energy import gradients
 from ffrobot.mesh.compat import geometry_nodes, lagrange_element
 
 LENGTH, HEIGHT, WIDTH, RHO = 1.0, 0.015, 0.025, 7850.0

@@ -13,12 +13,12 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ffrobot.errors import InputError, SolveError
-from ffrobot.fe_models.constitutive import stiffness
+from ffrobot.common.errors import InputError, SolveError
 from ffrobot.fe_models.link_records import Material
-from ffrobot.fe_models.strains import locate, pulled_back
-from ffrobot.fe_models.stress import point_stresses, surface_stresses
-from ffrobot.fe_models.surface_patches import outlined_patches
+from ffrobot.fe_models.solid.constitutive import stiffness
+from ffrobot.fe_models.solid.strains import locate, pulled_back
+from ffrobot.fe_models.solid.stress import point_stresses, surface_stresses
+from ffrobot.fe_models.solid.surface_patches import outlined_patches
 from ffrobot.mesh.compat import create_solid_mesh, geometry_nodes, lagrange_space
 from ffrobot.mesh.records import SurfacePatches
 
@@ -144,8 +144,8 @@ import numpy as np
 from mpi4py import MPI
 sys.path.insert(0, {folder!r})
 from test_solid_stress import C, PATH, L, H, B, bending, box, field, lagrange_space, patch_tags
-from ffrobot.fe_models.stress import point_stresses
-from ffrobot.fe_models.surface_patches import outlined_patches
+from ffrobot.fe_models.solid.stress import point_stresses
+from ffrobot.fe_models.solid.surface_patches import outlined_patches
 space = lagrange_space(box("tetrahedron", (8, 2, 2)), 1, vector=True)
 modes = field(space, bending)
 points = {{"a": (0.5, H / 2, 0.0), "b": (0.33, 0.01, 0.02), "c": (L, 0.0, 0.0)}}

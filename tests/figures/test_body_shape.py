@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from ffrobot.cli import cli
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import PictureMesh
 from ffrobot.fe_models.modal_body_file import write_modal_body
-from ffrobot.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
-from ffrobot.figures.plot import plot_file, plot_modal_body
+from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
+from ffrobot.pictures.figures.plot import plot_file, plot_modal_body
 
 LINK = """
 name = "arm"

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from ffrobot.cli import cli
-from ffrobot.errors import InputError
-from ffrobot.figures.figure_file import load_figures
-from ffrobot.figures.plot import plot_results
+from ffrobot.common.errors import InputError
+from ffrobot.pictures.figures.figure_file import load_figures
+from ffrobot.pictures.figures.plot import plot_results
 
 CASES = Path(__file__).parents[2] / "cases"
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffrobot.fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
-from ffrobot.mbs.planar_body import from_modal_body
+from ffrobot.mbs.model.planar_body import from_modal_body
 
 NAMED = ("root", "tip", "side")
 

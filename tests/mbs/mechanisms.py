@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from oracle import Mechanism
 
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.model import Assembly, build_model
-from ffrobot.mbs.scene_records import Scene
+from ffrobot.mbs.model.model import Assembly, build_model
+from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.mbs.scene.scene import Scene
 
 PLACEHOLDER = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # the bodies themselves are passed beside the scene
 

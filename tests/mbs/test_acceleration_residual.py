@@ -5,7 +5,7 @@ import zoo
 from mechanisms import always, assemble
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.solve.initial_state import undeformed_state
 
 
 def reported(name):

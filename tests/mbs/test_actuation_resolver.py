@@ -6,9 +6,9 @@ import velocity_transformation
 import zoo
 from mechanisms import always, assemble, oracle_of, relative
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.mbs import _core
-from ffrobot.mbs.initial_state import undeformed_state
+from ffrobot.mbs.solve.initial_state import undeformed_state
 
 DOP853 = _core.MethodKind.dop853
 LONG = "chain of 24"  # its frames' system is sparse

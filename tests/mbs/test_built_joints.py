@@ -8,17 +8,17 @@ from test_balances import OUTPUT_STEP, energy_and_losses
 from test_rigid_limit import rod
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.analyses import run_forward, run_pcid, run_static
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.fcid import run_fcid
-from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.mechanism_records import RigidBody
-from ffrobot.mbs.model import ZERO, Assembly
-from ffrobot.mbs.motors_only import run_motors_only
-from ffrobot.mbs.observation import joint_forces
-from ffrobot.mbs.planar_body import from_rigid_body
-from ffrobot.mbs.steering import Equipment, actuation_source
-from ffrobot.mbs.vibration import mass_matrix
+from ffrobot.mbs.analysis.analyses import run_forward, run_pcid, run_static
+from ffrobot.mbs.analysis.fcid import run_fcid
+from ffrobot.mbs.analysis.motors_only import run_motors_only
+from ffrobot.mbs.analysis.replay import Equipment, actuation_source
+from ffrobot.mbs.model.model import ZERO, Assembly
+from ffrobot.mbs.model.planar_body import from_rigid_body
+from ffrobot.mbs.quantities.observation import joint_forces
+from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.solve.initial_state import undeformed_state
+from ffrobot.mbs.solve.vibration import mass_matrix
 
 G = 9.81
 AT_REST = {"state": "static", "angles": ANGLES}

@@ -6,10 +6,10 @@ import zoo
 from links import ANGLES, TIP, arm, arm_links
 from mechanisms import always, assemble, forward, oracle_of, pcid
 
-from ffrobot.mbs.analyses import run_forward, run_pcid
-from ffrobot.mbs.initial_state import State, undeformed_state
-from ffrobot.mbs.steering import Equipment
-from ffrobot.mbs.vibration import mass_matrix, ringing, vibrations
+from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.replay import Equipment
+from ffrobot.mbs.solve.initial_state import State, undeformed_state
+from ffrobot.mbs.solve.vibration import mass_matrix, ringing, vibrations
 
 AT_REST = {"angles": ANGLES, "state": "static"}
 

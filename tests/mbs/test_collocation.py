@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ffrobot.mbs.collocation import Boundary, Problem, collocate
+from ffrobot.mbs.solve.collocation import Boundary, Problem, collocate
 
 SIGMA = np.array([30.0, 2e4])  # 1/s: p̈ = σ² p + f has the motions e^(σt) and e^(−σt)
 

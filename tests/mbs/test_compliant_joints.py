@@ -10,15 +10,15 @@ from test_rigid_limit import rod
 
 from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import robot_modes
-from ffrobot.errors import InputError
-from ffrobot.mbs.analyses import run_forward, run_pcid, run_static
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.compliant_joints import through_gears, unresolved_gears, with_compliance
-from ffrobot.mbs.linearisation import linearise
-from ffrobot.mbs.motors_only import run_motors_only
-from ffrobot.mbs.observation import joint_forces, motor_angle, point_motion
-from ffrobot.mbs.operating_points import operating_points
-from ffrobot.mbs.steering import Equipment
+from ffrobot.common.errors import InputError
+from ffrobot.mbs.analysis.analyses import run_forward, run_pcid, run_static
+from ffrobot.mbs.analysis.elastic_joints import through_gears, unresolved_gears, with_compliance
+from ffrobot.mbs.analysis.motors_only import run_motors_only
+from ffrobot.mbs.analysis.operating_points import operating_points
+from ffrobot.mbs.analysis.replay import Equipment
+from ffrobot.mbs.quantities.observation import joint_forces, motor_angle, point_motion
+from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.mbs.solve.linearisation import linearise
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
 MOTOR, LINK = J * N**2, M * L**2 / 3

@@ -7,13 +7,13 @@ import zoo
 from links import arm, arm_links, quintic, ritz_link
 from mechanisms import assemble, make_model, oracle_of, pcid, relative, revolute
 
-from ffrobot.errors import InputError, SolveError
+from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analyses import Outcome, run_pcid
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.fcid import run_fcid
-from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.time_functions import parse_expression, spline
+from ffrobot.mbs.analysis.analyses import Outcome, run_pcid
+from ffrobot.mbs.analysis.fcid import run_fcid
+from ffrobot.mbs.fields.time_functions import parse_expression, spline
+from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.mbs.solve.initial_state import undeformed_state
 
 OPEN = ["chain of 2", "backwards", "mixed", "mixed backwards", "tree", "loaded", "stiffened, driven"]
 WITH_PAYLOAD = ("loaded", "stiffened, driven")

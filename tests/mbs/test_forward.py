@@ -7,11 +7,11 @@ from mechanisms import always, forward, oracle_of, pcid, relative, revolute
 from scipy.optimize import lsq_linear
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.analyses import run_forward, run_pcid
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.fcid import run_fcid
-from ffrobot.mbs.observation import point_motion
-from ffrobot.mbs.steering import Equipment
+from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.fcid import run_fcid
+from ffrobot.mbs.analysis.replay import Equipment
+from ffrobot.mbs.quantities.observation import point_motion
+from ffrobot.mbs.scene.analysis_records import Analysis
 
 N = 3  # modes of a link
 UNLIMITED = np.full(N, np.inf)

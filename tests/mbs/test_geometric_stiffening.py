@@ -7,10 +7,10 @@ import pytest
 from links import arm, arm_links, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
 
-from ffrobot.errors import SolveError
-from ffrobot.mbs.analyses import run_forward, run_pcid
-from ffrobot.mbs.geometric_stiffening import estimated_effect
-from ffrobot.mbs.observation import energies, point_motion
+from ffrobot.common.errors import SolveError
+from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.model.geometric_stiffening import estimated_effect
+from ffrobot.mbs.quantities.observation import energies, point_motion
 
 # Wu and Haug's spin-up (formulation.md, section 11)
 LENGTH, MASS, EI, SPEED, RISE = 8.0, 8.0 * 0.2019, 566.6, 4.0, 15.0

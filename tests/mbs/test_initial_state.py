@@ -6,12 +6,12 @@ from links import ANGLES, TIP, arm, arm_links, ritz_link
 from mechanisms import always, assemble, make_model, pcid, revolute
 from test_rigid_limit import slider_crank
 
-from ffrobot.errors import InputError, SolveError
-from ffrobot.mbs.analyses import initial_state, run_pcid, run_static
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.model import build_model
-from ffrobot.mbs.observation import point_motion
+from ffrobot.common.errors import InputError, SolveError
+from ffrobot.mbs.analysis.analyses import initial_state, run_pcid, run_static
+from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.quantities.observation import point_motion
+from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.mbs.solve.initial_state import undeformed_state
 
 HOLD = {"name": "tip", "point": "link2.tip", "x": repr(float(TIP[0])), "y": repr(float(TIP[1]))}
 

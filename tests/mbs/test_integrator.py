@@ -5,12 +5,12 @@ import pytest
 from links import ANGLES, TIP, arm, arm_links
 from mechanisms import always, assemble, pcid, relative
 
-from ffrobot.errors import SolveError
+from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analyses import run_pcid
-from ffrobot.mbs.analysis_records import TIGHTEST_TOLERANCE
-from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.statics import static_equilibrium
+from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.scene.analysis_records import TIGHTEST_TOLERANCE
+from ffrobot.mbs.solve.initial_state import undeformed_state
+from ffrobot.mbs.solve.statics import static_equilibrium
 
 REPORTED = ("q", "v", "lambda_", "tau", "F_p")
 

@@ -8,13 +8,13 @@ import zoo
 from links import arm, arm_links, ritz_link
 from mechanisms import always, make_model, oracle_of, pcid, relative, revolute
 
-from ffrobot.errors import SolveError
+from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analyses import run_pcid
-from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.linearisation import Linearisation, held_by_motors, linearise
-from ffrobot.mbs.model import Assembly, ModalLoad
-from ffrobot.mbs.rows import joint_coordinate
+from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.model.measures import joint_coordinate
+from ffrobot.mbs.model.model import Assembly, ModalLoad
+from ffrobot.mbs.solve.initial_state import undeformed_state
+from ffrobot.mbs.solve.linearisation import Linearisation, held_by_motors, linearise
 
 constant = _core.TimeFunction.constant
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from partitioning import choose_partition, complete, integrate_partitioned
 
-from ffrobot.mbs.analyses import run_pcid
-from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.partitioning import choose_partition, complete, integrate_partitioned
-from ffrobot.solution import solve
+from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.solve.initial_state import undeformed_state
+from ffrobot.run.solution import solve
 
 CASES = Path(__file__).parents[2] / "cases"
 

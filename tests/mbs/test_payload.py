@@ -9,10 +9,10 @@ from mechanisms import assemble, make_model, random_state, relative
 from oracle import Mechanism
 
 from ffrobot.mbs._core import RowKind
-from ffrobot.mbs.mechanism_records import RigidBody
-from ffrobot.mbs.planar_body import from_rigid_body, with_payload
-from ffrobot.mbs.rows import End, Row
-from ffrobot.mbs.time_functions import parse_expression
+from ffrobot.mbs.fields.time_functions import parse_expression
+from ffrobot.mbs.model.measures import End, Row
+from ffrobot.mbs.model.planar_body import from_rigid_body, with_payload
+from ffrobot.mbs.scene.mechanism_records import RigidBody
 
 MASS = 0.7
 

@@ -5,10 +5,10 @@ import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic
 from mechanisms import always, make_model, pcid, relative, revolute
 
-from ffrobot.mbs.analyses import run_pcid
-from ffrobot.mbs.mechanism_records import RigidBody
-from ffrobot.mbs.observation import joint_forces, trajectory_force
-from ffrobot.mbs.planar_body import from_rigid_body
+from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.model.planar_body import from_rigid_body
+from ffrobot.mbs.quantities.observation import joint_forces, trajectory_force
+from ffrobot.mbs.scene.mechanism_records import RigidBody
 
 G = 9.81
 

@@ -6,9 +6,9 @@ import sys
 import numpy as np
 import pytest
 
-from ffrobot.errors import InputError
-from ffrobot.mbs.record_types import split_point
-from ffrobot.mbs.scene_file import load_scene
+from ffrobot.common.errors import InputError
+from ffrobot.mbs.fields.field_types import split_point
+from ffrobot.mbs.scene.load import load_scene
 
 SCENE = """
 name = "two_link"
@@ -330,5 +330,5 @@ def test_split_point():
 def test_import_stays_light():
     code = "import sys, ffrobot.mbs.scene_file; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert "ffrobot.mbs.scene_file" in loaded
+    assert "ffrobot.mbs.scene.load" in loaded
     assert not {"scipy", "h5py", "dolfinx", "gmsh", "petsc4py", "mpi4py", "matplotlib", "rich"} & set(loaded)

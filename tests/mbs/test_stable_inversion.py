@@ -6,15 +6,15 @@ from links import TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, relative, revolute
 from numpy.polynomial import Polynomial
 
-from ffrobot.errors import InputError, SolveError
-from ffrobot.mbs import stable_inversion
+from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs._core import TimeFunction
-from ffrobot.mbs.analyses import run_forward
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.motors_only import is_minimum_phase, path_error, run_motors_only
-from ffrobot.mbs.observation import point_motion
-from ffrobot.mbs.servo import equilibrium, is_unstable, linear_dynamics, make_servo, zeros
-from ffrobot.mbs.steering import Equipment
+from ffrobot.mbs.analysis.analyses import run_forward
+from ffrobot.mbs.analysis.motors_only import is_minimum_phase, path_error, run_motors_only
+from ffrobot.mbs.analysis.replay import Equipment
+from ffrobot.mbs.quantities.observation import point_motion
+from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.mbs.solve import stable_inversion
+from ffrobot.mbs.solve.servo import equilibrium, is_unstable, linear_dynamics, make_servo, zeros
 
 C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ffrobot.mbs.observation import point_motion
-from ffrobot.solution import solve
+from ffrobot.mbs.quantities.observation import point_motion
+from ffrobot.run.solution import solve
 
 LINK = """
 name = "arm"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ffrobot.fe_models.modal_body import StressPoint
-from ffrobot.mbs import stress
-from ffrobot.mbs.stress import body_stress, von_mises
+from ffrobot.mbs.quantities import stress
+from ffrobot.mbs.quantities.stress import body_stress, von_mises
 
 
 def textbook(s):

@@ -8,10 +8,10 @@ import zoo
 from mechanisms import assemble, oracle_of, random_state, relative
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.initial_state import undeformed_state
-from ffrobot.mbs.model import Assembly
-from ffrobot.mbs.rows import End
-from ffrobot.mbs.state_forces import state_function
+from ffrobot.mbs.fields.state_forces import state_function
+from ffrobot.mbs.model.measures import End
+from ffrobot.mbs.model.model import Assembly
+from ffrobot.mbs.solve.initial_state import undeformed_state
 
 T = 0.37
 STEP = 2e-3

@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.mbs._core import Op, TimeFunction
-from ffrobot.mbs.time_functions import ExpressionError, check_domain, load_waypoints, parse_expression
+from ffrobot.mbs.fields.time_functions import ExpressionError, check_domain, load_waypoints, parse_expression
 
 # Expression and its value, first and second derivative, worked out by hand.
 CLOSED_FORMS = [

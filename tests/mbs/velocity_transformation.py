@@ -3,7 +3,7 @@
 import numpy as np
 from oracle import rotation
 
-from ffrobot.mbs.rows import joint_coordinate, joint_rows
+from ffrobot.mbs.model.measures import joint_coordinate, joint_rows
 
 
 def open_chain(mechanism, scene, q):

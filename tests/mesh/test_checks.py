@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from solid_parts import integrate
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.mesh.checks import check_connected, check_quality, check_shape, oriented, straightened
 from ffrobot.mesh.jacobian import jacobians, reference_nodes, shape_functions
 from ffrobot.mesh.structured import structured_box

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from solid_parts import face_area, rectangle
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.mesh.faces import Boundary
 from ffrobot.mesh.records import CircleSection, Hole, InterfaceRecord, SurfacePatches
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from solid_parts import face_area, integrate
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.mesh.gmsh_session import gmsh_session
 from ffrobot.mesh.records import InterfaceRecord
 from ffrobot.mesh.structured import structured_box

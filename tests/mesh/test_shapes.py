@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from solid_parts import face_area, integrate, rectangle
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.mesh.records import CircleSection, Hole, SurfacePatches, TubeSection
 
 CELLS = ("tetrahedron", "hexahedron")

@@ -12,7 +12,7 @@ import ufl
 from dolfinx import fem
 from solid_parts import rectangle
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.mesh.compat import coordinate_element, geometry_nodes
 from ffrobot.mesh.records import CircleSection, InterfaceRecord, SolidMeshRecord, SurfacePatches
 from ffrobot.mesh.solid_mesh import distributed, solid_mesh
@@ -95,7 +95,7 @@ import sys, numpy as np, ufl
 from pathlib import Path
 from dolfinx import fem
 from mpi4py import MPI
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 from ffrobot.mesh.compat import coordinate_element, geometry_nodes
 from ffrobot.mesh.records import *
 from ffrobot.mesh.slices import section_quadrature

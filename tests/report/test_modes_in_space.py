@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ffrobot.body_surface import AMPLITUDE, body_surface, drawn_mode
-from ffrobot.report.modes_3d import MAX_TRIANGLES, coarsened
-from ffrobot.results_file import Results
+from ffrobot.pictures.body_surface import AMPLITUDE, body_surface, drawn_mode
+from ffrobot.pictures.report.modes_3d import MAX_TRIANGLES, coarsened
+from ffrobot.results.file import Results
 
 
 def bar(n, m):

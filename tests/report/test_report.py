@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from ffrobot.cli import cli
-from ffrobot.errors import InputError, SolveError
-from ffrobot.motion import hanging
-from ffrobot.outline import body_outline, points_outline
-from ffrobot.report import write_report
-from ffrobot.report.charts import MAX_POINTS, kept_outputs
-from ffrobot.report.runs import distinct_parts, runs, targets
-from ffrobot.report.tables import peaks_table
-from ffrobot.results_file import Results
+from ffrobot.common.errors import InputError, SolveError
+from ffrobot.pictures.motion import hanging
+from ffrobot.pictures.outline import body_outline, points_outline
+from ffrobot.pictures.report import write_report
+from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
+from ffrobot.pictures.report.runs import distinct_parts, runs, targets
+from ffrobot.pictures.report.tables import peaks_table
+from ffrobot.results.file import Results
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "mbs"))  # mechanisms, links,
 from table import PAGE, ROWS, Table, render
 
 from ffrobot.fe_models.link import cached_modal_body
-from ffrobot.mbs.planar_body import from_modal_body
+from ffrobot.mbs.model.planar_body import from_modal_body
 
 LINK = Path(__file__).parents[2] / "cases" / "two_link" / "link2.toml"
 

@@ -5,10 +5,10 @@ from links import arm, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
 from test_rigid_limit import rod
 
-from ffrobot.mbs.analyses import run_forward, run_pcid
-from ffrobot.mbs.mechanism_records import RigidBody
-from ffrobot.mbs.observation import energies
-from ffrobot.mbs.planar_body import from_rigid_body
+from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.model.planar_body import from_rigid_body
+from ffrobot.mbs.quantities.observation import energies
+from ffrobot.mbs.scene.mechanism_records import RigidBody
 
 CRANK, ROD = 0.2, 0.5
 

@@ -6,7 +6,7 @@ from links import ANGLES, arm, ritz_link
 from mechanisms import relative
 from robots import inverse
 
-from ffrobot.mbs.observation import point_motion
+from ffrobot.mbs.quantities.observation import point_motion
 
 STATIC = {"angles": ANGLES, "state": "static"}
 GROUP = "Modes and contrasts"

@@ -11,8 +11,8 @@ from test_forward import FULL
 from test_rigid_limit import rod
 
 from ffrobot.mbs._core import TimeFunction
-from ffrobot.mbs.analyses import run_forward, run_pcid
-from ffrobot.mbs.model import Assembly, ModalLoad
+from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.model.model import Assembly, ModalLoad
 
 GROUP = "Growth of differences, open loop"
 

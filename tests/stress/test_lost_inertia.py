@@ -6,7 +6,7 @@ from links import ritz_link
 from mechanisms import make_model, revolute
 from robots import free_run
 
-from ffrobot.errors import SolveError
+from ffrobot.common.errors import SolveError
 
 GROUP = "Geometric stiffening"
 

@@ -6,8 +6,8 @@ from mechanisms import relative
 from robots import inverse
 from units import SI, SYSTEMS, Units
 
-from ffrobot.mbs.analyses import run_static
-from ffrobot.mbs.analysis_records import Analysis
+from ffrobot.mbs.analysis.analyses import run_static
+from ffrobot.mbs.scene.analysis_records import Analysis
 
 OTHERS = [name for name in SYSTEMS if name != "SI"]
 STATIC = Analysis(name="rest", kind="static")

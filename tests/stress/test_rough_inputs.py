@@ -7,10 +7,10 @@ from mechanisms import make_model, relative, revolute
 from robots import free_run, inverse, pendulum, reaching
 from test_rigid_limit import rod
 
-from ffrobot.errors import InputError
-from ffrobot.mbs.analysis_records import Analysis
-from ffrobot.mbs.fcid import run_fcid
-from ffrobot.mbs.time_functions import load_waypoints
+from ffrobot.common.errors import InputError
+from ffrobot.mbs.analysis.fcid import run_fcid
+from ffrobot.mbs.fields.time_functions import load_waypoints
+from ffrobot.mbs.scene.analysis_records import Analysis
 
 GROUP = "Rough inputs"
 ELBOW = (-0.2, 1.4)

@@ -7,7 +7,7 @@ from mechanisms import make_model, revolute
 from robots import free_run, inverse, parallelogram, reaching, slider_crank, through_dead_centre
 from test_rigid_limit import rod
 
-from ffrobot.errors import InputError
+from ffrobot.common.errors import InputError
 
 GROUP = "Singular configurations and redundant constraints"
 SINGULAR = "reach only in a singular configuration"

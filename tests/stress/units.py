@@ -6,7 +6,7 @@ from types import MappingProxyType
 from links import ANGLES, TIP, arm_links, quintic
 from mechanisms import make_model, revolute
 
-from ffrobot.mbs.planar_body import PlanarPoint
+from ffrobot.mbs.model.planar_body import PlanarPoint
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import pytest
 from PIL import Image
 
 from ffrobot.cli import cli
-from ffrobot.errors import InputError, SolveError
-from ffrobot.mbs.stress import von_mises
-from ffrobot.results_file import Results
-from ffrobot.view import Options, view_file
+from ffrobot.common.errors import InputError, SolveError
+from ffrobot.mbs.quantities.stress import von_mises
+from ffrobot.pictures.view import Options, view_file
+from ffrobot.results.file import Results
 
 GRIDS = Options(pictures=False)
 DIGITS = 2e-7  # numbers in the files have 7 digits; lengths are about 1 m

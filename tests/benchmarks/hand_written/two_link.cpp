@@ -3,7 +3,7 @@
 //
 // Link 1 is simply supported (its ends stay on the frame's x axis), link 2 a cantilever, bending only, no damping:
 // S_bar_x = 0, j = 0, S_tilde = 0, m_xy = I. Coordinates y = (theta1, theta2, p1, p2) and their rates.
-#include "core/dop853_tableau.h"
+#include "core/integrate/dop853_tableau.h"
 
 #include <array>
 #include <chrono>

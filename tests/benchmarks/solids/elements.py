@@ -16,9 +16,9 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
+from ffrobot.common.validation import validate
 from ffrobot.fe_models.link_records import SolidLink
-from ffrobot.fe_models.solid_link import solid_modal_body
-from ffrobot.validation import validate
+from ffrobot.fe_models.solid.link import solid_modal_body
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

@@ -1,0 +1,1 @@
+"""What every part of the program uses: errors, validation of files, writing of files, runs under mpirun."""

@@ -1,0 +1,1 @@
+"""Links that are beams: elements, sections, modes, stresses."""

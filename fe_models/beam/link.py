@@ -1,0 +1,200 @@
+"""From a beam's link file to its modal body: mesh, modes, their sign, integrals. Importing this loads dolfinx."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import __version__
+from ...common.errors import InputError
+
+# First of all that load dolfinx: mesh.compat sets PETSc up.
+from ...mesh.interval import graded_nodes, interval_mesh, with_points
+from ..damping import damping_ratio
+from ..eigen import lowest_modes
+from ..invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
+from ..link_records import FAMILIES, BeamLink, Family
+from ..lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
+from ..modal_body import Interface, ModalBody, PictureMesh, Stations
+from ..stages import modes_hash
+from .beam import R_X, U_X, FamilyModel, family_model
+from .section_outline import section_outlines
+from .stress import beam_stresses, segments
+
+# Elements are not cut closer to their ends than this fraction of their length.
+SLIVER = 0.01
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+
+class Mode(NamedTuple):
+    """One mode: ω² in rad²/s², its family, and x (m,), the degrees of freedom of that family's model, xᵀMx = 1."""
+
+    omega2: float
+    family: Family
+    x: Floats
+
+
+def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progress) -> ModalBody:
+    """Compute the modal body of `link`, read from `path`.
+
+    Raises:
+        InputError: more modes are asked for than the mesh has.
+        SolveError: the eigensolver did not converge.
+    """
+    length = link.geometry.length
+    named = link.places
+    nodes = _element_boundaries(link)
+    mesh = interval_mesh(nodes)
+    # The fields are read on a mesh of their own: there also the middle and the interfaces are vertices.
+    station_mesh = interval_mesh(with_points(nodes, [0.5 * length, *named.values()]))
+    stations = station_space(station_mesh)
+    models: dict[Family, FamilyModel] = {}
+    for family in link.families:
+        progress(f"{link.name}: assembling {family}")
+        models[family] = _loaded(family_model(link, family, mesh, stations.x), link, stations.x)
+    progress(f"{link.name}: solving for the modes")
+    modes = select(models, _wanted(link, models, path))
+    fields = canonical(station_fields(models, modes, stations.x.size))
+    progress(f"{link.name}: integrating the inertia")
+    interfaces = {name: _interface(stations, fields, place) for name, place in named.items()}
+    attached = lumps(link.interface, interfaces)
+    integrals = with_lumped_masses(shape_integrals(link, stations, fields), attached)
+    omega: Floats = np.sqrt([mode.omega2 for mode in modes])
+    translation, rotation = np.moveaxis(fields[:R_X], 0, 1), np.moveaxis(fields[R_X:], 0, 1)
+    position = _on_axis(stations.x)
+    segment = segments(link, stations.x)
+    heights = np.array([section.height for section in link.sections])[segment]
+    outlines = section_outlines(link.shapes)[segment]
+    kept = Stations(position, translation, rotation, heights, stations.element, outlines)
+    return ModalBody(
+        name=link.name,
+        kind=link.geometry.kind,
+        reference_condition=link.reference.condition,
+        length=length,
+        **vars(integrals),
+        frequency=omega / (2 * np.pi),
+        stiffness=np.diag(omega**2),
+        modal_mass=modal_mass(models, modes),
+        damping_ratio=damping_ratio(link, omega),
+        family=tuple(mode.family for mode in modes),
+        geometric_stiffness=with_lumped_loads(geometric_stiffness(link, stations, fields, named), attached),
+        interfaces=interfaces,
+        stations=kept,
+        stress=beam_stresses(link, kept, omega**2, attached),
+        mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
+        input_hash=input_hash,
+        modes_hash=modes_hash(link),
+        ffrobot_version=__version__,
+    )
+
+
+def _loaded(model: FamilyModel, link: BeamLink, stations: Floats) -> FamilyModel:
+    """The eigenproblem with the masses on interfaces: M ← M + Σ m w wᵀ + J θ θᵀ, w and θ the motion there."""
+    M = model.M
+    for record in link.interface:
+        station = np.argmin(np.abs(stations - link.places[record.name]))
+        weights = lump_weights(record.mass, record.inertia)
+        for row, values in model.fields.items():
+            if weights[row]:
+                M = M + weights[row] * (values[station].T @ values[station])
+    return replace(model, M=M.tocsr())
+
+
+def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[Mode]:
+    """The modes numbered `wanted` (ascending; 1 is the lowest of all families together).
+
+    Equal frequencies (bending of a square or round section) are told apart by the order of the families, not by
+    rounding errors: the choice is the same on every machine.
+    """
+    modes = []
+    for family, model in models.items():
+        omega2, X = lowest_modes(model.K, model.M, model.strain, min(wanted[-1], model.K.shape[0]))
+        modes += [Mode(square, family, x) for square, x in zip(omega2, X.T, strict=True)]
+    modes.sort(key=lambda mode: (float(f"{mode.omega2:.9e}"), FAMILIES.index(mode.family)))
+    return [modes[number - 1] for number in wanted]
+
+
+def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], stations: int) -> Floats:
+    """(6, k, n) displacement and rotation, rows U_X … R_Z, of n modes at k stations."""
+    fields = np.zeros((6, stations, len(modes)))
+    for k, mode in enumerate(modes):
+        for row, values in models[mode.family].fields.items():
+            fields[row, :, k] = values @ mode.x
+    return fields
+
+
+def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> Floats:
+    """(n, n) m_ff = xᵀMx as assembled; families do not couple."""
+    products = np.zeros((len(modes), len(modes)))
+    for i, one in enumerate(modes):
+        for j, other in enumerate(modes[: i + 1]):
+            if one.family == other.family:
+                products[i, j] = products[j, i] = one.x @ (models[one.family].M @ other.x)
+    return products
+
+
+def canonical(fields: Floats) -> Floats:
+    """`fields` (6, k, n) with the sign of each mode as formulation.md, section 1, wants it.
+
+    The dominant translation is positive at the station nearest the root where it exceeds half its largest value; of a
+    mode without translation, the twist.
+    """
+    return fields * canonical_signs(fields)
+
+
+def canonical_signs(fields: Floats) -> Floats:
+    """(n,) 1 or −1: what `canonical` multiplies each mode by."""
+    signs = np.ones(fields.shape[2])
+    for k in range(signs.size):
+        rows = fields[U_X:R_X, :, k]
+        if not np.any(rows):
+            rows = fields[R_X:, :, k]
+        dominant = rows[np.argmax(np.abs(rows).max(axis=1))]
+        signs[k] = np.sign(dominant[np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max())])
+    return signs
+
+
+def _element_boundaries(link: BeamLink) -> Floats:
+    """As the link file wants them, and one more at each attached mass: shear and moment jump there."""
+    if link.mesh.nodes is not None:
+        nodes = np.array(link.mesh.nodes)
+    else:
+        assert link.mesh.elements is not None
+        nodes = graded_nodes(link.geometry.breakpoints, link.mesh.elements)
+    for record in link.interface:
+        place = link.places[record.name]
+        i = int(np.clip(np.searchsorted(nodes, place), 1, nodes.size - 1))
+        nearest = np.min(np.abs(nodes[i - 1 : i + 1] - place))
+        # Next to a node that jump does no harm, a sliver of an element does: its stiffness is all rounding.
+        if any(lump_weights(record.mass, record.inertia)) and nearest > SLIVER * (nodes[i] - nodes[i - 1]):
+            nodes = with_points(nodes, [place])
+    return nodes
+
+
+def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) -> Sequence[int]:
+    """Numbers of the modes asked for, from 1, ascending."""
+    wanted = link.modes.indices or range(1, (link.modes.count or 0) + 1)
+    available = sum(model.K.shape[0] for model in models.values())
+    if wanted[-1] > available:
+        key = "count" if link.modes.indices is None else "indices"
+        raise InputError(
+            f"{path}: modes.{key}: expected at most {available}, the number of modes available in family "
+            f'"{link.modes.family}" on this mesh, found {wanted[-1]}'
+        )
+    return wanted
+
+
+def _interface(stations: StationSpace, fields: Floats, position: float) -> Interface:
+    station = int(np.argmin(np.abs(stations.x - position)))
+    return Interface(_on_axis(np.array([position]))[0], fields[:R_X, station], fields[R_X:, station])
+
+
+def _on_axis(x: Floats) -> Floats:
+    return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)

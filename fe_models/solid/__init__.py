@@ -1,0 +1,1 @@
+"""Links that are solids: elasticity, supports, modes, invariants, stresses."""

@@ -1,0 +1,51 @@
+"""Hooke's law of the materials of a solid, in the axes of the link. NumPy only."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..link_records import Material, OrthotropicMaterial
+
+Floats = NDArray[np.float64]
+
+
+def stiffness(material: Material | OrthotropicMaterial) -> Floats:
+    """(6, 6) C with σ = C ε in Pa; rows σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy, columns ε_xx … and 2ε_yz, 2ε_xz, 2ε_xy.
+
+    Inverse of the compliance of Jones, Mechanics of Composite Materials (1999), eq. 2.26; isotropy is the case of equal
+    constants. A solid's isotropic material has a Poisson's ratio: the link file has been checked for it.
+    """
+    E, nu, G = _constants(material)
+    C = np.diag([0.0, 0.0, 0.0, G[1], G[2], G[0]])
+    C[:3, :3] = np.linalg.inv(_normal_compliance(E, nu))
+    return C
+
+
+def is_stable(material: OrthotropicMaterial) -> bool:
+    """Whether every strain stores energy: its normal compliance is positive definite."""
+    return bool(np.linalg.eigvalsh(_normal_compliance(material.youngs_modulus, material.poissons_ratio))[0] > 0)
+
+
+Triple = tuple[float, float, float]
+
+
+def _constants(material: Material | OrthotropicMaterial) -> tuple[Triple, Triple, Triple]:
+    """E_x, E_y, E_z; ν_xy, ν_yz, ν_xz; G_xy, G_yz, G_xz."""
+    if isinstance(material, OrthotropicMaterial):
+        return material.youngs_modulus, material.poissons_ratio, material.shear_modulus
+    E, nu = material.youngs_modulus, material.poissons_ratio
+    assert nu is not None
+    G = E / (2 * (1 + nu))
+    return (E, E, E), (nu, nu, nu), (G, G, G)
+
+
+def _normal_compliance(E: Triple, nu: Triple) -> Floats:
+    """(3, 3) ε_xx, ε_yy, ε_zz under unit σ_xx, σ_yy, σ_zz, in 1/Pa."""
+    return np.array(
+        [
+            [1 / E[0], -nu[0] / E[0], -nu[2] / E[0]],
+            [-nu[0] / E[0], 1 / E[1], -nu[1] / E[1]],
+            [-nu[2] / E[0], -nu[1] / E[1], 1 / E[2]],
+        ]
+    )

@@ -1,0 +1,141 @@
+"""Mean motion of faces and cross sections of a solid: six linear functionals of its displacements.
+
+Area-weighted averages about the centroid c of the face (the RBE3 convention): translation ∫u ds / A, and rotation
+θ = J⁻¹ ∫ r × u ds with r = x − c and J = ∫ (r·r I − r rᵀ) ds: the rigid motion nearest to u in the mean square. Both
+need no more than ∫N_a ds and ∫x N_a ds of each shape function N_a.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import meshtags
+from numpy.typing import NDArray
+
+from ...mesh.compat import compiled_form, geometry_degree, lagrange_element, lagrange_space, node_map
+from ...mesh.slices import section_quadrature
+from .elasticity import SolidModel
+from .tensors import LEVI_CIVITA
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Averages:
+    """Mean motion of k plane figures: faces, or cross sections.
+
+    Attributes:
+        weights: (4k, owned + ghosts) this rank's part of ∫N_a ds, ∫x N_a ds, ∫y N_a ds, ∫z N_a ds of each figure.
+        area: (k,) in m².
+        centroid: (k, 3) in m.
+        inertia: (k, 3, 3) J about the centroid in m⁴.
+        height: (k,) extent along y in m.
+        density: (k,) mean density in kg/m³.
+    """
+
+    weights: sp.csr_matrix
+    area: Floats
+    centroid: Floats
+    inertia: Floats
+    height: Floats
+    density: Floats
+
+    def of(self, model: SolidModel, modes: Floats) -> tuple[Floats, Floats]:
+        """Translation and rotation (k, 3, n) of `modes` (3 (owned + ghosts), n); collective."""
+        n = modes.shape[1]
+        moments = model.total(self.weights @ modes.reshape(-1, 3 * n)).reshape(-1, 4, 3, n)
+        translation = moments[:, 0] / self.area[:, None, None]
+        # ∫ r × u = ∫ x × u − c × ∫u
+        about_origin = np.einsum("abc,kbcn->kan", LEVI_CIVITA, moments[:, 1:])
+        shift = np.einsum("abc,kb,kcn->kan", LEVI_CIVITA, self.centroid, moments[:, 0])
+        return translation, np.linalg.solve(self.inertia, about_origin - shift)
+
+    def rows(self, model: SolidModel) -> Floats:
+        """B (k, 6, 3 owned): translation and rotation as rows over this rank's own degrees of freedom; collective."""
+        weights = model.to_owners(self.weights.toarray()).reshape(-1, 4, model.owned)
+        result = np.zeros((weights.shape[0], 6, model.owned, 3))
+        for axis in range(3):
+            result[:, axis, :, axis] = weights[:, 0] / self.area[:, None]
+        arm = weights[:, 1:] - self.centroid[:, :, None] * weights[:, :1]  # ∫ r_b N_a
+        moment = np.einsum("abc,kbi->kaic", LEVI_CIVITA, arm).reshape(len(arm), 3, -1)
+        result[:, 3:] = np.linalg.solve(self.inertia, moment).reshape(len(arm), 3, model.owned, 3)
+        return result.reshape(-1, 6, 3 * model.owned)
+
+
+def face_averages(model: SolidModel, facet_tags: object, tags: Sequence[int]) -> Averages:
+    """Mean motion of the faces with the given `tags`; collective."""
+    parts = [_face_weights(model, facet_tags, tag) for tag in tags]
+    weights = sp.csr_matrix(np.concatenate([w for w, _ in parts]))
+    nothing = np.full(len(tags), np.nan)
+    return _averages(model, weights, np.array([m for _, m in parts]), nothing, nothing)
+
+
+def section_averages(model: SolidModel, x: Floats) -> Averages:
+    """Mean motion of the cross sections at `x` (k,) in m; collective."""
+    element, nodes = lagrange_element(model.V), node_map(model.V)
+    degree = model.order + geometry_degree(model.mesh)
+    size = model.V.dofmap.index_map.size_local + model.V.dofmap.index_map.num_ghosts
+    rows, moments, ranges, masses = [], [], [], []
+    for place in x:
+        section = section_quadrature(model.mesh, float(place), degree)
+        w = section.weights
+        monomials = np.concatenate([np.ones((w.size, 1)), section.points], axis=1)
+        shapes = element.tabulate(0, section.X)[0, :, :, 0] if w.size else np.empty((0, element.dim))
+        cells, place_of = np.unique(section.cells, return_inverse=True)
+        gather = sp.csr_matrix((w, (place_of, np.arange(w.size))), shape=(cells.size, w.size))
+        entries = gather @ (monomials[:, :, None] * shapes[:, None, :]).reshape(w.size, 4 * element.dim)
+        columns = np.broadcast_to(nodes[cells][:, None, :], (cells.size, 4, element.dim))
+        row = np.broadcast_to(np.arange(4)[:, None], columns.shape)
+        rows.append(sp.csr_matrix((entries.ravel(), (row.ravel(), columns.ravel())), shape=(4, size)))
+        moments.append(monomials.T * w @ monomials)
+        ranges.append(section.y_range)
+        density = model.materials.density[model.materials.of_cell[section.cells]]
+        masses.append(w @ density)
+    low, high = _extremes(model, np.array(ranges))
+    averages = _averages(model, sp.vstack(rows, format="csr"), np.array(moments), high - low, np.array(masses))
+    return averages
+
+
+def _averages(model: SolidModel, weights: sp.csr_matrix, moments: Floats, height: Floats, mass: Floats) -> Averages:
+    """`moments` (k, 4, 4): this rank's part of ∫ (1, x)ᵀ(1, x) ds; `mass` (k,) of ∫ρ ds."""
+    moments = model.total(moments)
+    area = moments[:, 0, 0]
+    centroid = moments[:, 0, 1:] / area[:, None]
+    second = moments[:, 1:, 1:] - area[:, None, None] * centroid[:, :, None] * centroid[:, None, :]
+    inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+    return Averages(weights, area, centroid, inertia, height, model.total(mass) / area)
+
+
+def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Floats, Floats]:
+    """Of this rank, ∫N, ∫xN, ∫yN, ∫zN over a face, (4, owned + ghosts), and of ∫ (1, x)ᵀ(1, x) ds."""
+    mesh = model.mesh
+    facets = facet_tags.find(tag)  # type: ignore[attr-defined]
+    # Tag 1 of a set of its own, so that one form serves all faces: its numbers are compiled into it.
+    face = meshtags(mesh, 2, facets, np.ones(len(facets), dtype=np.int32))
+    degree = 2 * geometry_degree(mesh) + model.order
+    ds = ufl.Measure("ds", domain=mesh, subdomain_data=face, metadata={"quadrature_degree": degree})(1)
+    select = fem.Constant(mesh, np.zeros(4))
+    other = fem.Constant(mesh, np.zeros(4))
+    x = ufl.SpatialCoordinate(mesh)
+    monomial, factor = (c[0] + sum(c[k + 1] * x[k] for k in range(3)) for c in (select, other))
+    load = compiled_form(monomial * ufl.TestFunction(lagrange_space(mesh, model.order, vector=False)) * ds)
+    moment = compiled_form(monomial * factor * ds)
+    weights, moments = [], np.zeros((4, 4))
+    for row, unit in enumerate(np.eye(4)):
+        select.value[:] = unit
+        weights.append(fem.assemble_vector(load).array.copy())
+        for column, another in enumerate(np.eye(4)):
+            other.value[:] = another
+            moments[row, column] = fem.assemble_scalar(moment)
+    return np.array(weights), moments
+
+
+def _extremes(model: SolidModel, ranges: Floats) -> tuple[Floats, Floats]:
+    """Over all ranks, of `ranges` (k, 2) each."""
+    every = np.array(model.comm.allgather(ranges))
+    return every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)

@@ -1,0 +1,84 @@
+"""Inertia shape integrals of a solid, and the unit loads whose prestress stiffens it.
+
+With displacements and coordinates in the same space, every integral of formulation.md, section 3, is a product with the
+scalar mass matrix: x is its own nodal interpolation, so nothing is lumped and nothing is approximated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..invariants import Invariants
+from .elasticity import SolidModel
+from .strain_energy import geometric_stiffness, internal_forces
+from .supports import Flexibility
+
+Floats = NDArray[np.float64]
+
+PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+
+def shape_integrals(model: SolidModel, modes: Floats) -> Invariants:
+    """Integrals of the part alone, of modes (3 owned, n); collective."""
+    n, x = modes.shape[1], model.x
+    Phi = modes.reshape(-1, 3, n)
+    M_Phi = (model.mass @ modes).reshape(-1, 3, n)
+    M_x = (model.mass @ x.reshape(-1, 1)).reshape(-1, 3)
+    M_one = (model.mass @ np.ones((x.size, 1))).reshape(-1, 3)[:, 0]
+    S_bar_kl = model.total(np.einsum("akm,aln->klmn", Phi, M_Phi, optimize=True))
+    second = model.total(x.T @ M_x)
+    return Invariants(
+        mass=float(model.total(M_one.sum(keepdims=True))[0]),
+        first_moment=model.total(M_x.sum(axis=0)),
+        second_moment=0.5 * (second + second.T),
+        S_bar=model.total(M_Phi.sum(axis=0)),
+        I_bar=model.total(np.einsum("ak,aln->kln", x, M_Phi, optimize=True)),
+        S_bar_kl=0.5 * (S_bar_kl + S_bar_kl.transpose(1, 0, 3, 2)),
+    )
+
+
+def unit_loads(model: SolidModel, interfaces: Mapping[str, Floats]) -> dict[str, Floats]:
+    """(3 owned,) consistent nodal forces of each unit load of formulation.md, section 3; collective.
+
+    D'Alembert forces −ρ(a + α × x + ω × (ω × x)) of unit a, α and products of ω (of xy, the terms of ω_x ω_y and
+    ω_y ω_x together), and unit forces and moments at interfaces.
+
+    Args:
+        model: of the solid.
+        interfaces: B (6, 3 owned), mean motion of each; its transpose spreads a force.
+    """
+    x, e = model.x, np.eye(3)
+    fields: dict[str, Floats] = {}
+    for k, axis in enumerate("xyz"):
+        fields[f"t_{axis}"] = np.broadcast_to(-e[k], x.shape)
+        fields[f"r_{axis}"] = -np.cross(e[k], x)
+    for name, (k, j) in PAIRS.items():
+        turns = [(k, j)] if k == j else [(k, j), (j, k)]
+        fields[f"omega_{name}"] = -sum((np.cross(e[a], np.cross(e[b], x)) for a, b in turns), np.zeros_like(x))
+    forces = model.mass @ np.stack([field.reshape(-1) for field in fields.values()], axis=1)
+    loads = dict(zip(fields, forces.T, strict=True))
+    for name, B in interfaces.items():
+        rows = [(kind, axis) for kind in ("force", "moment") for axis in "xyz"]
+        loads |= {f"{kind}/{name}/{axis}": row for (kind, axis), row in zip(rows, B, strict=True)}
+    return loads
+
+
+def prestressed(flexibility: Flexibility, modes: Floats, interfaces: Mapping[str, Floats]) -> dict[str, Floats]:
+    """(n, n) geometric stiffness by unit load, the body held by its reference condition; collective.
+
+    Args:
+        flexibility: of the held body.
+        modes: (3 owned, n).
+        interfaces: as in `unit_loads`.
+    """
+    model = flexibility.model
+    loads = unit_loads(model, interfaces)
+    forces = np.stack(list(loads.values()), axis=1)
+    displacements = flexibility @ forces
+    # Bending stresses cancel over a section: the rounding errors of an assembled K, small as they are, would show.
+    displacements += flexibility @ (forces - internal_forces(model, model.with_ghosts(displacements)))
+    matrices = geometric_stiffness(model, model.with_ghosts(modes), model.with_ghosts(displacements))
+    return dict(zip(loads, matrices, strict=True))

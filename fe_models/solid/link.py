@@ -1,0 +1,225 @@
+"""From a solid's link file to its modal body: mesh, supports, modes, integrals. Importing this loads dolfinx."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ... import __version__
+from ...common.errors import InputError
+
+# First of all that load dolfinx: mesh.compat sets PETSc up.
+from ...mesh.compat import lagrange_element, node_map
+from ...mesh.defaults import default_order
+from ...mesh.interval import with_points
+from ...mesh.solid_mesh import SolidMesh, solid_mesh
+from ..beam.link import canonical_signs
+from ..damping import damping_ratio
+from ..families import section_motion
+from ..link_records import SolidLink
+from ..lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
+from ..modal_body import Interface, ModalBody, PictureMesh, Stations
+from ..stages import modes_hash
+from .eigen import Mass
+from .elasticity import MaterialMap, SolidModel, material_map, solid_model
+from .functionals import Averages, face_averages, section_averages
+from .invariants import prestressed, shape_integrals
+from .modes import wanted_modes
+from .stress import point_stresses, surface_stresses
+from .supports import Flexibility, RigidFace
+from .surface_patches import outlined_patches
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+# Cubic elements of the stations: as many as there are cells along the axis, within these bounds.
+ELEMENTS = (20, 40)
+
+# Components (translation 0 … 2, rotation 3 … 5) that each reference condition holds at root and tip.
+HELD: dict[str, dict[str, tuple[int, ...]]] = {
+    "cantilever": {"root": (0, 1, 2, 3, 4, 5), "tip": ()},
+    "simply-supported": {"root": (0, 1, 2, 3), "tip": (1, 2)},
+}
+
+
+class Places(NamedTuple):
+    """The interfaces by name: their mean motion, of modes and as rows B (6, 3 owned)."""
+
+    averages: dict[str, Averages]
+    rows: dict[str, Floats]
+
+    def motion(self, model: SolidModel, modes: Floats) -> dict[str, Interface]:
+        """What `modes` (3 (owned + ghosts), n) do at each; collective."""
+        found = {}
+        for name, averages in self.averages.items():
+            translation, rotation = averages.of(model, modes)
+            found[name] = Interface(averages.centroid[0], translation[0], rotation[0])
+        return found
+
+
+def solid_modal_body(
+    link: SolidLink,
+    path: Path,
+    input_hash: str,
+    progress: Progress,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    *,
+    remesh: bool = False,
+) -> ModalBody:
+    """Compute the modal body of `link`, read from `path`; collective over `comm`, the same on all its processes.
+
+    A mesh kept from an earlier run is used unless `remesh`.
+
+    Raises:
+        InputError: the part cannot be meshed, a face is missing, or more modes are asked for than the mesh has.
+        SolveError: the stiffness cannot be factorised, or the eigensolver did not converge.
+    """
+    solid = solid_mesh(
+        link.geometry, link.mesh, link.interface, link.surface_patch, path, comm, progress, remesh=remesh
+    )
+    progress(f"{link.name}: assembling")
+    model = solid_model(solid.mesh, link.mesh.order or default_order(solid.cell), _materials(link, solid, path))
+    places = _places(link, model, solid)
+    x, element = _station_grid(link, solid)
+    sections = section_averages(model, x)
+    progress(f"{link.name}: factorising {3 * model.V.dofmap.index_map.size_global} unknowns")
+    flexibility = _held(link, model, solid, places, path)
+    mass = _loaded(link, model, places)
+    progress(f"{link.name}: solving for the modes")
+    modes = wanted_modes(
+        link,
+        flexibility,
+        mass,
+        lambda X: section_motion(
+            sections, x, element, *sections.of(model, model.with_ghosts(X)), mass.motion_of_attached(X)
+        ),
+        str(path),
+    )
+    progress(f"{link.name}: integrating the inertia")
+    translation, rotation = sections.of(model, model.with_ghosts(modes.X))
+    signs = canonical_signs(np.concatenate([translation, rotation], axis=1).transpose(1, 0, 2))
+    X = modes.X * signs
+    seen = model.with_ghosts(X)
+    interfaces = places.motion(model, seen)
+    attached = lumps(link.interface, interfaces)
+    integrals = with_lumped_masses(shape_integrals(model, X), attached)
+    omega = np.sqrt(modes.omega2)
+    stresses = prestressed(flexibility, X, places.rows)
+    mesh = _picture(solid, model, seen)
+    C = model.materials.C[model.materials.of_cell]
+    return ModalBody(
+        name=link.name,
+        kind=link.geometry.kind,
+        reference_condition=link.reference.condition,
+        length=link.geometry.length,
+        **vars(integrals),
+        frequency=omega / (2 * np.pi),
+        stiffness=np.diag(modes.omega2),
+        modal_mass=model.total(X.T @ (mass @ X)),
+        damping_ratio=damping_ratio(link, omega),
+        family=tuple(modes.families),
+        geometric_stiffness=with_lumped_loads(stresses, attached),
+        interfaces=interfaces,
+        stations=_stations(sections, x, element, translation * signs, rotation * signs),
+        mesh=mesh,
+        stress=point_stresses(model.V, C, seen, link.stress.points, path) if link.stress.points else {},
+        surface_stress=surface_stresses(model.V, C, seen, mesh.points) if link.stress.surface else None,
+        surface_patches=(
+            outlined_patches(
+                model.V, solid.facet_tags, solid.faces, link.surface_patch, link.geometry.length, seen, path
+            )
+            if link.surface_patch
+            else None
+        ),
+        input_hash=input_hash,
+        modes_hash=modes_hash(link),
+        ffrobot_version=__version__,
+    )
+
+
+def _materials(link: SolidLink, solid: SolidMesh, path: Path) -> MaterialMap:
+    """Materials of the cells, by region."""
+    regions = []
+    for region in link.region:
+        if region.group not in solid.regions:
+            found = ", ".join(solid.regions) or "none"
+            raise InputError(
+                f"{path}: region.group: expected a volume group of the mesh ({found}), found {region.group}"
+            )
+        regions.append((solid.cell_tags.find(solid.regions[region.group]), region.material))
+    return material_map(solid.mesh, link.material, regions)
+
+
+def _places(link: SolidLink, model: SolidModel, solid: SolidMesh) -> Places:
+    """Root, tip and the interfaces of the link file: faces, or cross sections where the position is one number."""
+    sections = {record.name: record.position for record in link.interface if isinstance(record.position, float)}
+    faces = [name for name in ("root", "tip", *(record.name for record in link.interface)) if name not in sections]
+    averages = {name: face_averages(model, solid.facet_tags, [solid.faces[name]]) for name in dict.fromkeys(faces)}
+    averages |= {name: section_averages(model, np.array([x])) for name, x in sections.items()}
+    return Places(averages, {name: one.rows(model)[0] for name, one in averages.items()})
+
+
+def _held(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Places, path: Path) -> Flexibility:
+    """The body held by its reference condition, faces with rigid coupling made plates."""
+    held = HELD[link.reference.condition]
+    plates = {record.name for record in link.interface if record.coupling == "rigid"}
+    if link.coupling == "rigid":
+        plates |= {name for name, components in held.items() if components}
+    faces, taken = [], np.zeros(model.owned, dtype=bool)
+    for name in sorted(plates):
+        nodes = fem.locate_dofs_topological(model.V, 2, solid.facet_tags.find(solid.faces[name]))
+        own = nodes[nodes < model.owned]
+        if model.total(np.array([np.sum(taken[own])]))[0]:
+            raise InputError(
+                f"{path}: interface.coupling of {name}: expected rigid faces that do not touch each other "
+                f"({', '.join(sorted(plates))}), found nodes that two of them share"
+            )
+        taken[own] = True
+        supported = held.get(name, ()) if link.coupling == "rigid" else ()
+        free = [component for component in range(6) if component not in supported]
+        faces.append(RigidFace(own, places.averages[name].centroid[0], free))
+    if link.coupling == "rigid":
+        return Flexibility(model, faces, None)
+    rows = [places.rows[name][list(components)] for name, components in held.items()]
+    return Flexibility(model, faces, np.concatenate(rows))
+
+
+def _loaded(link: SolidLink, model: SolidModel, places: Places) -> Mass:
+    """The mass matrix with what is attached to interfaces."""
+    weights = {record.name: lump_weights(record.mass, record.inertia) for record in link.interface}
+    return Mass(model, [(places.rows[name], w) for name, w in weights.items() if np.any(w)])
+
+
+def _station_grid(link: SolidLink, solid: SolidMesh) -> tuple[Floats, NDArray[np.int64]]:
+    """Stations x (3e + 1,) in m and the four of each cubic element (e, 4); vertices at the middle and at sections."""
+    length = link.geometry.length
+    elements = int(np.clip(np.ceil(length / solid.size), *ELEMENTS))
+    sections = [record.position for record in link.interface if isinstance(record.position, float)]
+    vertices = with_points(np.linspace(0.0, length, elements + 1), [0.5 * length, *sections])
+    inner = vertices[:-1, None] + np.diff(vertices)[:, None] * np.array([0.0, 1.0, 2.0]) / 3
+    element = 3 * np.arange(vertices.size - 1)[:, None] + np.arange(4)
+    return np.append(inner.ravel(), length), element
+
+
+def _stations(sections: Averages, x: Floats, element: NDArray[np.int64], u: Floats, turn: Floats) -> Stations:
+    """Height from each station on: that in the middle of the way to the next, as the stations' two heights give it."""
+    height = np.append(0.5 * (sections.height[:-1] + sections.height[1:]), sections.height[-1])
+    centroid = sections.centroid.copy()
+    centroid[:, 0] = x
+    return Stations(centroid, u, turn, height, element)
+
+
+def _picture(solid: SolidMesh, model: SolidModel, modes: Floats) -> PictureMesh:
+    """The surface with what `modes` (3 (owned + ghosts), n) do at its points; collective."""
+    surface, n = solid.surface, modes.shape[1]
+    shapes = lagrange_element(model.V).tabulate(0, surface.X)[0, :, :, 0]
+    local = modes.reshape(-1, 3, n)[node_map(model.V)[surface.cells]]
+    displacement = np.zeros((len(surface.points), 3, n))
+    displacement[surface.rows] = np.einsum("pd,pdin->pin", shapes, local, optimize=True)
+    return PictureMesh(surface.points, surface.triangles, model.total(displacement), surface.edges)

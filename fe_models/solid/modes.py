@@ -1,0 +1,96 @@
+"""The modes that a link file asks for: the lowest of a family, however many others lie in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...common.errors import InputError
+from ..families import NEARLY, SectionMotion, aligned, names
+from ..link_records import SolidLink
+from .eigen import Mass, lowest_modes
+from .elasticity import SolidModel
+from .strain_energy import strain_energy
+from .supports import Flexibility
+
+Floats = NDArray[np.float64]
+# Mean motion of the sections, of modes (3 owned, n).
+Reader = Callable[[Floats], SectionMotion]
+
+
+@dataclass(frozen=True)
+class SolidModes:
+    """Modes in ascending order.
+
+    Attributes:
+        omega2: (n,) in rad²/s².
+        families: of each.
+        X: (3 owned, n), Xᵀ M X = I.
+    """
+
+    omega2: Floats
+    families: list[str]
+    X: Floats
+
+
+def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Reader, where: str) -> SolidModes:
+    """The modes that `link.modes` asks for; collective.
+
+    Lowest modes are computed in batches, those found before deflated, until the wanted ones are among them. The size of
+    a batch follows from the share of wanted ones so far.
+
+    Raises:
+        InputError: more are asked for than the mesh has.
+        SolveError: the eigensolver did not converge.
+    """
+    family, model = link.modes.family, flexibility.model
+    numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
+    needed, available = int(numbers[-1]) + 1, flexibility.rank
+    batch = needed + 2 if family == "all" else 2 * needed + 2
+    X = np.empty((3 * model.owned, 0))
+    while True:
+        if (family == "all" and needed > available) or X.shape[1] == available:
+            key = "count" if link.modes.indices is None else "indices"
+            raise InputError(
+                f"{where}: modes.{key}: expected at most the number of modes available in family "
+                f'"{family}" on this mesh, which has {available} of all families, found {needed}'
+            )
+        X = lowest_modes(flexibility, mass, min(batch, available - X.shape[1]), X)
+        omega2, X = _ritz(model, X)
+        motion = read(X)
+        Q = aligned(omega2, motion, family)
+        kinds = names(motion.turned(Q))
+        settled = available if X.shape[1] == available else _settled(omega2)
+        hits = [k for k, kind in enumerate(kinds[:settled]) if family in ("all", kind)]
+        if len(hits) >= needed:
+            chosen = np.array(hits)[numbers]
+            return _chosen(omega2, X, Q[:, chosen], [kinds[k] for k in chosen])
+        share = max(len(hits), 1) / X.shape[1]
+        batch = int(np.ceil((needed - len(hits)) / share)) + 2
+
+
+def _settled(omega2: Floats) -> int:
+    """How many of the modes found lie below the last gap: the others may belong with one that is yet to be found."""
+    gaps = np.flatnonzero(np.diff(omega2) > NEARLY * omega2[1:])
+    return int(gaps[-1]) + 1 if gaps.size else 0
+
+
+def _ritz(model: SolidModel, X: Floats) -> tuple[Floats, Floats]:
+    """ω² and modes in the space of X, from strain energies."""
+    omega2, Q = np.linalg.eigh(strain_energy(model, model.with_ghosts(X)))
+    return omega2, X @ Q
+
+
+def _chosen(omega2: Floats, X: Floats, Q: Floats, kinds: list[str]) -> SolidModes:
+    """Modes X Q, uncoupled among each other."""
+    K = (Q.T * omega2) @ Q
+    order = np.argsort(np.diag(K), kind="stable")
+    squares, turn = np.linalg.eigh(K[np.ix_(order, order)])
+    if not np.allclose(K, np.diag(np.diag(K)), rtol=0, atol=1e-12 * squares[0]):
+        Q = Q[:, order] @ turn
+    else:
+        Q, squares = Q[:, order], np.diag(K)[order]
+    return SolidModes(squares, [kinds[k] for k in order], X @ Q)

@@ -1,0 +1,151 @@
+"""What needs the displacement gradients of many fields at once: strain energies and geometric stiffness of modes.
+
+Both are integrals of products of gradients over the cells, done a few hundred cells at a time, with dense products in
+place of sparse matrices. Strain energies come out free of the rounding errors of an assembled stiffness matrix, whose
+entries are up to (length / element size)⁴ as large as the lowest ω².
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import basix
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...mesh.compat import coordinate_element, geometry_degree, geometry_nodes, lagrange_element, node_map
+from .elasticity import SolidModel, strain_degree
+
+Floats = NDArray[np.float64]
+
+# Numbers that a chunk of gradients may have: some 10 MB, which stay in the cache.
+CHUNK = 1_000_000
+
+# Rows xx, yy, zz, yz, xz, xy.
+VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+
+
+@dataclass(frozen=True)
+class Gradients:
+    """Displacement gradients of k fields in some cells.
+
+    Attributes:
+        cells: which, of this rank's own.
+        weights: (c, q) quadrature weight times volume in m³.
+        values: (c, 3, q, 3, k): ∂u_i/∂x_j at [:, j, :, i].
+        inverse: (c, 1 or q, 3, 3) ∂X_a/∂x_j at [:, :, j, a].
+        shapes: (3, q, d) slopes of the shape functions on the reference cell.
+    """
+
+    cells: slice
+    weights: Floats
+    values: Floats
+    inverse: Floats
+    shapes: Floats
+
+    def only(self, fields: slice) -> Gradients:
+        """Of some of the fields."""
+        return replace(self, values=self.values[..., fields])
+
+    def forces(self, stress: Floats) -> Floats:
+        """(c, d, 3, k) ∫ σ : ∇N_a dV at the nodes of each cell, of stresses (c, 6, q, k) times weights."""
+        c, _, q, k = stress.shape
+        tensor = np.empty((c, 3, q, 3, k))
+        for row, (i, j) in enumerate(VOIGT):
+            tensor[:, j, :, i] = tensor[:, i, :, j] = stress[:, row]
+        if self.inverse.shape[1] == 1:
+            reference = np.swapaxes(self.inverse[:, 0], 1, 2) @ tensor.reshape(c, 3, -1)
+        else:
+            reference = np.einsum("cqja,cjqm->caqm", self.inverse, tensor.reshape(c, 3, q, -1), optimize=True)
+        slopes = self.shapes.reshape(-1, self.shapes.shape[2]).T
+        return np.asarray(slopes @ reference.reshape(c, 3 * q, -1)).reshape(c, -1, 3, k)
+
+    def strains(self) -> Floats:
+        """(c, 6, q, k) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy."""
+        g = self.values
+        rows = [g[:, j, :, i] if i == j else g[:, j, :, i] + g[:, i, :, j] for i, j in VOIGT]
+        return np.stack(rows, axis=1)
+
+
+def gradients(model: SolidModel, fields: Floats) -> Iterator[Gradients]:
+    """Gradients of `fields` (3 (owned + ghosts), k) in all cells that this rank owns, a chunk at a time."""
+    mesh, k = model.mesh, fields.shape[1]
+    cell = lagrange_element(model.V).cell_type
+    X, rule = basix.make_quadrature(cell, strain_degree(mesh, model.order))
+    shapes = lagrange_element(model.V).tabulate(1, X)[1:, :, :, 0]  # (3, q, d)
+    points = geometry_nodes(mesh)[: mesh.topology.index_map(3).size_local]
+    nodes, values = node_map(model.V), fields.reshape(-1, 3 * k)
+    # The Jacobian of a straight tetrahedron is the same everywhere.
+    straight = cell == basix.CellType.tetrahedron and geometry_degree(mesh) == 1
+    maps = coordinate_element(mesh).tabulate(1, X[:1] if straight else X)[1:, :, :, 0]
+    step = max(1, CHUNK // (9 * len(rule) * k))
+    for start in range(0, len(points), step):
+        part = slice(start, min(start + step, len(points)))
+        J = np.einsum("jqv,cvi->cqij", maps, mesh.geometry.x[points[part]])
+        weights = np.abs(np.linalg.det(J)) * rule
+        inverse = np.linalg.inv(J).transpose(0, 1, 3, 2)  # ∂X_a/∂x_j at [j, a]
+        local = values[nodes[part]]  # (c, d, 3k)
+        reference = shapes.reshape(-1, shapes.shape[2]) @ local  # (c, 3q, 3k)
+        if straight:
+            physical = inverse[:, 0] @ reference.reshape(len(weights), 3, -1)
+        else:
+            reference = reference.reshape(len(weights), 3, len(rule), -1)
+            physical = np.einsum("cqja,caqk->cjqk", inverse, reference, optimize=True)
+        yield Gradients(part, weights, physical.reshape(len(weights), 3, len(rule), 3, k), inverse, shapes)
+
+
+def stresses(model: SolidModel, piece: Gradients, strains: Floats) -> Floats:
+    """(c, 6, q, k) σ = C ε in the cells of `piece`."""
+    C = model.materials.C[model.materials.of_cell[piece.cells]]
+    return np.asarray((C @ strains.reshape(*strains.shape[:2], -1)).reshape(strains.shape))
+
+
+def strain_energy(model: SolidModel, modes: Floats) -> Floats:
+    """(n, n) K_ff = ∫ ε(Φ_i) : C : ε(Φ_j) dV of `modes` (3 (owned + ghosts), n); collective."""
+    n = modes.shape[1]
+    total = np.zeros((n, n))
+    for piece in gradients(model, modes):
+        strain = piece.strains()
+        stress = stresses(model, piece, strain) * piece.weights[:, None, :, None]
+        total += strain.reshape(-1, n).T @ stress.reshape(-1, n)
+    total = model.total(total)
+    return 0.5 * (total + total.T)
+
+
+def internal_forces(model: SolidModel, fields: Floats) -> Floats:
+    """(3 owned, k) K u of displacements `fields` (3 (owned + ghosts), k), by their strains; collective."""
+    k = fields.shape[1]
+    nodes = node_map(model.V)
+    total = np.zeros((fields.shape[0] // 3, 3 * k))
+    for piece in gradients(model, fields):
+        stress = stresses(model, piece, piece.strains()) * piece.weights[:, None, :, None]
+        row = nodes[piece.cells].ravel()
+        collect = sp.csr_matrix((np.ones(row.size), (row, np.arange(row.size))), shape=(len(total), row.size))
+        total += collect @ piece.forces(stress).reshape(row.size, 3 * k)
+    return np.ascontiguousarray(model.to_owners(total.T).T).reshape(-1, k)
+
+
+def geometric_stiffness(model: SolidModel, modes: Floats, prestress: Floats) -> Floats:
+    """(l, n, n) ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV for the stresses σ of each of l displacement fields; collective.
+
+    Second variation of the work of a stress σ on the quadratic part of Green's strain (Bathe, Finite Element
+    Procedures, §6.2.3): positive where tension stiffens.
+
+    Args:
+        model: of the solid.
+        modes: (3 (owned + ghosts), n) Φ.
+        prestress: (3 (owned + ghosts), l) displacements that cause the stresses.
+    """
+    n, loads = modes.shape[1], prestress.shape[1]
+    total = np.zeros((loads, n * n))
+    for piece in gradients(model, np.concatenate([modes, prestress], axis=1)):
+        Phi = piece.values[..., :n]
+        load = piece.only(slice(n, None))
+        stress = stresses(model, load, load.strains()) * piece.weights[:, None, :, None]
+        for row, (a, b) in enumerate(VOIGT):
+            products = np.swapaxes(Phi[:, a], -1, -2) @ Phi[:, b]  # (c, q, n, n)
+            total += (1 if a == b else 2) * stress[:, row].reshape(-1, loads).T @ products.reshape(-1, n * n)
+    matrices = model.total(total).reshape(loads, n, n)
+    return np.asarray(0.5 * (matrices + matrices.transpose(0, 2, 1)))

@@ -1,0 +1,239 @@
+"""How a solid is held, and its flexibility F: the displacements u = F f under loads f, with the supports in place.
+
+Rigid faces (RBE2) move by q (six numbers about their centroid). Their nodes are clamped in the factorised matrix K_0
+and q comes back by static condensation (Craig and Bampton, 1968): with W the displacements under unit q and S = WᵀKW,
+
+    G = K_0⁻¹ + W S⁻¹ Wᵀ
+
+Mean supports B u = 0 leave K singular: six springs, on degrees of freedom that hold the body isostatically, make it
+positive definite, and loads in equilibrium leave them unloaded. With R the rigid motions and P = I − R (B R)⁻¹ B,
+
+    F = P G Pᵀ
+
+so that only sparse symmetric positive definite matrices are factorised and B never fills one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ...common.errors import SolveError
+from .elasticity import SolidModel, stiffness_matrix
+
+Floats = NDArray[np.float64]
+
+# Beyond this size MUMPS orders by approximate minimum fill: its default takes too long and too much.
+LARGE, AMF = 50_000, 2
+
+
+@dataclass(frozen=True)
+class RigidFace:
+    """A face that moves as a plate.
+
+    Attributes:
+        nodes: (f,) its nodes among this rank's own.
+        centroid: (3,) in m.
+        free: (k,) which of its translations (0 … 2) and rotations (3 … 5) no support holds.
+    """
+
+    nodes: NDArray[np.int64]
+    centroid: Floats
+    free: Sequence[int]
+
+
+class Flexibility:
+    """Factorised once, applied often; see the module. Vectors hold this rank's own degrees of freedom.
+
+    Args:
+        model: free in space.
+        faces: rigid ones; may be none.
+        B: (6, 3 owned) rows of the mean supports; None where the rigid faces hold the body.
+
+    Raises:
+        SolveError: the supported stiffness is not positive definite.
+    """
+
+    def __init__(self, model: SolidModel, faces: Sequence[RigidFace], B: Floats | None) -> None:
+        self.model = model
+        self.R = rigid_motions(model.x)
+        self.B = B
+        self.clamped = np.zeros((model.owned, 3), dtype=bool)
+        for face in faces:
+            self.clamped[face.nodes] = True
+        self.clamped = self.clamped.reshape(-1)
+        T = _plate_motions(model, faces)
+        KT = _times_stiffness(model, T) if T.shape[1] else T
+        self._factored = _factorised(self._supported(faces))
+        self._factor = self._factored.getPC().getFactorMatrix()
+        self._load, self._result = model.vector(), model.vector()
+        self._condense(T, KT)
+        if B is not None:
+            self._BR_inverse = np.linalg.inv(model.total(B @ self.R))
+
+    def _supported(self, faces: Sequence[RigidFace]) -> PETSc.Mat:
+        """K_0."""
+        if faces:
+            held = np.flatnonzero(self.clamped[::3]).astype(np.int32)
+            held = np.concatenate([held, self._ghosts_held()])
+            return stiffness_matrix(self.model, [fem.dirichletbc(np.zeros(3), held, self.model.V)])
+        K = stiffness_matrix(self.model)
+        _add_springs(self.model, K, self.R)
+        return K
+
+    def _ghosts_held(self) -> NDArray[np.int32]:
+        """Clamped nodes that other ranks own."""
+        seen = self.model.with_ghosts(self.clamped[:, None].astype(np.float64))[::3, 0] > 0
+        seen[: self.model.owned] = False
+        return np.flatnonzero(seen).astype(np.int32)
+
+    def _condense(self, T: Floats, KT: Floats) -> None:
+        """W and S⁻¹; where only mean supports hold the body, springs on the first face make S positive definite."""
+        self.W, self._S_inverse = T, np.empty((0, 0))
+        if not T.shape[1]:
+            return
+        inside = np.where(self.clamped[:, None], 0.0, KT)
+        self.W = T - self._solve(inside)
+        S = self.model.total(KT.T @ self.W)
+        S = 0.5 * (S + S.T)
+        if self.B is not None:
+            S[:6, :6] += np.diag(np.diag(S)[:6])
+        self._S_inverse = np.linalg.inv(S)
+
+    def __matmul__(self, loads: Floats) -> Floats:
+        """F f of loads (3 owned, k); collective."""
+        result: Floats = self._projected(self._condensed_solve(self._projected_load(loads)))
+        return result
+
+    @property
+    def rank(self) -> int:
+        """Number of independent displacements that the supports leave."""
+        total = 3 * self.model.V.dofmap.index_map.size_global - self.model.comm.allreduce(int(self.clamped.sum()))
+        return int(total + self.W.shape[1] - (0 if self.B is None else len(self.B)))
+
+    def apply(self, load: PETSc.Vec, result: PETSc.Vec) -> None:
+        """As above, of one PETSc vector."""
+        result.array[:] = (self @ load.array_r[:, None])[:, 0]
+
+    def _condensed_solve(self, loads: Floats) -> Floats:
+        """G f."""
+        result = self._solve(np.where(self.clamped[:, None], 0.0, loads))
+        if self.W.shape[1]:
+            result += self.W @ (self._S_inverse @ self.model.total(self.W.T @ loads))
+        return result
+
+    def _projected(self, U: Floats) -> Floats:
+        """P U."""
+        if self.B is None:
+            return U
+        return np.asarray(U - self.R @ (self._BR_inverse @ self.model.total(self.B @ U)))
+
+    def _projected_load(self, loads: Floats) -> Floats:
+        """Pᵀ f."""
+        if self.B is None:
+            return loads
+        return np.asarray(loads - self.B.T @ (self._BR_inverse.T @ self.model.total(self.R.T @ loads)))
+
+    def _solve(self, loads: Floats) -> Floats:
+        """K_0⁻¹ f, all columns at once: several times as fast as one by one."""
+        rows, columns = loads.shape
+        if columns == 1:
+            self._load.array[:] = loads[:, 0]
+            self._factor.solve(self._load, self._result)
+            return np.array(self._result.array_r[:, None])
+        total = self.model.V.dofmap.index_map.size_global * 3
+        F, U = (PETSc.Mat().createDense(((rows, total), (None, columns)), comm=self.model.comm) for _ in range(2))
+        for matrix in (F, U):
+            matrix.setUp()
+        F.getDenseArray()[:] = loads
+        F.assemble()
+        U.assemble()
+        self._factor.matSolve(F, U)
+        result = U.getDenseArray().copy()
+        F.destroy()
+        U.destroy()
+        return np.asarray(result)
+
+
+def rigid_motions(x: Floats) -> Floats:
+    """R (3p, 6): translations along, and rotations about, the axes through the origin, of nodes x (p, 3)."""
+    return _plate(x, np.zeros(3)).reshape(-1, 6)
+
+
+def _plate(x: Floats, center: Floats) -> Floats:
+    """(p, 3, 6) displacement of points x (p, 3) under unit translations, and rotations about `center`."""
+    unit = np.eye(3)
+    turns = [np.cross(axis, x - center) for axis in unit]
+    return np.stack([*(np.broadcast_to(axis, x.shape) for axis in unit), *turns], axis=2)
+
+
+def _plate_motions(model: SolidModel, faces: Sequence[RigidFace]) -> Floats:
+    """T (3 owned, m): each face's nodes under its free unit motions, all else at rest."""
+    columns = []
+    for face in faces:
+        motion = np.zeros((model.owned, 3, len(face.free)))
+        motion[face.nodes] = _plate(model.x[face.nodes], face.centroid)[:, :, list(face.free)]
+        columns.append(motion.reshape(3 * model.owned, -1))
+    return np.concatenate([np.empty((3 * model.owned, 0)), *columns], axis=1)
+
+
+def _times_stiffness(model: SolidModel, T: Floats) -> Floats:
+    """K T, with the free stiffness."""
+    K = stiffness_matrix(model)
+    u, f = K.createVecs()
+    result = np.empty_like(T)
+    for k in range(T.shape[1]):
+        u.array[:] = T[:, k]
+        K.mult(u, f)
+        result[:, k] = f.array_r
+    K.destroy()
+    return result
+
+
+def _factorised(K: PETSc.Mat) -> PETSc.KSP:
+    """Cholesky factors of K by MUMPS."""
+    solver = PETSc.KSP().create(K.comm)
+    solver.setOperators(K)
+    solver.setType(PETSc.KSP.Type.PREONLY)
+    pc = solver.getPC()
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType("mumps")
+    pc.setFactorSetUpSolverType()
+    if K.getSize()[0] > LARGE:
+        pc.getFactorMatrix().setMumpsIcntl(7, AMF)
+    try:
+        solver.setUp()
+    except PETSc.Error:
+        raise SolveError(
+            f"stiffness matrix of size {K.getSize()[0]}: it is not positive definite in double precision, or memory "
+            "does not suffice for its factors; check material and mesh, or use larger elements"
+        ) from None
+    K.destroy()
+    return solver
+
+
+def _add_springs(model: SolidModel, K: PETSc.Mat, R: Floats) -> None:
+    """Springs on six degrees of freedom that hold the body: pivots of its rigid motions, the largest left each time."""
+    diagonal = K.getDiagonal().array_r
+    stiffness = float(model.comm.allreduce(diagonal.sum())) / K.getSize()[0]
+    scale = np.sqrt(model.total((R**2).sum(axis=0)))
+    left = R / scale
+    first = K.getOwnershipRange()[0]
+    for _ in range(6):
+        size = np.einsum("ik,ik->i", left, left)
+        here = int(np.argmax(size)) if size.size else -1
+        best = model.comm.allgather(float(size[here]) if size.size else 0.0)
+        rank = int(np.argmax(best))
+        row = model.comm.bcast(left[here] if model.comm.rank == rank else None, root=rank)
+        if model.comm.rank == rank:
+            block = np.zeros((3, 3))
+            block[here % 3, here % 3] = stiffness
+            K.setValuesBlocked([(first + here) // 3], [(first + here) // 3], block, addv=True)
+        row = row / np.linalg.norm(row)
+        left = left - np.outer(left @ row, row)
+    K.assemble()

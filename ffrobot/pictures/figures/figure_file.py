@@ -1,0 +1,82 @@
+"""`figures.toml`: which figures a case shows, and what each draws."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from ...common.validation import InputFile, Record, load_toml, validate
+
+FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+
+
+def _file_name(value: str) -> str:
+    if not FILE_NAME.fullmatch(value):
+        raise ValueError(f'expected a name of letters, digits, "_", "-" and ".", found "{value}"')
+    return value
+
+
+FileName = Annotated[str, AfterValidator(_file_name)]
+Range = tuple[float, float]
+
+
+class Curve(Record):
+    """What is drawn: a dataset of the results file, or one column of it.
+
+    `data` reads, say, `inverse/joints/A/moment` or `forward/points/link2.tip/position[0]`. With `file`, a CSV file
+    whose first column is the time, its column `data` is drawn as separate points.
+    """
+
+    data: str
+    label: str
+    file: InputFile | None = None
+
+
+class FigureRecord(Record):
+    """One figure. Axes without a range take that of the data; units stand in the labels of the axes.
+
+    Kinds: "time" draws its curves over time; "path" draws (x, y) datasets against each other; "configurations" draws
+    the bodies of `analysis` at `times` (s), and its curves as paths. Of a linear `analysis`, at the first of `times`:
+    "bode" draws the frequency responses of `transfers` [input, output], "modes" the mode shapes of the robot;
+    "placement" the patches that an analysis of that kind found.
+    """
+
+    name: FileName
+    title: str = ""
+    kind: Literal["time", "path", "configurations", "bode", "modes", "placement"] = "time"
+    transfers: tuple[tuple[str, str], ...] = ()
+    curves: tuple[Curve, ...] = ()
+    analysis: str | None = None
+    times: tuple[float, ...] = ()
+    y_label: str = ""
+    x_range: Range | None = None
+    y_range: Range | None = None
+    limits: tuple[float, ...] = Field(default=())  # horizontal lines, such as the voltages a patch can take
+
+    @model_validator(mode="after")
+    def _consistent(self) -> FigureRecord:
+        if self.kind == "configurations" and (self.analysis is None or not self.times):
+            raise ValueError('expected the keys "analysis" and "times" in kind = "configurations"')
+        if self.kind in ("bode", "modes", "placement") and self.analysis is None:
+            raise ValueError(f'expected the key "analysis" in kind = "{self.kind}", found none')
+        if (self.kind == "bode") != bool(self.transfers):
+            raise ValueError(
+                f'expected the key "transfers" in kind = "bode" and only there, found kind = "{self.kind}"'
+            )
+        if self.kind in ("time", "path") and not self.curves:
+            raise ValueError(f'expected the key "curves" in kind = "{self.kind}", found none')
+        return self
+
+
+class FigureFile(Record):
+    """The figures of a case, in order."""
+
+    figure: tuple[FigureRecord, ...]
+
+
+def load_figures(path: Path) -> FigureFile:
+    """Read `figures.toml`. Raises `InputError` naming file, key, what was expected and what was found."""
+    return validate(FigureFile, load_toml(path, "figure file"), path)

@@ -1,0 +1,112 @@
+"""From a results file, or a modal body file, to a folder of figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from ...common.errors import InputError
+from ...common.files import check_folder, write_atomically
+from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
+from ...results.file import Results
+from .body_shape import draw_mesh, draw_modes
+from .configurations import draw_configurations
+from .figure_file import FigureFile, FigureRecord, load_figures
+from .linear import draw_bode, draw_robot_modes
+from .path import draw_path
+from .placement import draw_placement
+from .standard import standard_figures
+from .style import new_axes, style
+from .time_history import draw_time_history
+
+DRAW = {
+    "time": draw_time_history,
+    "path": draw_path,
+    "configurations": draw_configurations,
+    "placement": draw_placement,
+}
+
+DRAW_WHOLE = {"bode": draw_bode, "modes": draw_robot_modes}  # with axes of their own
+
+# No dates and no versions: the same results give the same files.
+METADATA = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+    "svg": {"Date": None, "Creator": None},
+}
+FORMATS = ("png", "pdf")  # unless asked for otherwise
+
+
+def plot_file(path: Path, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Draw the figures of a results file or of a modal body file, whichever it is, into `folder`: see the two."""
+    plot = plot_modal_body if is_modal_body_file(path) else plot_results
+    return plot(path, folder, formats)
+
+
+def plot_modal_body(path: Path, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Draw mesh and lowest modes of a modal body file into `folder`, which is made when absent.
+
+    Returns the files written, each figure in all `formats`: "png", "pdf", "svg". Raises `InputError` where the file
+    cannot be read, or for another format.
+    """
+    check_folder(folder)
+    _check_formats(formats)
+    body = read_modal_body(path)
+    with style():
+        return [
+            *write_figure(draw_mesh(body), folder, "mesh", formats),
+            *write_figure(draw_modes(body), folder, "modes", formats),
+        ]
+
+
+def plot_results(results_path: Path, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Draw the figures of a results file into `folder`, which is made when absent.
+
+    A file `figures.toml` beside the results says which figures and how; without one, the standard figures are drawn.
+    Returns the files written, each figure in all `formats`: "png", "pdf", "svg". Raises `InputError` where the results
+    or `figures.toml` cannot be read, or name what is not there, or for another format.
+    """
+    check_folder(folder)
+    _check_formats(formats)
+    figure_file = results_path.parent / "figures.toml"
+    written: list[Path] = []
+    with Results(results_path) as results, style():
+        figures = load_figures(figure_file) if figure_file.is_file() else FigureFile(figure=standard_figures(results))
+        for record in figures.figure:
+            written += write_figure(draw(record, results), folder, record.name, formats)
+    return written
+
+
+def draw(record: FigureRecord, results: Results) -> Figure:
+    """Draw one figure."""
+    if record.kind in DRAW_WHOLE:
+        return DRAW_WHOLE[record.kind](record, results)
+    picture, axes = new_axes(record.title)
+    DRAW[record.kind](axes, record, results)
+    if record.x_range is not None:
+        axes.set_xlim(*record.x_range)
+    if record.y_range is not None:
+        axes.set_ylim(*record.y_range)
+    return picture
+
+
+def _check_formats(formats: Sequence[str]) -> None:
+    if not formats or not set(formats) <= set(METADATA):
+        raise InputError(f'format: expected one or several of {", ".join(METADATA)}, found "{",".join(formats)}"')
+
+
+def write_figure(picture: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """A picture in all formats."""
+    paths = [folder / f"{name}.{extension}" for extension in formats]
+    for path, extension in zip(paths, formats, strict=True):
+        write_atomically(path, _image(picture, extension), "figure", make_folder=True)
+    return paths
+
+
+def _image(picture: Figure, extension: str) -> bytes:
+    stream = BytesIO()
+    picture.savefig(stream, format=extension, metadata=METADATA[extension])
+    return stream.getvalue()

@@ -1,0 +1,80 @@
+"""Time histories: the standard figures of every file, laid over each other where they show the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...results.file import Array, Results
+from ..figures.figure_file import Curve, FigureRecord
+from ..figures.standard import file_name, standard_figures
+from .charts import DASHES, Chart, shades, style
+from .runs import Run, Target, runs, sources, targets
+
+ENERGIES = ("kinetic", "strain", "gravitational")
+
+
+def history_charts(files: Sequence[Results]) -> list[Chart]:
+    """Path errors, paths, angles, deflections, forces, moments, voltages and energies."""
+    charts = {chart.name: chart for chart in _path_errors(files)}
+    for number, (results, source) in enumerate(zip(files, sources(files), strict=True)):
+        for record in (*standard_figures(results), *_energy_figures(results)):
+            if record.kind == "configurations":  # the mechanism moves instead
+                continue
+            chart = charts.setdefault(record.name, _empty(record))
+            for curve in record.curves:
+                _add(chart, results, record, curve, source, DASHES[number % len(DASHES)])
+    return list(charts.values())
+
+
+def _empty(record: FigureRecord) -> Chart:
+    if record.kind == "path":
+        return Chart(record.name, record.title, record.y_label or "y (m)", x_label="x (m)", equal_axes=True)
+    return Chart(record.name, record.title, record.y_label, limits=record.limits)
+
+
+def _add(chart: Chart, results: Results, record: FigureRecord, curve: Curve, source: str, dash: str) -> None:
+    """Add what `curve` draws: one line, or a shade for each column of its dataset."""
+    label = f"{source}: {curve.label}" if source else curve.label
+    values = results.data(curve.data)
+    if record.kind == "path":
+        chart.add(label, values[:, 0], values[:, 1], **style(len(chart.traces)))
+    elif values.shape[1] == 1:
+        chart.add(label, results.time(curve.data), values[:, 0], **style(len(chart.traces)))
+    else:
+        for k, color in enumerate(shades(values.shape[1])):
+            line = {"color": color, "width": 1, "dash": dash}
+            chart.add(f"{label} {k + 1}", results.time(curve.data), values[:, k], line=line)
+
+
+def _energy_figures(results: Results) -> Iterator[FigureRecord]:
+    for analysis in results.analyses:
+        curves = tuple(
+            Curve(data=f"{analysis}/energy/{kind}", label=kind)
+            for kind in ENERGIES
+            if results.has(f"{analysis}/energy/{kind}")
+        )
+        if curves:
+            name = file_name("energy", analysis)
+            yield FigureRecord(name=name, title=f"energies, {analysis}", curves=curves, y_label="energy (J)")
+
+
+def _path_errors(files: Sequence[Results]) -> list[Chart]:
+    """Distance of every point with a trajectory from where it should be."""
+    charts: dict[str, Chart] = {}
+    for run in runs(files):
+        time = run.results.time(run.analysis)
+        for target in targets(run):
+            name, title = target.trajectory, f"distance of {target.point} from its path"
+            chart = charts.setdefault(name, Chart(file_name("error", name), title, "distance (m)"))
+            error = path_error(run, target)
+            chart.add(run.label, time[: len(error)], error, **style(len(chart.traces)))
+    return list(charts.values())
+
+
+def path_error(run: Run, target: Target) -> Array:
+    """Distance (T,) in m between a point and its target, in the components that the target has."""
+    reached = run.results.data(f"{run.analysis}/points/{target.point}/position")[:, target.columns]
+    distance: Array = np.linalg.norm(reached[: len(target.wanted)] - target.wanted, axis=1)
+    return distance

@@ -1,0 +1,88 @@
+"""From results files to one HTML file that needs no network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from ... import __version__
+from ...common.errors import InputError, SolveError
+from ...common.files import write_atomically
+from ...results.file import Results
+from .histories import history_charts
+from .mechanism import mechanism
+from .modes import link_modes
+from .modes_3d import modes_3d
+from .runs import runs, sources
+from .tables import analyses_table, origins_table, peaks_table, voltages_table
+
+HERE = Path(__file__).parent
+
+
+def write_report(results_paths: Sequence[Path], path: Path) -> None:
+    """Write a page about one results file, or several side by side, to `path`; an earlier report is replaced.
+
+    Raises `InputError` where a file is no results file or `path` would cost a file of another kind, `SolveError` where
+    the page cannot be written or Plotly is not installed.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: output: expected a file name, found a folder")
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f'{path}: output: expected a name that ends in ".html", found "{path.name}"')
+    with ExitStack() as stack:
+        files = [stack.enter_context(Results(p)) for p in results_paths]
+        write_atomically(path, report(files).encode(), "report")
+
+
+def report(files: Sequence[Results]) -> str:
+    """The page as text."""
+    try:
+        from jinja2 import Environment, FileSystemLoader, StrictUndefined
+        from plotly.offline import get_plotlyjs, get_plotlyjs_version
+    except ModuleNotFoundError as error:
+        raise SolveError(f"a report needs {error.name}, which is not installed: pip install plotly jinja2") from None
+    environment = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template("page.html").render(
+        _content(files),
+        plotly_js=get_plotlyjs(),
+        plotly_version=get_plotlyjs_version(),
+        page_js=(HERE / "page.js").read_text(encoding="utf-8"),
+        modes_3d_js=(HERE / "modes_3d.js").read_text(encoding="utf-8"),
+        mechanism_js=(HERE / "mechanism.js").read_text(encoding="utf-8"),
+        page_css=(HERE / "page.css").read_text(encoding="utf-8"),
+        ffrobot_version=__version__,
+    )
+
+
+def _content(files: Sequence[Results]) -> dict[str, Any]:
+    """What the template fills in."""
+    all_runs = runs(files)
+    moving, modes, histories = mechanism(all_runs), link_modes(all_runs), history_charts(files)
+    shapes = modes_3d(modes)
+    charts = [*histories, *(chart for link in modes for chart in link.charts)]
+    return {
+        "title": ", ".join(dict.fromkeys(results.name for results in files)),
+        "mechanism": _script_data(moving.data),
+        "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
+        "shapes": shapes["links"],
+        "modes_3d": _script_data(shapes),
+        "histories": histories,
+        "modes": modes,
+        "analyses": analyses_table(all_runs),
+        "peaks": peaks_table(all_runs),
+        "voltages": voltages_table(all_runs),
+        "origins": origins_table(files),
+        "notes": moving.notes,
+        "skipped": [(source, line) for r, source in zip(files, sources(files), strict=True) for line in r.skipped],
+        "scenes": [(source or r.name, r.scene_text) for r, source in zip(files, sources(files), strict=True)],
+    }
+
+
+def _script_data(value: object) -> str:
+    """JSON that may stand inside a script element: nothing in it ends the element."""
+    return json.dumps(value, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")

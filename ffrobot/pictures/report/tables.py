@@ -1,0 +1,100 @@
+"""Tables of the page: what was solved, the largest values, and what they came from."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...results.file import Array, Results
+from .histories import path_error
+from .runs import Run, sources, targets
+
+
+@dataclass(frozen=True)
+class Table:
+    """A heading row, and rows of text."""
+
+    heading: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+
+
+def analyses_table(runs: Sequence[Run]) -> Table:
+    """One row for each run, as the summary of a solve has it."""
+    heading = ("analysis", "kind", "status", "reached (s)", "outputs", "steps", "rejected", "evaluations",
+               "error aim", "constraint violation", "wall (s)")  # fmt: skip
+    rows = []
+    for run in runs:
+        about, time = run.results.attributes(run.analysis), run.results.time(run.analysis)
+        integrated = about["kind"] != "static"
+        counts = tuple(f"{about[key]}" if integrated else "" for key in ("steps", "rejected", "evaluations"))
+        violation = run.results[f"{run.analysis}/constraint_violation"].max(initial=0.0)
+        rows.append(
+            (run.label, about["kind"], about["status"], f"{time[-1]:g}", f"{len(time)}", *counts,
+             f"{about['tolerance']:.0e}" if integrated else "", f"{violation:.0e}", f"{about['wall_seconds']:.3f}")
+        )  # fmt: skip
+    return Table(heading, rows)
+
+
+def peaks_table(runs: Sequence[Run]) -> Table:
+    """The largest absolute value of what a reader asks for first, in every run."""
+    rows = [
+        (run.label, what, f"{np.max(np.abs(values)):.6g} {unit}", f"{run.results.time(run.analysis)[_peak(values)]:g}")
+        for run in runs
+        for what, unit, values in _peaks(run)
+    ]
+    return Table(("analysis", "largest", "value", "at (s)"), rows)
+
+
+def _peaks(run: Run) -> Iterator[tuple[str, str, Array]]:
+    """(quantity, unit, its values (T, …)) of a run."""
+    results, analysis = run.results, run.analysis
+    for target in targets(run):
+        yield f"distance of {target.point} from its path", "m", path_error(run, target)
+    types = {joint["name"]: joint["type"] for joint in results.scene.get("joint", [])}
+    for joint in results.names(f"{analysis}/joints"):
+        if results.has(f"{analysis}/joints/{joint}/moment"):
+            unit = "N" if types.get(joint) == "prismatic" else "N·m"
+            yield f"motor of joint {joint}", unit, results[f"{analysis}/joints/{joint}/moment"]
+    for point in results.names(f"{analysis}/points"):
+        deflection = np.linalg.norm(results[f"{analysis}/points/{point}/deflection"], axis=1)
+        if deflection.any():
+            yield f"deflection of {point}", "m", deflection
+
+
+def voltages_table(runs: Sequence[Run]) -> Table:
+    """What the patches of every link should give, and what they can."""
+    heading = ("analysis", "patches on", "largest required (V)", "limit (V)", "times limit", "condition number of Φ_V")
+    rows = []
+    for run in runs:
+        for body in run.results.names(f"{run.analysis}/pzt"):
+            group = f"{run.analysis}/pzt/{body}"
+            about, largest = run.results.attributes(group), np.abs(run.results[f"{group}/required_voltage"]).max()
+            limited = np.isfinite(about["limit"])
+            limit = (f"{about['limit']:g}", f"{largest / about['limit']:.3g}") if limited else ("none", "")
+            rows.append((run.label, body, f"{largest:.6g}", *limit, f"{about['condition_number']:.3g}"))
+    return Table(heading, rows)
+
+
+def origins_table(files: Sequence[Results]) -> Table:
+    """Files, hashes and versions that the page rests on."""
+    rows = []
+    for results, source in zip(files, sources(files), strict=True):
+        rows.append((source or results.name, "results", str(results.path), _sha256(results.path.read_bytes())))
+        rows.append(("", "written by", f"ffrobot {results.ffrobot_version}", ""))
+        rows.append(("", "scene text", results.name, _sha256(results.scene_text.encode())))
+        for name, file in results.modal_files.items():
+            rows.append(("", f"modal body of {name}", str(file.path), file.sha256))
+            rows.append(("", f"link content of {name}", "", file.input_hash))
+    return Table(("results", "what", "where", "SHA-256"), rows)
+
+
+def _peak(values: Array) -> int:
+    """At which output the largest absolute value is."""
+    return int(np.unravel_index(np.argmax(np.abs(values)), values.shape)[0])
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

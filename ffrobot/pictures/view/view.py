@@ -1,0 +1,132 @@
+"""From a modal body file or a results file to a folder with grids for ParaView and pictures by PyVista."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...common.errors import InputError, SolveError
+from ...common.files import check_folder, write_atomically
+from ...common.validation import did_you_mean
+from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
+from ...results.file import Results
+from ..figures.standard import file_name
+from ..motion import Indices, visible_exaggeration
+from .grids import modes_grid, results_grid
+from .pictures import Picture, draw_pictures
+from .vtkhdf import Grid, vtkhdf_image
+from .xdmf import xdmf_text
+
+FRAMES = 201  # of an animation, unless asked for otherwise
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is to be seen.
+
+    Attributes:
+        analysis: of a results file; all if None.
+        frames: at most so many outputs, equally far apart.
+        time: of the picture, in s; that of the largest deflection if None.
+        scale: of deflections in the picture; as large as can be seen well if None.
+        pictures: whether to draw pictures; None: where PyVista can.
+    """
+
+    analysis: str | None = None
+    frames: int = FRAMES
+    time: float | None = None
+    scale: float | None = None
+    pictures: bool | None = None
+
+
+@dataclass(frozen=True)
+class Viewed:
+    """The files written, and notes on what could not be drawn."""
+
+    paths: list[Path]
+    notes: list[str]
+
+
+def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewed:
+    """Write grids and pictures (.png) of a modal body file or of a results file into `folder`.
+
+    Grids are .vtkhdf files, each with an .xdmf for programs that cannot read those.
+
+    Raises `InputError` where the file cannot be read or has no such analysis, `SolveError` where a file cannot be
+    written, or pictures that are asked for cannot be drawn: grids are written all the same.
+    """
+    options = options or Options()
+    check_folder(folder)
+    notes: list[str] = []
+    views = _modal_body(path) if is_modal_body_file(path) else _results(path, options, notes)
+    paths, pictures = [], []
+    for name, grid, picture in views:
+        paths.append(folder / f"{name}.vtkhdf")
+        write_atomically(paths[-1], vtkhdf_image(grid), "grid", make_folder=True)
+        paths.append(folder / f"{name}.xdmf")
+        write_atomically(paths[-1], xdmf_text(grid, paths[-2].name), "index of the grid")
+        pictures.append(replace(picture, grid=str(paths[-2]), path=f"{name}.png"))
+    if options.pictures is not False:
+        try:
+            paths += _draw(pictures, folder)
+        except SolveError as error:
+            if options.pictures:
+                raise
+            notes.append(str(error))
+    return Viewed(paths, list(dict.fromkeys(notes)))
+
+
+View = tuple[str, Grid, Picture]  # name of its files, grid, picture without paths
+
+
+def _modal_body(path: Path) -> Iterator[View]:
+    body = read_modal_body(path)
+    yield file_name(body.name), modes_grid(body), Picture(body.name, length=body.length)
+
+
+def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
+    with Results(path) as results:
+        for analysis in _analyses(results, options.analysis):
+            grid = results_grid(results, analysis, _frames(results, analysis, options.frames), notes)
+            yield file_name(analysis), grid, _snapshot(f"{results.name}: {analysis}", grid, options)
+
+
+def _analyses(results: Results, wanted: str | None) -> Sequence[str]:
+    if wanted is None:
+        return results.analyses
+    if wanted not in results.analyses:
+        near = did_you_mean(wanted, results.analyses)
+        raise InputError(
+            f'{results.path}: analysis: expected one of {", ".join(results.analyses)}, found "{wanted}"{near}'
+        )
+    return [wanted]
+
+
+def _frames(results: Results, analysis: str, count: int) -> Indices:
+    outputs = len(results.time(analysis))
+    return np.unique(np.linspace(0, outputs - 1, min(outputs, count)).round().astype(np.intp))
+
+
+def _snapshot(title: str, grid: Grid, options: Options) -> Picture:
+    """At the step nearest to the time asked for, or where deflections are largest."""
+    assert grid.time is not None
+    deflection = np.linalg.norm(grid.point_data["deflection"], axis=2).max(axis=1)
+    step = int(np.argmax(deflection) if options.time is None else np.argmin(np.abs(grid.time - options.time)))
+    scale = options.scale
+    if scale is None:
+        scale = visible_exaggeration(float(np.ptp(grid.points[step], axis=0).max()), float(deflection[step]))
+    return Picture(f"{title}, t = {grid.time[step]:.4g} s, deformation x {scale:g}", step=step, scale=scale)
+
+
+def _draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
+    """Draw elsewhere first: what cannot be drawn to its end leaves no half of a picture."""
+    with tempfile.TemporaryDirectory() as place:
+        draw_pictures([replace(picture, path=str(Path(place) / picture.path)) for picture in pictures])
+        paths = [folder / picture.path for picture in pictures]
+        for path in paths:
+            write_atomically(path, (Path(place) / path.name).read_bytes(), "picture")
+    return paths

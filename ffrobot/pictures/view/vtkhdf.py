@@ -1,0 +1,111 @@
+"""VTKHDF files: VTK's unstructured grids in HDF5, written without VTK.
+
+Format: docs.vtk.org, "VTKHDF format specification", version 2.0; ParaView reads it from 5.12 on. Cells are there once,
+points and their data once for each time step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ...fe_models.modal_body import Integers
+from ...results.file import Array
+
+# VTK's number of the cell with so many corners: vertex, line, triangle, quadrilateral.
+CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
+ROOT = "VTKHDF"
+TOPOLOGY = "XDMF/topology"  # outside of what VTKHDF describes: the cells as `xdmf` refers to them
+# How cells begin there, by number of corners: XDMF's number of the cell, and how many corners where that can vary.
+XDMF_HEADING = {1: (1, 1), 2: (2, 2), 3: (4,), 4: (5,)}
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells on P points that move over T steps.
+
+    Attributes:
+        cells: blocks (c, v) of cells with v corners each, in order.
+        points: (T, P, 3) in m.
+        time: (T,) in s; None for a grid that stands still, T = 1.
+        point_data: (T, P) or (T, P, 3) by name.
+        cell_data: (C,) by name, for all cells of all blocks.
+    """
+
+    cells: Sequence[Integers]
+    points: Array
+    time: Array | None = None
+    point_data: Mapping[str, Array] = field(default_factory=dict)
+    cell_data: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
+
+
+def vtkhdf_image(grid: Grid) -> bytes:
+    """The file as bytes; the same grid always gives the same. Numbers of points have 7 digits."""
+    with h5py.File("grid", "w", driver="core", backing_store=False) as file:
+        root = file.create_group(ROOT)
+        root.attrs["Version"] = np.array([2, 0])
+        root.attrs["Type"] = np.bytes_("UnstructuredGrid")
+        _write_cells(root, grid)
+        _write(root, "Points", _flat(grid.points))
+        for name, values in grid.point_data.items():
+            _write(root, f"PointData/{name}", _flat(values))
+        for name, cell_values in grid.cell_data.items():
+            _write(root, f"CellData/{name}", cell_values)
+        if grid.time is not None:
+            _write_steps(root, grid, grid.time)
+        _write(file, TOPOLOGY, mixed_topology(grid))
+        file.flush()
+        image: bytes = file.id.get_file_image()
+        return image
+
+
+def mixed_topology(grid: Grid) -> Integers:
+    """The cells as XDMF has them where kinds are mixed, in one row."""
+    rows = []
+    for block in grid.cells:
+        heading = XDMF_HEADING[block.shape[1]]
+        rows.append(np.concatenate([np.broadcast_to(heading, (len(block), len(heading))), block], axis=1).ravel())
+    topology: Integers = np.concatenate(rows).astype(np.int64)
+    return topology
+
+
+def _write_cells(root: h5py.Group, grid: Grid) -> None:
+    corners = np.concatenate([np.full(len(block), block.shape[1]) for block in grid.cells])
+    connectivity = np.concatenate([block.ravel() for block in grid.cells])
+    counts = {"Points": grid.points.shape[1], "Cells": len(corners), "ConnectivityIds": len(connectivity)}
+    for name, count in counts.items():
+        _write(root, f"NumberOf{name}", np.array([count]))
+    _write(root, "Connectivity", connectivity)
+    _write(root, "Offsets", np.concatenate([[0], np.cumsum(corners)]))
+    _write(root, "Types", np.array([CELL_TYPE[v] for v in corners], dtype=np.uint8))
+
+
+def _write_steps(root: h5py.Group, grid: Grid, time: Array) -> None:
+    """Where each step begins: its points and their data follow those of the step before, cells are the same."""
+    steps = root.create_group("Steps")
+    steps.attrs["NSteps"] = len(time)
+    same, own = np.zeros(len(time), dtype=np.int64), np.arange(len(time)) * grid.points.shape[1]
+    _write(steps, "Values", time)
+    _write(steps, "NumberOfParts", np.ones_like(same))
+    _write(steps, "PartOffsets", same)
+    _write(steps, "PointOffsets", own)
+    _write(steps, "CellOffsets", same[:, None])
+    _write(steps, "ConnectivityIdOffsets", same[:, None])
+    for name in grid.point_data:
+        _write(steps, f"PointDataOffsets/{name}", own)
+    for name in grid.cell_data:
+        _write(steps, f"CellDataOffsets/{name}", same)
+
+
+def _flat(values: Array) -> NDArray[np.float32]:
+    """(T P, …) of (T, P, …), in the precision of the file."""
+    return values.reshape(-1, *values.shape[2:]).astype(np.float32)
+
+
+def _write(group: h5py.Group, name: str, values: NDArray[np.generic]) -> None:
+    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size > 1000 else {}
+    group.create_dataset(name, data=values, track_times=False, **packed)

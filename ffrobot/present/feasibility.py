@@ -1,0 +1,132 @@
+"""The table "can these actuators do it?" of a results file, and its lines in the summary of a solve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console, Group
+from rich.table import Table
+
+from ..common.errors import InputError
+from ..common.validation import quoted
+
+Array = NDArray[np.float64]
+
+
+def feasibility_tables(path: Path, analysis: str | None) -> Group:
+    """Tables of one analysis of the results file at `path`, or of all. Raises `InputError` where there are none."""
+    from ..results.write import FORMAT
+
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != FORMAT:
+                raise InputError(f"{path}: expected a results file, found format {file.attrs.get('format')!r}")
+            judged = [name for name, group in file.items() if "feasibility" in group]
+            if analysis is not None and analysis not in judged:
+                raise InputError(
+                    f"{path}: --analysis: expected an analysis with motors or patches, {quoted(judged)}, found"
+                    f' "{analysis}"'
+                )
+            wanted = judged if analysis is None else [analysis]
+            return Group(*(table for name in wanted for table in _tables(name, file[name])))
+    except OSError as error:
+        reason = "no such file" if not path.is_file() else f"not a readable HDF5 file ({error})"
+        raise InputError(f"{path}: expected a results file, found {reason}") from None
+
+
+def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
+    yield f'analysis "{name}" ({group.attrs["kind"]})'
+    if "joints" in group["feasibility"]:
+        yield _motors(group["feasibility/joints"])
+    for body, judged in group["feasibility"].get("pzt", {}).items():
+        yield _patches(body, group[f"pzt/{body}"], judged)
+        yield _modes(body, judged)
+        yield _remedy_line(judged)
+    yield ""
+
+
+def _motors(group: h5py.Group) -> Table:
+    table = _table(
+        "motor of", "moment", "limit", "speed", "limit", "power (W)", "limit", "factor", "from t (s)", "can it?"
+    )
+    keys = ("moment", "moment_limit", "speed", "speed_limit", "power", "power_limit")
+    for name, motor in group.items():
+        peaks = [_number(motor.attrs[key]) for key in keys]
+        table.add_row(name, *peaks, *_verdict(motor.attrs["factor"], motor.attrs["saturation_time"]))
+    return table
+
+
+def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
+    table = _table(
+        body, "at (m)", "needs (V)", "has (V)", "needs (N·m)", "has", "factor", "from (s)", "kV/mm", "depoling",
+        "strain (µ)", "can it?",
+    )  # fmt: skip
+    required, available = judged["required_moment"][()], judged["available_moment"][()]
+    c, depoling = np.abs(pzt["moment_per_volt"][()]), judged.attrs["depoling_field"]
+    for k in range(len(required)):
+        moments = (required[k] / c[k], available[k] / c[k], required[k], available[k])
+        field, strain = judged["field"][k], judged["strain"][k]
+        factor, since, can = _verdict(judged["factor"][k], judged["saturation_time"][k])
+        beyond = [
+            name
+            for name, is_beyond in (
+                ("depoled", judged["limited_field"][k] > depoling),
+                ("strained", strain > judged.attrs["strain_limit"]),
+            )
+            if is_beyond
+        ]
+        table.add_row(
+            f"patch {k + 1}", f"{pzt['edges'][k].mean():.4g}", *map(_number, moments), factor, since,
+            _number(field / 1e6), "" if np.isinf(depoling) else _number(field / depoling), _number(1e6 * strain),
+            ", ".join([can, *beyond]),
+        )  # fmt: skip
+    return table
+
+
+def _modes(body: str, judged: h5py.Group) -> Table:
+    table = _table(body, "needs (N/√kg)", "all patches have (N/√kg)", "factor")
+    for k, (needed, had, factor) in enumerate(
+        zip(judged["mode_required"][()], judged["mode_available"][()], judged["mode_factor"][()], strict=True), 1
+    ):
+        table.add_row(f"mode {k}", _number(needed), _number(had), _number(factor))
+    return table
+
+
+def _remedy_line(judged: h5py.Group) -> str:
+    if np.all(judged["factor"][()] <= 1.0):
+        return f"the patches can do it; a limit of {_number(judged['remedies'].attrs['limit'])} V would do"
+    remedies = judged["remedies"].attrs
+    count = f"{remedies['count']} patches"
+    if not remedies["count"]:
+        missing = _number(remedies["most_factor"])
+        count = f"no number of patches ({remedies['most_count']} have room, and lack a factor {missing})"
+    return (
+        f"what alone would do: a limit of {_number(remedies['limit'])} V; {remedies['layers']} layers;"
+        f" layers of {_number(1e3 * remedies['thickness'])} mm at the same field; {count}"
+    )
+
+
+def _verdict(factor: float, since: float) -> tuple[str, str, str]:
+    return _number(factor), "" if np.isnan(since) else f"{since:g}", "yes" if factor <= 1 else "no"
+
+
+def _number(value: float) -> str:
+    if np.isinf(value):
+        return "none"
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
+
+
+def _table(*headers: str) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
+    for k, header in enumerate(headers):
+        table.add_column(header, justify="right" if k else "left", no_wrap=True)
+    return table
+
+
+def print_feasibility(path: Path, analysis: str | None, console: Console) -> None:
+    """Print the tables of a results file."""
+    console.print(feasibility_tables(path, analysis))

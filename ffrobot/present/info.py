@@ -1,0 +1,104 @@
+"""What a modal body file or a results file holds, as text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from io import StringIO
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from ..common.errors import InputError
+from ..fe_models.modal_body import ModalBody
+from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
+from ..fe_models.modal_body_file import read_modal_body
+from ..results.loop import HEADINGS, metrics_of, metrics_row
+from ..results.write import FORMAT as RESULTS_FORMAT
+
+
+def describe(path: Path) -> str:
+    """Text for `ffrobot info`. Raises `InputError` for a file that is neither a modal body nor results."""
+    try:
+        with h5py.File(path, "r") as file:
+            kind = file.attrs.get("format")
+            if kind == RESULTS_FORMAT:
+                return _results(file)
+    except OSError as error:
+        reason = f"not a readable HDF5 file ({error})"
+        if not path.is_file():
+            reason = "a folder" if path.is_dir() else "no such file"
+        raise InputError(f"{path}: expected a modal body file or a results file, found {reason}") from None
+    if kind == MODAL_FORMAT:
+        return _modal_body(read_modal_body(path))
+    raise InputError(f"{path}: expected a modal body file or a results file, found format {kind!r}")
+
+
+def _modal_body(body: ModalBody) -> str:
+    center = _place(body, body.first_moment / body.mass)
+    lines = [
+        f"modal body {body.name!r}: {body.kind}, {body.reference_condition} reference condition, {body.length:g} m",
+        f"made by ffrobot {body.ffrobot_version} from input {body.input_hash[:12]}",
+        f"mass {body.mass:.6g} kg, center of mass {center}",
+        "interfaces: " + ", ".join(f"{name} at {_place(body, i.position)}" for name, i in body.interfaces.items()),
+        f"stations: {len(body.stations.position)} along the axis",
+        f"geometric stiffness: {', '.join(body.geometric_stiffness) or 'none'}",
+        *_optional(body),
+    ]
+    modes = Table("mode", "family", "frequency (Hz)", "ω (rad/s)", "damping ratio")
+    for k, family in enumerate(body.family):
+        frequency = body.frequency[k]
+        modes.add_row(
+            f"{k + 1}", family, f"{frequency:.6f}", f"{6.283185307179586 * frequency:.5f}", f"{body.damping_ratio[k]:g}"
+        )
+    return "\n".join(lines) + "\n" + _rendered(modes)
+
+
+def _place(body: ModalBody, position: NDArray[np.float64]) -> str:
+    """Coordinates (3,) as text, rounding errors of solids as what they are: 0."""
+    x, y, z = np.where(np.abs(position) < 1e-12 * body.length, 0.0, position)
+    return f"({x:.6g}, {y:.6g}, {z:.6g}) m"
+
+
+def _optional(body: ModalBody) -> Iterator[str]:
+    """Lines on what only some modal bodies have."""
+    for name, point in body.stress.items():
+        yield f"modal stresses at {name}, {_place(body, point.position)}"
+    if body.surface_stress is not None:
+        yield f"modal stresses on the surface, at {len(body.surface_stress)} points"
+    if (patches := body.surface_patches) is not None:
+        faces = " and ".join(face for face in ("top", "bottom") if getattr(patches, face) is not None)
+        places = ", ".join(f"{start:g} … {end:g}" for start, end in patches.edges)
+        yield f"patches outlined in the mesh, {faces}, {patches.width:g} m wide: {places} m"
+
+
+def _results(file: h5py.File) -> str:
+    lines = [f"results of scene {file.attrs['name']!r}, made by ffrobot {file.attrs['ffrobot_version']}"]
+    for name, body in json.loads(file.attrs["modal_bodies"]).items():
+        lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
+    analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "wall (s)")
+    datasets = Table("dataset", "shape")
+    loops = Table(*HEADINGS, box=None, padding=(0, 1, 0, 0))
+    for name, group in file.items():
+        time, attributes = group["time"], group.attrs
+        analyses.add_row(
+            name, attributes["kind"], attributes["status"], f"{len(time)}", f"{time[-1]:g}", f"{attributes['steps']}",
+            f"{attributes['wall_seconds']:.3f}",
+        )  # fmt: skip
+        if "control/commands" in group:
+            loops.add_row(*metrics_row(name, metrics_of(group["control"].attrs)))
+        group.visititems(
+            lambda _, item: datasets.add_row(item.name, str(item.shape)) if isinstance(item, h5py.Dataset) else None
+        )
+    tables = [analyses, loops, datasets] if loops.row_count else [analyses, datasets]
+    return "\n".join(lines) + "\n" + "".join(map(_rendered, tables))
+
+
+def _rendered(table: Table) -> str:
+    out = StringIO()
+    Console(file=out, width=110).print(table)
+    return out.getvalue()

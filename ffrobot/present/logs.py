@@ -1,0 +1,56 @@
+"""What a command tells besides its output: `--verbose` on the error stream, `--log-file` with times in a file.
+
+The library logs to loggers named as its modules, below "ffrobot", and leaves it to others what becomes of that.
+"""
+
+from __future__ import annotations
+
+import logging
+import platform
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import click
+
+F = TypeVar("F", bound=Callable[..., object])
+
+LOGGER = logging.getLogger("ffrobot")
+LOGGER.addHandler(logging.NullHandler())
+
+
+def logging_options(command: F) -> F:
+    """Give a command the options `--verbose` and `--log-file`."""
+    path = click.Path(dir_okay=False, writable=True, path_type=Path)
+    verbose = click.option("-v", "--verbose", is_flag=True, expose_value=False, callback=_verbose, help="Tell more.")
+    log_file = click.option(
+        "--log-file", metavar="FILE", type=path, expose_value=False, callback=_log_file, help="Append a log to FILE."
+    )
+    return verbose(log_file(command))
+
+
+def _verbose(context: click.Context, parameter: click.Parameter, verbose: bool) -> None:
+    if verbose:
+        handler = logging.StreamHandler()
+        handler.addFilter(lambda record: record.levelno < logging.ERROR)  # the command prints its errors itself
+        _add(handler, "%(message)s")
+
+
+def _log_file(context: click.Context, parameter: click.Parameter, path: Path | None) -> None:
+    if path is None:
+        return
+    try:
+        _add(logging.FileHandler(path, encoding="utf-8"), "%(asctime)s %(levelname)s %(message)s")
+    except OSError as error:
+        raise click.BadParameter(f"cannot write {path}: {error.strerror}") from None
+    from .. import __version__
+
+    LOGGER.info("ffrobot %s, Python %s, %s", __version__, platform.python_version(), platform.platform())
+    LOGGER.info("%s", " ".join(sys.argv))
+
+
+def _add(handler: logging.Handler, layout: str) -> None:
+    handler.setFormatter(logging.Formatter(layout))
+    LOGGER.addHandler(handler)
+    LOGGER.setLevel(logging.INFO)

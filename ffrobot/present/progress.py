@@ -1,0 +1,54 @@
+"""Progress on a terminal: what is being done and how far it is; nothing where the error stream is piped."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from ..common.parallel import is_first
+from ..run.solution import Watcher
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+
+logger = logging.getLogger(__name__)
+
+
+class Display(Watcher):
+    """Shows the stage, and a bar with the remaining time for analyses; cleared when done."""
+
+    def __init__(self) -> None:
+        self._progress: Progress | None = None
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> Display:
+        if sys.stderr.isatty() and is_first():
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+            columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+            self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._progress.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        if self._progress:
+            self._progress.stop()
+
+    def stage(self, title: str) -> None:
+        """Replace what is shown by `title`, with a pulse until a time is known."""
+        logger.info("%s", title)
+        if self._progress is None:
+            return
+        if self._task is not None:
+            self._progress.remove_task(self._task)
+        self._task = self._progress.add_task(title, total=None)
+
+    def advance(self, t: float, end: float) -> bool:
+        """Move the bar."""
+        if self._progress is not None and self._task is not None:
+            self._progress.update(self._task, completed=t, total=end)
+        return True

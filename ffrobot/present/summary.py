@@ -1,0 +1,220 @@
+"""What a solve prints at its end."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from ..mbs.analysis.analyses import Outcome
+from ..mbs.analysis.elastic_joints import unresolved_gears
+from ..mbs.analysis.motors_only import describe_zeros, is_minimum_phase, path_error
+from ..mbs.model.geometric_stiffening import NOTABLE
+from ..mbs.model.truncation import modes_kept
+from ..mbs.solve.stable_inversion import Inversion
+from ..results.loop import HEADINGS, metrics_row
+from ..run.mode_choice import ModeChoice
+from ..run.solution import Solution
+from .control_summary import LINEAR_COLUMNS, PLACEMENT_COLUMNS, linear_lines, linear_table, placement_table
+
+PLAIN_WIDTH = 120  # columns where the output is no terminal
+
+
+def summary_console() -> Console:
+    """The standard output; names in a scene are no markup, and what goes to a file is not squeezed into 80 columns."""
+    width = None if sys.stdout.isatty() else PLAIN_WIDTH
+    return Console(width=width, markup=False, highlight=False, emoji=False)
+
+
+def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], console: Console) -> None:
+    """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
+    console.print(_analyses(solution))
+    console.print("error aim: relative to the peak of each quantity; constraints: largest violation")
+    for table in _tables(solution):
+        console.print()
+        console.print(table)
+    for name in solution.feasibility:
+        console.print(f"{name}: {_verdict(solution, name)}")
+    for line in linear_lines(solution):
+        console.print(line)
+    notes = Table.grid(padding=(0, 2))
+    for title, text in _notes(solution, seconds):
+        notes.add_row(title, text)
+    console.print()
+    console.print(notes)
+    console.print(f"results    {path}", soft_wrap=True)
+
+
+def _tables(solution: Solution) -> Iterator[Table]:
+    """What was found of each kind, where there is any."""
+    if any(solution.voltages.values()):
+        yield _voltages(solution)
+    if solution.loops:
+        yield _loops(solution)
+    if any(solution.stresses.values()):
+        yield _stresses(solution)
+    if solution.linear:
+        yield linear_table(solution, _table(*LINEAR_COLUMNS))
+    if solution.placements:
+        yield placement_table(solution, _table(*PLACEMENT_COLUMNS))
+
+
+def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    outcomes = solution.outcomes
+    chosen = {
+        name: f"{outcome.integrator.name}; {outcome.integrator.reason}"
+        for name, outcome in outcomes.items()
+        if outcome.analysis.integrated and outcome.analysis.integrator == "auto"
+    }
+    yield from (("integrator", line) for line in _alike(chosen.items()))
+    for name, outcome in outcomes.items():
+        if outcome.inversion is not None:
+            yield "motors only", f"{name}: {_inversion(outcome, outcome.inversion)}"
+    if solution.mode_choice is not None:
+        yield "modes", _modes(solution, solution.mode_choice)
+    warnings = [(name, line) for name, loop in solution.loops.items() for line in loop.warnings]
+    warnings += [(name, line) for name, outcome in outcomes.items() for line in unresolved_gears(outcome.gears)]
+    yield from (("warning", line) for line in _alike(warnings))
+    yield _stiffening(solution)
+    yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
+    if solution.skipped:
+        yield "skipped", "; ".join(solution.skipped)
+
+
+def _alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """What is said of several analyses, once for all of them."""
+    names: dict[str, list[str]] = {}
+    for name, text in lines:
+        names.setdefault(text, []).append(name)
+    for text, of in names.items():
+        yield f"{', '.join(of)}: {text}"
+
+
+def _modes(solution: Solution, choice: ModeChoice) -> str:
+    """How many modes were enough, and what leaving out the others costs and saves."""
+    kept = [f"{body.name}: {modes_kept(body)}" for body in solution.model.bodies if body.n_modes]
+    lines = ["; ".join(kept)]
+    for name, errors in choice.errors.items():
+        if any(errors.values()):
+            found = ", ".join(f"{kind} {error:.0e}" for kind, error in errors.items() if error)
+            lines.append(f"{name}: error of leaving out the others, estimated: {found}")
+        else:
+            lines.append(
+                f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
+            )
+    tried = ", ".join(map(str, choice.tried))
+    fewer = {body.name: body.reduction.lowest for body in solution.model.bodies if body.reduction is not None}
+    if fewer:
+        keys = ", ".join(f"modes = {lowest} for {name}" for name, lowest in fewer.items())
+        lines.append(f"the same without search: {keys}")
+    lines.append(
+        f"solved with {tried} modal coordinates, {choice.seconds:.2f} s before the last; the highest frequency is"
+        f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
+    )
+    return "\n".join(lines)
+
+
+def _inversion(outcome: Outcome, inversion: Inversion) -> str:
+    """What the zeros are, how the path was inverted, and what that leaves of it."""
+    linear, factor = inversion.linearisation, inversion.servo.factor
+    error = np.abs(path_error(inversion, outcome.time, outcome.q)).max()
+    left = f"largest error of the path {error:.2g}"
+    if is_minimum_phase(linear):
+        output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the vibration"
+        return f"{output}: minimum phase, integrated forward; {left}"
+    return (
+        f"not minimum phase, zeros at {describe_zeros(linear)} 1/s; stable inversion with"
+        f" {outcome.analysis.pre_actuation:.3g} s of pre- and {outcome.analysis.post_actuation:.3g} s of post-actuation"
+        f" (start off rest by {inversion.off_rest:.1g}); {left}"
+    )
+
+
+def _stiffening(solution: Solution) -> tuple[str, str]:
+    """What loads along the links do to their stiffness, and whether the equations know."""
+    effect = max(solution.stiffening_effects.values(), default=0.0)
+    changes = f"loads change a mode's stiffness by up to {100 * effect:.2g} %"
+    if solution.stiffened:
+        return "stiffening", f"geometric stiffening is on: {changes}"
+    if effect > NOTABLE:
+        return "warning", f"geometric stiffening is off, and {changes}: consider geometric_stiffening = true"
+    return "stiffening", f"geometric stiffening is off: {changes}"
+
+
+def _analyses(solution: Solution) -> Table:
+    table = _table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
+    for name, outcome in solution.outcomes.items():
+        analysis, reached = outcome.analysis, outcome.time[-1]
+        integrated = analysis.integrated
+        table.add_row(
+            name,
+            analysis.kind,
+            outcome.integrator.name if integrated else "",
+            f"{reached:g}" if outcome.status == "completed" else f"{reached:g} of {analysis.end:g}",
+            f"{outcome.steps}" if integrated else "",
+            f"{analysis.tolerance:.0e}" if integrated else "",
+            _violation(outcome),
+            f"{outcome.wall_seconds:.3f}",
+        )
+    return table
+
+
+def _voltages(solution: Solution) -> Table:
+    table = _table("voltages of", "on", "largest (V)", "limit (V)", "times limit", "cond Φ_V")
+    for name, by_body in solution.voltages.items():
+        for body, values in by_body.items():
+            patches = solution.patches[body]
+            limit = patches.limit.min()
+            table.add_row(
+                name,
+                body,
+                f"{values.largest:.0f}" if values.largest >= 1e3 else f"{values.largest:.3g}",
+                "none" if limit == np.inf else f"{limit:g}",
+                "" if limit == np.inf else f"{np.abs(values.required / patches.limit).max():.3g}",
+                f"{patches.condition_number:.3g}",
+            )
+    return table
+
+
+def _verdict(solution: Solution, analysis: str) -> str:
+    """Whether the actuators can do it, and which cannot."""
+    short = solution.feasibility[analysis].short
+    if not short:
+        return "motors and patches can do it, as far as limits are given"
+    lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
+    return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility"
+
+
+def _loops(solution: Solution) -> Table:
+    table = _table(*HEADINGS)
+    for name, loop in solution.loops.items():
+        table.add_row(*metrics_row(name, loop.metrics))
+    return table
+
+
+def _stresses(solution: Solution) -> Table:
+    table = _table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)")
+    for name, by_body in solution.stresses.items():
+        for body, stress in by_body.items():
+            value, k, place = stress.largest()
+            table.add_row(name, body, f"{value / 1e6:.4g}", place, f"{solution.outcomes[name].time[k]:g}")
+    return table
+
+
+def _table(*headers: str) -> Table:
+    """Columns of text without lines: the first ones left, numbers right; names fold where they must."""
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
+    for k, header in enumerate(headers):
+        if k < 2 or header == "integrator":
+            table.add_column(header, overflow="fold")
+        else:
+            table.add_column(header, justify="right", no_wrap=True)
+    return table
+
+
+def _violation(outcome: Outcome) -> str:
+    """The largest of position, velocity and acceleration level."""
+    return f"{outcome.residual.max():.0e}" if outcome.residual.size else ""

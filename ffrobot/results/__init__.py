@@ -1,0 +1,1 @@
+"""The results file: its groups, written and read."""

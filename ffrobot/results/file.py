@@ -1,0 +1,217 @@
+"""Reading results files: datasets by name, attributes, and the modal bodies that the results rest on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.errors import InputError
+from ..common.validation import did_you_mean
+from ..fe_models.modal_body import ModalBody
+from ..fe_models.modal_body_file import read_modal_body
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from ..actuation.control.linear_model import LinearModel
+
+Array = NDArray[np.float64]
+
+COLUMN = re.compile(r"(?P<dataset>.*?)\[(?P<column>\d+)\]")
+
+
+@dataclass(frozen=True)
+class ModalFile:
+    """The modal body file that a body of the scene came from, as it was then."""
+
+    path: Path
+    sha256: str
+    input_hash: str
+
+
+class Results:
+    """An open results file. Datasets are named as in the file: `inverse/points/link2.tip/position`.
+
+    Raises `InputError` where `path` is no results file.
+    """
+
+    def __init__(self, path: PathLike[str] | str) -> None:
+        self._open(Path(path), path)
+
+    @classmethod
+    def from_image(cls, image: bytes, path: Path) -> Results:
+        """Results whose file is in memory only; messages call them `path`."""
+        results = cls.__new__(cls)
+        # not as a file of Python's: HDF5 closes what is left open at the end, when Python is no more
+        results._open(path, h5py.h5f.open_file_image(image))
+        return results
+
+    def _open(self, path: Path, content: PathLike[str] | str | h5py.h5f.FileID) -> None:
+        self.path = path
+        try:
+            self._file = h5py.File(content, "r")
+        except OSError as error:
+            reason = "no such file" if not self.path.exists() else f"not a readable HDF5 file ({error})"
+            raise InputError(f"{path}: expected a results file, found {reason}") from None
+        if "scene" not in self._file.attrs:
+            self._file.close()
+            raise InputError(f"{path}: expected a results file, found an HDF5 file without a scene")
+        self.scene_text: str = self._file.attrs["scene"]
+        self.scene: dict[str, Any] = tomllib.loads(self.scene_text)
+
+    def __enter__(self) -> Results:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        if not self._file:
+            return f"Results({str(self.path)!r}), closed"
+        lines = [f"Results({str(self.path)!r}): scene {self.name!r}"]
+        for name in self.analyses:
+            about, time = self.attributes(name), self.time(name)
+            lines.append(f"  {name}: {about['kind']}, {len(time)} outputs up to {time[-1]:g} s, {about['status']}")
+        return "\n".join(lines)
+
+    def close(self) -> None:
+        """Close the file; nothing can be read afterwards."""
+        self._file.close()
+
+    @property
+    def name(self) -> str:
+        """Name of the scene."""
+        return str(self._file.attrs["name"])
+
+    @property
+    def ffrobot_version(self) -> str:
+        """Version of the program that wrote the file."""
+        return str(self._file.attrs["ffrobot_version"])
+
+    @property
+    def skipped(self) -> list[str]:
+        """What the solve left out, one line each."""
+        return [str(line) for line in self._file.attrs["skipped"]]
+
+    @property
+    def analyses(self) -> list[str]:
+        """Names of the analyses that the file holds, in the order of the scene."""
+        return [entry["name"] for entry in self.scene["analysis"] if entry["name"] in self._file]
+
+    @property
+    def modal_files(self) -> dict[str, ModalFile]:
+        """The file behind each flexible body of the scene."""
+        entries = json.loads(self._file.attrs["modal_bodies"]).items()
+        return {name: ModalFile(Path(e["path"]), e["sha256"], e["input_hash"]) for name, e in entries}
+
+    def modal_body(self, name: str) -> ModalBody:
+        """The modal body that body `name` was solved with.
+
+        Its file is looked for where it was, then beside the results; its hash tells whether it is the same.
+        Raises `InputError` where `name` is no flexible body, or its file cannot be found.
+        """
+        files = self.modal_files
+        if name not in files:
+            raise InputError(f'{self.path}: expected a flexible body, found "{name}"{did_you_mean(name, files)}')
+        file = files[name]
+        for path in (file.path, self.path.parent / file.path.name):  # a folder that has been moved keeps both
+            if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == file.sha256:
+                return read_modal_body(path)
+        found = "another" if file.path.is_file() else "none"
+        raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with, found {found}')
+
+    def modal(self, analysis: str, body: str) -> Array:
+        """P (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""
+        group = f"{analysis}/bodies/{body}"
+        p, transform = self[f"{group}/modal"], f"{group}/modal_transform"
+        return p @ self[transform].T if self.has(transform) else p
+
+    def linear(self, analysis: str) -> tuple[LinearModel, ...]:
+        """The linear models of an analysis of kind "linear", one for each of its times."""
+        from .linear import read_linear
+
+        return read_linear(self, analysis)
+
+    def attributes(self, group: str) -> Mapping[str, Any]:
+        """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`."""
+        return dict(self._file[group].attrs)
+
+    def names(self, group: str) -> list[str]:
+        """Names inside a group such as `inverse/points`; none when the file does not have it."""
+        return list(self._file[group]) if group in self._file else []
+
+    def has(self, dataset: str) -> bool:
+        """Whether the file holds this dataset or group."""
+        return dataset in self._file
+
+    def time(self, dataset: str) -> Array:
+        """Output times (T,), in s, of the analysis that `dataset` belongs to; the analysis' own name does, too.
+
+        Of what is in `control/` of a closed loop, the times of its samples.
+        """
+        analysis, *inside = dataset.strip("/").split("/")
+        return self[f"{analysis}/control/time" if inside[:1] == ["control"] else f"{analysis}/time"]
+
+    def __getitem__(self, dataset: str) -> Array:
+        """A dataset with the shape it has in the file. Raises `InputError` if absent."""
+        item = self._file.get(dataset)
+        if not isinstance(item, h5py.Dataset):
+            raise InputError(f'{self.path}: expected the dataset "{dataset}", found none{self._near(dataset)}')
+        return np.asarray(item, dtype=float)
+
+    def data(self, name: str) -> Array:
+        """A dataset as (T, columns), or one of its columns, `name[k]`, as (T, 1). Raises `InputError` if absent."""
+        match = COLUMN.fullmatch(name)
+        dataset = match["dataset"] if match else name
+        values = self[dataset]
+        values = values.reshape(len(values), -1)
+        if match is None:
+            return values
+        k = int(match["column"])
+        if k >= values.shape[1]:
+            raise InputError(f'{self.path}: expected column {k} of "{dataset}", found {values.shape[1]} columns')
+        return values[:, k : k + 1]
+
+    def columns(self, analysis: str) -> dict[str, Array]:
+        """Everything an analysis holds over time, one (T,) array each.
+
+        The name is the dataset's inside the analysis, with the column where it has several:
+        `points/link2.tip/position[0]`.
+        """
+        found: dict[str, Array] = {}
+        outputs = len(self.time(analysis))
+
+        def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
+            if not isinstance(item, h5py.Dataset) or item.shape[:1] != (outputs,) or name.startswith("resume/"):
+                return
+            values = np.asarray(item, dtype=float).reshape(outputs, -1)
+            labels = [name] if item.ndim == 1 else [f"{name}[{k}]" for k in range(values.shape[1])]
+            found.update(zip(labels, values.T, strict=True))
+
+        self._file[analysis].visititems(collect)
+        return found
+
+    def frame(self, analysis: str) -> DataFrame:
+        """`columns` of an analysis as a table of pandas, by time (s)."""
+        from pandas import DataFrame
+
+        return DataFrame(self.columns(analysis)).set_index("time")
+
+    def _near(self, dataset: str) -> str:
+        known: list[str] = []
+        self._file.visit(known.append)
+        return did_you_mean(dataset, known)

@@ -1,0 +1,1 @@
+"""Stage 2 from a scene to everything that is computed of it."""

@@ -1,0 +1,177 @@
+"""`modes = "auto"`: how many modes of the links a scene needs for its tolerance; it is solved with more and more.
+
+The first solves are cheap: few modes leave out the high frequencies, which hold the steps down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..mbs.model.planar_body import PlanarBody
+from ..mbs.model.truncation import loaded_points, with_fewer_modes
+from ..mbs.quantities.observation import joint_forces, point_motion, trajectory_force
+from ..mbs.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from .solution import Solution
+
+Array = NDArray[np.float64]
+Reported = Mapping[str, Mapping[str, Array]]
+"""Quantities of an analysis by kind and name, (T, …)."""
+Errors = Mapping[str, Mapping[str, float]]
+"""By analysis and kind of quantity, relative to peaks."""
+
+GROWTH = 1.5  # of the number of modes from one solve to the next
+LEAST_RATIO = 0.1  # of two differences one after the other: better ones are luck
+MARGIN = 0.5  # part of the tolerance that an estimate has to meet: it may be too small
+SMALLEST = 1e-3  # of the largest peak of its kind: quantities below are measured against that
+
+
+@dataclass(frozen=True)
+class ModeChoice:
+    """What the search for the number of modes found.
+
+    Attributes:
+        errors: estimated error that leaving out modes makes of the largest quantity of each kind, relative to its peak,
+            by analysis and kind; 0 where all modes of the files were needed.
+        before: likewise, how much the last solve differs from the one before it.
+        tried: numbers of modal coordinates of all bodies together in the solves; the last is the one kept.
+        seconds: of the solves before the last.
+        highest: ω (rad/s) of the highest mode kept, and of the highest there is.
+    """
+
+    errors: Errors
+    before: Errors
+    tried: Sequence[int]
+    seconds: float
+    highest: tuple[float, float]
+
+
+@dataclass
+class ErrorEstimate:
+    """Errors of the last of several solves with more and more modes, from the differences of the last three.
+
+    Where these shrink by a ratio ρ from one to the next, the last solve is off by ρ/(1 − ρ) times the last difference.
+    The largest ratio of any kind counts for all kinds of an analysis, and more than the difference is never assumed.
+    """
+
+    last: Mapping[str, Reported] = field(default_factory=dict)
+    differences: Errors = field(default_factory=dict)
+    errors: Errors = field(default_factory=dict)
+    ratio: float | None = None
+
+    def add(self, reported: Mapping[str, Reported]) -> None:
+        """Take in the next solve, by analysis."""
+        before, self.differences = self.differences, {}
+        if self.last:
+            self.differences = {name: difference(of, self.last[name]) for name, of in reported.items()}
+        self.last = reported
+        ratios = {name: _ratio(of, before[name]) for name, of in self.differences.items() if name in before}
+        self.ratio = max(ratios.values(), default=None)
+        self.errors = {
+            name: {kind: d * _remaining(ratios.get(name, 1.0)) for kind, d in of.items()}
+            for name, of in self.differences.items()
+        }
+
+    def meets(self, tolerances: Mapping[str, float]) -> bool:
+        """Whether all errors are well within the tolerances, by analysis; one difference does not tell."""
+        return self.ratio is not None and self._excess(tolerances) <= MARGIN
+
+    def is_hopeless(self, tolerances: Mapping[str, float], more: int) -> bool:
+        """Whether `more` further solves are not expected to meet the tolerances at the pace so far."""
+        return self.ratio is not None and self._excess(tolerances) * self.ratio**more > MARGIN
+
+    def _excess(self, tolerances: Mapping[str, float]) -> float:
+        return max(max(of.values(), default=0.0) / tolerances[name] for name, of in self.errors.items())
+
+
+def _ratio(now: Mapping[str, float], before: Mapping[str, float]) -> float:
+    """Of two differences one after the other, the largest of all kinds."""
+    return max((now[kind] / max(before[kind], 1e-300) for kind in now if now[kind] > 0.0), default=LEAST_RATIO)
+
+
+def _remaining(ratio: float) -> float:
+    """What is left to come, as a part of the last difference: a geometric series."""
+    ratio = max(ratio, LEAST_RATIO)
+    return min(1.0, ratio / (1.0 - ratio)) if ratio < 1.0 else 1.0
+
+
+def difference(now: Reported, before: Reported) -> dict[str, float]:
+    """By kind, the largest difference of two solves relative to the peak of its quantity."""
+    found = {}
+    for kind, quantities in now.items():
+        peaks = {name: np.abs(values).max(initial=0.0) for name, values in quantities.items()}
+        floor = max(SMALLEST * max(peaks.values(), default=0.0), 1e-300)
+        changes = [
+            float(np.abs(values - before[kind][name]).max(initial=0.0) / max(peaks[name], floor))
+            for name, values in quantities.items()
+        ]
+        found[kind] = max(changes, default=0.0)
+    return found
+
+
+def error_tolerances(scene: Scene) -> dict[str, float]:
+    """What the error of each analysis may be; algebraic ones that do not say follow the tightest that is integrated."""
+    integrated = [analysis.tolerance for analysis in scene.analysis if analysis.kind in ("pcid", "forward")]
+    tightest = min(integrated, default=None)
+    return {
+        analysis.name: tightest
+        if tightest is not None
+        and analysis.kind not in ("pcid", "forward")
+        and "tolerance" not in analysis.model_fields_set
+        else analysis.tolerance
+        for analysis in scene.analysis
+    }
+
+
+def reported(solution: Solution, analysis: str) -> Reported:
+    """Everything of an analysis whose error counts."""
+    outcome = solution.outcomes[analysis]
+    scene, bodies = solution.scene, outcome.assembly.model.bodies
+    points = [f"{body.name}.{point}" for body in bodies if body.n_modes for point in body.points]
+    held = {c.owner for c in outcome.assembly.constraints if c.is_trajectory}
+    joints = {joint.name: joint_forces(outcome, joint.name) for joint in scene.joint}
+    found: dict[str, dict[str, Array]] = {
+        "deflections": {point: point_motion(outcome, point).deflection for point in points},
+        "forces": {f"trajectory {name}": trajectory_force(outcome, name) for name in held}
+        | {f"joint {name}": of.reaction for name, of in joints.items()},
+        "motors": {name: of.motor for name, of in joints.items() if of.motor is not None},
+        "voltages": {body: of.required for body, of in solution.voltages.get(analysis, {}).items()},
+    }
+    return {kind: quantities for kind, quantities in found.items() if quantities}
+
+
+def levels(scene: Scene, bodies: Mapping[str, PlanarBody]) -> list[dict[str, PlanarBody]]:
+    """The flexible bodies with `modes` given, with more and more modes where that is "auto"; the last have all.
+
+    A level has the modes up to one frequency, of all bodies: 1, 2, 3, 5, 8 … of each on average. `bodies` have all.
+    """
+    wanted = {body.name: body.modes for body in scene.body if body.modes is not None}
+    loaded = {name: loaded_points(scene, name) for name in wanted}
+    fixed = {
+        name: with_fewer_modes(bodies[name], modes, loaded[name])
+        for name, modes in wanted.items()
+        if isinstance(modes, int)
+    }
+    auto = {name: bodies[name] for name, modes in wanted.items() if modes == "auto"}
+    if not auto:
+        return [fixed]
+    found = []
+    squares = np.sort(np.concatenate([body.stiffness for body in auto.values()]))
+    each = 1
+    while each * len(auto) < len(squares):
+        cut = squares[each * len(auto) - 1]
+        level = {
+            name: with_fewer_modes(body, int(np.count_nonzero(body.stiffness <= cut)), loaded[name])
+            for name, body in auto.items()
+        }
+        if all(body.reduction is None for body in level.values()):
+            break
+        found.append(fixed | level)
+        each = int(np.ceil(GROWTH * each))
+    return [*found, fixed | auto]

@@ -1,0 +1,58 @@
+"""What a scene does not need, in words: it is not computed, not multiplied, not stored."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..fe_models.modal_body import ModalBody
+from ..mbs.model.planar_body import PlanarBody, vanishing_terms
+from ..mbs.model.truncation import modes_kept
+from ..mbs.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from .bodies import LoadedBody
+
+_STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
+
+_TERMS = {"D_ff": "damping", "S_tilde": "S̃", "j": "j"}
+
+
+def skipped(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
+    """One line for each thing left out."""
+    for name, body in bodies.items():
+        if body.modal is None:
+            continue
+        if not body.computed:
+            yield f"{name}: stage 1, up to date"
+        elif body.reused:
+            yield f"{name}: {_STAGE_1[body.reused]}"
+        yield from _modes(name, body.planar, body.modal)
+    flexible = [name for name, body in bodies.items() if body.modal is not None]
+    rigid = [name for name in bodies if name not in flexible]
+    if rigid:
+        yield f"modal coordinates of {', '.join(rigid)}, rigid"
+    yield "coordinates out of the plane"
+    for term, symbol in _TERMS.items():
+        of = [name for name, body in bodies.items() if term in vanishing_terms(body.planar)]
+        if of:
+            whose = "" if of == flexible else f" of {', '.join(of)}"
+            yield f"{symbol}{whose}, which is zero"
+    algebraic = [analysis.name for analysis in scene.analysis if analysis.kind in ("fcid", "static")]
+    if algebraic:
+        yield f"integration of {', '.join(algebraic)}, algebraic"
+
+
+def _modes(name: str, planar: PlanarBody, modal: ModalBody) -> Iterator[str]:
+    """Modes that do not move in the plane, and those left out by choice."""
+    whole = planar if planar.reduction is None else planar.reduction.whole
+    idle = np.flatnonzero(~whole.modal_transform.any(axis=1))
+    if idle.size:
+        families = Counter(modal.family[k] for k in idle)
+        named = ", ".join(f"{count} {family}" for family, count in families.items())
+        yield f"{name}: {idle.size} of {modal.mode_count} modes, which do not move in the plane ({named})"
+    if planar.reduction is not None:
+        yield f"{name}: all modes but {modes_kept(planar)}"

@@ -1,0 +1,1 @@
+"""The analyses of a scene, one file for each kind."""

@@ -1,0 +1,165 @@
+"""Inverse dynamics with motors only: the analysis `kind = "motors-only"`.
+
+`output = "tip"` follows the path exactly, by stable inversion with pre- and post-actuation where zeros lie in the right
+half plane. `output = "redefined"` follows it with a point nearer the joints, and reports what that leaves at the tip:
+the part of the vibration that the output does not see.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.errors import InputError
+from ..fields.time_functions import spline
+from ..model.model import Array, Model
+from ..scene.analysis_records import Analysis
+from ..solve.initial_state import check_reach, undeformed_state
+from ..solve.integrators import Choice
+from ..solve.servo import SINGULAR, Servo, is_unstable, make_servo
+from ..solve.stable_inversion import Inversion, Linearisation, invert, linearise
+from .analyses import Outcome
+
+DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
+FACTOR_STEP = 0.02  # of the search for the largest factor
+MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
+GROWTH = 1.0  # ln of what a motion of the zero dynamics may grow by along a path and count as bounded
+REST = 1e-9  # speed of a path at rest, relative to its mean speed
+
+
+def run_motors_only(model: Model, analysis: Analysis, progress: Callable[[float], bool]) -> Outcome:
+    """Motion and motor forces for the trajectories, no other force acting.
+
+    Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of reach,
+    and a given factor whose output is not minimum phase; `SolveError` where no equilibrium or no motion is
+    found.
+    """
+    began = time.perf_counter()
+    servo, linear = _output(model, analysis)
+    check_reach(servo.path, undeformed_state(servo.path), analysis.times)
+    needs_future = bool(is_unstable(linear.zeros[0]).any())
+    _check_rest(servo, analysis, needs_future)
+    pre, post = _durations(analysis, linear, needs_future)
+    inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
+    analysis = analysis.model_copy(update={"pre_actuation": pre, "post_actuation": post})
+    return _outcome(analysis, inversion, time.perf_counter() - began)
+
+
+def path_error(inversion: Inversion, times: Array, q: Array) -> Array:
+    """How far (T, components) the specified points, joints and angles themselves are from their path."""
+    path = inversion.servo.path
+    rest = np.zeros(q.shape[1])
+    rows = [i for i, held in enumerate(path.is_trajectory) if held]
+    return np.array([path.system.constraints(t, one, rest)[0][rows] for t, one in zip(times, q, strict=True)])
+
+
+def _output(model: Model, analysis: Analysis) -> tuple[Servo, Linearisation]:
+    """The output the path is for: the point itself, or as near to it as is minimum phase or as the scene says."""
+    end = analysis.end
+    if analysis.output == "tip" or analysis.factor is not None:
+        servo = make_servo(model, end, 1.0 if analysis.output == "tip" else float(analysis.factor or 0.0))
+        linear = linearise(servo, end)
+        _check_relative_degree(servo, linear)
+        if analysis.output == "redefined" and not is_minimum_phase(linear):
+            raise InputError(
+                f'{model.scene.path}: analysis "{analysis.name}": factor: expected one whose output is minimum phase,'
+                f" since it is integrated forward, found {analysis.factor:g} with zeros in the right half plane:"
+                f' {describe_zeros(linear)}; use a smaller factor, leave it out, or use output = "tip"'
+            )
+        return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, linear)
+    for k in range(round(1 / FACTOR_STEP) + 1):
+        servo = make_servo(model, end, max(0.0, 1.0 - k * FACTOR_STEP))
+        linear = linearise(servo, end)
+        if is_minimum_phase(linear):
+            return _with_expected_deflections(replace(servo, factor=MARGIN * servo.factor), linear)
+    raise InputError(
+        f'{model.scene.path}: analysis "{analysis.name}": output: expected a robot whose joint motion is minimum phase'
+        f' for "redefined", found zeros in the right half plane even then: {describe_zeros(linear)}'
+    )
+
+
+def _with_expected_deflections(servo: Servo, linear: Linearisation) -> tuple[Servo, Linearisation]:
+    """The part of the deflections that the output leaves out, replaced by what the path's loads bend without vibration.
+
+    A function of time alone: it changes the output's target, not its zeros.
+    """
+    sag = linearise(replace(servo, factor=1.0), float(linear.times[-1])).shape
+    offset = [f.held(0.0, linear.times[-1]) for f in spline(linear.times, (1 - servo.factor) * sag, at_rest=True)]
+    servo = replace(servo, offset=tuple(offset))
+    return servo, linearise(servo, float(linear.times[-1]))
+
+
+def is_minimum_phase(linear: Linearisation) -> bool:
+    """Whether no zero lies in the right half plane at rest, and none long enough along the path to matter."""
+    at_rest = linear.zeros[[0, -1]]
+    grows = linear.zeros.real.max() * linear.times[-1] > GROWTH
+    return not (is_unstable(at_rest).any() or grows)
+
+
+def describe_zeros(linear: Linearisation) -> str:
+    """The slowest zeros in the right half plane, in 1/s."""
+    row = max(linear.zeros, key=lambda s: float(s.real.max()))
+    found = row[is_unstable(row)]
+    shown = ", ".join(f"{s.real:.4g}{f' ± {s.imag:.4g}i' if s.imag > 0 else ''}" for s in found if s.imag >= 0)
+    return shown if len(shown) < 120 else ", ".join(shown.split(", ")[:4]) + f" … ({len(found)} in all)"
+
+
+def _check_relative_degree(servo: Servo, linear: Linearisation) -> None:
+    """Raise `InputError` where some time of the path the motors cannot accelerate its output."""
+    values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
+    worst = int((values[:, -1] / values[:, 0]).argmin())
+    if values[worst, -1] < SINGULAR * values[worst, 0]:
+        raise InputError(
+            f"{servo.path.model.scene.path}: expected motors that accelerate every component of the path, found at"
+            f" t = {linear.times[worst]:g} s a singular coupling: take another number of modes or another factor"
+        )
+
+
+def _check_rest(servo: Servo, analysis: Analysis, needs_future: bool) -> None:
+    """Raise `InputError` for a path that moves where the robot has to be at rest."""
+    ends = [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
+    for constraint in servo.path.model.trajectories:
+        values = constraint.target.sample(np.linspace(0.0, analysis.end, 101))[0]
+        mean = float(np.ptp(values)) / analysis.end
+        for t in ends:
+            rate = constraint.target(t)[1]
+            if abs(rate) > REST * max(mean, 1.0):
+                raise InputError(
+                    f'{servo.path.model.scene.path}: trajectory "{constraint.owner}": {constraint.component}: expected'
+                    f' a path at rest at t = {t:g} s, before or after which "{analysis.name}" holds it, found the rate'
+                    f" {rate:.4g}: start and end with zero speed, as 10*s**3 - 15*s**4 + 6*s**5 does"
+                )
+
+
+def _durations(analysis: Analysis, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
+    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
+    s = linear.zeros[[0, -1]]
+    grow, decay = s.real[is_unstable(s)], -s.real[s.real < 0]
+    pre = DECAY / grow.min() if needs_future else 0.0
+    post = min(DECAY / decay.min(initial=np.inf), analysis.end) if needs_future else 0.0
+    given = analysis.pre_actuation, analysis.post_actuation
+    chosen = [automatic if value is None else value for automatic, value in zip((pre, post), given, strict=True)]
+    step = analysis.output_step
+    return tuple(math.ceil(value / step - 1e-9) * step for value in chosen)  # type: ignore[return-value]
+
+
+def _outcome(analysis: Analysis, inversion: Inversion, seconds: float) -> Outcome:
+    servo = inversion.servo
+    times = analysis.times
+    inside = times <= inversion.curve.x[-1] + 1e-9 * analysis.end  # what an integration reached
+    run = servo.core().outputs(times[inside].tolist(), inversion.shape, servo.resolver())
+    reached = run.reached
+    how = "two-point problem" if is_unstable(inversion.linearisation.zeros[0]).any() else "integrated forward"
+    outcome = Outcome(
+        analysis, servo.driven, times[:reached], run.q[:reached], run.v[:reached], run.a[:reached],
+        run.multipliers[:reached, : len(servo.driven.constraints)], run.tau[:reached], None,
+        run.residual[:reached], inversion.status,
+        len(inversion.curve.x) - 1, 0, inversion.iterations, seconds, Choice("collocation", how), inversion=inversion,
+    )  # fmt: skip
+    if not reached:  # an iteration that left the numbers: no motion to keep
+        replace(outcome, time_reached=float(inversion.curve.x[0])).check_completed()
+    return outcome

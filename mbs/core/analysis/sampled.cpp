@@ -1,0 +1,121 @@
+#include "core/analysis/sampled.h"
+
+#include <algorithm>
+
+namespace ffrobot {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using VectorMap = Eigen::Map<const VectorXd>;
+
+Sensing::Sensing(const System &system, std::vector<AlongRow> rows, std::vector<OfModes> modes)
+    : system_(system), rows_(std::move(rows)), modes_(std::move(modes)), workspace_(system),
+      readings_(VectorXd::Zero(static_cast<Index>(rows_.size() + modes_.size()))) {
+  for (const auto &sensor : rows_)
+    needs_accelerations_ |= sensor.order == 2;
+}
+
+const VectorXd &Sensing::read(const double *q, const double *v, const double *a) {
+  update_kinematics(system_, q, v, workspace_);
+  Index i = 0;
+  RowMotion motion;
+  for (const auto &[row, order] : rows_) {
+    evaluate(row, workspace_.bodies, motion);
+    readings_[i++] = order == 0   ? motion.value
+                     : order == 1 ? motion.rate
+                                  : row_acceleration(system_, row, motion, q, a, workspace_);
+  }
+  for (const auto &[body, vector, order] : modes_)
+    readings_[i++] = vector.dot(VectorMap((order == 0 ? q : v) + system_.first_coordinate[body] + 3, vector.size()));
+  return readings_;
+}
+
+HeldCommands::HeldCommands(std::size_t motors, std::vector<Patches> patches)
+    : drive_(motors, 0.0), patches_(std::move(patches)) {
+  for (const auto &[body, Phi_V] : patches_)
+    modal_.emplace_back(VectorXd::Zero(Phi_V.rows()));
+}
+
+void HeldCommands::set(const VectorXd &u) {
+  std::copy_n(u.data(), drive_.size(), drive_.begin());
+  auto first = static_cast<Index>(drive_.size());
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const auto &Phi_V = patches_[i].second;
+    modal_[i].noalias() = Phi_V * u.segment(first, Phi_V.cols());
+    first += Phi_V.cols();
+  }
+}
+
+void HeldCommands::steer(double, Workspace &workspace) {
+  std::copy(drive_.begin(), drive_.end(), workspace.external_drive.begin());
+  workspace.has_external_modal = !patches_.empty();
+  for (std::size_t i = 0; i < patches_.size(); ++i)
+    workspace.external_modal[patches_[i].first] = modal_[i];
+}
+
+namespace {
+
+struct Event {
+  double time;
+  std::size_t sample;
+  bool acts; // the command of the sample, which is taken otherwise
+};
+
+// Samples, and the actions of their commands, in order; what lies closer together than a clock tells is at one time.
+std::vector<Event> schedule(const Sampling &sampling, double end) {
+  std::vector<Event> events;
+  const auto &times = sampling.times;
+  const double same = 1e-9 * (times.size() > 1 ? times[1] - times[0] : end);
+  std::size_t acted = 0;
+  const auto act_until = [&](double t, std::size_t taken) {
+    for (; acted < taken && times[acted] + sampling.delay <= t + same; ++acted) {
+      const double then = times[acted] + sampling.delay;
+      events.push_back({then < t - same ? then : t, acted, true});
+    }
+  };
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    act_until(times[k], k);
+    events.push_back({times[k], k, false});
+    if (sampling.delay == 0)
+      act_until(times[k], k + 1);
+  }
+  act_until(end, times.size());
+  return events;
+}
+
+} // namespace
+
+Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
+                const IntegrationControls &controls, HeldCommands &commands, Sensing &sensing, const Sampling &sampling,
+                const std::function<bool(double)> &carry_on) {
+  const System &system = motion.system();
+  OutputEvaluator evaluate(system, times.size(), &commands, nullptr);
+  VectorXd y(2 * q.size()), a = VectorXd::Zero(q.size());
+  y << q, v;
+  std::vector<VectorXd> taken(sampling.times.size());
+  const std::vector<Event> events = schedule(sampling, times.back());
+  Breaks breaks;
+  for (const Event &event : events)
+    breaks.times.push_back(event.time);
+  breaks.at = [&](std::size_t i, double t, const double *state) {
+    const Event &event = events[i];
+    if (event.acts) {
+      commands.set(taken[event.sample]);
+      return;
+    }
+    const double *rates = state + system.coordinates;
+    if (sensing.needs_accelerations()) {
+      commands.steer(t, motion.workspace());
+      accelerations(system, t, state, rates, motion.workspace(), a.data());
+    }
+    taken[event.sample] = sampling.controller(event.sample, t, sensing.read(state, rates, a.data()));
+  };
+  Run result;
+  result.report = integrate(
+      motion, times, y, controls, [&](std::size_t i, double t, const double *state) { evaluate(i, t, state); },
+      carry_on, nullptr, &breaks);
+  result.outputs = evaluate.take(result.report.outputs);
+  return result;
+}
+
+} // namespace ffrobot

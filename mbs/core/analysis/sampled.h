@@ -1,0 +1,71 @@
+// A motion under a sampled controller: sensors are read at samples, commands are held in between.
+#pragma once
+
+#include "core/analysis/run.h"
+
+#include <functional>
+#include <utility>
+#include <vector>
+
+namespace ffrobot {
+
+// What sensors read of a state: the motion along rows and modal coordinates, or their derivatives of an order.
+class Sensing {
+public:
+  struct AlongRow {
+    Row row;
+    int order; // 0 value, 1 rate, 2 acceleration
+  };
+  struct OfModes {
+    std::size_t body;
+    Eigen::VectorXd vector; // (n) reading = vector . p
+    int order;              // 0 or 1
+  };
+
+  Sensing(const System &system, std::vector<AlongRow> rows, std::vector<OfModes> modes);
+
+  Eigen::Index count() const { return readings_.size(); }
+
+  // Readings (count), rows first, of (q, v) with accelerations a, which only sensors of order 2 need.
+  const Eigen::VectorXd &read(const double *q, const double *v, const double *a);
+  bool needs_accelerations() const { return needs_accelerations_; }
+
+private:
+  const System &system_;
+  std::vector<AlongRow> rows_;
+  std::vector<OfModes> modes_;
+  Workspace workspace_;
+  Eigen::VectorXd readings_;
+  bool needs_accelerations_ = false;
+};
+
+// Motor forces on the first drives, in their order, and voltages of patches, all as they were last set.
+class HeldCommands final : public Steering {
+public:
+  using Patches = std::pair<std::size_t, Eigen::MatrixXd>; // body, Phi_V (n, k)
+
+  HeldCommands(std::size_t motors, std::vector<Patches> patches);
+
+  // u: motors, then the patches of one body after the other.
+  void set(const Eigen::VectorXd &u);
+  void steer(double t, Workspace &workspace) override;
+
+private:
+  std::vector<double> drive_;
+  std::vector<Patches> patches_;
+  std::vector<Eigen::VectorXd> modal_; // of each entry of patches_
+};
+
+struct Sampling {
+  std::vector<double> times;
+  double delay = 0; // from a sample to when its command acts
+  // u for readings y at sample k; never asked about time beyond the run
+  std::function<Eigen::VectorXd(std::size_t, double, const Eigen::VectorXd &)> controller;
+};
+
+// As run(); `commands`, which `motion` is steered by, hold what they were set to until the first command acts.
+Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q,
+                const Eigen::VectorXd &v, const IntegrationControls &controls, HeldCommands &commands, Sensing &sensing,
+                const Sampling &sampling, const std::function<bool(double)> &carry_on);
+
+} // namespace ffrobot

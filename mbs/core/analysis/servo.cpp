@@ -1,0 +1,132 @@
+#include "core/analysis/servo.h"
+
+#include <limits>
+
+namespace ffrobot {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+MotorsOnly::MotorsOnly(const System &path, std::vector<Row> motors, const System &driven,
+                       std::vector<std::size_t> motor_constraint, double factor, std::vector<TimeFunction> offset,
+                       VectorXd guess)
+    : path_system_(path), driven_system_(driven), motors_(std::move(motors)),
+      motor_constraint_(std::move(motor_constraint)), factor_(factor), offset_(std::move(offset)),
+      guess_(std::move(guess)), path_(path, guess_), driven_(driven, guess_) {
+  residual_ = p_ = p_dot_ = p_ddot_ = VectorXd::Zero(path.coordinates - static_cast<Index>(3 * path.bodies.size()));
+}
+
+void MotorsOnly::restart() { path_.start_at(guess_); }
+
+bool MotorsOnly::solve(double t, const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
+  output_p_ = factor_ * p;
+  output_p_dot_ = factor_ * p_dot;
+  output_p_ddot_ = factor_ * p_ddot;
+  for (std::size_t k = 0; k < offset_.size(); ++k) {
+    const Jet offset = offset_[k](t);
+    const auto i = static_cast<Index>(k);
+    output_p_[i] += offset.value;
+    output_p_dot_[i] += offset.rate;
+    output_p_ddot_[i] += offset.acceleration;
+  }
+  path_.set_shape(output_p_, output_p_dot_, output_p_ddot_);
+  if (!path_.move(t))
+    return false;
+  const Workspace &w = path_.workspace();
+  RowMotion motion;
+  for (std::size_t i = 0; i < motors_.size(); ++i) {
+    evaluate(motors_[i], w.bodies, motion);
+    const double acceleration =
+        row_acceleration(path_system_, motors_[i], motion, path_.q().data(), path_.a().data(), w);
+    driven_.set_target(t, motor_constraint_[i], {motion.value, motion.rate, acceleration});
+  }
+  driven_.start_at(path_.q()); // the very same frames where factor = 1
+  driven_.set_shape(p, p_dot, p_ddot);
+  if (!driven_.solve(t))
+    return false;
+  Index column = 0;
+  for (const auto &force : driven_.shape_force()) {
+    residual_.segment(column, force.size()) = force;
+    column += force.size();
+  }
+  return true;
+}
+
+bool MotorsOnly::solve(double t, const std::vector<ModalShape> &shape) {
+  Index k = 0;
+  for (const auto &of_body : shape)
+    for (const auto &function : of_body) {
+      const Jet p = function(t);
+      p_[k] = p.value;
+      p_dot_[k] = p.rate;
+      p_ddot_[k++] = p.acceleration;
+    }
+  return solve(t, p_, p_dot_, p_ddot_);
+}
+
+namespace {
+
+// r at one node; NaN where no position is found
+VectorXd residual(MotorsOnly &servo, double t, const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
+  if (servo.solve(t, p, p_dot, p_ddot))
+    return servo.residual();
+  servo.restart();
+  return VectorXd::Constant(servo.modes(), std::numeric_limits<double>::quiet_NaN());
+}
+
+} // namespace
+
+RowMajorMatrix servo_residuals(MotorsOnly &servo, const std::vector<double> &times, const RowMajorMatrix &p,
+                               const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot) {
+  RowMajorMatrix r(p.rows(), p.cols());
+  servo.restart();
+  for (Index i = 0; i < p.rows(); ++i)
+    r.row(i) = residual(servo, times[static_cast<std::size_t>(i)], p.row(i), p_dot.row(i), p_ddot.row(i)).transpose();
+  return r;
+}
+
+InternalDynamics servo_derivatives(MotorsOnly &servo, const std::vector<double> &times, const RowMajorMatrix &p,
+                                   const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot) {
+  constexpr double step = 1e-5;
+  const Index N = p.rows(), n = p.cols();
+  InternalDynamics d{{N, n * n}, {N, n * n}, {N, n * n}};
+  servo.restart();
+  for (Index i = 0; i < N; ++i) {
+    const double t = times[static_cast<std::size_t>(i)];
+    VectorXd x[] = {p.row(i), p_dot.row(i), p_ddot.row(i)};
+    const auto difference = [&](RowMajorMatrix &to, VectorXd &of, double h) {
+      Eigen::Map<RowMajorMatrix> matrix(to.row(i).data(), n, n);
+      for (Index k = 0; k < n; ++k) {
+        const double middle = of[k];
+        of[k] = middle + h;
+        const VectorXd up = residual(servo, t, x[0], x[1], x[2]);
+        of[k] = middle - h;
+        matrix.col(k) = (up - residual(servo, t, x[0], x[1], x[2])) / (2 * h);
+        of[k] = middle;
+      }
+    };
+    residual(servo, t, x[0], x[1], x[2]); // the position that the others start at
+    difference(d.K, x[0], step);
+    difference(d.D, x[1], 1.0);
+    difference(d.M, x[2], 1.0);
+  }
+  return d;
+}
+
+FcidOutputs servo_outputs(MotorsOnly &servo, const std::vector<double> &times, const std::vector<ModalShape> &shape,
+                          ActuationResolver &resolver) {
+  servo.restart();
+  return collect(servo.motion(), times, [&](double t) { return servo.solve(t, shape); }, &resolver);
+}
+
+MotorsOnlyActuation::MotorsOnlyActuation(const System &driven, MotorsOnly servo, std::vector<ModalShape> shape,
+                                         std::vector<bool> is_motor, ActuationResolver resolver)
+    : ActuationSource(driven, std::move(is_motor), std::move(resolver)), system_(driven), servo_(std::move(servo)),
+      shape_(std::move(shape)) {}
+
+void MotorsOnlyActuation::find(double t) {
+  servo_.solve(t, shape_); // was found at all output times before; a failure in between shows as a refused step
+  resolve();
+}
+
+} // namespace ffrobot

@@ -1,0 +1,88 @@
+// Inverse dynamics with motors alone: the path is a servo constraint, whose force enters through the joint motors.
+//
+//     M q_ddot + C_mq^T nu + T_q^T tau = Q,   C_m(q) = 0,   y_a(q) = path(t)
+//
+// T: the motors' coordinates, as many as the mechanism with rigid links has degrees of freedom. With p(t) given, all
+// frames follow from the constraints; the (R, theta) rows then give nu and tau, and the p rows leave a residual
+// r(t, p, p_dot, p_ddot), linear in p_ddot. r = 0 is the internal dynamics (Blajer and Kolodziejczyk 2004; Seifried
+// 2014, ch. 4).
+//
+// The output y_a is where the point would be with the same motor coordinates and the deflections a p + offset(t): the
+// point itself with a = 1 and no offset, joint motion alone with a = 0 (Wang and Vidyasagar 1991; De Luca and Siciliano
+// 1993). The offset is (1 - a) times the deflections that are expected.
+#pragma once
+
+#include "core/analysis/fcid.h"
+#include "core/analysis/replay.h"
+#include "core/analysis/run.h"
+
+#include <vector>
+
+namespace ffrobot {
+
+class MotorsOnly {
+public:
+  // path: under C_m and the specified trajectories; motors: their rows in it. driven: the same bodies under C_m and the
+  // motors' rows, motor i being constraint motor_constraint[i]. offset: one function per mode of all bodies, or empty.
+  // guess: coordinates the first position is found from. Both systems must outlive this.
+  MotorsOnly(const System &path, std::vector<Row> motors, const System &driven,
+             std::vector<std::size_t> motor_constraint, double factor, std::vector<TimeFunction> offset,
+             Eigen::VectorXd guess);
+
+  Eigen::Index modes() const { return residual_.size(); }
+
+  // False where no position is found.
+  bool solve(double t, const Eigen::VectorXd &p, const Eigen::VectorXd &p_dot, const Eigen::VectorXd &p_ddot);
+  bool solve(double t, const std::vector<ModalShape> &shape);
+  void restart(); // the next position is found from the guess
+
+  const Eigen::VectorXd &residual() const { return residual_; } // r: modal forces that nobody supplies
+  const FullyConstrained &motion() const { return driven_; }    // of the robot; its lambda: nu and -tau
+
+private:
+  const System &path_system_, &driven_system_;
+  std::vector<Row> motors_;
+  std::vector<std::size_t> motor_constraint_;
+  double factor_;
+  std::vector<TimeFunction> offset_;
+  Eigen::VectorXd guess_, residual_, p_, p_dot_, p_ddot_, output_p_, output_p_dot_, output_p_ddot_;
+  FullyConstrained path_, driven_;
+};
+
+// r (N, n) at N nodes: times (N), p, p_dot, p_ddot (N, n), all modes of all bodies. NaN where no position is found.
+RowMajorMatrix servo_residuals(MotorsOnly &servo, const std::vector<double> &times, const RowMajorMatrix &p,
+                               const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot);
+
+// Derivatives of r at N nodes, each (N, n n), row after row. r is linear in p_ddot and quadratic in p_dot, so
+// differences are exact there but for rounding; by p they are central ones over 1e-5 of a modal coordinate.
+struct InternalDynamics {
+  RowMajorMatrix M, D, K;
+};
+InternalDynamics servo_derivatives(MotorsOnly &servo, const std::vector<double> &times, const RowMajorMatrix &p,
+                                   const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot);
+
+// Motion and forces for p(t), one row per time that was reached; shape_force is the residual.
+FcidOutputs servo_outputs(MotorsOnly &servo, const std::vector<double> &times, const std::vector<ModalShape> &shape,
+                          ActuationResolver &resolver);
+
+// The motors' forces for p(t), solved anew at every time.
+class MotorsOnlyActuation final : public ActuationSource {
+public:
+  MotorsOnlyActuation(const System &driven, MotorsOnly servo, std::vector<ModalShape> shape, std::vector<bool> is_motor,
+                      ActuationResolver resolver);
+
+  const System &system() const override { return system_; }
+  const Workspace &workspace() const override { return servo_.motion().workspace(); }
+  const Eigen::VectorXd &q() const override { return servo_.motion().q(); }
+  const std::vector<Eigen::VectorXd> &shape_force() const override { return servo_.motion().shape_force(); }
+
+protected:
+  void find(double t) override;
+
+private:
+  const System &system_;
+  MotorsOnly servo_;
+  std::vector<ModalShape> shape_;
+};
+
+} // namespace ffrobot

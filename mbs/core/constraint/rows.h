@@ -1,0 +1,68 @@
+// Scalar functions of marker motions: constraint equations, motor coordinates and the directions of applied loads.
+#pragma once
+
+#include "core/body/planar_body.h"
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace ffrobot {
+
+// A marker of a body, or (body < 0) a point and direction fixed to the ground.
+struct MarkerReference {
+  MarkerReference(int body, int marker, const Eigen::Vector2d &ground)
+      : body(body), marker(marker), ground{Eigen::Vector2d::Zero(), ground, Eigen::Vector2d::Zero(), 0, 0} {}
+
+  int body;
+  int marker;
+  MarkerMotion ground;
+
+  const MarkerMotion &motion(const std::vector<PlanarBodyState> &bodies) const {
+    return body < 0 ? ground : bodies[static_cast<std::size_t>(body)].markers[static_cast<std::size_t>(marker)];
+  }
+};
+
+enum class RowKind {
+  x,     // (r_b - r_a)_x, global
+  y,     // (r_b - r_a)_y, global
+  angle, // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
+  slide, // n . (r_b - r_a), n fixed to the section of a
+  gear,  // n_b alpha_b - n_a alpha_a, the angle between shafts behind gears: (N, N - 1) is that of a rotor on a that
+         // turns N times as fast as b does on a
+};
+
+// Whether the directions of such rows, and with them their coefficients below, move with the bodies.
+constexpr bool moves(RowKind kind) { return kind == RowKind::slide; }
+
+// The only coefficient (x, y, angle) that is not zero in rows that do not move.
+constexpr int component_of(RowKind kind) { return kind == RowKind::gear ? 2 : static_cast<int>(kind); }
+
+struct Row {
+  RowKind kind;
+  MarkerReference a, b;
+  Eigen::Vector2d direction = Eigen::Vector2d::Zero(); // of a slide, in the axes of a; of a gear (n_b, n_a)
+  double offset = 0;                                   // the row's value at its zero
+};
+
+// value, its rate, and acceleration = coefficient_b . (acceleration of b) + coefficient_a . (… of a) + bias, with
+// marker accelerations (x, y, angular). The transposed coefficients spread a force along the row over the markers.
+struct RowMotion {
+  double value = 0, rate = 0, bias = 0;
+  Eigen::Vector3d coefficient_a = Eigen::Vector3d::Zero(), coefficient_b = Eigen::Vector3d::Zero();
+};
+
+void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMotion &motion);
+
+// Adds the wrench of a generalized force of size `force` along the row to its two markers.
+void add_wrench(const Row &row, const RowMotion &motion, double force, std::vector<Eigen::Matrix3Xd> &wrench);
+
+// Partial derivatives of the row with respect to the coordinates (R, theta, p) of all bodies.
+void jacobian(const Row &row, const RowMotion &motion, const std::vector<PlanarBody> &bodies,
+              const std::vector<PlanarBodyState> &states, const std::vector<Eigen::Index> &first_coordinate,
+              Eigen::Ref<Eigen::VectorXd> gradient);
+
+// The part of it that belongs to the frames: (R, theta) of all bodies, three entries each. Adds to `gradient`.
+void add_frame_gradient(const Row &row, const RowMotion &motion, const std::vector<PlanarBodyState> &states,
+                        Eigen::Ref<Eigen::VectorXd> gradient);
+
+} // namespace ffrobot

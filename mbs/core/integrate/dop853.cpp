@@ -1,0 +1,60 @@
+#include "core/integrate/dop853.h"
+
+#include "core/integrate/explicit_stages.h"
+
+#include <cmath>
+
+namespace ffrobot {
+
+using Eigen::Index;
+using Tableau = Dop853Tableau;
+
+Dop853::Dop853(OdeSystem &system)
+    : system_(system), n_(system.size()), K_(Eigen::MatrixXd::Zero(n_, Tableau::dense_stages)), stage_(n_), end_(n_),
+      start_(n_), F_(n_, Tableau::dense_order) {}
+
+bool Dop853::step(double t, const double *y, double h, double) {
+  run_stages<Tableau, 1, Tableau::stages - 1>(system_, t, y, h, K_, stage_);
+  advance<Tableau::b, Tableau::stages>(K_.data(), n_, h, y, end_.data());
+  return true;
+}
+
+double Dop853::estimate(double h, Eigen::VectorXd &error) {
+  constexpr auto all = std::make_index_sequence<Tableau::stages + 1>();
+  double square5 = 0, square3 = 0;
+  for (Index i = 0; i < n_; ++i) {
+    const double e5 = combine<Tableau::e5>(K_.data(), n_, i, all);
+    const double e3 = combine<Tableau::e3>(K_.data(), n_, i, all);
+    error[i] = h * e5;
+    square5 += e5 * e5;
+    square3 += e3 * e3;
+  }
+  const double denominator = square5 + 0.01 * square3;
+  return denominator > 0 ? std::sqrt(square5 / denominator) : (denominator == 0 ? 1.0 : NAN);
+}
+
+void Dop853::prepare_dense(double t, const double *y, double h) {
+  run_stages<Tableau, Tableau::stages + 1, Tableau::dense_stages - 1>(system_, t, y, h, K_, stage_);
+  t0_ = t;
+  h_ = h;
+  start_ = Eigen::Map<const Eigen::VectorXd>(y, n_);
+  F_.col(0) = end_ - start_;
+  F_.col(1) = h * K_.col(0) - F_.col(0);
+  F_.col(2) = 2 * F_.col(0) - h * (K_.col(Tableau::stages) + K_.col(0));
+  for (Index row = 0; row < 4; ++row) {
+    F_.col(3 + row).setZero();
+    for (Index j = 0; j < Tableau::dense_stages; ++j)
+      F_.col(3 + row) += (h * Tableau::d[row][j]) * K_.col(j);
+  }
+}
+
+void Dop853::interpolate(double t, double *y) const {
+  const double x = (t - t0_) / h_;
+  Eigen::Map<Eigen::VectorXd> out(y, n_);
+  out = x * F_.col(Tableau::dense_order - 1);
+  for (int i = Tableau::dense_order - 2; i >= 0; --i)
+    out = (i % 2 == 0 ? x : 1 - x) * (out + F_.col(i));
+  out += start_;
+}
+
+} // namespace ffrobot

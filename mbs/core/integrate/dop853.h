@@ -1,0 +1,40 @@
+// DOP853 (Hairer, Norsett, Wanner 1993): order 8, error estimate of orders 5 and 3, dense output of order 7.
+#pragma once
+
+#include "core/integrate/dop853_tableau.h"
+#include "core/integrate/method.h"
+
+#include <cmath>
+
+namespace ffrobot {
+
+class Dop853 final : public Method {
+public:
+  explicit Dop853(OdeSystem &system);
+
+  bool step(double t, const double *y, double h, double tolerance) override;
+  bool correct(double t) override { return system_.correct(t, end_.data()); }
+
+  // Estimate of order 5, and the factor that the estimate of order 3 brings it down by: together they shrink as h^8.
+  double estimate(double h, Eigen::VectorXd &error) override;
+  double error_order() const override { return 8; }
+  double share(double fraction) const override { return std::sqrt(fraction) / 8; }
+
+  bool lands_on_outputs() const override { return false; }
+  void prepare_dense(double t, const double *y, double h) override; // three more slopes
+  void interpolate(double t, double *y) const override;
+
+  double *end() override { return end_.data(); }
+  double *first_slope() override { return K_.data(); }
+  double *last_slope() override { return K_.col(Dop853Tableau::stages).data(); }
+
+private:
+  OdeSystem &system_;
+  Eigen::Index n_;
+  Eigen::MatrixXd K_; // slopes, (n, dense_stages)
+  Eigen::VectorXd stage_, end_, start_;
+  Eigen::MatrixXd F_; // (n, dense_order)
+  double t0_ = 0, h_ = 0;
+};
+
+} // namespace ffrobot

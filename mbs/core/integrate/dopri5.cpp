@@ -1,0 +1,44 @@
+#include "core/integrate/dopri5.h"
+
+#include "core/integrate/explicit_stages.h"
+
+namespace ffrobot {
+
+using Eigen::Index;
+using Tableau = Dopri5Tableau;
+
+Dopri5::Dopri5(OdeSystem &system)
+    : system_(system), n_(system.size()), K_(Eigen::MatrixXd::Zero(n_, Tableau::stages + 1)), stage_(n_), end_(n_),
+      start_(n_), F_(n_, 4) {}
+
+bool Dopri5::step(double t, const double *y, double h, double) {
+  run_stages<Tableau, 1, Tableau::stages - 1>(system_, t, y, h, K_, stage_);
+  advance<Tableau::b, Tableau::stages>(K_.data(), n_, h, y, end_.data());
+  return true;
+}
+
+double Dopri5::estimate(double h, Eigen::VectorXd &error) {
+  for (Index i = 0; i < n_; ++i)
+    error[i] = h * combine<Tableau::e>(K_.data(), n_, i, std::make_index_sequence<Tableau::stages + 1>());
+  return 1;
+}
+
+void Dopri5::prepare_dense(double t, const double *y, double h) {
+  t0_ = t;
+  h_ = h;
+  start_ = Eigen::Map<const Eigen::VectorXd>(y, n_);
+  F_.col(0) = end_ - start_;
+  F_.col(1) = h * K_.col(0) - F_.col(0);
+  F_.col(2) = F_.col(0) - h * K_.col(Tableau::stages) - F_.col(1);
+  F_.col(3).setZero();
+  for (Index j = 0; j <= Tableau::stages; ++j)
+    F_.col(3) += (h * Tableau::d[j]) * K_.col(j);
+}
+
+void Dopri5::interpolate(double t, double *y) const {
+  const double x = (t - t0_) / h_;
+  Eigen::Map<Eigen::VectorXd>(y, n_) =
+      start_ + x * (F_.col(0) + (1 - x) * (F_.col(1) + x * (F_.col(2) + (1 - x) * F_.col(3))));
+}
+
+} // namespace ffrobot

@@ -1,0 +1,53 @@
+// Generalized-alpha on the equations of motion with constraints: order 2, adaptive, damping at high frequencies to
+// taste. J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993); M. Arnold, O. Bruels, Multibody Syst. Dyn. 18 (2007); in
+// the stabilised index-2 form of M. Arnold, O. Bruels, A. Cardona, Numer. Math. 129 (2015): velocities meet C_dot = 0
+// by the multipliers of the equations of motion, positions meet C = 0 by multipliers of their own.
+#pragma once
+
+#include "core/integrate/implicit_projection.h"
+#include "core/integrate/method.h"
+
+namespace ffrobot {
+
+class GeneralizedAlpha final : public Method {
+public:
+  // spectral_radius: what a step leaves of vibrations far above 1 / h; 1: no damping, 0: all of it
+  GeneralizedAlpha(ImplicitSystem &system, double spectral_radius);
+
+  bool step(double t, const double *y, double h, double tolerance) override;
+  bool correct(double t) override { return project_(t, end_.data()); }
+  double estimate(double h, Eigen::VectorXd &error) override;
+  double error_order() const override { return 3; }
+  double share(double fraction) const override { return 4 * fraction; }
+  void accept(double h) override;
+  void restart() override {
+    started_ = false;
+    previous_step_ = 0;
+  }
+
+  bool lands_on_outputs() const override { return true; }
+  void prepare_dense(double t, const double *y, double h) override;
+  void interpolate(double t, double *y) const override; // cubic Hermite polynomial
+
+  double *end() override { return end_.data(); }
+  double *first_slope() override { return first_slope_.data(); }
+  double *last_slope() override { return last_slope_.data(); }
+
+private:
+  void start(double t, const double *y, double h);
+  void advance(const double *y, double h);    // end_ from the accelerations
+  void stiff_force(const Eigen::VectorXd &x); // force_ = (N - M) x
+
+  ImplicitSystem &system_;
+  ImplicitProjection project_;
+  Eigen::Index n_; // coordinates
+  double alpha_m_, alpha_f_, beta_, gamma_, leading_;
+  double damping_factor_ = 0, stiffness_factor_ = 0;
+  // v_dot: accelerations at the start, end and before; a: the method's own, behind them by alpha_m - alpha_f steps
+  Eigen::VectorXd v_dot_, next_v_dot_, previous_v_dot_, drift_, a_, next_a_, position_correction_;
+  Eigen::VectorXd end_, start_, first_slope_, last_slope_, change_, excess_, force_, x_, value_, rate_, c_;
+  double previous_step_ = 0, t0_ = 0, h_ = 0;
+  bool started_ = false, at_start_ = true;
+};
+
+} // namespace ffrobot

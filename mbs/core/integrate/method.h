@@ -1,0 +1,66 @@
+// One-step methods, interchangeable: what the driver of an integration (integrate.h) needs of them.
+#pragma once
+
+#include "core/integrate/ode.h"
+
+#include <Eigen/Core>
+
+#include <memory>
+#include <string>
+
+namespace ffrobot {
+
+class Method {
+public:
+  virtual ~Method() = default;
+
+  // One step from (t, y) with the slope there in first_slope(); the result, before any correction, is in end().
+  // `tolerance` bounds what iterations may leave. False where the equations of the step could not be solved.
+  virtual bool step(double t, const double *y, double h, double tolerance) = 0;
+
+  // Moves end() back onto the invariants; false where that fails.
+  virtual bool correct(double t) = 0;
+
+  // Error of the step of size h just made, and a factor on its size; needs last_slope(), the slope at end(), set by the
+  // caller.
+  virtual double estimate(double h, Eigen::VectorXd &error) = 0;
+
+  virtual double error_order() const = 0; // the estimate shrinks as h^error_order
+
+  // Part of the tolerance that the estimate of one step may take, which covers `fraction` of the run. The estimates of
+  // single steps add up like a random walk where errors scatter, step by step where they all point the same way;
+  // factors are from tests/mbs/test_integrator.py, errors against tolerances.
+  virtual double share(double fraction) const = 0;
+
+  // Whether a step leaves little of vibrations that it does not resolve. They are an error once, not at every step.
+  virtual bool damps() const { return false; }
+
+  // The step just made was accepted: its corrected end and last slope are those of the next step's start.
+  virtual void accept(double) {}
+
+  // Loads jump here, and the first slope with them: what earlier steps tell of slopes is of no use for the next.
+  virtual void restart() {}
+
+  // Whether steps have to end at output times, or there is an interpolation as good as the steps.
+  virtual bool lands_on_outputs() const = 0;
+
+  // Coefficients for interpolate() within the step just made.
+  virtual void prepare_dense(double t, const double *y, double h) = 0;
+  virtual void interpolate(double t, double *y) const = 0;
+
+  virtual double *end() = 0;
+  virtual double *first_slope() = 0;
+  virtual double *last_slope() = 0;
+};
+
+enum class MethodKind { dopri5, dop853, radau, generalized_alpha };
+
+struct MethodChoice {
+  MethodKind kind = MethodKind::dop853;
+  double spectral_radius = 0.8; // of generalized-alpha at infinite frequency
+};
+
+// The system must outlive the method.
+std::unique_ptr<Method> make_method(const MethodChoice &choice, ImplicitSystem &system);
+
+} // namespace ffrobot

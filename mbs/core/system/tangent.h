@@ -1,0 +1,60 @@
+// Exact derivatives of the equations of motion F = M a - Q + C_q^T lambda = 0 and of rows, from formulas.
+//
+// The linear equations of a motion (q, v, a, lambda) are
+//     M da + D dv + K dq + C_q^T dlambda = dQ of the inputs,     D = -dQ/dv,  K = dF/dq at fixed lambda and drives.
+#pragma once
+
+#include "core/system/system.h"
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace ffrobot {
+
+struct Tangent {
+  explicit Tangent(Eigen::Index coordinates)
+      : M(Eigen::MatrixXd::Zero(coordinates, coordinates)), D(M), K(M), force(coordinates) {}
+
+  Eigen::MatrixXd M, D, K; // (coordinates, coordinates)
+  Eigen::VectorXd force;   // M a - Q (coordinates), drives taken off
+};
+
+// Derivatives of the accelerations of rows (rows, coordinates): row_ddot = by_acceleration a + ...; the first is the
+// Jacobian of the rows' values too, and by_velocity is twice the derivative of row_dot with respect to q.
+struct RowTangents {
+  RowTangents(Eigen::Index rows, Eigen::Index coordinates)
+      : by_acceleration(rows, coordinates), by_velocity(rows, coordinates), by_position(rows, coordinates) {}
+
+  Eigen::MatrixXd by_acceleration, by_velocity, by_position;
+};
+
+// M, D, K and the force of the bodies, and of the drives (external ones too) as they are at time t.
+// Leaves the kinematics of (q, v) in w, on which the functions below rest.
+void tangent(const System &system, double t, const double *q, const double *v, const double *a, Workspace &w,
+             Tangent &result);
+
+// K += multiplier d2(row)/dq2: what a force -multiplier along the row adds. After tangent.
+void add_row_curvature(const System &system, const Row &row, double multiplier, const Workspace &w,
+                       Eigen::Ref<Eigen::MatrixXd> K);
+
+// Row i of `result`. After tangent, or anything else that sets the kinematics of (q, v).
+void row_tangent(const System &system, const Row &row, const double *q, const double *v, const double *a,
+                 const Workspace &w, Eigen::Index i, RowTangents &result);
+
+// M, D, K of one body (its block of the system's), without applied loads. After kinematics.
+void tangent(const PlanarBody &body, const PlanarBodyState &state, const double *q, const double *v, const double *a,
+             const Eigen::Vector2d &gravity, Eigen::Ref<Eigen::MatrixXd> M, Eigen::Ref<Eigen::MatrixXd> D,
+             Eigen::Ref<Eigen::MatrixXd> K);
+
+// K += d2(wrench . (x, y, angle) of marker k)/dq2 of one body, the wrench in global axes and fixed.
+void add_marker_curvature(const PlanarBody &body, const PlanarBodyState &state, Eigen::Index k,
+                          const Eigen::Vector3d &wrench, Eigen::Ref<Eigen::MatrixXd> K);
+
+// Derivatives (3, coordinates of the body) of the acceleration (x, y, angular) of a marker, as RowTangents.
+struct MarkerTangent {
+  Eigen::Matrix3Xd by_acceleration, by_velocity, by_position;
+};
+void marker_tangent(const PlanarBody &body, const PlanarBodyState &state, Eigen::Index k, const double *v,
+                    const double *a, MarkerTangent &result);
+
+} // namespace ffrobot

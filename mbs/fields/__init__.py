@@ -1,0 +1,1 @@
+"""What the records of a scene are made of: names, references to points, functions of time."""

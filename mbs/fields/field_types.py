@@ -1,0 +1,102 @@
+"""What the records of a scene file are made of: names, points, expressions in t, checks of keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
+
+from ...common.validation import Record, existing_file, quoted
+from .._core import TimeFunction
+from .time_functions import Waypoints, load_waypoints, parse_expression, user_function
+
+GROUND = "ground"
+
+T = TypeVar("T")
+
+
+def split_point(reference: str) -> tuple[str, str]:
+    """`"link1.tip"` → `("link1", "tip")`. Raises `ValueError` when it is not of the form BODY.POINT."""
+    body, dot, point = reference.partition(".")
+    if not (body and dot and point) or "." in point:
+        raise ValueError(f'expected a point as "BODY.POINT", found "{reference}"')
+    return body, point
+
+
+def _time_function(value: object, info: ValidationInfo) -> TimeFunction:
+    if isinstance(value, TimeFunction):
+        return value
+    objects = (info.context or {}).get("objects", {})
+    if isinstance(value, str) and value in objects:
+        return user_function(objects[value])
+    if isinstance(value, str):
+        return parse_expression(value)
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return parse_expression(repr(value))
+    raise ValueError(f"expected an expression in t, found {value!r}")
+
+
+def _name(value: str) -> str:
+    """Names become groups of the results file and parts of "BODY.POINT"."""
+    if not value or value != value.strip() or "/" in value or "." in value:
+        raise ValueError(f'expected a name without "/", "." and blanks around it, found "{value}"')
+    return value
+
+
+def _point(value: str) -> str:
+    split_point(value)
+    return value
+
+
+def _side(value: str) -> str:
+    if value != GROUND:
+        split_point(value)
+    return value
+
+
+def _waypoints(value: object, info: ValidationInfo) -> Waypoints:
+    if isinstance(value, Waypoints):
+        return value
+    if not isinstance(value, str):
+        raise ValueError(f"expected the name of a CSV file in quotes, found {value!r}")
+    return load_waypoints(existing_file(Path(value), info))
+
+
+def _not_empty(entries: tuple[T, ...]) -> tuple[T, ...]:
+    # Not a min_length: pydantic would complain about that, too, whenever an entry is wrong.
+    if not entries:
+        raise ValueError("expected at least one entry, found none")
+    return entries
+
+
+def one_of(record: Record, keys: tuple[str, ...], why: str = "") -> str:
+    """The one key of `keys` that is set. Raises `ValueError` when there is none or more than one."""
+    found = [key for key in keys if getattr(record, key) is not None]
+    if len(found) != 1:
+        raise ValueError(f"expected exactly one of the keys {quoted(keys)}{why}, found {quoted(found)}")
+    return found[0]
+
+
+def only(record: Record, subject: str, allowed: tuple[str, ...], optional: tuple[str, ...]) -> list[str]:
+    """Which of the `optional` keys are set. Raises `ValueError` unless all are `allowed` and there is at least one."""
+    found = [key for key in optional if getattr(record, key) is not None]
+    if not found or not set(found) <= set(allowed):
+        raise ValueError(f'expected the keys {quoted(allowed)} beside "{subject}", found {quoted(found)}')
+    return found
+
+
+def present(**functions: TimeFunction | None) -> dict[str, TimeFunction]:
+    """Those that are given, by name."""
+    return {name: function for name, function in functions.items() if function is not None}
+
+
+Name = Annotated[str, AfterValidator(_name)]
+PointReference = Annotated[str, AfterValidator(_point)]
+Side = Annotated[str, AfterValidator(_side)]
+Vector2 = tuple[float, float]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Expression = Annotated[TimeFunction, PlainValidator(_time_function, json_schema_input_type=str | float)]
+WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints, json_schema_input_type=str)]
+NotEmpty = AfterValidator(_not_empty)

@@ -1,0 +1,123 @@
+"""Geometric stiffening of a planar body: what loads along a link do to its bending stiffness, and the energy with it.
+
+A unit load has the geometric stiffness K (n, n) of the prestress it causes. By virtual work, the displacement along
+that load is then Φp − ½ pᵀK p: to second order, a bent link is shorter. Everything else follows from it: mass matrix,
+velocity terms, gravity, constraints (formulation.md, section 4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ...fe_models.modal_body import ModalBody
+    from ..analysis.analyses import Outcome
+
+Array = NDArray[np.float64]
+NEGLIGIBLE = 1e-12
+NOTABLE = 0.01  # relative change of a mode's stiffness from which on the summary warns, and "auto" switches it on
+
+
+@dataclass(frozen=True)
+class GeometricStiffening:
+    """K of unit loads, in the modal coordinates of a `PlanarBody`; positive where it stiffens.
+
+    K_omega (n, n) of θ̇² = 1; K_s (2, n, n) of forces ρ along x and y (the opposite of a frame acceleration); K_h (n, n)
+    likewise of an angular acceleration; K_points: (3, n, n) of forces along x and y and a moment at each interface.
+    """
+
+    K_omega: Array
+    K_s: Array
+    K_h: Array
+    K_points: Mapping[str, Array]
+
+    def transformed(self, T: Array) -> GeometricStiffening:
+        """In coordinates p' with p = T p'."""
+        points = {name: T.T @ K @ T for name, K in self.K_points.items()}
+        return GeometricStiffening(
+            T.T @ self.K_omega @ T, T.T @ self.K_s @ T, T.T @ self.K_h @ T, MappingProxyType(points)
+        )
+
+    def with_payload(self, point: str, position: Array, mass: float, inertia: float) -> GeometricStiffening:
+        """With a mass (kg) and moment of inertia (kg·m²) at one of its points: the loads of their inertia are added."""
+        n = len(self.K_h)
+        K_x, K_y, K_phi = self.K_points.get(point, np.zeros((3, n, n)))
+        x, y = position
+        return GeometricStiffening(
+            self.K_omega + mass * (x * K_x + y * K_y),
+            self.K_s + mass * np.array([K_x, K_y]),
+            self.K_h + mass * (x * K_y - y * K_x) + inertia * K_phi,
+            self.K_points,
+        )
+
+
+def from_modal_body(body: ModalBody, in_plane: NDArray[np.intp]) -> GeometricStiffening | None:
+    """What the file of a modal body holds for planar motion; None where it holds nothing of the kind."""
+    K = {load: matrix[np.ix_(in_plane, in_plane)] for load, matrix in body.geometric_stiffness.items()}
+    if "omega_zz" not in K:
+        return None
+    points = {
+        name: np.array([K[f"force/{name}/x"], K[f"force/{name}/y"], K[f"moment/{name}/z"]])
+        for name in body.interfaces
+        if f"force/{name}/x" in K
+    }
+    # The file's loads are d'Alembert's: opposite to the acceleration.
+    return GeometricStiffening(K["omega_zz"], np.array([-K["t_x"], -K["t_y"]]), -K["r_z"], MappingProxyType(points))
+
+
+def core_arguments(stiffening: GeometricStiffening | None, markers: list[str]) -> dict[str, list[Array] | Array]:
+    """`second_order` (by rows of W) and `K_omega` of `_core.System.add_body`; empty where they vanish."""
+    none = np.zeros((0, 0))
+    if stiffening is None:
+        return {"second_order": [], "K_omega": none}
+    n = len(stiffening.K_omega)
+    rows = [*stiffening.K_s, stiffening.K_h]
+    for name in markers:
+        rows += list(stiffening.K_points.get(name, np.zeros((3, n, n))))
+    largest = max((float(np.abs(K).max(initial=0.0)) for K in [*rows, stiffening.K_omega]), default=0.0)
+    rows = [K if np.abs(K).max(initial=0.0) > NEGLIGIBLE * largest else none for K in rows]
+    return {"second_order": rows, "K_omega": stiffening.K_omega if n else none}
+
+
+def second_order_displacement(stiffening: GeometricStiffening | None, point: str, p: Array) -> Array:
+    """−½ pᵀK p (T, 2) of a point, for p (T, n), in body axes; zero where it is not known."""
+    if stiffening is None or point not in stiffening.K_points:
+        return np.zeros((len(p), 2))
+    displacement: Array = -0.5 * np.einsum("ti,kij,tj->tk", p, stiffening.K_points[point][:2], p)
+    return displacement
+
+
+def estimated_effect(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> float:
+    """Largest relative change of a mode's stiffness by the loads of a run, whether it was on in the run or not.
+
+    Loads are those of θ̇², of the frame's acceleration less gravity, of θ̈, and of the constraints.
+    """
+    assembly, gravity = outcome.assembly, np.array(outcome.assembly.model.scene.gravity)
+    wrenches = assembly.constraint_wrenches(outcome.q, outcome.lambda_)
+    largest = 0.0
+    for body in assembly.model.bodies:
+        known = stiffening.get(body.name)
+        if known is None or not body.n_modes:
+            continue
+        columns = outcome.coordinates(body.name)
+        q, v, a = outcome.q[:, columns], outcome.v[:, columns], outcome.a[:, columns]
+        diagonal = np.outer(v[:, 2] ** 2, np.diag(known.K_omega)) - np.outer(a[:, 2], np.diag(known.K_h))
+        pull = _in_body_axes(q[:, 2], gravity - a[:, :2])
+        diagonal += pull @ np.einsum("kii->ki", known.K_s)
+        for point, wrench in wrenches.get(body.name, {}).items():
+            if point in known.K_points:
+                loads = np.column_stack([_in_body_axes(q[:, 2], wrench[:, :2]), wrench[:, 2]])
+                diagonal += loads @ np.einsum("kii->ki", known.K_points[point])
+        largest = max(largest, float((np.abs(diagonal) / body.stiffness).max(initial=0.0)))
+    return largest
+
+
+def _in_body_axes(theta: Array, vector: Array) -> Array:
+    c, s = np.cos(theta), np.sin(theta)
+    return np.column_stack([c * vector[:, 0] + s * vector[:, 1], c * vector[:, 1] - s * vector[:, 0]])

@@ -1,0 +1,150 @@
+"""What is reported of a run: motion of points, forces of trajectories, reactions and moments of joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import _core
+from ..analysis.analyses import Outcome
+from ..fields.field_types import split_point
+from ..model.geometric_stiffening import second_order_displacement
+from ..model.measures import End
+from ..model.model import Array, Assembly, Constraint
+from ..model.planar_body import PlanarBody
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """Motion of a body's frame and modes, one row per output; p as `stored_coordinates` says."""
+
+    position: Array  # (T, 2) R, m
+    angle: Array  # (T,) θ, rad
+    modal: Array  # (T, n)
+    modal_velocity: Array  # (T, n)
+    velocity: Array  # (T, 2) m/s
+    angular_velocity: Array  # (T,) rad/s
+
+
+@dataclass(frozen=True)
+class PointMotion:
+    """Motion of a point of a body."""
+
+    position: Array  # (T, 2) global, m
+    deflection: Array  # (T, 2) Φ p in the body frame, m
+
+
+@dataclass(frozen=True)
+class JointForces:
+    """Constraint force on the second body of a joint in global axes, and constraint moment (weld, prismatic)."""
+
+    reaction: Array  # (T, 2) N
+    reaction_moment: Array | None  # (T,) N·m
+    motor: Array | None  # (T,) N·m, or N for a prismatic joint
+
+
+def body_motion(outcome: Outcome, body: PlanarBody) -> BodyMotion:
+    """Motion of `body` in an analysis."""
+    columns = outcome.coordinates(body.name)
+    q, v = outcome.q[:, columns], outcome.v[:, columns]
+    T = body.modal_transform if stored_coordinates(body) is None else np.eye(body.n_modes)
+    return BodyMotion(q[:, :2], q[:, 2], q[:, 3:] @ T.T, v[:, 3:] @ T.T, v[:, :2], v[:, 2])
+
+
+def stored_coordinates(body: PlanarBody) -> Array | None:
+    """What makes p of the modal body file (n_file, n) of the coordinates that results give; None where they give p.
+
+    They give the coordinates of the equations where these are fewer than the modes of the file.
+    """
+    n_file, n = body.modal_transform.shape
+    return body.modal_transform if n < n_file else None
+
+
+def modes_of_file(outcome: Outcome, body: PlanarBody) -> Array:
+    """P (T, n_file) in the modes of the modal body file."""
+    return np.asarray(outcome.q[:, outcome.coordinates(body.name)][:, 3:] @ body.modal_transform.T)
+
+
+def point_motion(outcome: Outcome, reference: str) -> PointMotion:
+    """Motion of "BODY.POINT": r = R + A (x + Φ p), and what geometric stiffening takes off Φp where it is on."""
+    name, label = split_point(reference)
+    body = outcome.assembly.model.body(name)
+    point = body.points[label]
+    q = outcome.q[:, outcome.coordinates(name)]
+    deflection = q[:, 3:] @ point.translation.T + second_order_displacement(body.stiffening, label, q[:, 3:])
+    return PointMotion(q[:, :2] + rotated(q[:, 2], point.position + deflection), deflection)
+
+
+def trajectory_force(outcome: Outcome, trajectory: str) -> Array:
+    """−λ_s (T, m): the force on the point in global axes, or the moment on the joint; a column per component."""
+    columns = [i for i, c in enumerate(outcome.assembly.constraints) if c.is_trajectory and c.owner == trajectory]
+    order = [c.component for c in outcome.assembly.model.trajectories if c.owner == trajectory]
+    columns.sort(key=lambda i: order.index(outcome.assembly.constraints[i].component))
+    return -outcome.lambda_[:, columns]
+
+
+def trajectory_target(outcome: Outcome, trajectory: str) -> Array:
+    """Specified values (T, m) in the order of `trajectory_force`; held before 0 and after the end of the analysis."""
+    targets = [c.target for c in outcome.assembly.model.trajectories if c.owner == trajectory]
+    return np.column_stack([target.sample(np.clip(outcome.time, 0.0, outcome.analysis.end))[0] for target in targets])
+
+
+def joint_forces(outcome: Outcome, joint: str) -> JointForces:
+    """Reaction of a joint on its second body, and what its motor does."""
+    reaction, moment = np.zeros((len(outcome.time), 2)), None
+    for i, constraint in enumerate(outcome.assembly.constraints):
+        if constraint.is_trajectory or constraint.owner != joint:
+            continue
+        force = -outcome.lambda_[:, i]
+        match constraint.row.kind:
+            case _core.RowKind.x:
+                reaction[:, 0] += force
+            case _core.RowKind.y:
+                reaction[:, 1] += force
+            case _core.RowKind.slide:
+                reaction += force[:, None] * _direction(outcome, constraint)
+            case _core.RowKind.angle:
+                moment = force
+    motors = list(outcome.assembly.model.motors)
+    moments = outcome.motor_moments
+    motor = moments[:, motors.index(joint)] if moments is not None and joint in motors else None
+    return JointForces(reaction, moment, motor)
+
+
+def motor_angle(outcome: Outcome, joint: str) -> Array | None:
+    """θ_m (T,) of the motor of a joint whose gear gives, behind the gear; None of others."""
+    if joint in outcome.gears:
+        return outcome.gears[joint].angle
+    model = outcome.assembly.model
+    rows = [gear.motor for gear in model.gears if gear.joint == joint]
+    if not rows:
+        return None
+    assembly = Assembly(model, model.joints, (), rows)
+    sensing = _core.Sensing(assembly.system, [(assembly.motor_rows[0], 0)], [])
+    angle: Array = sensing.read(outcome.q, outcome.v, outcome.a)[:, 0]
+    return angle
+
+
+def energies(outcome: Outcome) -> dict[str, Array]:
+    """Kinetic, strain and gravitational energy (J) and dissipated power (W), each (T,)."""
+    values = outcome.assembly.system.energies(outcome.q, outcome.v)
+    return dict(zip(("kinetic", "strain", "gravitational", "dissipated_power"), values.T, strict=True))
+
+
+def _direction(outcome: Outcome, constraint: Constraint) -> Array:
+    """The direction (T, 2) of a slide in global axes: fixed to the section of its first end."""
+    return rotated(_section_angle(outcome, constraint.row.a), np.array(constraint.row.direction))
+
+
+def _section_angle(outcome: Outcome, end: End) -> Array:
+    if end.body is None:
+        return np.zeros(len(outcome.time))
+    q = outcome.q[:, outcome.coordinates(end.body)]
+    return q[:, 2] + q[:, 3:] @ outcome.assembly.model.body(end.body).points[end.point].rotation
+
+
+def rotated(theta: Array, vector: Array) -> Array:
+    """A(θ) times vectors of the body frame, (T, 2)."""
+    x, y = np.broadcast_to(vector, (len(theta), 2)).T
+    return np.column_stack([np.cos(theta) * x - np.sin(theta) * y, np.sin(theta) * x + np.cos(theta) * y])

@@ -1,0 +1,1 @@
+"""The records of a scene file, and loading them."""

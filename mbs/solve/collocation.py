@@ -1,0 +1,193 @@
+"""Collocation of second-order equations r(t, p, ṗ, p̈) = 0 between two boundary conditions.
+
+On each interval p̈ is a polynomial through its values K at a few points; p and ṗ are its integrals, continuous at the
+breaks (Ascher, Christiansen and Russell 1981). Gauss points carry growing and decaying solutions alike, whatever the
+size of an interval (Ascher, Mattheij and Russell 1995, ch. 10).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..model.model import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+STAGES = 4
+MOST_ITERATIONS = 25
+TOLERANCE = 1e-12  # of the last Newton step, relative to the peak of its quantity
+ROUNDING = 1e-8  # below which a step that no longer shrinks is rounding
+
+
+class Boundary(NamedTuple):
+    """rows · (y − y_0) = 0 for y = (p, ṗ): rows (k, 2n), y_0 (2n,)."""
+
+    rows: Array
+    state: Array
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The equations, for N nodes at once: times (N,), p, ṗ, p̈ (N, n).
+
+    residual(times, p, ṗ, p̈) gives r (N, n). derivatives(times) gives ∂r/∂p̈, ∂r/∂ṗ, ∂r/∂p, each (N, n, n): they only
+    set the pace of Newton's method. `scale` (n,) is about |ṗ|/|p|, 1/s, `size` a typical |scale · p|. All conditions at
+    the start make it an initial value problem; then intervals have to resolve vibrations, or those of varying equations
+    grow.
+    """
+
+    residual: Callable[[Array, Array, Array, Array], Array]
+    derivatives: Callable[[Array], tuple[Array, Array, Array]]
+    scale: Array
+    size: float
+    start: Boundary
+    end: Boundary
+
+
+class Scheme(NamedTuple):
+    """Points c (s,) on [0, 1] and what integrals of the polynomial through values there are: once, twice."""
+
+    c: Array
+    to_powers: Array  # (s, s) values → coefficients of 1, ξ, ξ² …
+    stage_once: Array  # (s, s)
+    stage_twice: Array
+    end_once: Array  # (s,)
+    end_twice: Array
+
+
+def gauss(stages: int = STAGES) -> Scheme:
+    """Collocation at the zeros of the Legendre polynomial (Hairer, Nørsett and Wanner, II.7)."""
+    c = (np.polynomial.legendre.leggauss(stages)[0] + 1) / 2  # type: ignore[no-untyped-call]
+    m = np.arange(stages)
+    to_powers = np.linalg.inv(c[:, None] ** m)
+    once, twice = 1 / (m + 1), 1 / ((m + 1) * (m + 2))
+    return Scheme(
+        c, to_powers, c[:, None] ** (m + 1) * once @ to_powers, c[:, None] ** (m + 2) * twice @ to_powers,
+        once @ to_powers, twice @ to_powers,
+    )  # fmt: skip
+
+
+GAUSS = gauss()
+
+
+@dataclass(frozen=True)
+class Found:
+    """p(t) as piecewise polynomials, (n,) values; whether Newton's method converged, and its iterations."""
+
+    curve: PPoly
+    converged: bool
+    iterations: int
+
+
+def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Array, Array, Array]]) -> Found:
+    """Solve on the given breaks (N+1,) from a guess of (p, ṗ, p̈) at any times."""
+    h = np.diff(breaks)
+    times = breaks[:-1, None] + h[:, None] * GAUSS.c
+    n = len(problem.scale)
+    derivatives = [x.reshape(*times.shape, n, n) for x in problem.derivatives(times.ravel())]
+    linear = _LinearSystem(problem, breaks, derivatives)
+    p, v = guess(breaks)[:2]
+    K = guess(times.ravel())[2].reshape(*times.shape, n)
+    previous, converged, iteration = np.inf, False, 0
+    while not converged and iteration < MOST_ITERATIONS:
+        iteration += 1
+        stages = _stages(h, p, v, K)
+        r = problem.residual(times.ravel(), *(x.reshape(-1, n) for x in (*stages, K))).reshape(K.shape)
+        if not np.all(np.isfinite(r)):
+            break
+        p_step, v_step, K_step = linear.solve(r, p, v, K)
+        p, v, K = p + p_step, v + v_step, K + K_step
+        peak = max(np.abs(problem.scale * p).max(), np.abs(v).max(), problem.size)
+        size = max(np.abs(problem.scale * p_step).max(), np.abs(v_step).max()) / peak
+        converged = size <= TOLERANCE or (size <= ROUNDING and size > 0.3 * previous)
+        if not np.isfinite(size):
+            break
+        previous = size
+    return Found(_curve(breaks, p, v, K), bool(converged), iteration)
+
+
+def _stages(h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
+    """States p and ṗ (N, s, n) at the Gauss points, from their values at the breaks and K (N, s, n)."""
+    step = h[:, None, None]
+    once, twice = (np.einsum("ij,Njn->Nin", a, K) for a in (GAUSS.stage_once, GAUSS.stage_twice))
+    p_stages = p[:-1, None] + GAUSS.c[:, None] * step * v[:-1, None] + step**2 * twice
+    return p_stages, v[:-1, None] + step * once
+
+
+def _curve(breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
+    """Coefficients in powers of t − left break, highest first."""
+    from scipy.interpolate import PPoly
+
+    h = np.diff(breaks)[:, None]
+    powers = np.einsum("mi,Nin->mNn", GAUSS.to_powers, K)
+    integrated = [x / ((m + 1) * (m + 2) * h**m) for m, x in enumerate(powers)]
+    return PPoly(np.array([*integrated[::-1], v[:-1], p[:-1]]), breaks)
+
+
+class _LinearSystem:
+    """Newton's equations: stages eliminated interval by interval, then a banded system for the values at breaks."""
+
+    def __init__(self, problem: Problem, breaks: Array, derivatives: list[Array]) -> None:
+        from scipy.linalg.lapack import dgbtrf
+
+        M, D, K = derivatives
+        self.problem, self.h = problem, np.diff(breaks)
+        N, s, n = M.shape[:3]
+        h = self.h[:, None, None, None, None]
+        E = h * GAUSS.stage_once[:, None, :, None] * D[:, :, :, None] + h**2 * (
+            GAUSS.stage_twice[:, None, :, None] * K[:, :, :, None]
+        )  # (N, s, n, s, n)
+        for i in range(s):
+            E[:, i, :, i] += M[:, i]
+        self.G = np.concatenate([K, D + GAUSS.c[:, None, None] * h[..., 0] * K], axis=3).reshape(N, s * n, 2 * n)
+        self.E_inverse = np.linalg.inv(E.reshape(N, s * n, s * n))
+        self.S = np.concatenate([problem.scale, np.ones(n)])
+        response = -(self.E_inverse @ self.G).reshape(N, s, n, 2 * n)
+        Y = np.concatenate(self._at_end(np.eye(2 * n)[:n], np.eye(2 * n)[n:], response), axis=1)
+        blocks = np.concatenate([Y, -np.broadcast_to(np.eye(2 * n), Y.shape)], axis=2)
+        blocks = self.S[:, None] * blocks / np.tile(self.S, 2)
+        self.boundary = [problem.start.rows / self.S, problem.end.rows / self.S]
+        self.n_start = len(problem.start.rows)
+        self.lower, self.upper = self.n_start + 2 * n - 1, 4 * n - 1 - self.n_start
+        self.lu, self.pivots, info = dgbtrf(self._banded(blocks), self.lower, self.upper)
+        self.singular = info != 0
+
+    def _at_end(self, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
+        """States p and ṗ (N, n, …) at the ends of intervals for p, ṗ at their starts and K (N, s, n, …)."""
+        h = self.h.reshape(-1, *(1 for _ in K.shape[2:]))
+        once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (GAUSS.end_once, GAUSS.end_twice))
+        return p + h * v + h**2 * twice, v + h * once
+
+    def _banded(self, blocks: Array) -> Array:
+        """Rows: conditions at the start, continuity at the end of each interval, conditions at the end (LAPACK gb)."""
+        N, size = blocks.shape[:2]
+        band = np.zeros((2 * self.lower + self.upper + 1, (N + 1) * size))
+        for k, rows, first in ((0, self.boundary[0], 0), (N, self.boundary[1], self.n_start)):
+            i, j = np.indices(rows.shape)
+            band[self.lower + self.upper + first + i - j, size * k + j] = rows
+        i, j = np.indices(blocks.shape[1:])
+        columns = size * np.arange(N)[:, None, None] + j
+        band[np.broadcast_to(self.lower + self.upper + self.n_start + i - j, columns.shape), columns] = blocks
+        return band
+
+    def solve(self, r: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array, Array]:
+        """Steps of p, ṗ at the breaks and of K at the stages."""
+        from scipy.linalg.lapack import dgbtrs
+
+        N, s, n = r.shape
+        K_step = -(self.E_inverse @ r.reshape(N, s * n, 1)).reshape(N, s, n)
+        ends = self._at_end(p[:-1], v[:-1], K + K_step)
+        gap = self.S * np.concatenate([p[1:] - ends[0], v[1:] - ends[1]], axis=1)
+        start, end = (
+            -b.rows @ (np.concatenate([p[k], v[k]]) - b.state)
+            for k, b in ((0, self.problem.start), (-1, self.problem.end))
+        )
+        x, _ = dgbtrs(self.lu, self.lower, self.upper, np.concatenate([start, gap.ravel(), end]), self.pivots)
+        y = x.reshape(N + 1, 2 * n) / self.S
+        K_step -= (self.E_inverse @ (self.G @ y[:-1, :, None])).reshape(N, s, n)
+        return y[:, :n], y[:, n:], K_step

@@ -1,0 +1,116 @@
+"""Why a run ended before its end: what is wrong with the last state that it reached."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model.model import Array, Assembly
+from .initial_state import State, frame_gradients
+from .path_checks import JUMP
+from .vibration import system_mass_matrix
+
+NEARLY_SINGULAR = 1e-3  # ratio of singular values of C_q; a motion that only comes near it has no trouble there
+FAR_BENT = 0.5  # of a link's length, in the mean
+
+
+def find_cause(assembly: Assembly, t: float, state: State) -> str:
+    """A sentence with numbers and advice; empty where nothing is found.
+
+    The likely causes, the more certain first: a state or target that is not a number, a mass matrix that has lost its
+    sense (geometric stiffening), a link bent too far, constraints that turn singular.
+    """
+    return (
+        _not_a_number(assembly, t, state)
+        or lost_inertia(assembly, state.q)
+        or _bent(assembly, state.q)
+        or _load_jumps(assembly, t)
+        or _singular(assembly, t, state.q)
+    )
+
+
+def _not_a_number(assembly: Assembly, t: float, state: State) -> str:
+    for constraint in assembly.constraints:
+        if not np.isfinite(constraint.target(t)).all():
+            return f"{constraint.row.label} has no finite value, velocity or acceleration there"
+    if not np.isfinite(assembly.system.evaluate(t, state.q, state.v)[0]).all():
+        return "the accelerations there are no finite numbers: a load or a target grows without bound"
+    return ""
+
+
+def lost_inertia(assembly: Assembly, q: Array) -> str:
+    """A sentence where a motion that the constraints allow has no kinetic energy left; empty otherwise.
+
+    m_θθ − pᵀK_ω p has to stay above what the modes take of it, hhᵀ: n modes of a cantilever leave about 1/n³ of J.
+    """
+    stiffened = [body for body in assembly.model.bodies if body.stiffening is not None and body.n_modes]
+    if not stiffened:
+        return ""
+    _, _, C_q = assembly.system.constraints(0.0, q, np.zeros_like(q))
+    free = np.linalg.svd(C_q)[2][len(C_q) :].T if len(C_q) else np.eye(len(q))
+    M = free.T @ system_mass_matrix(assembly, q) @ free
+    undeformed = q.copy()
+    for first, body in zip(assembly.first, assembly.model.bodies, strict=True):
+        undeformed[first + 3 : first + 3 + body.n_modes] = 0.0
+    least, at_first = (
+        float(np.linalg.eigvalsh(m)[0]) for m in (M, free.T @ system_mass_matrix(assembly, undeformed) @ free)
+    )
+    if least > 0.1 * at_first:
+        return ""
+    names = ", ".join(f'"{body.name}"' for body in stiffened)
+    return (
+        f"geometric stiffening has taken away all inertia that the modes of {names} leave (least eigenvalue of the mass"
+        f" matrix {least:.2g}, straight {at_first:.2g}): its second-order terms end here; use fewer modes,"
+        " links divided in two, or geometric_stiffening = false"
+    )
+
+
+def _load_jumps(assembly: Assembly, t: float) -> str:
+    """Whether a load jumps there: its size just after t is not what its value and slope just before t make of it."""
+    dt = 1e-9 * max(t, 1e-9)
+    loads = [(row.label, size) for row, size in assembly.model.loads]
+    loads += [(f'load of the patches of "{load.body}"', load.size) for load in assembly.model.modal_loads]
+    for label, size in loads:
+        before, after = (size(s) for s in (t - dt, t + dt))
+        if not np.isfinite(after).all():
+            return f"{label} has no finite value, slope or curvature after that time"
+        change = after[0] - before[0] - dt * (before[1] + after[1])
+        if abs(change) > JUMP * max(abs(before[0]), abs(after[0])):
+            return f"{label} jumps from {before[0]:.6g} to {after[0]:.6g} there: round it off, or loosen the tolerance"
+    return ""
+
+
+def _bent(assembly: Assembly, q: Array) -> str:
+    """The link that is bent most, by the mean of its deflection against its radius of gyration."""
+    bodies = zip(assembly.first, assembly.model.bodies, strict=True)
+    bent = [
+        (float(np.linalg.norm(q[first + 3 : first + 3 + body.n_modes]) / np.sqrt(body.inertia)), body.name)
+        for first, body in bodies
+    ]
+    most, name = max(bent)
+    if most < FAR_BENT:
+        return ""
+    return (
+        f'"{name}" is bent by {100 * most:.0f} % of its length, which small deformations do not describe: a load beyond'
+        " buckling, a spin that needs geometric_stiffening = true, a link too soft, or an arm without motors that falls"
+        " apart"
+    )
+
+
+def _singular(assembly: Assembly, t: float, q: Array) -> str:
+    """Whether the constraints can hardly be told apart there."""
+    if not assembly.constraints:
+        return ""
+    J = frame_gradients(assembly, t, q)
+    if len(J) > J.shape[1]:
+        return ""
+    left, values, _ = np.linalg.svd(J)
+    ratio = float(values[-1] / values[0])
+    if ratio > NEARLY_SINGULAR:
+        return ""
+    weights = np.abs(left[:, -1])
+    involved = dict.fromkeys(c.row.label for c, w in zip(assembly.constraints, weights, strict=True) if w > 0.1)
+    return (
+        f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; {'; '.join(involved)}):"
+        " an arm stretched or folded, or a mechanism at a dead centre, where no finite force on the driven point says"
+        " which way to go on; keep clear of it, or drive a joint instead"
+    )

@@ -1,0 +1,102 @@
+"""The integrators of the core, and which one a scene asks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from .. import _core
+from ..model.model import Array, Assembly
+from ..scene.analysis_records import Analysis
+from .initial_state import State
+from .vibration import ringing, vibrations
+
+METHODS = {
+    "dopri5": _core.MethodKind.dopri5,
+    "dop853": _core.MethodKind.dop853,
+    "radau": _core.MethodKind.radau,
+    "generalized-alpha": _core.MethodKind.generalized_alpha,
+}
+
+# What the rule is made of, measured on the two-link case (26 coordinates; tests/benchmarks): step size times frequency
+# at which DOP853 is stable, and at which both resolve a vibration to a tolerance of 1e-4; time of a step of Radau IIA
+# in steps of DOP853, alone and where a replay of actuation is most of an evaluation; parts of the tolerance below which
+# both need not resolve a vibration, Radau since it damps it away. DOPRI5 never wins by more than clocks scatter:
+# undamped, its steps have to be five times as short as those of DOP853 (it is stable up to 1.0), damped nearly three.
+STABLE = 4.8
+RESOLVED_DOP853, RESOLVED_RADAU = 1.25, 0.34
+COST_OF_RADAU, COST_OF_RADAU_STEERED = 2.4, 1.4
+NEGLIGIBLE_DOP853, NEGLIGIBLE_RADAU = 0.1, 1.0
+
+MOST_COORDINATES = 600  # beyond them the eigenproblem takes longer than many a run
+MANY_PERIODS = 1e5
+
+
+@dataclass(frozen=True)
+class Choice:
+    """An integrator by its name in scenes, and why it was chosen."""
+
+    name: str
+    reason: str
+
+
+NOT_INTEGRATED = Choice("none", "nothing to integrate")
+
+
+def choose_integrator(
+    assembly: Assembly, analysis: Analysis, start: State, steering: _core.Steering | None = None
+) -> Choice:
+    """The integrator for an analysis from `start`, under the actuation `steering` that it replays, if any.
+
+    Explicit steps are held by the highest frequency whether it is excited or not, implicit ones by the highest that
+    rings above the tolerance. The rule estimates the number of steps of both; a wrong guess costs time, not accuracy.
+    """
+    if analysis.integrator != "auto":
+        return Choice(analysis.integrator, "asked for")
+    if len(analysis.times) == 1:
+        return Choice("dop853", "nothing to integrate")
+    if assembly.model.gears:
+        return Choice("dop853", "springs in joints are not among the stiff forces of implicit integrators")
+    highest = max((float(np.sqrt(body.stiffness.max(initial=0.0))) for body in assembly.model.bodies), default=0.0)
+    if highest == 0.0:
+        return Choice("dop853", "nothing vibrates")
+    if len(start.q) > MOST_COORDINATES:
+        name = "radau" if highest * analysis.end > MANY_PERIODS else "dop853"
+        return Choice(name, f"links vibrate at up to {highest:.3g} rad/s (more coordinates than are looked at closely)")
+    modes = vibrations(assembly, start)
+    if not len(modes.frequency):
+        return Choice("dop853", "nothing vibrates")
+    excited = ringing(assembly, start, modes, steering)
+    top, scale = modes.frequency[-1], analysis.tolerance / 1e-4
+    phase = partial(_ringing_phase, modes.frequency, modes.damping_ratio, excited, analysis.end)
+    explicit = phase(NEGLIGIBLE_DOP853 * analysis.tolerance) / (RESOLVED_DOP853 * scale ** (1 / 8))
+    implicit = phase(NEGLIGIBLE_RADAU * analysis.tolerance) / (RESOLVED_RADAU * scale ** (1 / 5))
+    explicit, implicit = max(analysis.end * top / STABLE, explicit), max(len(analysis.times), implicit)
+    rings = excited > analysis.tolerance
+    felt = f"{modes.frequency[rings].max():.3g} rad/s" if rings.any() else "no frequency"
+    reason = f"vibrations up to {top:.3g} rad/s, ringing above the tolerance up to {felt}"
+    cost = COST_OF_RADAU if steering is None else COST_OF_RADAU_STEERED
+    return Choice("radau" if cost * implicit < explicit else "dop853", reason)
+
+
+def beyond_order(choice: Choice, analysis: Analysis) -> str:
+    """A sentence where steps have become too short with a method of order 2; empty with any other."""
+    if choice.name != "generalized-alpha":
+        return ""
+    return (
+        f"a tolerance of {analysis.tolerance:g} is below what generalized-alpha reaches here: at order 2 it takes steps"
+        ' too short to get anywhere, down to rounding; loosen the tolerance, or use integrator = "radau" or "dop853"'
+    )
+
+
+def _ringing_phase(omega: Array, damping_ratio: Array, excited: Array, end: float, threshold: float) -> float:
+    """∫ ω dt (rad) up to `end`, ω the highest frequency that still rings above the threshold."""
+    phase, covered = 0.0, 0.0
+    for i in np.flatnonzero(excited > threshold)[::-1]:
+        decay = damping_ratio[i] * omega[i]
+        lasts = end if decay <= 0 else min(end, float(np.log(excited[i] / threshold)) / decay)
+        phase += float(omega[i]) * max(0.0, lasts - covered)
+        covered = max(covered, lasts)
+    return phase

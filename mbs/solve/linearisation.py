@@ -1,0 +1,172 @@
+"""The equations of motion, linear about a configuration or a motion, in independent coordinates.
+
+The core differentiates them exactly (core/tangent.h, core/reduction.h): M δs̈ + D δṡ + K δs = Σ inputs · δu, where
+s = (motor coordinates, p of all bodies). About a motion the matrices belong to it: centrifugal and Coriolis terms, the
+forces that drive it, and how H = ∂q/∂s turns along it are in D and K.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from ...common.errors import SolveError
+from .. import _core
+from ..fields.field_types import split_point
+from ..model.measures import FRAME, End, Row, joint_coordinate
+from ..model.model import ZERO, Array, Assembly, Constraint, Model
+
+DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
+
+
+@dataclass(frozen=True)
+class LinearMechanism:
+    """M δs̈ + D δṡ + K δs = inputs · δu about (time, q, v, a); f independent coordinates s.
+
+    Attributes:
+        M, D, K: (f, f).
+        inputs: (f,) per unit of each motor ("joint/NAME") and force at a point ("force/BODY.POINT/x", "…/y").
+        outputs: (f,) derivatives of joint coordinates ("joint/NAME"), of motors behind gears that give ("motor/NAME"),
+            and places of points ("point/BODY.POINT/x", …).
+        transformation: H = ∂q/∂s (coordinates, f).
+        transformation_rate: its rate along the motion: δv = H δṡ + H_dot δs.
+        force: (f,) what drives the motion itself: forces along the independent rows, modal forces beside the loads.
+        lambda_: (constraints,) multipliers of the joints.
+        names: (f,) of s: "joint/NAME" (or what was chosen instead), then "modal/BODY/k", k from 1.
+    """
+
+    time: float
+    q: Array
+    v: Array
+    a: Array
+    M: Array
+    D: Array
+    K: Array
+    inputs: Mapping[str, Array]
+    outputs: Mapping[str, Array]
+    transformation: Array
+    transformation_rate: Array
+    force: Array
+    lambda_: Array
+    names: tuple[str, ...]
+
+    def modal(self, body: str) -> list[int]:
+        """Where in s the modal coordinates of a body are."""
+        return [i for i, name in enumerate(self.names) if name.startswith(f"modal/{body}/")]
+
+
+class Linearisation:
+    """What `linearise` needs of a model at every configuration: joints only, drives are loads of the scene.
+
+    `independent` rows are the motors' where these fit the mechanism. Where they do not, as many of them as are
+    independent, then other joint coordinates, then angles and places of frames make up the number, those first that
+    the constraints determine worst at `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs.
+    """
+
+    def __init__(self, model: Model, q: Array, points: Sequence[str] = ()) -> None:
+        joints = {f"joint/{name}": row for name, row in _joint_coordinates(model).items()}
+        give = {gear.joint for gear in model.gears}
+        motors = {f"{'motor' if name in give else 'joint'}/{name}": row for name, row in model.motors.items()}
+        candidates = [motors, {name: row for name, row in joints.items() if name not in motors}, _frames(model)]
+        places = {f"{point}/{axis}": _place(point, axis) for point in points for axis in "xy"}
+        rows = [row for group in (*candidates, joints, places) for row in group.values()]
+        self.model = model
+        self.assembly = Assembly(model, model.joints, model.loads, rows)
+        core = iter(self.assembly.motor_rows)
+        known = [{name: next(core) for name in group} for group in (*candidates, joints, places)]
+        self._motors = {f"joint/{name}": row for name, row in zip(model.motors, known[0].values(), strict=True)}
+        self._joints = {name: row for name, row in known[0].items() if name not in known[3]} | known[3]
+        self._places = known[4]
+        independent = _choose(self.assembly, q, known[:3])
+        self.independent = list(independent.values())
+        modal = [f"modal/{body.name}/{k}" for body in model.bodies for k in range(1, body.n_modes + 1)]
+        self.names = (*independent, *modal)
+
+    def at(self, t: float, q: Array, v: Array, a: Array) -> LinearMechanism:
+        """The linear equations about a motion whose q, v and a meet the joint constraints.
+
+        Raises `SolveError` in a configuration in which the independent coordinates do not determine the others.
+        """
+        system = self.assembly.system
+        linear = _core.reduce(system, self.independent, t, q, v, a, 1)
+        if not linear.reciprocal_condition > DEPENDENT**2 or not np.all(np.isfinite(linear.K)):
+            rows = ", ".join(self.names[: len(self.independent)])
+            raise SolveError(
+                f"{self.model.scene.path}: linear model at t = {t:g} s: {rows} do not determine the configuration there"
+                " (a singular one)"
+            )
+        inputs = self._motors | {f"force/{place}": row for place, row in self._places.items()}
+        outputs = self._joints | {f"point/{place}": row for place, row in self._places.items()}
+        return LinearMechanism(
+            t, q, v, a, linear.M, linear.D, linear.K,
+            self._gradients(inputs, linear.H, q), self._gradients(outputs, linear.H, q),
+            linear.H, linear.H_dot, linear.force, linear.multipliers, self.names,
+        )  # fmt: skip
+
+    def _gradients(self, rows: dict[str, _core.Row], H: Array, q: Array) -> Mapping[str, Array]:
+        rest = np.zeros_like(q)
+        gradients = _core.row_tangents(self.assembly.system, list(rows.values()), q, rest, rest)[0] @ H
+        return MappingProxyType(dict(zip(rows, gradients, strict=True)))
+
+
+def linearise(model: Model, t: float, q: Array, v: Array, a: Array, points: Sequence[str] = ()) -> LinearMechanism:
+    """The linear equations about one configuration or instant of a motion; see `Linearisation` for many."""
+    return Linearisation(model, q, points).at(t, q, v, a)
+
+
+def held_by_motors(model: Model, q: Array) -> list[Constraint]:
+    """Constraints that keep the motor coordinates where they are at q."""
+    free = [Constraint(row, ZERO, name, "motor", is_trajectory=True) for name, row in model.motors.items()]
+    assembly = Assembly(model, free)
+    values = assembly.system.constraints(0.0, q, np.zeros_like(q))[0]
+    targets = [_core.TimeFunction.constant(float(value)) for value in values]
+    return [replace(c, target=target) for c, target in zip(assembly.constraints, targets, strict=True)]
+
+
+def _joint_coordinates(model: Model) -> dict[str, Row]:
+    """Coordinates of the joints that move, by name; a motor's is the row that it drives."""
+    moving = [joint for joint in model.scene.joint if joint.type != "weld"]
+    rows = model.motors | {gear.joint: gear.coordinate for gear in model.gears}
+    return {joint.name: rows.get(joint.name) or joint_coordinate(model.scene, joint) for joint in moving}
+
+
+def _frames(model: Model) -> dict[str, Row]:
+    """Angles and places of the frames."""
+    return {
+        f"frame/{body.name}/{kind.name}": Row(f"frame of {body.name}", kind, End(None), End(body.name, FRAME))
+        for kind in (_core.RowKind.angle, _core.RowKind.x, _core.RowKind.y)
+        for body in model.bodies
+    }
+
+
+def _place(point: str, axis: str) -> Row:
+    return Row(f"{point}/{axis}", getattr(_core.RowKind, axis), End(None), End(*split_point(point)))
+
+
+def _choose(assembly: Assembly, q: Array, groups: Sequence[Mapping[str, _core.Row]]) -> dict[str, _core.Row]:
+    """The rows that, with the joints, determine the frames: earlier groups first, those of a group as QR pivots."""
+    from scipy.linalg import qr
+
+    rest, frames = np.zeros_like(q), assembly.rigid_coordinates
+
+    def gradients(rows: Sequence[_core.Row]) -> Array:
+        result: Array = _core.row_tangents(assembly.system, rows, q, rest, rest)[0][:, frames]
+        return result
+
+    basis = np.linalg.qr(gradients(assembly.constraint_rows).T)[0]
+    chosen: dict[str, _core.Row] = {}
+    for group in groups:
+        missing = len(frames) - basis.shape[1]
+        if not missing or not group:
+            continue
+        rows = gradients(list(group.values()))
+        Q, R, order = qr((rows - (rows @ basis) @ basis.T).T, mode="economic", pivoting=True)
+        independent = np.abs(np.diag(R)) > DEPENDENT * np.linalg.norm(rows, axis=1).max()
+        count = min(missing, int(np.count_nonzero(independent)))
+        names = list(group)
+        chosen |= {names[i]: group[names[i]] for i in sorted(order[:count])}
+        basis = np.hstack([basis, Q[:, :count]])
+    return chosen

@@ -1,0 +1,61 @@
+"""Jumps of trajectories: no finite force moves a robot along them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...common.errors import InputError
+from .._core import TimeFunction
+from ..model.model import Array, Assembly
+
+SAMPLES = 2001
+LOOKED_INTO = 5  # intervals between samples, the roughest ones
+HALVINGS = 25
+JUMP = 1e-4  # in terms of the largest value or velocity: less is rounded numbers in an expression
+
+
+def check_smooth(assembly: Assembly, end: float) -> None:
+    """Raise `InputError` for a trajectory that jumps, in value or velocity, between t = 0 and `end` (s).
+
+    Accelerations may jump. What is looked into are the intervals that the trapezoidal rule on the exact derivatives
+    describes worst; a jump is what stays however far they are halved.
+    """
+    for constraint in assembly.constraints:
+        if not constraint.is_trajectory:
+            continue
+        for order, quantity in enumerate(("value", "velocity")):
+            found = _jump(constraint.target, end, order)
+            if found is not None:
+                t, before, after = found
+                raise InputError(
+                    f"{assembly.model.scene.path}: {constraint.row.label}: expected a continuous {quantity}, found a"
+                    f" jump from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot"
+                    " follow; round it off (waypoints make a smooth curve)"
+                )
+
+
+def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float, float] | None:
+    """Time, value before and after of the first jump that is found in a derivative of that order; None without one."""
+    times = np.linspace(0.0, end, SAMPLES)
+    samples = function.sample(times)[order]
+    size = float(np.ptp(samples)) if order == 0 else float(np.abs(samples).max())
+    if not (np.isfinite(samples).all() and size > 0):
+        return None
+    jumps = []
+    for i in np.argsort(-_misfits(function, times, order))[:LOOKED_INTO]:
+        a, b = times[i], times[i + 1]
+        for _ in range(HALVINGS):
+            middle = 0.5 * (a + b)
+            left, right = _misfits(function, np.array([a, middle, b]), order)
+            a, b = (a, middle) if left > right else (middle, b)
+        if _misfits(function, np.array([a, b]), order)[0] > JUMP * size:
+            before, after = function.sample(np.array([a, b]))[order]
+            jumps.append((float(b), float(before), float(after)))
+    return min(jumps, default=None)
+
+
+def _misfits(function: TimeFunction, times: Array, order: int) -> Array:
+    """What the trapezoidal rule on the next derivative misses of each change between neighbouring times (T − 1,)."""
+    value, slope = function.sample(times)[order : order + 2]
+    misfits: Array = np.abs(np.diff(value) - 0.5 * np.diff(times) * (slope[1:] + slope[:-1]))
+    return np.nan_to_num(misfits, nan=0.0, posinf=0.0)

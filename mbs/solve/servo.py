@@ -1,0 +1,163 @@
+"""A path as a servo constraint whose force enters through the joint motors alone: its equations and their zeros.
+
+With p(t) given all frames follow, and r(t, p, ṗ, p̈) = 0 is what is left: the internal dynamics (Blajer and
+Kolodziejczyk 2004; Seifried 2014, ch. 4). It is the zero dynamics about a path that is held.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...common.errors import InputError, SolveError
+from .. import _core
+from .._core import TimeFunction
+from ..model.measures import Row
+from ..model.model import ZERO, Array, Assembly, Constraint, Model
+from .initial_state import undeformed_state
+
+MOST_ITERATIONS = 50
+TOLERANCE = 1e-12  # of an equilibrium's last Newton step
+CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped
+SINGULAR = 1e-13  # of M of the internal dynamics, scaled
+
+
+@dataclass(frozen=True)
+class Servo:
+    """The robot under its path, and under its motors; `factor` 1 takes the path's own points as output.
+
+    A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p +
+    `offset`, which is what is expected of the rest.
+    """
+
+    path: Assembly
+    driven: Assembly
+    factor: float
+    guess: Array  # coordinates (R, θ, p) that pick the branch
+    loads: tuple[tuple[Row, TimeFunction], ...]  # of the scene, held before and after the path as it is
+    offset: tuple[TimeFunction, ...] = ()  # one for each mode of all bodies, or none
+
+    def core(self) -> _core.MotorsOnly:
+        """The evaluator of r(t, p, ṗ, p̈)."""
+        order = [c.owner for c in self.driven.constraints]
+        numbers = [order.index(motor_owner(name)) for name in self.path.model.motors]
+        return _core.MotorsOnly(
+            self.path.system, self.path.motor_rows, self.driven.system, numbers, self.factor, list(self.offset),
+            self.guess,
+        )  # fmt: skip
+
+    def resolver(self) -> _core.ActuationResolver:
+        """What reads the motors' forces off the multipliers."""
+        return _core.ActuationResolver(self.driven.system, self.driven.is_trajectory, self.driven.motor_rows)
+
+    def source(self, shape: list[list[TimeFunction]]) -> _core.ActuationSource:
+        """The motors' forces for p(t), at any time."""
+        return _core.MotorsOnlyActuation(
+            self.driven.system, self.core(), shape, self.driven.is_trajectory, self.resolver()
+        )
+
+    @property
+    def scale(self) -> Array:
+        """Frequencies ω of all modes (n,), rad/s."""
+        omega: Array = np.sqrt(np.concatenate([body.stiffness for body in self.path.model.bodies]))
+        return omega
+
+
+def motor_owner(joint: str) -> str:
+    """What the constraint on a motor's coordinate is listed under."""
+    return f'motor of joint "{joint}"'
+
+
+def make_servo(model: Model, end: float, factor: float) -> Servo:
+    """The equations for a path that is held before 0 and after `end`.
+
+    Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes.
+    """
+    for found, what in ((len(model.motors), "motors"), (len(model.trajectories), "trajectory components")):
+        if found != model.rigid_freedom:
+            raise InputError(
+                f'{model.scene.path}: expected for kind = "motors-only" as many {what} as the mechanism has degrees of'
+                f" freedom ({model.rigid_freedom}), found {found}"
+            )
+    if not any(body.n_modes for body in model.bodies):
+        raise InputError(
+            f'{model.scene.path}: expected at least one flexible body for kind = "motors-only", found only rigid ones:'
+            ' kind = "pcid" gives their motors\' forces'
+        )
+    rows = list(model.motors.values())
+    held = [Constraint(c.row, c.target.held(0.0, end), c.owner, c.component, True) for c in model.trajectories]
+    motors = [Constraint(row, ZERO, motor_owner(name), "value", True) for name, row in model.motors.items()]
+    loads = tuple((row, size.held(0.0, end)) for row, size in model.loads)
+    path = Assembly(model, [*model.joints, *held], loads, rows)
+    driven = Assembly(model, [*model.joints, *motors], loads, rows)
+    return Servo(path, driven, factor, undeformed_state(path).q, loads)
+
+
+@dataclass(frozen=True)
+class LinearDynamics:
+    """M δp̈ + D δṗ + K δp = 0 of the internal dynamics at `times` (N,): each (N, n, n)."""
+
+    times: Array
+    M: Array
+    D: Array
+    K: Array
+
+    def __call__(self, times: Array) -> tuple[Array, Array, Array]:
+        """M, D, K at any times, straight lines between those that are known."""
+        right = np.clip(np.searchsorted(self.times, times), 1, len(self.times) - 1)
+        left = right - 1
+        width = self.times[right] - self.times[left]
+        share = np.clip((times - self.times[left]) / width, 0.0, 1.0)[:, None, None]
+        M, D, K = ((1 - share) * x[left] + share * x[right] for x in (self.M, self.D, self.K))
+        return M, D, K
+
+
+def linear_dynamics(core: _core.MotorsOnly, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
+    """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n)."""
+    n = p.shape[1]
+    found = core.derivatives(times.tolist(), p, v, a)
+    M, D, K = (x.reshape(-1, n, n) for x in (found.M, found.D, found.K))
+    return LinearDynamics(times, M, D, K)
+
+
+def equilibrium(servo: Servo, core: _core.MotorsOnly, t: float) -> Array:
+    """Shape p (n,) at rest under path and loads as at time t. Raises `SolveError` where there is none."""
+    p = np.zeros((1, len(servo.scale)))
+    rest = np.zeros_like(p)
+    for _ in range(MOST_ITERATIONS):
+        r = core.residuals([t], p, rest, rest)[0]
+        K = linear_dynamics(core, np.array([t]), p, rest, rest).K[0]
+        if not (np.all(np.isfinite(r)) and np.all(np.isfinite(K))):
+            break
+        step = np.linalg.solve(K, r)
+        p = p - step
+        if np.linalg.norm(step) <= TOLERANCE * (np.linalg.norm(p) + 1e-12):
+            return np.asarray(p[0])
+    raise SolveError(
+        f"{servo.path.model.scene.path}: no equilibrium under the motors was found at t = {t:g} s: the links are too"
+        " soft for their loads there"
+    )
+
+
+def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:
+    """Matrix (2n, 2n) of ẏ = 𝒜 y for y = (ω p, ṗ), at node k."""
+    n = len(scale)
+    A = np.zeros((2 * n, 2 * n))
+    A[:n, n:] = np.diag(scale)
+    A[n:, :n] = -np.linalg.solve(dynamics.M[k], dynamics.K[k] / scale)
+    A[n:, n:] = -np.linalg.solve(dynamics.M[k], dynamics.D[k])
+    return A
+
+
+def zeros(dynamics: LinearDynamics, scale: Array) -> NDArray[np.complex128]:
+    """Zeros (N, 2n) from motors to path, 1/s, of the equations frozen at each node; the slowest first."""
+    s = np.linalg.eigvals(np.array([first_order(dynamics, k, scale) for k in range(len(dynamics.times))]))
+    found: NDArray[np.complex128] = np.take_along_axis(s, np.argsort(np.abs(s), axis=1, kind="stable"), axis=1)
+    return found
+
+
+def is_unstable(s: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    """Zeros in the right half plane, beyond rounding."""
+    return s.real > CENTRE * np.abs(s)

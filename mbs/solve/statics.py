@@ -1,0 +1,58 @@
+"""Static equilibrium under gravity, given loads and the trajectory constraints at t = 0."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...common.errors import SolveError
+from .. import _core
+from ..model.model import Array, Assembly
+from .initial_state import State, with_rates
+
+MOST_ITERATIONS = 60
+TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, positions to the size of the robot
+ROUNDING = 4e-16  # steps this small, relative to the size of the robot, are no steps
+LARGEST_STEP = 0.5  # relative likewise: keeps to the branch of the start
+
+
+def static_equilibrium(assembly: Assembly, start: State) -> State:
+    """Solve Q(q) − C_qᵀλ = 0, C(q, 0) = 0 by Newton from `start`; returns the state (v kept on Ċ = 0).
+
+    Raises `SolveError` where the robot has no equilibrium near the start.
+    """
+    system, n = assembly.system, assembly.system.coordinates
+    rest, sizes = np.zeros(n), assembly.sizes
+
+    def residual(x: Array) -> tuple[Array, float]:
+        C, _, C_q = system.constraints(0.0, x[:n], rest)
+        Q, constraint_forces = system.force_at_rest(0.0, x[:n]), C_q.T @ x[n:]
+        size = max(float(np.abs(Q).max()), float(np.abs(constraint_forces).max(initial=0.0)))
+        return np.concatenate([Q - constraint_forces, C]), size
+
+    _, _, C_q = system.constraints(0.0, start.q, rest)
+    multipliers = np.linalg.lstsq(C_q.T, system.force_at_rest(0.0, start.q), rcond=None)[0]
+    x, largest = np.concatenate([start.q, multipliers]), np.inf
+    for _ in range(MOST_ITERATIONS):
+        r, size = residual(x)
+        closed = np.abs(r[n:] / assembly.row_sizes).max(initial=0.0) <= TOLERANCE
+        if closed and (np.abs(r[:n]).max() <= TOLERANCE * size or largest <= ROUNDING):
+            return with_rates(assembly, x[:n], start.v)
+        try:
+            step = np.linalg.solve(_jacobian(assembly, x), r)
+        except np.linalg.LinAlgError:
+            break
+        largest = float(np.abs(step[:n] / sizes).max())
+        x = x - step * min(1.0, LARGEST_STEP / largest if largest else 1.0)
+        if not np.all(np.isfinite(x)):
+            break
+    raise SolveError(
+        f"{assembly.model.scene.path}: no static equilibrium was found near the initial angles: a robot without"
+        " motors or trajectories may have none there; give angles closer to it"
+    )
+
+
+def _jacobian(assembly: Assembly, x: Array) -> Array:
+    """Exact derivative of Q − C_qᵀλ and C with respect to (q, λ), at rest."""
+    n, rest = assembly.system.coordinates, np.zeros(assembly.system.coordinates)
+    _, _, K, C_q = _core.tangent(assembly.system, 0.0, x[:n], rest, rest, x[n:], [])
+    return np.block([[-K, -C_q.T], [C_q, np.zeros((len(C_q), len(C_q)))]])

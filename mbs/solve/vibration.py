@@ -1,0 +1,110 @@
+"""Small vibrations of an assembly about a state, under its constraints: frequencies, shapes, forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import _core
+from ..model.model import Array, Assembly
+from ..model.planar_body import PlanarBody
+from .initial_state import State
+
+
+@dataclass(frozen=True)
+class Vibrations:
+    """Modes of M q̈ + D q̇ + K q + C_qᵀ λ = 0, C_q q = 0; frame motions without stiffness are left out.
+
+    frequency ω (n,) rad/s ascending; damping_ratio (n,); shape (coordinates, n), M-orthonormal; force (constraints, n),
+    the λ per unit of each mode's coordinate; mass M (coordinates, coordinates).
+    """
+
+    frequency: Array
+    damping_ratio: Array
+    shape: Array
+    force: Array
+    mass: Array
+
+
+def mass_matrix(body: PlanarBody, q: Array) -> Array:
+    """M of one body at its coordinates q = (R, θ, p): formulation.md, section 4 (Shabana, ch. 5)."""
+    theta, p = q[2], q[3:]
+    c, s = np.cos(theta), np.sin(theta)
+    A, A_theta = np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]])
+    s, s_p, inertia, h = body.first_moment + body.S_bar @ p, body.S_bar, body.m_xy, body.h + p @ body.S_tilde
+    if (K := body.stiffening) is not None:
+        s, s_p, inertia, h = s - 0.5 * p @ K.K_s @ p, s_p - K.K_s @ p, inertia - K.K_omega, h - K.K_h @ p
+    M = np.eye(len(q))
+    M[:2, :2] = body.mass * np.eye(2)
+    M[:2, 2] = M[2, :2] = A_theta @ s
+    M[:2, 3:] = A @ s_p
+    M[3:, :2] = M[:2, 3:].T
+    M[2, 2] = body.inertia + 2 * body.j @ p + p @ inertia @ p
+    M[2, 3:] = M[3:, 2] = h
+    return M
+
+
+def vibrations(assembly: Assembly, state: State) -> Vibrations:
+    """The constrained vibrations about `state`, with the stiffness of the links alone (no loads, no rotation)."""
+    bodies = assembly.model.bodies
+    M = system_mass_matrix(assembly, state.q)
+    K = _stiffness(assembly)
+    D = _block_diagonal([block for body in bodies for block in (np.zeros((3, 3)), body.damping)])
+    _, _, C_q = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))
+    free = np.linalg.svd(C_q)[2][len(C_q) :].T if len(C_q) else np.eye(len(K))
+    L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
+    squares, vectors = np.linalg.eigh(L_inverse @ (free.T @ (K[:, None] * free)) @ L_inverse.T)
+    shape = L_inverse.T @ vectors
+    stiff = squares > 1e-9 * squares.max(initial=0.0)
+    omega, shape = np.sqrt(squares[stiff]), free @ shape[:, stiff]
+    unbalanced = M @ shape * omega**2 - K[:, None] * shape  # = C_qᵀ λ
+    force = np.linalg.lstsq(C_q.T, unbalanced, rcond=None)[0] if len(C_q) else np.zeros((0, len(omega)))
+    return Vibrations(omega, np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega), shape, force, M)
+
+
+def _stiffness(assembly: Assembly) -> Array:
+    """Diagonal of K over all coordinates."""
+    return np.concatenate([np.concatenate([np.zeros(3), body.stiffness]) for body in assembly.model.bodies])
+
+
+def system_mass_matrix(assembly: Assembly, q: Array) -> Array:
+    """M (coordinates, coordinates) of all bodies and of the rotors in joints."""
+    blocks = zip(assembly.model.bodies, assembly.first, strict=True)
+    M = _block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
+    gradient, inertia = assembly.system.rotor_rows(q)
+    return M + gradient.T @ (inertia[:, None] * gradient)
+
+
+def _block_diagonal(blocks: list[Array]) -> Array:
+    size = sum(len(block) for block in blocks)
+    matrix, first = np.zeros((size, size)), 0
+    for block in blocks:
+        matrix[first : first + len(block), first : first + len(block)] = block
+        first += len(block)
+    return matrix
+
+
+def ringing(assembly: Assembly, state: State, modes: Vibrations, steering: _core.Steering | None = None) -> Array:
+    """Amplitude (n,) with which each mode rings from `state` on, in the force it moves most, relative to that force.
+
+    A mode at rest follows its load and the links' static deflection under the prescribed motion; the velocity v, the
+    acceleration a or the jerk j about that with which it starts is the vibration v/ω, a/ω², j/ω³. What the robot does
+    beside following statically is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on.
+    """
+    system, q, v = assembly.system, state.q, state.v
+    a, lambda_ = system.evaluate(0.0, q, v, steering)
+    dt = 1e-3 / modes.frequency.max(initial=1.0)
+    jerk = (system.evaluate(dt, q + dt * v, v + dt * a, steering)[0] - a) / dt
+    omega, project = modes.frequency, (modes.shape * _stiffness(assembly)[:, None]).T / modes.frequency[:, None] ** 2
+    amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
+    if not len(lambda_):
+        stroke = np.abs(modes.shape).max(axis=0) * amplitude
+        result: Array = stroke / max(stroke.max(initial=0.0), 1e-300)
+        return result
+    forces = np.abs(modes.force) * amplitude
+    group = np.array(assembly.groups)
+    sizes = np.array([np.abs(lambda_[group == g]).max() + forces[group == g].sum() for g in group])
+    sizes = np.maximum(sizes, max(1e-3 * float(sizes.max()), 1e-300))
+    result = (forces / sizes[:, None]).max(axis=0)
+    return result
