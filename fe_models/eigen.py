@@ -23,7 +23,7 @@ ROUNDING_LIMIT = 1e-6
 def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, count: int) -> tuple[Floats, Floats]:
     """Lowest eigenpairs of K x = ω² M x by Krylov–Schur, shift-inverted at zero, K factorised by Cholesky.
 
-    Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
+    MechanismSystem rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
     Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
     them, and tells where a mesh is too fine for double precision.
 

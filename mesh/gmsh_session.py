@@ -190,7 +190,7 @@ def _group_name(dim: int, tag: int) -> str:
 
 
 def _points() -> tuple[Integers, Floats]:
-    """Row of each node tag of gmsh, and (p, 3) coordinates."""
+    """Measure of each node tag of gmsh, and (p, 3) coordinates."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
     number[tags.astype(np.int64)] = np.arange(len(tags))

@@ -11,7 +11,7 @@ import pytest
 from ffrobot.fe_models.link import make_link
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis import fcid
-from ffrobot.mbs.model.model import Assembly
+from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.model.planar_body import core_arguments, vanishing_terms
 from ffrobot.mbs.scene.load import make_scene
 from ffrobot.results.write import results_image
@@ -93,7 +93,7 @@ def test_rigid_bodies_have_no_modal_blocks(folder):
     solution = prepare(arm(folder, "bending"))
     stick, flexible = solution.model.bodies
     assert core_arguments(stick, [], [])["W"].shape == (3, 0)
-    assert Assembly(solution.model, solution.model.joints).system.coordinates == 3 + 3 + flexible.n_modes
+    assert MechanismSystem(solution.model, solution.model.joints).system.coordinates == 3 + 3 + flexible.n_modes
     assert "modal coordinates of stick, rigid" in solution.skipped
 
 

@@ -68,7 +68,7 @@ def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> C
 def joint_mobility(setup: Setup) -> Array:
     """(motors,) acceleration of each joint per moment on it at the start, links rigid, the other joints free."""
     model = setup.model
-    if len(model.motors) != model.rigid_freedom:
+    if len(model.motors) != model.degrees_of_freedom:
         return np.zeros(len(model.motors))
     arm = RigidArm(model)
     M, _ = arm.terms(arm.angles(setup.source), np.zeros(len(model.motors)))

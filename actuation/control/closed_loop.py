@@ -13,7 +13,7 @@ from ...mbs import _core
 from ...mbs.analysis.analyses import STATUS, Outcome, Progress, as_long_as, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
 from ...mbs.analysis.replay import actuation_source, motor_limits
-from ...mbs.model.model import ZERO, Assembly, Model, load_rows
+from ...mbs.model.model import ZERO, MechanismSystem, Model, load_rows
 from ...mbs.scene.analysis_records import Analysis
 from ...mbs.scene.loop_records import ComputedTorque, Lqr
 from ...mbs.solve.initial_state import State
@@ -109,7 +109,7 @@ def run_closed_loop(
     rows = [signal.row for signal in read if signal.row is not None]
     drives = [*((row, ZERO) for row in built.motors.values()), *loads]
     drives += load_rows(model.scene, analysis.disturbance)
-    assembly = Assembly(built, built.joints, drives, rows)
+    assembly = MechanismSystem(built, built.joints, drives, rows)
     sensor = sensing(assembly, read)
 
     begin, duration = analysis.times[0], np.ptp(analysis.times)
@@ -136,7 +136,7 @@ def run_closed_loop(
 
 
 def _integrate(
-    assembly: Assembly,
+    assembly: MechanismSystem,
     analysis: Analysis,
     source: Outcome,
     rigid: Model,
@@ -149,7 +149,7 @@ def _integrate(
     began = time.perf_counter()
     start = State(source.q[0].copy(), source.v[0].copy())
     if analysis.start == "scene":
-        start = initial_state(Assembly(rigid, [*rigid.joints, *rigid.trajectories], rigid.loads))
+        start = initial_state(MechanismSystem(rigid, [*rigid.joints, *rigid.trajectories], rigid.loads))
         start = rotors_like(assembly.model, start, source)
     integrator = choose_integrator(assembly, analysis, start)
     voltages = [(assembly.index[body], array.Phi_V) for body, array in patches.items()]

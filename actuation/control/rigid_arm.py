@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...common.errors import InputError
 from ...mbs import _core
 from ...mbs.analysis.analyses import Outcome
-from ...mbs.model.model import ZERO, Assembly, Constraint, Model
+from ...mbs.model.model import ZERO, Constraint, MechanismSystem, Model
 from ...mbs.model.planar_body import PlanarBody, PlanarPoint
 from ...mbs.scene.loop_records import ComputedTorque
 from ...mbs.solve.initial_state import undeformed_state
@@ -29,9 +29,9 @@ class RigidArm:
     """
 
     def __init__(self, model: Model) -> None:
-        if len(model.motors) != model.rigid_freedom:
+        if len(model.motors) != model.degrees_of_freedom:
             raise InputError(
-                f"{model.scene.path}: controller: expected motors that fit the mechanism ({model.rigid_freedom} of"
+                f"{model.scene.path}: controller: expected motors that fit the mechanism ({model.degrees_of_freedom} of"
                 f" them), found {len(model.motors)}"
             )
         rigid = replace(model, bodies=tuple(_rigid(body) for body in model.bodies), modal_loads=(), loads=())
@@ -42,14 +42,14 @@ class RigidArm:
         self._q = undeformed_state(self._at_rest).q
 
     @staticmethod
-    def _assembly(model: Model, accelerated: str | None) -> Assembly:
+    def _assembly(model: Model, accelerated: str | None) -> MechanismSystem:
         one = _core.TimeFunction.polynomial(np.array([0.0, 1.0]), np.array([[0.5, 0.0, 0.0]]))
         motors = [
             Constraint(row, one if name == accelerated else ZERO, name, "motor", is_trajectory=False)
             for name, row in model.motors.items()
         ]
         # joint angles of the initial guess are met by no target: `_place` moves the arm to the angles it is asked for
-        return Assembly(model, [*model.joints, *motors])
+        return MechanismSystem(model, [*model.joints, *motors])
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
         """Coordinates q and C_q at joint angles gamma, by Newton from the last place."""
@@ -66,9 +66,9 @@ class RigidArm:
 
     def angles(self, source: Outcome) -> Array:
         """Joint angles (motors,) at the start of an analysis, its links taken as straight."""
-        frames = source.q[0][source.assembly.rigid_coordinates]
+        frames = source.q[0][source.assembly.frame_coordinates]
         q = np.zeros_like(self._q)
-        q[self._at_rest.rigid_coordinates] = frames
+        q[self._at_rest.frame_coordinates] = frames
         C = self._at_rest.system.constraints(0.0, q, np.zeros_like(q))[0]
         angles: Array = C[self._motors]
         return angles

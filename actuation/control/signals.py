@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mbs import _core
-from ...mbs.model.measures import End, Row, joint_coordinate
-from ...mbs.model.model import Assembly, Model
+from ...mbs.model.measures import Marker, Measure, joint_coordinate
+from ...mbs.model.model import MechanismSystem, Model
 from ...mbs.scene.loop_records import PERMITTIVITY, Sensor
 from ..patches.patches import PatchArray
 
@@ -31,7 +31,7 @@ class Signal:
     order: int
     resolution: float
     noise: float
-    row: Row | None = None
+    row: Measure | None = None
     body: str = ""
     vector: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -55,7 +55,9 @@ def signals(model: Model, patches: Mapping[str, PatchArray], sensor: Sensor) -> 
     elif sensor.point is not None:
         body, _, point = sensor.point.partition(".")
         for axis in ("x", "y"):
-            row = Row(f'sensor on "{sensor.point}"', getattr(_core.RowKind, axis), End(None), End(body, point))
+            row = Measure(
+                f'sensor on "{sensor.point}"', getattr(_core.MeasureKind, axis), Marker(None), Marker(body, point)
+            )
             yield Signal(f"point/{sensor.point}/{axis}{ending}", order, *quality, row)
     elif sensor.pzt is not None:
         for k, vector in enumerate(volts_per_modal_coordinate(patches[sensor.pzt], sensor.capacitance), 1):
@@ -85,7 +87,7 @@ def merged(given: Sequence[Signal], needed: Sequence[Signal]) -> tuple[Signal, .
     return tuple(sorted(by_name.values(), key=lambda signal: signal.row is None))
 
 
-def sensing(assembly: Assembly, read: Sequence[Signal]) -> _core.Sensing:
+def sensing(assembly: MechanismSystem, read: Sequence[Signal]) -> _core.Sensing:
     """What reads these signals in the core; the motor rows of `assembly` are those of the signals along rows."""
     orders = [signal.order for signal in read if signal.row is not None]
     along = list(zip(assembly.motor_rows, orders, strict=True))

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mbs import _core
-from ..mbs.model.model import Assembly
+from ..mbs.model.model import MechanismSystem
 
 Array = NDArray[np.float64]
-State = tuple[Assembly, Array, Array]
+State = tuple[MechanismSystem, Array, Array]
 """Equations, q and v."""
 
 

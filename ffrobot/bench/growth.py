@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..mbs.analysis.analyses import run_pcid
-from ..mbs.model.model import Assembly, build_model
+from ..mbs.model.model import MechanismSystem, build_model
 from ..mbs.model.planar_body import PlanarBody, PlanarPoint
 from ..mbs.scene.analysis_records import Analysis
 from ..mbs.scene.scene import Scene
@@ -66,7 +66,7 @@ def chain(links: int, modes: int, closed: bool) -> State:
     bodies = [sine_link(f"b{i}", modes) for i in range(links)]
     angles = {body.name: np.pi * (i + 0.5) / links for i, body in enumerate(bodies)}
     model = build_model(_scene(bodies, angles, closed), bodies)
-    assembly = Assembly(model, [*model.joints, *model.trajectories], (), list(model.motors.values()))
+    assembly = MechanismSystem(model, [*model.joints, *model.trajectories], (), list(model.motors.values()))
     q, at = np.zeros(assembly.system.coordinates), np.zeros(2)
     for first, angle in zip(assembly.first, angles.values(), strict=True):
         q[first : first + 3] = *at, angle

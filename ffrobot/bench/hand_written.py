@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import InputError, SolveError
-from ..mbs.model.model import Assembly, Model
+from ..mbs.model.model import MechanismSystem, Model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.solve.initial_state import undeformed_state
 from .evaluation import State
@@ -72,13 +72,13 @@ def link_numbers(body: PlanarBody) -> str:
 
 def general_state(model: Model) -> State:
     """The state at which the program times itself, on the constraints: equations, q, v."""
-    assembly = Assembly(model, [*model.joints, *model.trajectories])
+    assembly = MechanismSystem(model, [*model.joints, *model.trajectories])
     start = undeformed_state(assembly)
     q, v = start.q.copy(), np.zeros_like(start.v)
     bend = iter(1e-4 / (1 + np.arange(sum(body.n_modes for body in model.bodies))))
     for first, body in zip(assembly.first, model.bodies, strict=True):
         q[first + 3 : first + 3 + body.n_modes] = [next(bend) for _ in range(body.n_modes)]
-    frames = assembly.rigid_coordinates
+    frames = assembly.frame_coordinates
     for _ in range(20):
         C, C_dot, C_q = assembly.system.constraints(TIME, q, v)
         q[frames] -= np.linalg.solve(C_q[:, frames], C)

@@ -85,7 +85,7 @@ def place_patches(solution: Solution, wanted: Placement, outcome: Outcome) -> Pl
         if source.F_p is None:
             raise InputError(
                 f'{path}: analysis "{outcome.analysis.name}": placement.criterion: expected motors that fit the'
-                f' mechanism for "voltage", found {len(solution.model.motors)} for {solution.model.rigid_freedom}'
+                f' mechanism for "voltage", found {len(solution.model.motors)} for {solution.model.degrees_of_freedom}'
             )
         F_p = source.F_p[:, source.modal_columns(wanted.body)]
     else:

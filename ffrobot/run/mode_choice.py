@@ -146,7 +146,7 @@ def reported(solution: Solution, analysis: str) -> Reported:
     return {kind: quantities for kind, quantities in found.items() if quantities}
 
 
-def levels(scene: Scene, bodies: Mapping[str, PlanarBody]) -> list[dict[str, PlanarBody]]:
+def truncation_levels(scene: Scene, bodies: Mapping[str, PlanarBody]) -> list[dict[str, PlanarBody]]:
     """The flexible bodies with `modes` given, with more and more modes where that is "auto"; the last have all.
 
     A level has the modes up to one frequency, of all bodies: 1, 2, 3, 5, 8 … of each on average. `bodies` have all.

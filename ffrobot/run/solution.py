@@ -22,11 +22,11 @@ from ..actuation.points import PointForces, PointSet, point_set, with_points
 from ..common.errors import InputError
 from ..mbs.analysis.analyses import Outcome, run_forward, run_pcid, run_static
 from ..mbs.analysis.earlier_run import EarlierRun
-from ..mbs.analysis.elastic_joints import through_gears
+from ..mbs.analysis.elastic_joints import add_transmission
 from ..mbs.analysis.fcid import run_fcid
 from ..mbs.analysis.motors_only import run_motors_only
 from ..mbs.analysis.operating_points import operating_points
-from ..mbs.analysis.replay import Equipment
+from ..mbs.analysis.replay import ActuatorSet
 from ..mbs.model.geometric_stiffening import NOTABLE, estimated_effect
 from ..mbs.model.model import ModalLoad, Model, build_model
 from ..mbs.model.planar_body import PlanarBody
@@ -37,7 +37,7 @@ from ..mbs.scene.scene import Scene
 from .bodies import LoadedBody, add_patches, load_bodies
 from .evaluation import ALLOCATED, evaluate, place_patches
 from .interruption import Interruption
-from .mode_choice import ErrorEstimate, ModeChoice, error_tolerances, levels, reported
+from .mode_choice import ErrorEstimate, ModeChoice, error_tolerances, reported, truncation_levels
 from .omissions import skipped as skipped_lines
 
 Array = NDArray[np.float64]
@@ -129,7 +129,7 @@ def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Inter
     """The scene solved with as many modes as its tolerances need: see `mode_choice`."""
     began = time.perf_counter()
     tolerances = error_tolerances(solution.scene)
-    every = levels(solution.scene, _whole(solution.bodies))
+    every = truncation_levels(solution.scene, _whole(solution.bodies))
     estimate, tried, k = ErrorEstimate(), [], 0
     while True:
         last = time.perf_counter()
@@ -221,7 +221,7 @@ def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     bodies = {body.name: loaded for body, loaded in zip(scene.body, load_bodies(scene, watcher.stage), strict=True)}
     seconds = {"links and files": time.perf_counter() - began}
     structure = add_patches(scene, bodies)
-    first = levels(scene, _whole(bodies))[0]
+    first = truncation_levels(scene, _whole(bodies))[0]
     bodies = {name: replace(body, planar=first.get(name, body.planar)) for name, body in bodies.items()}
     return _assembled(scene, bodies, structure, seconds, stiffened=scene.geometric_stiffening is True)
 
@@ -279,26 +279,26 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
     if analysis.kind in ("linear", "placement"):
         return operating_points(model, analysis, solution.outcomes[analysis.source] if analysis.source else None)
     if analysis.kind == "static":
-        return through_gears(run_static(model, analysis))
+        return add_transmission(run_static(model, analysis))
     if analysis.kind == "fcid":
-        return through_gears(run_fcid(model, analysis))
+        return add_transmission(run_fcid(model, analysis))
     if analysis.kind == "motors-only":
-        return through_gears(run_motors_only(model, analysis, progress))
+        return add_transmission(run_motors_only(model, analysis, progress))
     if analysis.kind == "pcid":
         replayed = any(later.actuation == analysis.name for later in solution.scene.analysis)
-        return through_gears(run_pcid(model, analysis, replayed, progress, earlier))
+        return add_transmission(run_pcid(model, analysis, replayed, progress, earlier))
     source = solution.outcomes[analysis.actuation] if analysis.actuation else None
     if analysis.kind == "closed-loop":
         assert source is not None
         outcome, loop = run_closed_loop(model, analysis, source, solution.patches, progress)
         solution.loops[analysis.name] = loop
         return outcome
-    return run_forward(model, analysis, source, _equipment(solution), progress, earlier)
+    return run_forward(model, analysis, source, _actuator_set(solution), progress, earlier)
 
 
-def _equipment(solution: Solution) -> Equipment:
+def _actuator_set(solution: Solution) -> ActuatorSet:
     """The actuators of the scene, fresh for one run."""
-    return Equipment(
+    return ActuatorSet(
         {name: allocation(array, limited=False) for name, array in solution.patches.items()},
         {name: allocation(array, limited=True) for name, array in solution.patches.items()},
         {name: points.actuator() for name, points in solution.points.items()},

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...common.errors import SolveError
 from .. import _core
-from ..model.model import ZERO, Array, Assembly, Model
+from ..model.model import ZERO, Array, MechanismSystem, Model
 from ..scene.analysis_records import Analysis
 from ..solve.diagnosis import find_cause, lost_inertia
 from ..solve.initial_state import State, check_reach, undeformed_state
@@ -20,7 +20,7 @@ from ..solve.path_checks import check_smooth
 from ..solve.statics import static_equilibrium
 from .earlier_run import EarlierRun
 from .elastic_joints import GearMotion, check_applied, drive_sizes, with_compliance, with_rotors
-from .replay import Equipment, actuation_source, applied_actuators, motor_limits
+from .replay import ActuatorSet, actuation_source, applied_actuators, motor_limits
 
 if TYPE_CHECKING:
     from ..solve.stable_inversion import Inversion
@@ -54,7 +54,7 @@ class Outcome:
     """What an analysis computed, one row per output time; bodies side by side in the columns of q, v, a, F_p."""
 
     analysis: Analysis
-    assembly: Assembly
+    assembly: MechanismSystem
     time: Array  # (T,)
     q: Array  # (T, coordinates)
     v: Array
@@ -124,7 +124,7 @@ def run_pcid(
 
     Raises `InputError` where the trajectories cannot be followed.
     """
-    assembly = Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+    assembly = MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
     start = initial_state(assembly)
     check_smooth(assembly, analysis.end)
     check_reach(assembly, undeformed_state(assembly), analysis.times)
@@ -136,7 +136,7 @@ def run_forward(
     model: Model,
     analysis: Analysis,
     source: Outcome | None,
-    equipment: Equipment,
+    actuator_set: ActuatorSet,
     progress: Progress,
     earlier: EarlierRun | None = None,
 ) -> Outcome:
@@ -147,19 +147,19 @@ def run_forward(
     """
     model = with_compliance(model)
     if source is None:
-        assembly = Assembly(model, model.joints, model.loads)
+        assembly = MechanismSystem(model, model.joints, model.loads)
         return _integrate(assembly, analysis, initial_state(assembly), None, None, None, progress, earlier=earlier)
     analysis, loads = as_long_as(source, analysis), model.loads
     if source.inversion is not None:
         loads = source.inversion.servo.loads
-    rows, actuators = applied_actuators(model, analysis, source, equipment)
+    rows, actuators = applied_actuators(model, analysis, source, actuator_set)
     sizes, moved = [ZERO] * len(rows), with_rotors(source, model)
     if model.gears:
         check_applied(model, analysis)
         limits = motor_limits(model)
         sizes = drive_sizes(source, limits if analysis.limits else np.full_like(limits, np.inf))
         actuators = actuators[1:]  # without the motors
-    assembly = Assembly(model, model.joints, [*zip(rows, sizes, strict=True), *loads])
+    assembly = MechanismSystem(model, model.joints, [*zip(rows, sizes, strict=True), *loads])
     steering = _core.Actuation(actuation_source(source), actuators) if actuators else None
     start = State(moved.q[0].copy(), moved.v[0].copy())  # bodies and their order are the same
     return _integrate(assembly, analysis, start, steering, None, None, progress, earlier)
@@ -178,13 +178,13 @@ def run_static(model: Model, analysis: Analysis) -> Outcome:
     The targets are frozen, so that the multipliers of the state at rest are those of the equilibrium.
     """
     held = [replace(c, target=_core.TimeFunction.constant(c.target(0.0)[0])) for c in model.trajectories]
-    assembly = Assembly(model, [*model.joints, *held], model.loads, list(model.motors.values()))
+    assembly = MechanismSystem(model, [*model.joints, *held], model.loads, list(model.motors.values()))
     state = static_equilibrium(assembly, undeformed_state(assembly))
     at_rest = State(state.q, np.zeros_like(state.q))
     return _integrate(assembly, analysis, at_rest, None, resolver_of(assembly), None, lambda _: True)
 
 
-def initial_state(assembly: Assembly) -> State:
+def initial_state(assembly: MechanismSystem) -> State:
     """The initial state the scene asks for."""
     start = undeformed_state(assembly)
     if assembly.model.scene.initial.state == "static":
@@ -192,20 +192,20 @@ def initial_state(assembly: Assembly) -> State:
     return start
 
 
-def resolver_of(assembly: Assembly) -> _core.ActuationResolver | None:
+def resolver_of(assembly: MechanismSystem) -> _core.ActuatorForces | None:
     """What turns trajectory forces into motor and modal forces; None where the motors do not fit the mechanism."""
     model = assembly.model
-    if not model.trajectories or len(model.motors) != model.rigid_freedom:
+    if not model.trajectories or len(model.motors) != model.degrees_of_freedom:
         return None
-    return _core.ActuationResolver(assembly.system, assembly.is_trajectory, assembly.motor_rows)
+    return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_rows)
 
 
 def _integrate(
-    assembly: Assembly,
+    assembly: MechanismSystem,
     analysis: Analysis,
     start: State,
-    steering: _core.Steering | None,
-    resolver: _core.ActuationResolver | None,
+    steering: _core.ExternalLoads | None,
+    resolver: _core.ActuatorForces | None,
     recording: _core.Recording | None,
     progress: Progress,
     earlier: EarlierRun | None = None,
@@ -239,7 +239,7 @@ def _integrate(
     return outcome if earlier is None else earlier.followed_by(outcome)
 
 
-def _taken_over(assembly: Assembly, analysis: Analysis, earlier: EarlierRun) -> Outcome:
+def _taken_over(assembly: MechanismSystem, analysis: Analysis, earlier: EarlierRun) -> Outcome:
     """The outcome of a run that had reached its end."""
     rows: dict[str, Any] = {"tau": None, "F_p": None} | dict(earlier.rows)
     return Outcome(

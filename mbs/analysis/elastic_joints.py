@@ -1,7 +1,7 @@
 """Gears that give: the robot with its rotors as bodies, and what motors must do for a motion found without them.
 
 Inverse analyses and equilibria take gears for rigid: their motion is that of the links, and their rotors turn with
-them. What a gear transmits is then known, and where its motor has to be follows (`through_gears`; Spong 1987).
+them. What a gear transmits is then known, and where its motor has to be follows (`add_transmission`; Spong 1987).
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from ...common.errors import InputError
 from .. import _core
 from ..fields.time_functions import spline
-from ..model.measures import End, Row
-from ..model.model import ZERO, Array, Assembly, Constraint, Model
+from ..model.measures import Marker, Measure
+from ..model.model import ZERO, Array, Constraint, MechanismSystem, Model
 from ..model.planar_body import PlanarBody, from_rigid_body
 from ..model.transmissions import Gear, joint_gears, joint_rotors
 from ..scene.analysis_records import Analysis
@@ -64,9 +64,15 @@ def with_compliance(model: Model) -> Model:
                 f'{model.scene.path}: joint "{gear.joint}": stiffness: expected a joint with a motor, found one without'
             )
     pins = [
-        Constraint(Row(gear.rotor, kind, End(None), End(gear.rotor)), ZERO, gear.rotor, kind.name, is_trajectory=False)
+        Constraint(
+            Measure(gear.rotor, kind, Marker(None), Marker(gear.rotor)),
+            ZERO,
+            gear.rotor,
+            kind.name,
+            is_trajectory=False,
+        )
         for gear in gears
-        for kind in (_core.RowKind.x, _core.RowKind.y)
+        for kind in (_core.MeasureKind.x, _core.MeasureKind.y)
     ]
     firm = [joint for joint in model.scene.joint if joint.stiffness is None]
     rigid = model.scene.model_copy(update={"joint": tuple(firm)})
@@ -90,7 +96,7 @@ def _rotor(model: Model, gear: Gear) -> PlanarBody:
     return from_rigid_body(gear.rotor, RigidBody(mass=mass, inertia=inertia, center=(0.0, 0.0)))
 
 
-def through_gears(outcome: Outcome) -> Outcome:
+def add_transmission(outcome: Outcome) -> Outcome:
     """An inverse analysis or equilibrium with what motors must do behind gears that give.
 
     With the rigid rotor's angle ψ = N γ + α_a the gear transmits τ_s = τ − J N ψ̈. The twist δ = θ_m − γ follows from
@@ -116,10 +122,10 @@ def through_gears(outcome: Outcome) -> Outcome:
 
 def _angles(outcome: Outcome, gear: Gear) -> tuple[Array, Array]:
     """γ and α_a with their rates and accelerations, each (T, 3)."""
-    ground = Row("", _core.RowKind.angle, End(None), gear.coordinate.a)
+    ground = Measure("", _core.MeasureKind.angle, Marker(None), gear.coordinate.a)
     rows = [gear.coordinate, *([] if gear.coordinate.a.body is None else [ground])]
     model = outcome.assembly.model
-    assembly = Assembly(model, model.joints, (), rows)
+    assembly = MechanismSystem(model, model.joints, (), rows)
     along = [(row, order) for row in assembly.motor_rows for order in range(3)]
     x = (np.ascontiguousarray(values) for values in (outcome.q, outcome.v, outcome.a))
     read = _core.Sensing(assembly.system, along, []).read(*x)
@@ -167,7 +173,7 @@ def with_rotors(source: Outcome, model: Model) -> Outcome:
     if not source.gears:
         raise InputError(
             f'{model.scene.path}: analysis "{source.analysis.name}": expected motors that fit the mechanism'
-            f" ({model.rigid_freedom} of them) beside joints with stiffness, found {len(model.motors)}"
+            f" ({model.degrees_of_freedom} of them) beside joints with stiffness, found {len(model.motors)}"
         )
     columns: list[list[Array]] = [[source.q], [source.v], [source.a]]
     for gear in model.gears:
@@ -179,7 +185,7 @@ def with_rotors(source: Outcome, model: Model) -> Outcome:
     q, v, a = (np.hstack(parts) for parts in columns)
     known_rows = source.assembly.constraints
     pins = [constraint for constraint in model.joints if constraint not in known_rows]
-    assembly = Assembly(model, [*known_rows, *pins])
+    assembly = MechanismSystem(model, [*known_rows, *pins])
     lambda_ = np.zeros((len(q), len(assembly.constraints)))  # nothing pulls at the pins
     lambda_[:, [assembly.constraints.index(row) for row in known_rows]] = source.lambda_
     return replace(source, assembly=assembly, q=q, v=v, a=a, lambda_=lambda_)

@@ -12,7 +12,7 @@ from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
 from ..fields.time_functions import spline
-from ..model.model import ZERO, Array, Assembly, Model
+from ..model.model import ZERO, Array, MechanismSystem, Model
 from ..model.planar_body import PlanarBody
 from ..scene.analysis_records import Analysis
 from ..solve.initial_state import check_reach, undeformed_state
@@ -32,12 +32,12 @@ def run_fcid(model: Model, analysis: Analysis) -> Outcome:
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
     `SolveError` where no static shape is found.
     """
-    assembly = Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
-    frames = len(assembly.rigid_coordinates)
+    assembly = MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+    frames = len(assembly.frame_coordinates)
     if len(assembly.constraints) != frames:
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": kind: expected as many trajectory components as the'
-            f" mechanism has degrees of freedom ({model.rigid_freedom}) for "
+            f" mechanism has degrees of freedom ({model.degrees_of_freedom}) for "
             f'"fcid", found {len(assembly.constraints) - len(model.joints)}'
         )
     start = undeformed_state(assembly)
@@ -64,7 +64,7 @@ def run_fcid(model: Model, analysis: Analysis) -> Outcome:
 
 
 def prescribed_shape(
-    assembly: Assembly, analysis: Analysis, guess: Array, resolver: _core.ActuationResolver | None
+    assembly: MechanismSystem, analysis: Analysis, guess: Array, resolver: _core.ActuatorForces | None
 ) -> Shape:
     """p(t) of every body, with its derivatives."""
     bodies = assembly.model.bodies
@@ -75,7 +75,9 @@ def prescribed_shape(
     return [[ZERO] * body.n_modes for body in bodies]
 
 
-def _static(assembly: Assembly, analysis: Analysis, guess: Array, resolver: _core.ActuationResolver | None) -> Shape:
+def _static(
+    assembly: MechanismSystem, analysis: Analysis, guess: Array, resolver: _core.ActuatorForces | None
+) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
     nodes = _nodes(analysis)
     p = _core.static_shape(assembly.system, nodes.tolist(), guess, resolver)

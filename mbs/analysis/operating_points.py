@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from ...common.errors import InputError
-from ..model.model import Assembly, Model
+from ..model.model import MechanismSystem, Model
 from ..scene.analysis_records import Analysis
 from ..solve.initial_state import undeformed_state
 from ..solve.linearisation import held_by_motors
 from .analyses import Outcome, run_static
-from .elastic_joints import through_gears, with_compliance, with_rotors
+from .elastic_joints import add_transmission, with_compliance, with_rotors
 
 NEAR = 1e-9  # of the end of an analysis: how far from an output a time may be for rounding
 
@@ -26,9 +26,9 @@ def operating_points(model: Model, analysis: Analysis, source: Outcome | None) -
     if source is None:
         held = model
         if not model.trajectories and model.motors:
-            start = undeformed_state(Assembly(model, model.joints))
+            start = undeformed_state(MechanismSystem(model, model.joints))
             held = replace(model, trajectories=tuple(held_by_motors(model, start.q)))
-        outcome = with_rotors(through_gears(run_static(held, analysis)), with_compliance(model))
+        outcome = with_rotors(add_transmission(run_static(held, analysis)), with_compliance(model))
         return replace(outcome, tau=None, F_p=None)
     source = with_rotors(source, with_compliance(model))
     rows = [_row(model, analysis, source, t) for t in analysis.times]

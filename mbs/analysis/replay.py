@@ -11,7 +11,7 @@ import numpy as np
 from ...common.errors import InputError
 from ...common.validation import quoted
 from .. import _core
-from ..model.measures import End, Row
+from ..model.measures import Marker, Measure
 from ..model.model import Array, Model
 from ..scene.analysis_records import Analysis
 
@@ -28,7 +28,7 @@ class PointActuator:
 
 
 @dataclass(frozen=True)
-class Equipment:
+class ActuatorSet:
     """Actuators by the body they sit on; `patches` know no limits, `limited_patches` theirs."""
 
     patches: Mapping[str, _core.Allocation] = field(default_factory=dict)
@@ -44,8 +44,8 @@ def motor_limits(model: Model) -> Array:
 
 
 def applied_actuators(
-    model: Model, analysis: Analysis, source: Outcome, equipment: Equipment
-) -> tuple[list[Row], list[_core.Actuator]]:
+    model: Model, analysis: Analysis, source: Outcome, actuator_set: ActuatorSet
+) -> tuple[list[Measure], list[_core.Actuator]]:
     """Rows along which forces act, and the actuators that set them, in the order in which the core numbers them.
 
     Raises `InputError` where the motors do not fit the mechanism, or a body has no actuation points.
@@ -53,41 +53,41 @@ def applied_actuators(
     if analysis.apply == "trajectory":
         return [c.row for c in source.assembly.constraints if c.is_trajectory], [_core.TrajectoryForces(0)]
     if analysis.apply == "points":
-        return _point_actuators(model, analysis, source, equipment)
+        return _point_actuators(model, analysis, source, actuator_set)
     if source.tau is None:
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": apply: expected motors that fit the mechanism'
-            f" ({model.rigid_freedom} of them) for {analysis.apply!r}, found {len(model.motors)}; name them with"
+            f" ({model.degrees_of_freedom} of them) for {analysis.apply!r}, found {len(model.motors)}; name them with"
             ' motor = true, or use apply = "trajectory"'
         )
     limits = motor_limits(model)
     motors = _core.Motors(0, limits if analysis.limits else np.full_like(limits, np.inf))
-    patches = equipment.limited_patches if analysis.limits else equipment.patches
+    patches = actuator_set.limited_patches if analysis.limits else actuator_set.patches
     index = {body.name: i for i, body in enumerate(model.bodies)}
     bent = [_core.Patches(index[name], allocation) for name, allocation in patches.items()]
     return list(model.motors.values()), [motors, *(bent if analysis.apply == "joints+pzt" else [])]
 
 
 def _point_actuators(
-    model: Model, analysis: Analysis, source: Outcome, equipment: Equipment
-) -> tuple[list[Row], list[_core.Actuator]]:
+    model: Model, analysis: Analysis, source: Outcome, actuator_set: ActuatorSet
+) -> tuple[list[Measure], list[_core.Actuator]]:
     driven = [body.name for body in model.bodies if is_driven(source, body.name)]
-    missing = [name for name in driven if name not in equipment.points]
+    missing = [name for name in driven if name not in actuator_set.points]
     if missing:
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": apply: expected [[actuation_points]] on every body that'
             f' "{source.analysis.name}" drives ({quoted(driven)}), found none on {quoted(missing)}'
         )
-    rows: list[Row] = []
+    rows: list[Measure] = []
     actuators: list[_core.Actuator] = []
     for i, body in enumerate(model.bodies):
-        if body.name not in equipment.points:
+        if body.name not in actuator_set.points:
             continue
-        points = equipment.points[body.name]
+        points = actuator_set.points[body.name]
         actuators.append(_core.PointForces(len(rows), i, points.equations))
         for name in points.points:
-            for kind in (_core.RowKind.x, _core.RowKind.y):
-                rows.append(Row(f'actuation point on "{body.name}"', kind, End(None), End(body.name, name)))
+            for kind in (_core.MeasureKind.x, _core.MeasureKind.y):
+                rows.append(Measure(f'actuation point on "{body.name}"', kind, Marker(None), Marker(body.name, name)))
     return rows, actuators
 
 
@@ -105,7 +105,7 @@ def actuation_source(source: Outcome) -> _core.ActuationSource:
     assembly = source.assembly
     resolver = None
     if source.tau is not None:
-        resolver = _core.ActuationResolver(assembly.system, assembly.is_trajectory, assembly.motor_rows)
+        resolver = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_rows)
     if source.shape is not None:
         return _core.FullyConstrainedActuation(
             assembly.system, source.shape, source.q[0], assembly.is_trajectory, resolver

@@ -56,8 +56,8 @@ std::tuple<RowMajor, RowMajor> sample(ActuationSource &source, const std::vector
 } // namespace
 
 void bind_actuation(nb::module_ &m) {
-  nb::class_<ActuationResolver>(m, "ActuationResolver", "Trajectory forces as motor forces and modal forces.")
-      .def(nb::init<const System &, std::vector<bool>, std::vector<Row>>(), "system"_a, "trajectory"_a, "motors"_a,
+  nb::class_<ActuatorForces>(m, "ActuatorForces", "Trajectory forces as motor forces and modal forces.")
+      .def(nb::init<const System &, std::vector<bool>, std::vector<Measure>>(), "system"_a, "trajectory"_a, "motors"_a,
            nb::keep_alive<1, 2>());
 
   nb::class_<Allocation>(m, "Allocation", "Voltages within limits by bounded weighted least squares.")
@@ -85,12 +85,11 @@ void bind_actuation(nb::module_ &m) {
   nb::class_<ActuationSource>(m, "ActuationSource", "What an inverse analysis found, at any time of it.")
       .def("sample", &sample, "times"_a, "tau (T, motors) and F_p (T, modes of all bodies).");
   nb::class_<RecordedActuation, ActuationSource>(m, "RecordedActuation", "From the dense output of a recorded run.")
-      .def(nb::init<const System &, const Recording &, std::vector<bool>, std::optional<ActuationResolver>>(),
-           "system"_a, "recording"_a, "is_trajectory"_a, "resolver"_a.none(), nb::keep_alive<1, 2>(),
-           nb::keep_alive<1, 3>());
+      .def(nb::init<const System &, const Recording &, std::vector<bool>, std::optional<ActuatorForces>>(), "system"_a,
+           "recording"_a, "is_trajectory"_a, "resolver"_a.none(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
   nb::class_<FullyConstrainedActuation, ActuationSource>(m, "FullyConstrainedActuation", "Solved anew at every time.")
       .def(nb::init<const System &, std::vector<ModalShape>, VectorXd, std::vector<bool>,
-                    std::optional<ActuationResolver>>(),
+                    std::optional<ActuatorForces>>(),
            "system"_a, "shape"_a, "guess"_a, "is_trajectory"_a, "resolver"_a.none(), nb::keep_alive<1, 2>());
 
   nb::class_<ActuationPoints>(m, "ActuationPoints", "Generalized forces of a body as forces at points of it.")
@@ -113,7 +112,7 @@ void bind_actuation(nb::module_ &m) {
       .def(nb::init<std::size_t, Allocation>(), "body"_a, "allocation"_a);
   nb::class_<PointForces, Actuator>(m, "PointForces", "Generalized forces of one body at its actuation points.")
       .def(nb::init<std::size_t, std::size_t, ActuationPoints>(), "first_drive"_a, "body"_a, "points"_a);
-  nb::class_<Actuation, Steering>(m, "Actuation", "An inverse analysis and the actuators that carry it out.")
+  nb::class_<Actuation, ExternalLoads>(m, "Actuation", "An inverse analysis and the actuators that carry it out.")
       .def(nb::init<std::shared_ptr<ActuationSource>, std::vector<std::shared_ptr<Actuator>>>(), "source"_a,
            "actuators"_a);
 }

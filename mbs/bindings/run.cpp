@@ -98,7 +98,7 @@ void bind_run(nb::module_ &m) {
       .def_ro("gathered", &Checkpoint::gathered)
       .def_ro("outputs", &Checkpoint::outputs);
 
-  nb::class_<Steering>(m, "Steering", "Steers a system from outside.");
+  nb::class_<ExternalLoads>(m, "ExternalLoads", "Steers a system from outside.");
 
   nb::class_<Run>(m, "Run", "Outputs of an analysis, one row per output time reached, and how it went.")
       .def_prop_ro("status", [](const Run &r) { return r.report.status; })
@@ -118,9 +118,9 @@ void bind_run(nb::module_ &m) {
 
   m.def(
       "run",
-      [](const System &system, std::vector<int> group, std::vector<bool> moment, Steering *steering,
+      [](const System &system, std::vector<int> group, std::vector<bool> moment, ExternalLoads *steering,
          const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v, double tolerance,
-         unsigned long max_steps, MethodKind method, double spectral_radius, ActuationResolver *resolver,
+         unsigned long max_steps, MethodKind method, double spectral_radius, ActuatorForces *resolver,
          const std::function<bool(double)> &carry_on, Recording *recording, Checkpoint *checkpoint) {
         const nb::gil_scoped_release unlocked;
         ConstrainedMotion motion(system, std::move(group), std::move(moment), steering);
@@ -138,7 +138,7 @@ void bind_run(nb::module_ &m) {
   nb::class_<Sensing>(m, "Sensing", "What sensors read of a state: rows, then modal coordinates, or their rates.")
       .def(
           "__init__",
-          [](Sensing *s, const System &system, const std::vector<std::pair<Row, int>> &rows,
+          [](Sensing *s, const System &system, const std::vector<std::pair<Measure, int>> &rows,
              const std::vector<std::tuple<std::size_t, Eigen::VectorXd, int>> &modes) {
             std::vector<Sensing::AlongRow> along;
             std::vector<Sensing::OfModes> of;

@@ -17,8 +17,8 @@ void bind_servo(nb::module_ &m) {
       .def_ro("D", &InternalDynamics::D)
       .def_ro("K", &InternalDynamics::K);
 
-  nb::class_<MotorsOnly>(m, "MotorsOnly", "Inverse dynamics of a path with joint motors alone.")
-      .def(nb::init<const System &, std::vector<Row>, const System &, std::vector<std::size_t>, double,
+  nb::class_<ServoConstraint>(m, "ServoConstraint", "Inverse dynamics of a path with joint motors alone.")
+      .def(nb::init<const System &, std::vector<Measure>, const System &, std::vector<std::size_t>, double,
                     std::vector<TimeFunction>, Eigen::VectorXd>(),
            "path"_a, "motors"_a, "driven"_a, "motor_constraint"_a, "factor"_a, "offset"_a, "guess"_a,
            nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>())
@@ -29,8 +29,8 @@ void bind_servo(nb::module_ &m) {
       .def("outputs", &servo_outputs, "times"_a, "shape"_a, "resolver"_a,
            "Motion and forces for p(t), shape[body][mode].");
 
-  nb::class_<MotorsOnlyActuation, ActuationSource>(m, "MotorsOnlyActuation", "Solved anew at every time.")
-      .def(nb::init<const System &, MotorsOnly, std::vector<ModalShape>, std::vector<bool>, ActuationResolver>(),
+  nb::class_<ServoActuation, ActuationSource>(m, "ServoActuation", "Solved anew at every time.")
+      .def(nb::init<const System &, ServoConstraint, std::vector<ModalShape>, std::vector<bool>, ActuatorForces>(),
            "driven"_a, "servo"_a, "shape"_a, "is_motor"_a, "resolver"_a, nb::keep_alive<1, 2>(),
            nb::keep_alive<1, 3>());
 }

@@ -48,7 +48,7 @@ PlanarBody make_body(double mass, double inertia, const Vector2d &first_moment, 
 
 // (a, lambda) at one state; steering may be null
 std::tuple<VectorXd, VectorXd> evaluate_state(const System &system, double t, const VectorXd &q, const VectorXd &v,
-                                              Steering *steering) {
+                                              ExternalLoads *steering) {
   check_size("q", q.size(), system.coordinates);
   check_size("v", v.size(), system.coordinates);
   Workspace w(system);
@@ -97,7 +97,7 @@ std::tuple<MatrixXd, VectorXd> rotor_rows(const System &system, const VectorXd &
   const auto count = static_cast<Eigen::Index>(system.constraints.size() - system.held);
   MatrixXd gradients = MatrixXd::Zero(q.size(), count);
   VectorXd inertia(count);
-  RowMotion motion;
+  MeasureMotion motion;
   for (Eigen::Index k = 0; k < count; ++k) {
     const Constraint &rotor = system.constraints[system.held + static_cast<std::size_t>(k)];
     evaluate(rotor.row, w.bodies, motion);
@@ -170,18 +170,18 @@ void bind_system(nb::module_ &m) {
       .def(nb::init<int, int, Vector2d>(), "body"_a, "marker"_a, "ground"_a)
       .def_ro("body", &MarkerReference::body)
       .def_ro("marker", &MarkerReference::marker);
-  nb::enum_<RowKind>(m, "RowKind", "What a row measures between its two markers.")
-      .value("x", RowKind::x)
-      .value("y", RowKind::y)
-      .value("angle", RowKind::angle)
-      .value("slide", RowKind::slide)
-      .value("gear", RowKind::gear);
-  nb::class_<Row>(m, "Row", "A scalar function of the motion of two markers: that of b relative to a.")
-      .def(nb::init<RowKind, MarkerReference, MarkerReference, Vector2d, double>(), "kind"_a, "a"_a, "b"_a,
+  nb::enum_<MeasureKind>(m, "MeasureKind", "What a row measures between its two markers.")
+      .value("x", MeasureKind::x)
+      .value("y", MeasureKind::y)
+      .value("angle", MeasureKind::angle)
+      .value("slide", MeasureKind::slide)
+      .value("gear", MeasureKind::gear);
+  nb::class_<Measure>(m, "Measure", "A scalar function of the motion of two markers: that of b relative to a.")
+      .def(nb::init<MeasureKind, MarkerReference, MarkerReference, Vector2d, double>(), "kind"_a, "a"_a, "b"_a,
            "direction"_a, "offset"_a)
-      .def_ro("kind", &Row::kind)
-      .def_ro("a", &Row::a)
-      .def_ro("b", &Row::b);
+      .def_ro("kind", &Measure::kind)
+      .def_ro("a", &Measure::a)
+      .def_ro("b", &Measure::b);
 
   nb::class_<StateFunction>(m, "StateFunction", "A force of the user's, of time, position and velocity.")
       .def_static("python", &python_force, "function"_a, "A callable of t, x, y, v_x, v_y that returns (x, y, moment).")
@@ -206,27 +206,30 @@ void bind_system(nb::module_ &m) {
           "mass"_a, "inertia"_a, "first_moment"_a, "stiffness"_a, "damping"_a, "W"_a, "j"_a, "S_tilde"_a, "m_xy"_a,
           "marker_positions"_a, "second_order"_a, "K_omega"_a)
       .def(
-          "add_constraint", [](System &s, const Row &row, const TimeFunction &f) { s.constraints.push_back({row, f}); },
-          "row"_a, "target"_a)
+          "add_constraint",
+          [](System &s, const Measure &row, const TimeFunction &f) { s.constraints.push_back({row, f}); }, "row"_a,
+          "target"_a)
       .def(
           "add_rotor",
-          [](System &s, const Row &row, double inertia) { s.constraints.push_back({row, Constant(0.0), 1 / inertia}); },
+          [](System &s, const Measure &row, double inertia) {
+            s.constraints.push_back({row, Constant(0.0), 1 / inertia});
+          },
           "row"_a, "inertia"_a, "After all constraints.")
       .def(
           "add_friction",
-          [](System &s, const Row &row, double viscous, double coulomb, double speed) {
+          [](System &s, const Measure &row, double viscous, double coulomb, double speed) {
             s.drives.push_back({row, Constant(0.0), {viscous, coulomb, speed}});
           },
           "row"_a, "viscous"_a, "coulomb"_a, "speed"_a)
       .def(
           "add_spring",
-          [](System &s, const Row &motor, const Row &joint, double stiffness, double damping) {
+          [](System &s, const Measure &motor, const Measure &joint, double stiffness, double damping) {
             s.springs.push_back({motor, joint, stiffness, damping});
           },
           "motor"_a, "joint"_a, "stiffness"_a, "damping"_a)
       .def(
-          "add_drive", [](System &s, const Row &row, const TimeFunction &f) { s.drives.push_back({row, f}); }, "row"_a,
-          "size"_a)
+          "add_drive", [](System &s, const Measure &row, const TimeFunction &f) { s.drives.push_back({row, f}); },
+          "row"_a, "size"_a)
       .def(
           "add_modal_drive",
           [](System &s, int body, const VectorXd &vector, const TimeFunction &f) {

@@ -51,7 +51,7 @@ VectorXd force_for_motion(const System &system, double t, const VectorXd &q, con
 }
 
 // (by_acceleration, by_velocity, by_position) of rows
-std::tuple<MatrixXd, MatrixXd, MatrixXd> row_tangents(const System &system, const std::vector<Row> &rows,
+std::tuple<MatrixXd, MatrixXd, MatrixXd> row_tangents(const System &system, const std::vector<Measure> &rows,
                                                       const VectorXd &q, const VectorXd &v, const VectorXd &a) {
   check_motion(system, q, v, a);
   Workspace w(system);
@@ -63,7 +63,7 @@ std::tuple<MatrixXd, MatrixXd, MatrixXd> row_tangents(const System &system, cons
   return {result.by_acceleration, result.by_velocity, result.by_position};
 }
 
-Reduction reduce(const System &system, const std::vector<Row> &independent, double t, const VectorXd &q,
+Reduction reduce(const System &system, const std::vector<Measure> &independent, double t, const VectorXd &q,
                  const VectorXd &v, const VectorXd &a, int repetitions) {
   check_motion(system, q, v, a);
   Workspace w(system);

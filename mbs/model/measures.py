@@ -15,7 +15,7 @@ FRAME = ""  # instead of a point's name: the frame of the body itself
 
 
 @dataclass(frozen=True)
-class End:
+class Marker:
     """One end of a row: a point of a body (or its frame, point = FRAME), or a position on the ground (body None)."""
 
     body: str | None
@@ -24,61 +24,61 @@ class End:
 
 
 @dataclass(frozen=True)
-class Row:
+class Measure:
     """value = motion of `b` relative to `a`; `label` names it in messages, `carries_moment` tells N·m from N."""
 
     label: str
-    kind: _core.RowKind
-    a: End
-    b: End
+    kind: _core.MeasureKind
+    a: Marker
+    b: Marker
     direction: tuple[float, float] = (0.0, 0.0)
     offset: float = 0.0
 
     @property
     def carries_moment(self) -> bool:
         """Whether the force along the row is a moment."""
-        return bool(self.kind in (_core.RowKind.angle, _core.RowKind.gear))
+        return bool(self.kind in (_core.MeasureKind.angle, _core.MeasureKind.gear))
 
 
-def joint_rows(scene: Scene, joint: Joint) -> tuple[Row, ...]:
+def joint_rows(scene: Scene, joint: Joint) -> tuple[Measure, ...]:
     """The constraints C_m of a joint. Welds and prismatic joints keep the relative angle of the initial guess."""
     a, b = (_end(side, joint.at) for side in joint.between)
     label = f'joint "{joint.name}"'
-    together = (Row(f"{label}, x", _core.RowKind.x, a, b), Row(f"{label}, y", _core.RowKind.y, a, b))
+    together = (Measure(f"{label}, x", _core.MeasureKind.x, a, b), Measure(f"{label}, y", _core.MeasureKind.y, a, b))
     if joint.type == "revolute":
         return together
     offset = _guessed_angle(scene, b) - _guessed_angle(scene, a)
-    aligned = Row(f"{label}, angle", _core.RowKind.angle, a, b, offset=offset)
+    aligned = Measure(f"{label}, angle", _core.MeasureKind.angle, a, b, offset=offset)
     if joint.type == "weld":
         return (*together, aligned)
     x, y = _unit_axis(joint)
-    return (Row(f"{label}, across the axis", _core.RowKind.slide, a, b, direction=(-y, x)), aligned)
+    return (Measure(f"{label}, across the axis", _core.MeasureKind.slide, a, b, direction=(-y, x)), aligned)
 
 
-def joint_coordinate(scene: Scene, joint: Joint) -> Row:
+def joint_coordinate(scene: Scene, joint: Joint) -> Measure:
     """The joint's own coordinate: angle of the second on the first (as `motors` defines it), or way along the axis."""
     a, b = (_end(side, joint.at) for side in joint.between)
     label = f'joint "{joint.name}"'
     if joint.type == "prismatic":
-        return Row(f"{label}, along the axis", _core.RowKind.slide, a, b, direction=_unit_axis(joint))
+        return Measure(f"{label}, along the axis", _core.MeasureKind.slide, a, b, direction=_unit_axis(joint))
     if scene.motors == "frame":
-        a, b = (End(end.body, FRAME, end.position) for end in (a, b))
-    return Row(f"{label}, angle", _core.RowKind.angle, a, b)
+        a, b = (Marker(end.body, FRAME, end.position) for end in (a, b))
+    return Measure(f"{label}, angle", _core.MeasureKind.angle, a, b)
 
 
-def trajectory_rows(scene: Scene, trajectory: Trajectory) -> dict[str, Row]:
+def trajectory_rows(scene: Scene, trajectory: Trajectory) -> dict[str, Measure]:
     """The specified-trajectory constraints C_s by component ("x", "y" or "value"); their values equal the target."""
-    label, ground = f'trajectory "{trajectory.name}"', End(None)
+    label, ground = f'trajectory "{trajectory.name}"', Marker(None)
     if trajectory.joint is not None:
         joint = next(joint for joint in scene.joint if joint.name == trajectory.joint)
         row = joint_coordinate(scene, joint)
-        return {"value": Row(label, row.kind, row.a, row.b, row.direction)}
+        return {"value": Measure(label, row.kind, row.a, row.b, row.direction)}
     if trajectory.angle is not None:
         body, _, point = trajectory.angle.partition(".")
-        return {"value": Row(label, _core.RowKind.angle, ground, End(body, point))}
+        return {"value": Measure(label, _core.MeasureKind.angle, ground, Marker(body, point))}
     assert trajectory.point is not None
-    end = End(*split_point(trajectory.point))
-    return {c: Row(f"{label}, {c}", getattr(_core.RowKind, c), ground, end) for c in trajectory.components}
+    end = Marker(*split_point(trajectory.point))
+    return {c: Measure(f"{label}, {c}", getattr(_core.MeasureKind, c), ground, end) for c in trajectory.components}
 
 
 def is_open_chain(scene: SceneKeys) -> bool:
@@ -106,11 +106,11 @@ def motor_joints(scene: SceneKeys) -> tuple[Joint, ...]:
     )
 
 
-def _end(side: str, at: tuple[float, float]) -> End:
-    return End(None, FRAME, at) if side == GROUND else End(*split_point(side))
+def _end(side: str, at: tuple[float, float]) -> Marker:
+    return Marker(None, FRAME, at) if side == GROUND else Marker(*split_point(side))
 
 
-def _guessed_angle(scene: Scene, end: End) -> float:
+def _guessed_angle(scene: Scene, end: Marker) -> float:
     return 0.0 if end.body is None else scene.initial.angles.get(end.body, 0.0)
 
 

@@ -15,7 +15,7 @@ from .._core import StateFunction, TimeFunction
 from ..fields.field_types import GROUND, split_point
 from ..scene.mechanism_records import Load
 from ..scene.scene import Scene
-from .measures import FRAME, End, Row, joint_coordinate, joint_rows, motor_joints, trajectory_rows
+from .measures import FRAME, Marker, Measure, joint_coordinate, joint_rows, motor_joints, trajectory_rows
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
 from .transmissions import Friction, Gear, joint_frictions, joint_rotors
 
@@ -27,7 +27,7 @@ ZERO = _core.TimeFunction.constant(0.0)
 class Constraint:
     """A row that is held at `target`(t): `component` of the joint or trajectory `owner`."""
 
-    row: Row
+    row: Measure
     target: TimeFunction
     owner: str
     component: str
@@ -52,11 +52,11 @@ class Model:
     modal_loads: tuple[ModalLoad, ...]
     joints: tuple[Constraint, ...]
     trajectories: tuple[Constraint, ...]
-    motors: dict[str, Row]
-    loads: tuple[tuple[Row, TimeFunction], ...]
-    rotors: tuple[tuple[Row, float], ...] = ()
-    frictions: tuple[tuple[Row, Friction], ...] = ()
-    state_forces: tuple[tuple[End, StateFunction], ...] = ()
+    motors: dict[str, Measure]
+    loads: tuple[tuple[Measure, TimeFunction], ...]
+    rotors: tuple[tuple[Measure, float], ...] = ()
+    frictions: tuple[tuple[Measure, Friction], ...] = ()
+    state_forces: tuple[tuple[Marker, StateFunction], ...] = ()
     gears: tuple[Gear, ...] = ()  # that give; empty where they are taken for rigid (see `compliant_joints`)
 
     def body(self, name: str) -> PlanarBody:
@@ -69,7 +69,7 @@ class Model:
         return self.bodies[: len(self.bodies) - len(self.gears)]
 
     @property
-    def rigid_freedom(self) -> int:
+    def degrees_of_freedom(self) -> int:
         """Degrees of freedom with rigid links and gears, counted: coordinates less joint constraints."""
         return 3 * len(self.bodies) - len(self.joints) - len(self.gears)
 
@@ -97,30 +97,35 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
         tuple(_state_forces(scene)),
     )  # fmt: skip
     named = any(joint.motor for joint in scene.joint)
-    if named and trajectories and len(motors) != model.rigid_freedom:
+    if named and trajectories and len(motors) != model.degrees_of_freedom:
         raise InputError(
             f"{scene.path}: joint: expected as many motors as the mechanism has degrees of freedom"
-            f" ({model.rigid_freedom}), found {len(motors)} ({quoted(motors)})"
+            f" ({model.degrees_of_freedom}), found {len(motors)} ({quoted(motors)})"
         )
     return model
 
 
-def load_rows(scene: Scene, loads: Sequence[Load]) -> Iterator[tuple[Row, TimeFunction]]:
+def load_rows(scene: Scene, loads: Sequence[Load]) -> Iterator[tuple[Measure, TimeFunction]]:
     """Directions of given loads and their sizes."""
-    kinds = {"x": _core.RowKind.x, "y": _core.RowKind.y, "moment": _core.RowKind.angle}
+    kinds = {"x": _core.MeasureKind.x, "y": _core.MeasureKind.y, "moment": _core.MeasureKind.angle}
     joints = {joint.name: joint for joint in scene.joint}
     for load in loads:
         if load.joint is not None:
             yield joint_coordinate(scene, joints[load.joint]), load.components["moment"]
         elif load.point is not None:
             for component, size in load.components.items():
-                yield Row(f'load on "{load.point}"', kinds[component], End(None), End(*split_point(load.point))), size
+                yield (
+                    Measure(
+                        f'load on "{load.point}"', kinds[component], Marker(None), Marker(*split_point(load.point))
+                    ),
+                    size,
+                )
 
 
-def _state_forces(scene: Scene) -> Iterator[tuple[End, StateFunction]]:
+def _state_forces(scene: Scene) -> Iterator[tuple[Marker, StateFunction]]:
     for load in scene.load:
         if load.point is not None and load.force is not None:
-            yield End(*split_point(load.point)), load.force
+            yield Marker(*split_point(load.point)), load.force
 
 
 def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
@@ -153,7 +158,7 @@ def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
             )
 
 
-class Assembly:
+class MechanismSystem:
     """A core `System` with the numbering that leads back from its rows to the scene.
 
     `constraints` are in the core's order: joints and trajectories sorted for a small envelope of C M⁻¹ Cᵀ. Rotors of
@@ -164,8 +169,8 @@ class Assembly:
         self,
         model: Model,
         constraints: Sequence[Constraint],
-        drives: Sequence[tuple[Row, TimeFunction]] = (),
-        motors: Sequence[Row] = (),
+        drives: Sequence[tuple[Measure, TimeFunction]] = (),
+        motors: Sequence[Measure] = (),
     ) -> None:
         self.model = model
         self.index = {body.name: i for i, body in enumerate(model.bodies)}
@@ -199,7 +204,7 @@ class Assembly:
         self.first = np.array(self.system.first_coordinate, dtype=int)
 
     @property
-    def rigid_coordinates(self) -> NDArray[np.intp]:
+    def frame_coordinates(self) -> NDArray[np.intp]:
         """Indices of (R, θ) of all bodies in q (3 bodies,)."""
         indices: NDArray[np.intp] = (self.first[:, None] + np.arange(3)).ravel()
         return indices
@@ -250,23 +255,23 @@ class Assembly:
                 if end.body is None or end.point == FRAME:
                     continue
                 wrench = wrenches.setdefault(end.body, {}).setdefault(end.point, np.zeros((len(lambda_), 3)))
-                if row.kind == _core.RowKind.slide:
+                if row.kind == _core.MeasureKind.slide:
                     wrench[:, :2] += (sign * multiplier)[:, None] * self._slide_direction(row, q)
                 else:
-                    column = (_core.RowKind.x, _core.RowKind.y, _core.RowKind.angle).index(row.kind)
+                    column = (_core.MeasureKind.x, _core.MeasureKind.y, _core.MeasureKind.angle).index(row.kind)
                     wrench[:, column] += sign * multiplier
         return wrenches
 
-    def _slide_direction(self, row: Row, q: Array) -> Array:
+    def _slide_direction(self, row: Measure, q: Array) -> Array:
         """The direction (T, 2) of a slide in global axes; the rotation of its section is small against the frame's."""
         theta = q[:, self.first[self.index[row.a.body]] + 2] if row.a.body is not None else np.zeros(len(q))
         x, y = row.direction
         return np.column_stack([np.cos(theta) * x - np.sin(theta) * y, np.sin(theta) * x + np.cos(theta) * y])
 
-    def _core_row(self, row: Row) -> _core.Row:
-        return _core.Row(row.kind, self._marker(row.a), self._marker(row.b), np.array(row.direction), row.offset)
+    def _core_row(self, row: Measure) -> _core.Measure:
+        return _core.Measure(row.kind, self._marker(row.a), self._marker(row.b), np.array(row.direction), row.offset)
 
-    def _marker(self, end: End) -> _core.Marker:
+    def _marker(self, end: Marker) -> _core.Marker:
         if end.body is None:
             return _core.Marker(-1, 0, np.array(end.position))
         body = self.index[end.body]
@@ -282,7 +287,7 @@ def _point(body: PlanarBody, name: str) -> PlanarPoint:
     return PlanarPoint(np.zeros(2), np.zeros((2, body.n_modes)), np.zeros(body.n_modes))
 
 
-def envelope_order(rows: Sequence[Row]) -> list[int]:
+def envelope_order(rows: Sequence[Measure]) -> list[int]:
     """Order of constraint rows that keeps the envelope of C M⁻¹ Cᵀ small: reverse Cuthill–McKee on shared bodies."""
     touched = [{end.body for end in (row.a, row.b)} - {None} for row in rows]
     if len({body for bodies in touched for body in bodies}) <= 2:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from .. import _core
 from ..scene.mechanism_records import Joint
 from ..scene.scene import Scene
-from .measures import End, Row, joint_coordinate
+from .measures import Marker, Measure, joint_coordinate
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Friction:
     speed: float
 
 
-def joint_rotors(scene: Scene) -> Iterator[tuple[Row, float]]:
+def joint_rotors(scene: Scene) -> Iterator[tuple[Measure, float]]:
     """Rows whose rate u is that of a rotor, and the inertia J of its kinetic energy ½ J u².
 
     A rotor on the first body a of a joint turns at N α̇_b − (N − 1) α̇_a behind a gear of ratio N (Spong 1987 neglects
@@ -35,7 +35,7 @@ def joint_rotors(scene: Scene) -> Iterator[tuple[Row, float]]:
             yield row, joint.rotor_inertia * N**2
         else:
             yield (
-                Row(f'rotor of joint "{joint.name}"', _core.RowKind.gear, row.a, row.b, (N, N - 1)),
+                Measure(f'rotor of joint "{joint.name}"', _core.MeasureKind.gear, row.a, row.b, (N, N - 1)),
                 joint.rotor_inertia,
             )
 
@@ -55,8 +55,8 @@ class Gear:
     inertia: float  # J, kg·m²
     stiffness: float  # k, N·m/rad
     damping: float  # c, N·m·s/rad
-    motor: Row
-    coordinate: Row
+    motor: Measure
+    coordinate: Measure
 
 
 def joint_gears(scene: Scene) -> Iterator[Gear]:
@@ -68,11 +68,11 @@ def joint_gears(scene: Scene) -> Iterator[Gear]:
 
 def _gear(scene: Scene, joint: Joint, stiffness: float) -> Gear:
     row, N, rotor = joint_coordinate(scene, joint), joint.gear_ratio, f"{joint.name}/rotor"
-    motor = Row(f'motor of joint "{joint.name}"', _core.RowKind.gear, row.a, End(rotor), (1.0, 1 / N))
+    motor = Measure(f'motor of joint "{joint.name}"', _core.MeasureKind.gear, row.a, Marker(rotor), (1.0, 1 / N))
     return Gear(joint.name, rotor, N, joint.rotor_inertia, stiffness, joint.damping, motor, row)
 
 
-def joint_frictions(scene: Scene) -> Iterator[tuple[Row, Friction]]:
+def joint_frictions(scene: Scene) -> Iterator[tuple[Measure, Friction]]:
     """The joint coordinates on which friction acts."""
     for joint in scene.joint:
         if joint.viscous_friction or joint.coulomb_friction:

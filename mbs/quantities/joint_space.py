@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..analysis.analyses import Outcome
-from ..model.model import ZERO, Array, Assembly, Constraint
+from ..model.model import ZERO, Array, Constraint, MechanismSystem
 
 
 def motor_rates(outcome: Outcome) -> Array:
@@ -24,7 +24,7 @@ def held_joint_motion(outcome: Outcome) -> Array:
     The modal columns of the velocity transformation D of Shaban 2022, Eq. 18: C_mq δq = 0 and T_q δq = 0 give δ(R, θ).
     Needs as many motors as the mechanism with rigid links has degrees of freedom.
     """
-    frames = outcome.assembly.rigid_coordinates
+    frames = outcome.assembly.frame_coordinates
     modes = np.setdiff1d(np.arange(outcome.q.shape[1]), frames)
     rows = _gradients(outcome)
     motion = np.zeros((len(rows), outcome.q.shape[1], len(modes)))
@@ -38,7 +38,7 @@ def _gradients(outcome: Outcome) -> Array:
     model = outcome.assembly.model
     motors = [Constraint(row, ZERO, name, "motor", is_trajectory=False) for name, row in model.motors.items()]
     wanted = [*model.joints, *motors]
-    assembly = Assembly(model, wanted)
+    assembly = MechanismSystem(model, wanted)
     order = [assembly.constraints.index(constraint) for constraint in wanted]
     gradients: Array = assembly.system.constraint_jacobians(outcome.q)[:, order]
     return gradients

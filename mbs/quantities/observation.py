@@ -10,8 +10,8 @@ from .. import _core
 from ..analysis.analyses import Outcome
 from ..fields.field_types import split_point
 from ..model.geometric_stiffening import second_order_displacement
-from ..model.measures import End
-from ..model.model import Array, Assembly, Constraint
+from ..model.measures import Marker
+from ..model.model import Array, Constraint, MechanismSystem
 from ..model.planar_body import PlanarBody
 
 
@@ -98,13 +98,13 @@ def joint_forces(outcome: Outcome, joint: str) -> JointForces:
             continue
         force = -outcome.lambda_[:, i]
         match constraint.row.kind:
-            case _core.RowKind.x:
+            case _core.MeasureKind.x:
                 reaction[:, 0] += force
-            case _core.RowKind.y:
+            case _core.MeasureKind.y:
                 reaction[:, 1] += force
-            case _core.RowKind.slide:
+            case _core.MeasureKind.slide:
                 reaction += force[:, None] * _direction(outcome, constraint)
-            case _core.RowKind.angle:
+            case _core.MeasureKind.angle:
                 moment = force
     motors = list(outcome.assembly.model.motors)
     moments = outcome.motor_moments
@@ -120,7 +120,7 @@ def motor_angle(outcome: Outcome, joint: str) -> Array | None:
     rows = [gear.motor for gear in model.gears if gear.joint == joint]
     if not rows:
         return None
-    assembly = Assembly(model, model.joints, (), rows)
+    assembly = MechanismSystem(model, model.joints, (), rows)
     sensing = _core.Sensing(assembly.system, [(assembly.motor_rows[0], 0)], [])
     angle: Array = sensing.read(outcome.q, outcome.v, outcome.a)[:, 0]
     return angle
@@ -137,7 +137,7 @@ def _direction(outcome: Outcome, constraint: Constraint) -> Array:
     return rotated(_section_angle(outcome, constraint.row.a), np.array(constraint.row.direction))
 
 
-def _section_angle(outcome: Outcome, end: End) -> Array:
+def _section_angle(outcome: Outcome, end: Marker) -> Array:
     if end.body is None:
         return np.zeros(len(outcome.time))
     q = outcome.q[:, outcome.coordinates(end.body)]

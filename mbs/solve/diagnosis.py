@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model.model import Array, Assembly
+from ..model.model import Array, MechanismSystem
 from .initial_state import State, frame_gradients
 from .path_checks import JUMP
 from .vibration import system_mass_matrix
@@ -13,7 +13,7 @@ NEARLY_SINGULAR = 1e-3  # ratio of singular values of C_q; a motion that only co
 FAR_BENT = 0.5  # of a link's length, in the mean
 
 
-def find_cause(assembly: Assembly, t: float, state: State) -> str:
+def find_cause(assembly: MechanismSystem, t: float, state: State) -> str:
     """A sentence with numbers and advice; empty where nothing is found.
 
     The likely causes, the more certain first: a state or target that is not a number, a mass matrix that has lost its
@@ -28,7 +28,7 @@ def find_cause(assembly: Assembly, t: float, state: State) -> str:
     )
 
 
-def _not_a_number(assembly: Assembly, t: float, state: State) -> str:
+def _not_a_number(assembly: MechanismSystem, t: float, state: State) -> str:
     for constraint in assembly.constraints:
         if not np.isfinite(constraint.target(t)).all():
             return f"{constraint.row.label} has no finite value, velocity or acceleration there"
@@ -37,7 +37,7 @@ def _not_a_number(assembly: Assembly, t: float, state: State) -> str:
     return ""
 
 
-def lost_inertia(assembly: Assembly, q: Array) -> str:
+def lost_inertia(assembly: MechanismSystem, q: Array) -> str:
     """A sentence where a motion that the constraints allow has no kinetic energy left; empty otherwise.
 
     m_θθ − pᵀK_ω p has to stay above what the modes take of it, hhᵀ: n modes of a cantilever leave about 1/n³ of J.
@@ -64,7 +64,7 @@ def lost_inertia(assembly: Assembly, q: Array) -> str:
     )
 
 
-def _load_jumps(assembly: Assembly, t: float) -> str:
+def _load_jumps(assembly: MechanismSystem, t: float) -> str:
     """Whether a load jumps there: its size just after t is not what its value and slope just before t make of it."""
     dt = 1e-9 * max(t, 1e-9)
     loads = [(row.label, size) for row, size in assembly.model.loads]
@@ -79,7 +79,7 @@ def _load_jumps(assembly: Assembly, t: float) -> str:
     return ""
 
 
-def _bent(assembly: Assembly, q: Array) -> str:
+def _bent(assembly: MechanismSystem, q: Array) -> str:
     """The link that is bent most, by the mean of its deflection against its radius of gyration."""
     bodies = zip(assembly.first, assembly.model.bodies, strict=True)
     bent = [
@@ -96,7 +96,7 @@ def _bent(assembly: Assembly, q: Array) -> str:
     )
 
 
-def _singular(assembly: Assembly, t: float, q: Array) -> str:
+def _singular(assembly: MechanismSystem, t: float, q: Array) -> str:
     """Whether the constraints can hardly be told apart there."""
     if not assembly.constraints:
         return ""

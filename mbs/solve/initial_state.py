@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ...common.errors import InputError
 from ..fields.field_types import GROUND, split_point
-from ..model.measures import FRAME, End
-from ..model.model import Array, Assembly, Constraint
+from ..model.measures import FRAME, Marker
+from ..model.model import Array, Constraint, MechanismSystem
 from ..model.transmissions import Gear
 from ..scene.mechanism_records import Joint
 
@@ -32,7 +32,7 @@ class State:
     v: Array
 
 
-def undeformed_state(assembly: Assembly) -> State:
+def undeformed_state(assembly: MechanismSystem) -> State:
     """The state with p = ṗ = 0 that meets all constraints at t = 0, next to the guessed angles and rates.
 
     Raises `InputError` for constraints that repeat or contradict each other, a target out of reach, and a singular
@@ -48,7 +48,7 @@ def undeformed_state(assembly: Assembly) -> State:
     return _unwound(assembly, with_rates(assembly, q, guess.v))
 
 
-def _unwound(assembly: Assembly, state: State) -> State:
+def _unwound(assembly: MechanismSystem, state: State) -> State:
     """The state with rotors where their gears are not strained."""
     q, v = state.q.copy(), state.v.copy()
     for gear in assembly.model.gears:
@@ -57,10 +57,10 @@ def _unwound(assembly: Assembly, state: State) -> State:
     return State(q, v)
 
 
-def output_angle(assembly: Assembly, gear: Gear, x: Array) -> float:
+def output_angle(assembly: MechanismSystem, gear: Gear, x: Array) -> float:
     """γ + α_a/N, which is a rotor's angle over N where its gear is not strained; of q, or its rate of v."""
 
-    def angle(end: End) -> float:
+    def angle(end: Marker) -> float:
         if end.body is None:
             return 0.0
         first, body = assembly.first[assembly.index[end.body]], assembly.model.body(end.body)
@@ -70,36 +70,36 @@ def output_angle(assembly: Assembly, gear: Gear, x: Array) -> float:
     return angle(gear.coordinate.b) - (1 - 1 / gear.ratio) * angle(gear.coordinate.a)
 
 
-def with_rates(assembly: Assembly, q: Array, v: Array) -> State:
+def with_rates(assembly: MechanismSystem, q: Array, v: Array) -> State:
     """The state at q with (Ṙ, θ̇) moved onto Ċ = 0 by the least change, ṗ kept."""
     _, rate, _ = assembly.system.constraints(0.0, q, v)
     v = v.copy()
-    v[assembly.rigid_coordinates] -= _least_step(assembly, 0.0, q, rate)
+    v[assembly.frame_coordinates] -= _least_step(assembly, 0.0, q, rate)
     return State(q, v)
 
 
-def frame_gradients(assembly: Assembly, t: float, q: Array) -> Array:
+def frame_gradients(assembly: MechanismSystem, t: float, q: Array) -> Array:
     """∂C/∂(R, θ) with rows and columns relative to their natural sizes: the same in all units."""
     _, _, C_q = assembly.system.constraints(t, q, np.zeros_like(q))
-    r = assembly.rigid_coordinates
+    r = assembly.frame_coordinates
     J: Array = C_q[:, r] * assembly.sizes[r] / assembly.row_sizes[:, None]
     return J
 
 
-def _least_step(assembly: Assembly, t: float, q: Array, residual: Array) -> Array:
+def _least_step(assembly: MechanismSystem, t: float, q: Array, residual: Array) -> Array:
     """The smallest change of (R, θ) that takes `residual` off C (or, as a rate, off Ċ)."""
     J = frame_gradients(assembly, t, q)
     step: Array = np.linalg.lstsq(J, residual / assembly.row_sizes, rcond=None)[0]
-    return step * assembly.sizes[assembly.rigid_coordinates]
+    return step * assembly.sizes[assembly.frame_coordinates]
 
 
-def check_reach(assembly: Assembly, start: State, times: Array) -> None:
+def check_reach(assembly: MechanismSystem, start: State, times: Array) -> None:
     """Raise `InputError` with the first time at which the undeformed robot cannot follow its trajectories.
 
     A flexible arm would stretch its small-deformation modes beyond all sense instead of failing; better to say so.
     Configurations are looked at `REACH_CHECKS` times, and between them where they come close to a singular one.
     """
-    if not any(assembly.is_trajectory) or len(assembly.constraints) > len(assembly.rigid_coordinates):
+    if not any(assembly.is_trajectory) or len(assembly.constraints) > len(assembly.frame_coordinates):
         return
     q, passed = start.q, list[tuple[float, Array, float]]()
     for t in map(float, times[:: max(1, len(times) // REACH_CHECKS)]):
@@ -113,7 +113,7 @@ def check_reach(assembly: Assembly, start: State, times: Array) -> None:
         q = following
 
 
-def _least_freedom(assembly: Assembly, passed: Sequence[tuple[float, Array, float]]) -> tuple[float, float]:
+def _least_freedom(assembly: MechanismSystem, passed: Sequence[tuple[float, Array, float]]) -> tuple[float, float]:
     """The freedom of constraints at the last of up to three configurations, or the least about the middle one; when.
 
     Where it turns zero it is a kink |t − t*|, which three samples give away: beside a smooth minimum they are alike.
@@ -136,9 +136,9 @@ def _least_freedom(assembly: Assembly, passed: Sequence[tuple[float, Array, floa
     return min(values), 0.5 * (a + b)
 
 
-def _newton(assembly: Assembly, t: float, q: Array) -> Array | None:
+def _newton(assembly: MechanismSystem, t: float, q: Array) -> Array | None:
     """(R, θ) moved onto C(q, t) = 0 by steps of least size, p kept; None where that does not converge."""
-    q, r = q.copy(), assembly.rigid_coordinates
+    q, r = q.copy(), assembly.frame_coordinates
     rest, sizes, row_sizes = np.zeros_like(q), assembly.sizes, assembly.row_sizes
     for _ in range(MOST_ITERATIONS):
         C, _, _ = assembly.system.constraints(t, q, rest)
@@ -154,7 +154,7 @@ def _newton(assembly: Assembly, t: float, q: Array) -> Array | None:
     return q if left <= 1e3 * TOLERANCE * size else None
 
 
-def _freedom_of_constraints(assembly: Assembly, t: float, q: Array) -> float:
+def _freedom_of_constraints(assembly: MechanismSystem, t: float, q: Array) -> float:
     """Ratio of singular values of C_q: 0 where the mechanism has lost a direction that its constraints need.
 
     Of the mechanism with rigid links where it follows trajectories: that modes could give way does not count. A loop
@@ -164,22 +164,22 @@ def _freedom_of_constraints(assembly: Assembly, t: float, q: Array) -> float:
     if not len(C_q):
         return 1.0
     J = C_q * assembly.sizes / assembly.row_sizes[:, None]
-    if any(assembly.is_trajectory) and len(J) <= len(assembly.rigid_coordinates):
-        J = J[:, assembly.rigid_coordinates]
+    if any(assembly.is_trajectory) and len(J) <= len(assembly.frame_coordinates):
+        J = J[:, assembly.frame_coordinates]
     values = np.linalg.svd(J, compute_uv=False)
     return float(values[-1] / values[0])
 
 
-def _singular_start(assembly: Assembly, q: Array) -> str:
+def _singular_start(assembly: MechanismSystem, q: Array) -> str:
     """Why constraints that differ cannot be told apart at q: everywhere on the way (redundant), or just there."""
     path, names = assembly.model.scene.path, _names(assembly.constraints)
-    loop = Assembly(assembly.model, assembly.model.joints)
+    loop = MechanismSystem(assembly.model, assembly.model.joints)
     J = frame_gradients(loop, 0.0, q)
     values, right = np.linalg.svd(J)[1:]
     missing = int(np.count_nonzero(values < SINGULAR * values[0]))
-    free = right[len(J) - missing :].sum(axis=0) * loop.sizes[loop.rigid_coordinates]
+    free = right[len(J) - missing :].sum(axis=0) * loop.sizes[loop.frame_coordinates]
     moved = q.copy()
-    moved[loop.rigid_coordinates] += 0.05 * free
+    moved[loop.frame_coordinates] += 0.05 * free
     beside = _newton(loop, 0.0, moved)
     if missing and beside is not None and _freedom_of_constraints(loop, 0.0, beside) < SINGULAR:
         return (
@@ -194,7 +194,7 @@ def _singular_start(assembly: Assembly, q: Array) -> str:
     )
 
 
-def _check_redundancy(assembly: Assembly, q: Array) -> None:
+def _check_redundancy(assembly: MechanismSystem, q: Array) -> None:
     """Rows that depend on each other in a configuration chosen at random depend on each other in all."""
     if not assembly.constraints:
         return
@@ -215,7 +215,7 @@ def _check_redundancy(assembly: Assembly, q: Array) -> None:
     )
 
 
-def _unreachable(assembly: Assembly, t: float, q: Array) -> str:
+def _unreachable(assembly: MechanismSystem, t: float, q: Array) -> str:
     """Which trajectory (or joints) the links cannot meet at time t."""
     trajectories = [c for c in assembly.constraints if c.is_trajectory]
     how = (
@@ -236,8 +236,8 @@ def _unreachable(assembly: Assembly, t: float, q: Array) -> str:
     )
 
 
-def _only_joints(assembly: Assembly) -> Assembly:
-    return Assembly(assembly.model, assembly.model.joints)
+def _only_joints(assembly: MechanismSystem) -> MechanismSystem:
+    return MechanismSystem(assembly.model, assembly.model.joints)
 
 
 def _names(constraints: Sequence[Constraint]) -> str:
@@ -246,7 +246,7 @@ def _names(constraints: Sequence[Constraint]) -> str:
     return ", ".join(dict.fromkeys(f'{kind} "{c.owner}"' for c in trajectories))
 
 
-def _chain_guess(assembly: Assembly) -> State:
+def _chain_guess(assembly: MechanismSystem) -> State:
     """Frames placed from joint to joint with the guessed angles and rates; loops are left to Newton."""
     model = assembly.model
     q, v = np.zeros(assembly.system.coordinates), np.zeros(assembly.system.coordinates)
@@ -278,9 +278,9 @@ def _one_side_placed(joint: Joint, placed: set[str]) -> bool:
     return sum(side.partition(".")[0] in placed for side in joint.between) == 1
 
 
-def _arm(assembly: Assembly, q: Array, side: str) -> tuple[Array, NDArray[np.float64]]:
+def _arm(assembly: MechanismSystem, q: Array, side: str) -> tuple[Array, NDArray[np.float64]]:
     """A x of a point of an undeformed body, and A_θ x."""
-    end = End(*split_point(side))
+    end = Marker(*split_point(side))
     assert end.body is not None
     body = assembly.index[end.body]
     x, y = assembly.model.bodies[body].points[end.point].position
@@ -289,7 +289,7 @@ def _arm(assembly: Assembly, q: Array, side: str) -> tuple[Array, NDArray[np.flo
     return arm, np.array([-arm[1], arm[0]])
 
 
-def _motion(assembly: Assembly, q: Array, v: Array, side: str, at: tuple[float, float]) -> tuple[Array, Array]:
+def _motion(assembly: MechanismSystem, q: Array, v: Array, side: str, at: tuple[float, float]) -> tuple[Array, Array]:
     """Position and velocity of a placed point, or of a place on the ground."""
     if side == GROUND:
         return np.array(at), np.zeros(2)

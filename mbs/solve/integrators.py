@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 
 from .. import _core
-from ..model.model import Array, Assembly
+from ..model.model import Array, MechanismSystem
 from ..scene.analysis_records import Analysis
 from .initial_state import State
-from .vibration import ringing, vibrations
+from .vibration import modal_excitation, vibrations
 
 METHODS = {
     "dopri5": _core.MethodKind.dopri5,
@@ -46,7 +46,7 @@ NOT_INTEGRATED = Choice("none", "nothing to integrate")
 
 
 def choose_integrator(
-    assembly: Assembly, analysis: Analysis, start: State, steering: _core.Steering | None = None
+    assembly: MechanismSystem, analysis: Analysis, start: State, steering: _core.ExternalLoads | None = None
 ) -> Choice:
     """The integrator for an analysis from `start`, under the actuation `steering` that it replays, if any.
 
@@ -68,7 +68,7 @@ def choose_integrator(
     modes = vibrations(assembly, start)
     if not len(modes.frequency):
         return Choice("dop853", "nothing vibrates")
-    excited = ringing(assembly, start, modes, steering)
+    excited = modal_excitation(assembly, start, modes, steering)
     top, scale = modes.frequency[-1], analysis.tolerance / 1e-4
     phase = partial(_ringing_phase, modes.frequency, modes.damping_ratio, excited, analysis.end)
     explicit = phase(NEGLIGIBLE_DOP853 * analysis.tolerance) / (RESOLVED_DOP853 * scale ** (1 / 8))

@@ -16,8 +16,8 @@ import numpy as np
 from ...common.errors import SolveError
 from .. import _core
 from ..fields.field_types import split_point
-from ..model.measures import FRAME, End, Row, joint_coordinate
-from ..model.model import ZERO, Array, Assembly, Constraint, Model
+from ..model.measures import FRAME, Marker, Measure, joint_coordinate
+from ..model.model import ZERO, Array, Constraint, MechanismSystem, Model
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
 
@@ -74,7 +74,7 @@ class Linearisation:
         places = {f"{point}/{axis}": _place(point, axis) for point in points for axis in "xy"}
         rows = [row for group in (*candidates, joints, places) for row in group.values()]
         self.model = model
-        self.assembly = Assembly(model, model.joints, model.loads, rows)
+        self.assembly = MechanismSystem(model, model.joints, model.loads, rows)
         core = iter(self.assembly.motor_rows)
         known = [{name: next(core) for name in group} for group in (*candidates, joints, places)]
         self._motors = {f"joint/{name}": row for name, row in zip(model.motors, known[0].values(), strict=True)}
@@ -106,7 +106,7 @@ class Linearisation:
             linear.H, linear.H_dot, linear.force, linear.multipliers, self.names,
         )  # fmt: skip
 
-    def _gradients(self, rows: dict[str, _core.Row], H: Array, q: Array) -> Mapping[str, Array]:
+    def _gradients(self, rows: dict[str, _core.Measure], H: Array, q: Array) -> Mapping[str, Array]:
         rest = np.zeros_like(q)
         gradients = _core.row_tangents(self.assembly.system, list(rows.values()), q, rest, rest)[0] @ H
         return MappingProxyType(dict(zip(rows, gradients, strict=True)))
@@ -120,44 +120,46 @@ def linearise(model: Model, t: float, q: Array, v: Array, a: Array, points: Sequ
 def held_by_motors(model: Model, q: Array) -> list[Constraint]:
     """Constraints that keep the motor coordinates where they are at q."""
     free = [Constraint(row, ZERO, name, "motor", is_trajectory=True) for name, row in model.motors.items()]
-    assembly = Assembly(model, free)
+    assembly = MechanismSystem(model, free)
     values = assembly.system.constraints(0.0, q, np.zeros_like(q))[0]
     targets = [_core.TimeFunction.constant(float(value)) for value in values]
     return [replace(c, target=target) for c, target in zip(assembly.constraints, targets, strict=True)]
 
 
-def _joint_coordinates(model: Model) -> dict[str, Row]:
+def _joint_coordinates(model: Model) -> dict[str, Measure]:
     """Coordinates of the joints that move, by name; a motor's is the row that it drives."""
     moving = [joint for joint in model.scene.joint if joint.type != "weld"]
     rows = model.motors | {gear.joint: gear.coordinate for gear in model.gears}
     return {joint.name: rows.get(joint.name) or joint_coordinate(model.scene, joint) for joint in moving}
 
 
-def _frames(model: Model) -> dict[str, Row]:
+def _frames(model: Model) -> dict[str, Measure]:
     """Angles and places of the frames."""
     return {
-        f"frame/{body.name}/{kind.name}": Row(f"frame of {body.name}", kind, End(None), End(body.name, FRAME))
-        for kind in (_core.RowKind.angle, _core.RowKind.x, _core.RowKind.y)
+        f"frame/{body.name}/{kind.name}": Measure(f"frame of {body.name}", kind, Marker(None), Marker(body.name, FRAME))
+        for kind in (_core.MeasureKind.angle, _core.MeasureKind.x, _core.MeasureKind.y)
         for body in model.bodies
     }
 
 
-def _place(point: str, axis: str) -> Row:
-    return Row(f"{point}/{axis}", getattr(_core.RowKind, axis), End(None), End(*split_point(point)))
+def _place(point: str, axis: str) -> Measure:
+    return Measure(f"{point}/{axis}", getattr(_core.MeasureKind, axis), Marker(None), Marker(*split_point(point)))
 
 
-def _choose(assembly: Assembly, q: Array, groups: Sequence[Mapping[str, _core.Row]]) -> dict[str, _core.Row]:
+def _choose(
+    assembly: MechanismSystem, q: Array, groups: Sequence[Mapping[str, _core.Measure]]
+) -> dict[str, _core.Measure]:
     """The rows that, with the joints, determine the frames: earlier groups first, those of a group as QR pivots."""
     from scipy.linalg import qr
 
-    rest, frames = np.zeros_like(q), assembly.rigid_coordinates
+    rest, frames = np.zeros_like(q), assembly.frame_coordinates
 
-    def gradients(rows: Sequence[_core.Row]) -> Array:
+    def gradients(rows: Sequence[_core.Measure]) -> Array:
         result: Array = _core.row_tangents(assembly.system, rows, q, rest, rest)[0][:, frames]
         return result
 
     basis = np.linalg.qr(gradients(assembly.constraint_rows).T)[0]
-    chosen: dict[str, _core.Row] = {}
+    chosen: dict[str, _core.Measure] = {}
     for group in groups:
         missing = len(frames) - basis.shape[1]
         if not missing or not group:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...common.errors import InputError
 from .._core import TimeFunction
-from ..model.model import Array, Assembly
+from ..model.model import Array, MechanismSystem
 
 SAMPLES = 2001
 LOOKED_INTO = 5  # intervals between samples, the roughest ones
@@ -14,7 +14,7 @@ HALVINGS = 25
 JUMP = 1e-4  # in terms of the largest value or velocity: less is rounded numbers in an expression
 
 
-def check_smooth(assembly: Assembly, end: float) -> None:
+def check_smooth(assembly: MechanismSystem, end: float) -> None:
     """Raise `InputError` for a trajectory that jumps, in value or velocity, between t = 0 and `end` (s).
 
     Accelerations may jump. What is looked into are the intervals that the trapezoidal rule on the exact derivatives

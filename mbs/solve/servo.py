@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..model.measures import Row
-from ..model.model import ZERO, Array, Assembly, Constraint, Model
+from ..model.measures import Measure
+from ..model.model import ZERO, Array, Constraint, MechanismSystem, Model
 from .initial_state import undeformed_state
 
 MOST_ITERATIONS = 50
@@ -32,31 +32,29 @@ class Servo:
     `offset`, which is what is expected of the rest.
     """
 
-    path: Assembly
-    driven: Assembly
+    path: MechanismSystem
+    driven: MechanismSystem
     factor: float
     guess: Array  # coordinates (R, θ, p) that pick the branch
-    loads: tuple[tuple[Row, TimeFunction], ...]  # of the scene, held before and after the path as it is
+    loads: tuple[tuple[Measure, TimeFunction], ...]  # of the scene, held before and after the path as it is
     offset: tuple[TimeFunction, ...] = ()  # one for each mode of all bodies, or none
 
-    def core(self) -> _core.MotorsOnly:
+    def core(self) -> _core.ServoConstraint:
         """The evaluator of r(t, p, ṗ, p̈)."""
         order = [c.owner for c in self.driven.constraints]
         numbers = [order.index(motor_owner(name)) for name in self.path.model.motors]
-        return _core.MotorsOnly(
+        return _core.ServoConstraint(
             self.path.system, self.path.motor_rows, self.driven.system, numbers, self.factor, list(self.offset),
             self.guess,
         )  # fmt: skip
 
-    def resolver(self) -> _core.ActuationResolver:
+    def resolver(self) -> _core.ActuatorForces:
         """What reads the motors' forces off the multipliers."""
-        return _core.ActuationResolver(self.driven.system, self.driven.is_trajectory, self.driven.motor_rows)
+        return _core.ActuatorForces(self.driven.system, self.driven.is_trajectory, self.driven.motor_rows)
 
     def source(self, shape: list[list[TimeFunction]]) -> _core.ActuationSource:
         """The motors' forces for p(t), at any time."""
-        return _core.MotorsOnlyActuation(
-            self.driven.system, self.core(), shape, self.driven.is_trajectory, self.resolver()
-        )
+        return _core.ServoActuation(self.driven.system, self.core(), shape, self.driven.is_trajectory, self.resolver())
 
     @property
     def scale(self) -> Array:
@@ -76,10 +74,10 @@ def make_servo(model: Model, end: float, factor: float) -> Servo:
     Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes.
     """
     for found, what in ((len(model.motors), "motors"), (len(model.trajectories), "trajectory components")):
-        if found != model.rigid_freedom:
+        if found != model.degrees_of_freedom:
             raise InputError(
                 f'{model.scene.path}: expected for kind = "motors-only" as many {what} as the mechanism has degrees of'
-                f" freedom ({model.rigid_freedom}), found {found}"
+                f" freedom ({model.degrees_of_freedom}), found {found}"
             )
     if not any(body.n_modes for body in model.bodies):
         raise InputError(
@@ -90,8 +88,8 @@ def make_servo(model: Model, end: float, factor: float) -> Servo:
     held = [Constraint(c.row, c.target.held(0.0, end), c.owner, c.component, True) for c in model.trajectories]
     motors = [Constraint(row, ZERO, motor_owner(name), "value", True) for name, row in model.motors.items()]
     loads = tuple((row, size.held(0.0, end)) for row, size in model.loads)
-    path = Assembly(model, [*model.joints, *held], loads, rows)
-    driven = Assembly(model, [*model.joints, *motors], loads, rows)
+    path = MechanismSystem(model, [*model.joints, *held], loads, rows)
+    driven = MechanismSystem(model, [*model.joints, *motors], loads, rows)
     return Servo(path, driven, factor, undeformed_state(path).q, loads)
 
 
@@ -114,7 +112,7 @@ class LinearDynamics:
         return M, D, K
 
 
-def linear_dynamics(core: _core.MotorsOnly, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
+def linear_dynamics(core: _core.ServoConstraint, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
     """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n)."""
     n = p.shape[1]
     found = core.derivatives(times.tolist(), p, v, a)
@@ -122,7 +120,7 @@ def linear_dynamics(core: _core.MotorsOnly, times: Array, p: Array, v: Array, a:
     return LinearDynamics(times, M, D, K)
 
 
-def equilibrium(servo: Servo, core: _core.MotorsOnly, t: float) -> Array:
+def equilibrium(servo: Servo, core: _core.ServoConstraint, t: float) -> Array:
     """Shape p (n,) at rest under path and loads as at time t. Raises `SolveError` where there is none."""
     p = np.zeros((1, len(servo.scale)))
     rest = np.zeros_like(p)

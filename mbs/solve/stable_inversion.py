@@ -197,7 +197,7 @@ class _Solver:
         return largest
 
 
-def _boundary(servo: Servo, core: _core.MotorsOnly, t: float, unstable: bool) -> Boundary:
+def _boundary(servo: Servo, core: _core.ServoConstraint, t: float, unstable: bool) -> Boundary:
     """No part of y − y_rest in the unstable subspace of the equilibrium at time t, or none in the rest.
 
     An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ. Undamped motions count as

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...common.errors import SolveError
 from .. import _core
-from ..model.model import Array, Assembly
+from ..model.model import Array, MechanismSystem
 from .initial_state import State, with_rates
 
 MOST_ITERATIONS = 60
@@ -15,7 +15,7 @@ ROUNDING = 4e-16  # steps this small, relative to the size of the robot, are no 
 LARGEST_STEP = 0.5  # relative likewise: keeps to the branch of the start
 
 
-def static_equilibrium(assembly: Assembly, start: State) -> State:
+def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
     """Solve Q(q) − C_qᵀλ = 0, C(q, 0) = 0 by Newton from `start`; returns the state (v kept on Ċ = 0).
 
     Raises `SolveError` where the robot has no equilibrium near the start.
@@ -51,7 +51,7 @@ def static_equilibrium(assembly: Assembly, start: State) -> State:
     )
 
 
-def _jacobian(assembly: Assembly, x: Array) -> Array:
+def _jacobian(assembly: MechanismSystem, x: Array) -> Array:
     """Exact derivative of Q − C_qᵀλ and C with respect to (q, λ), at rest."""
     n, rest = assembly.system.coordinates, np.zeros(assembly.system.coordinates)
     _, _, K, C_q = _core.tangent(assembly.system, 0.0, x[:n], rest, rest, x[n:], [])

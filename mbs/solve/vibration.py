@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _core
-from ..model.model import Array, Assembly
+from ..model.model import Array, MechanismSystem
 from ..model.planar_body import PlanarBody
 from .initial_state import State
 
@@ -45,7 +45,7 @@ def mass_matrix(body: PlanarBody, q: Array) -> Array:
     return M
 
 
-def vibrations(assembly: Assembly, state: State) -> Vibrations:
+def vibrations(assembly: MechanismSystem, state: State) -> Vibrations:
     """The constrained vibrations about `state`, with the stiffness of the links alone (no loads, no rotation)."""
     bodies = assembly.model.bodies
     M = system_mass_matrix(assembly, state.q)
@@ -63,12 +63,12 @@ def vibrations(assembly: Assembly, state: State) -> Vibrations:
     return Vibrations(omega, np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega), shape, force, M)
 
 
-def _stiffness(assembly: Assembly) -> Array:
+def _stiffness(assembly: MechanismSystem) -> Array:
     """Diagonal of K over all coordinates."""
     return np.concatenate([np.concatenate([np.zeros(3), body.stiffness]) for body in assembly.model.bodies])
 
 
-def system_mass_matrix(assembly: Assembly, q: Array) -> Array:
+def system_mass_matrix(assembly: MechanismSystem, q: Array) -> Array:
     """M (coordinates, coordinates) of all bodies and of the rotors in joints."""
     blocks = zip(assembly.model.bodies, assembly.first, strict=True)
     M = _block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
@@ -85,7 +85,9 @@ def _block_diagonal(blocks: list[Array]) -> Array:
     return matrix
 
 
-def ringing(assembly: Assembly, state: State, modes: Vibrations, steering: _core.Steering | None = None) -> Array:
+def modal_excitation(
+    assembly: MechanismSystem, state: State, modes: Vibrations, steering: _core.ExternalLoads | None = None
+) -> Array:
     """Amplitude (n,) with which each mode rings from `state` on, in the force it moves most, relative to that force.
 
     A mode at rest follows its load and the links' static deflection under the prescribed motion; the velocity v, the

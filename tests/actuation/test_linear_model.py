@@ -11,7 +11,7 @@ from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import controllability, observability, robot_modes
 from ffrobot.actuation.control.zeros import zeros
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.model import Assembly
+from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.model.planar_body import with_payload
 from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.linearisation import linearise
@@ -22,7 +22,7 @@ CLAMPED = np.array([1.8751040687, 4.6940911330, 7.8547574382])  # of cos λ cosh
 
 
 def at_rest(model, points=("link2.tip",)):
-    q = undeformed_state(Assembly(model, model.joints)).q
+    q = undeformed_state(MechanismSystem(model, model.joints)).q
     return linear_model(linearise(model, 0.0, q, 0 * q, 0 * q, points), {})
 
 
@@ -85,15 +85,15 @@ def test_damping_ratios_of_a_clamped_link_are_those_of_its_modes():
 def test_frequencies_are_rayleigh_quotients():
     """ω² = strain energy of the shape over its kinetic energy as a velocity; and the shapes keep joints closed."""
     model = arm(arm_links(modes=4), gravity=(0.0, 0.0))
-    q = undeformed_state(Assembly(model, model.joints)).q
+    q = undeformed_state(MechanismSystem(model, model.joints)).q
     modes = robot_modes(at_rest(model))
-    system = Assembly(model, model.joints).system
+    system = MechanismSystem(model, model.joints).system
     C_q = system.constraints(0.0, q, 0 * q)[2]
     assert list(modes.frequency[:2]) == [0.0, 0.0]
     for frequency, motion in zip(modes.frequency[2:], modes.motion[2:].real, strict=True):
         assert np.abs(C_q @ motion).max() < 1e-10
         p_only = motion.copy()
-        p_only[Assembly(model, model.joints).rigid_coordinates] = 0.0
+        p_only[MechanismSystem(model, model.joints).frame_coordinates] = 0.0
         kinetic, strain = system.energies(q[None], motion[None])[0, 0], system.energies(p_only[None], 0 * q[None])[0, 1]
         assert 2 * np.pi * frequency == pytest.approx(np.sqrt(strain / kinetic), rel=1e-9)
 

@@ -11,7 +11,7 @@ from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.placement import held_modes, place
 from ffrobot.actuation.patches.patches import patch_array
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.model import Assembly
+from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.model.planar_body import from_modal_body
 from ffrobot.mbs.scene.actuator_records import PztLayout
 from ffrobot.mbs.scene.control_records import Placement
@@ -27,7 +27,7 @@ def arm(cantilever):
     modal = cantilever(6)
     planar = from_modal_body("arm", modal)
     model = make_model([planar], gravity=(0.0, 0.0), joint=[revolute("hub", "ground", "arm.root")])
-    q = undeformed_state(Assembly(model, model.joints)).q
+    q = undeformed_state(MechanismSystem(model, model.joints)).q
     return modal, planar, linear_model(linearise(model, 0.0, q, 0 * q, 0 * q), {})
 
 

@@ -27,7 +27,7 @@ import pytest
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.analyses import initial_state, run_pcid
 from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.model.model import Assembly
+from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.run.solution import prepare
 
@@ -47,7 +47,7 @@ def scene(case_copy, ffrobot, monkeypatch):
 
 def test_right_hand_side(benchmark, scene):
     model = prepare(scene).model
-    assembly = Assembly(model, [*model.joints, *model.trajectories])
+    assembly = MechanismSystem(model, [*model.joints, *model.trajectories])
     start = initial_state(assembly)
     assert (assembly.system.coordinates, len(assembly.constraints)) == (26, 6)
     benchmark(_core.time_evaluations, assembly.system, 0.0, start.q, start.v, EVALUATIONS)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from oracle import Mechanism
 
-from ffrobot.mbs.model.model import Assembly, build_model
+from ffrobot.mbs.model.model import MechanismSystem, build_model
 from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.mbs.scene.scene import Scene
 
@@ -43,7 +43,7 @@ def revolute(name, first, second, **keys):
 
 def assemble(model):
     """All joints, trajectories, loads and motors of the model in one system."""
-    return Assembly(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+    return MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
 
 
 def random_state(rng, size, modal=0.1):

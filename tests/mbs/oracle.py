@@ -1,7 +1,7 @@
 """The planar equations as formulation.md, section 4, states them: dense matrices, written to be read, not to be fast.
 
-Shares nothing with the compiled core but its input: `PlanarBody`, rows (`ffrobot.mbs.model.measures.Row`) and functions
-of time.
+Shares nothing with the compiled core but its input: `PlanarBody`, rows (`ffrobot.mbs.model.measures.Measure`) and
+functions of time.
 Coordinates q = (R, θ, p) of one body after the other; symbols as in Shabana, Dynamics of Multibody Systems, ch. 5.
 """
 

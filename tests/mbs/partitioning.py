@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ffrobot.common.errors import SolveError
-from ffrobot.mbs.model.model import Array, Assembly
+from ffrobot.mbs.model.model import Array, MechanismSystem
 from ffrobot.mbs.solve.initial_state import State
 
 MOST_ITERATIONS = 20
@@ -28,7 +28,7 @@ class Partition:
     dependent: NDArray[np.intp]
 
 
-def choose_partition(assembly: Assembly, state: State) -> Partition:
+def choose_partition(assembly: MechanismSystem, state: State) -> Partition:
     """Dependent coordinates that make C_q,d as well conditioned as QR with column pivoting can."""
     from scipy.linalg import qr
 
@@ -38,7 +38,7 @@ def choose_partition(assembly: Assembly, state: State) -> Partition:
     return Partition(np.sort(order[m:]), np.sort(order[:m]))
 
 
-def complete(assembly: Assembly, partition: Partition, t: float, q: Array, v: Array) -> State:
+def complete(assembly: MechanismSystem, partition: Partition, t: float, q: Array, v: Array) -> State:
     """The state whose independent coordinates and rates are those of (q, v); dependent ones of q are the first guess.
 
     Raises `SolveError` where the dependent coordinates cannot meet the constraints: the partition has turned singular.
@@ -57,7 +57,9 @@ def complete(assembly: Assembly, partition: Partition, t: float, q: Array, v: Ar
     return State(q, v)
 
 
-def integrate_partitioned(assembly: Assembly, start: State, times: Array, tolerance: float) -> tuple[Array, Array]:
+def integrate_partitioned(
+    assembly: MechanismSystem, start: State, times: Array, tolerance: float
+) -> tuple[Array, Array]:
     """Q and multipliers λ (T, …) at `times`, by SciPy's DOP853 on the independent coordinates."""
     from scipy.integrate import solve_ivp
 

@@ -11,8 +11,8 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid, run_static
 from ffrobot.mbs.analysis.fcid import run_fcid
 from ffrobot.mbs.analysis.motors_only import run_motors_only
-from ffrobot.mbs.analysis.replay import Equipment, actuation_source
-from ffrobot.mbs.model.model import ZERO, Assembly
+from ffrobot.mbs.analysis.replay import ActuatorSet, actuation_source
+from ffrobot.mbs.model.model import ZERO, MechanismSystem
 from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.quantities.observation import joint_forces
 from ffrobot.mbs.scene.analysis_records import Analysis
@@ -54,10 +54,10 @@ def test_accelerations_are_those_of_the_whole_mass_matrix(motors):
     rng = np.random.default_rng(3)
     model = geared_arm(trajectory=[], motors=motors)
     bare = geared_arm(first={}, second={}, trajectory=[], motors=motors)
-    assembly, without = Assembly(model, model.joints), Assembly(bare, bare.joints)
+    assembly, without = MechanismSystem(model, model.joints), MechanismSystem(bare, bare.joints)
     n = assembly.system.coordinates
     state = undeformed_state(assembly)
-    modes = np.setdiff1d(np.arange(n), assembly.rigid_coordinates)
+    modes = np.setdiff1d(np.arange(n), assembly.frame_coordinates)
     q = state.q.copy()
     q[modes] += 0.01 * rng.standard_normal(len(modes))
     v = rng.standard_normal(n)
@@ -127,7 +127,7 @@ def test_motors_alone_carry_rotors_and_friction_along():
     servo = Analysis(name="servo", kind="motors-only", end=1.0, output_step=0.01)
     source = run_motors_only(model, servo, always)
     replay = forward(actuation="servo", apply="joints", tolerance=1e-7)
-    outcome = run_forward(model, replay, source, Equipment(), always)
+    outcome = run_forward(model, replay, source, ActuatorSet(), always)
     assert source.q.shape == outcome.q.shape
     assert relative(outcome.q, source.q) < 1e-5
 
@@ -159,7 +159,7 @@ def test_inverse_moments_carry_out_the_motion_with_rotors_and_friction():
     model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION)
     source = run_pcid(model, pcid(tolerance=1e-8, end=0.4), True, always)
     assert np.abs(joint_forces(source, "O").motor).max() > 1.0
-    assembly = Assembly(model, model.joints, [(row, ZERO) for row in model.motors.values()])
+    assembly = MechanismSystem(model, model.joints, [(row, ZERO) for row in model.motors.values()])
     actuators = [_core.Motors(0, np.full(2, np.inf))]
     actuators += [
         _core.Patches(i, _core.Allocation(np.eye(2), np.eye(2), np.eye(2), np.full(2, np.inf), np.ones(2)))

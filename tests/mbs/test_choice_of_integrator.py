@@ -7,9 +7,9 @@ from links import ANGLES, TIP, arm, arm_links
 from mechanisms import always, assemble, forward, oracle_of, pcid
 
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
-from ffrobot.mbs.analysis.replay import Equipment
+from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.solve.initial_state import State, undeformed_state
-from ffrobot.mbs.solve.vibration import mass_matrix, ringing, vibrations
+from ffrobot.mbs.solve.vibration import mass_matrix, modal_excitation, vibrations
 
 AT_REST = {"angles": ANGLES, "state": "static"}
 
@@ -68,7 +68,7 @@ def test_ringing_is_what_a_static_start_leaves():
     measured = np.hypot(fit[3::2], fit[4::2])  # (modes, constraints)
     group = np.array(assembly.groups)
     scale = [np.abs(outcome.lambda_[0, group == g]).max() + measured[:, group == g].sum(axis=0).max() for g in group]
-    np.testing.assert_allclose(ringing(assembly, start, modes), (measured / scale).max(axis=1), rtol=0.1)
+    np.testing.assert_allclose(modal_excitation(assembly, start, modes), (measured / scale).max(axis=1), rtol=0.1)
 
 
 def test_what_rings_is_resolved_explicitly():
@@ -102,7 +102,7 @@ def at_rest():
 def test_a_replay_that_does_not_ring_is_integrated_implicitly(at_rest):
     model, inverse = at_rest
     analysis = forward(tolerance=1e-3, actuation="inverse", apply="trajectory")
-    outcome = run_forward(model, analysis, inverse, Equipment(), always)
+    outcome = run_forward(model, analysis, inverse, ActuatorSet(), always)
     assert outcome.integrator.name == "radau"
     assert np.abs(outcome.q - inverse.q).max() < 1e-4
 
@@ -111,7 +111,7 @@ def test_motors_without_the_modal_forces_that_went_with_them_let_links_ring(at_r
     """From the same rest, under the same moments: judged by how the replay itself rings, not by its source."""
     model, inverse = at_rest
     analysis = forward(tolerance=1e-3, actuation="inverse", apply="joints", max_steps=100)
-    outcome = run_forward(model, analysis, inverse, Equipment(), always)
+    outcome = run_forward(model, analysis, inverse, ActuatorSet(), always)
     assert (inverse.integrator.name, outcome.integrator.name) == ("radau", "dop853")
 
 

@@ -12,10 +12,10 @@ from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import robot_modes
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid, run_static
-from ffrobot.mbs.analysis.elastic_joints import through_gears, unresolved_gears, with_compliance
+from ffrobot.mbs.analysis.elastic_joints import add_transmission, unresolved_gears, with_compliance
 from ffrobot.mbs.analysis.motors_only import run_motors_only
 from ffrobot.mbs.analysis.operating_points import operating_points
-from ffrobot.mbs.analysis.replay import Equipment
+from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import joint_forces, motor_angle, point_motion
 from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.mbs.solve.linearisation import linearise
@@ -123,9 +123,9 @@ def test_implicit_integrators_agree_with_explicit_ones(integrator):
 
 def carried_out(model, end=1.0):
     """Distance (T,) of the tip from its path when the motors do what the inverse analysis says; and that analysis."""
-    source = through_gears(run_pcid(model, pcid(tolerance=1e-9, end=end, output_step=0.0025), True, always))
+    source = add_transmission(run_pcid(model, pcid(tolerance=1e-9, end=end, output_step=0.0025), True, always))
     replay = forward(actuation="inverse", apply="joints", tolerance=1e-9, end=end, output_step=0.0025)
-    outcome = run_forward(model, replay, source, Equipment(), always)
+    outcome = run_forward(model, replay, source, ActuatorSet(), always)
     assert outcome.status == "completed"
     tip = f"{model.links[-1].name}.tip"
     error = point_motion(outcome, tip).position - point_motion(source, tip).position
@@ -162,16 +162,16 @@ def test_motors_alone_carry_flexible_links_behind_gears_that_give(second, left):
     path = {"name": "tip", "point": "link2.tip", "x": nonic(TIP[0], 0.4), "y": nonic(TIP[1], 1.5)}
     model = geared_arm(GEARED, second, initial={"state": "static", "angles": ANGLES}, trajectory=[path])
     servo = Analysis(name="servo", kind="motors-only", end=1.0, output_step=0.005)
-    source = through_gears(run_motors_only(model, servo, always))
+    source = add_transmission(run_motors_only(model, servo, always))
     replay = forward(actuation="servo", apply="joints", tolerance=1e-8, output_step=0.005)
-    outcome = run_forward(model, replay, source, Equipment(), always)
+    outcome = run_forward(model, replay, source, ActuatorSet(), always)
     error = point_motion(outcome, "link2.tip").position - point_motion(source, "link2.tip").position
     assert np.linalg.norm(error, axis=1).max() < left
 
 
 def test_coarse_outputs_are_told_of():
     model = rigid_arm(GEARED | {"stiffness": 30.0}, RIGID)
-    source = through_gears(run_pcid(model, pcid(tolerance=1e-6, output_step=0.05), True, always))
+    source = add_transmission(run_pcid(model, pcid(tolerance=1e-6, output_step=0.05), True, always))
     (line,) = unresolved_gears(source.gears)
     assert "refine output_step" in line
 
@@ -191,7 +191,7 @@ def test_equilibrium_winds_the_gears():
 
 def test_static_moments_are_those_of_the_gears():
     analysis = Analysis(name="static", kind="static")
-    static = through_gears(run_static(geared_arm(GEARED, analysis=(analysis,)), analysis))
+    static = add_transmission(run_static(geared_arm(GEARED, analysis=(analysis,)), analysis))
     for joint in "OA":
         np.testing.assert_allclose(static.gears[joint].gear_moment, joint_forces(static, joint).motor)
 
@@ -215,9 +215,9 @@ def test_what_does_not_go_is_refused():
     with pytest.raises(InputError, match="a joint with a motor"):
         with_compliance(pendulum(motor=False))
     model = geared_arm(GEARED)
-    source = through_gears(run_pcid(model, pcid(end=0.1), True, always))
+    source = add_transmission(run_pcid(model, pcid(end=0.1), True, always))
     with pytest.raises(InputError, match='"joints" or "joints\\+pzt" beside joints'):
-        run_forward(model, forward(actuation="inverse", apply="trajectory", end=0.1), source, Equipment(), always)
+        run_forward(model, forward(actuation="inverse", apply="trajectory", end=0.1), source, ActuatorSet(), always)
     loaded = geared_arm(GEARED, load=[{"joint": "O", "moment": "1"}])
     with pytest.raises(InputError, match=r"expected no \[\[load\]\] on"):
-        through_gears(run_pcid(loaded, pcid(end=0.1), False, always))
+        add_transmission(run_pcid(loaded, pcid(end=0.1), False, always))

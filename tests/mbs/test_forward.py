@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
 from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.analysis.replay import Equipment
+from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.mbs.scene.analysis_records import Analysis
 
@@ -24,7 +24,7 @@ def patches(Phi, limit=UNLIMITED):
     }
 
 
-FULL = Equipment(patches(np.eye(N)))  # patches that reach every mode
+FULL = ActuatorSet(patches(np.eye(N)))  # patches that reach every mode
 
 
 @pytest.fixture(scope="module")
@@ -32,10 +32,10 @@ def model():
     return arm()
 
 
-def pair(model, apply, tolerance, equipment=FULL):
+def pair(model, apply, tolerance, actuator_set=FULL):
     inverse = run_pcid(model, pcid(tolerance=tolerance), True, always)
     analysis = forward(tolerance=tolerance, actuation="inverse", apply=apply)
-    outcome = run_forward(model, analysis, inverse, equipment, always)
+    outcome = run_forward(model, analysis, inverse, actuator_set, always)
     assert outcome.status == "completed"
     return inverse, outcome
 
@@ -73,7 +73,7 @@ def test_joint_moments_alone_leave_the_path(model):
 
 
 def test_joint_moments_alone_are_the_full_actuation_with_patches_that_do_nothing(model):
-    nothing = Equipment(patches(np.zeros((N, N))))
+    nothing = ActuatorSet(patches(np.zeros((N, N))))
     _, idle = pair(model, "joints+pzt", 1e-6, nothing)
     _, joints = pair(model, "joints", 1e-6)
     assert relative(idle.q, joints.q) < 1e-6
@@ -138,8 +138,8 @@ def test_saturated_actuators_give_what_their_limits_leave(kind):
         else run_fcid(model, Analysis(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01))
     )
     analysis = forward(tolerance=1e-7, actuation="inverse", apply="joints+pzt", limits=True)
-    equipment = Equipment(limited_patches=patches(Phi, limit))
-    outcome = run_forward(model, analysis, inverse, equipment, always)
+    actuator_set = ActuatorSet(limited_patches=patches(Phi, limit))
+    outcome = run_forward(model, analysis, inverse, actuator_set, always)
     tau = np.clip(inverse.tau, [-12.0, -4.0], [12.0, 4.0])
     assert np.any(tau != inverse.tau)
     mechanism, saturated = oracle_of(outcome.assembly), 0
@@ -161,7 +161,7 @@ def test_saturated_actuators_give_what_their_limits_leave(kind):
 
 def test_limits_that_are_never_reached_change_nothing(model):
     inverse = run_pcid(model, pcid(tolerance=1e-6), True, always)
-    wide = Equipment(limited_patches=patches(np.eye(N), np.full(N, 1e6)))
+    wide = ActuatorSet(limited_patches=patches(np.eye(N), np.full(N, 1e6)))
     runs = [
         run_forward(
             model, forward(tolerance=1e-6, actuation="inverse", apply="joints+pzt", limits=limits), inverse, e, always

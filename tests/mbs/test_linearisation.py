@@ -12,7 +12,7 @@ from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.analyses import run_pcid
 from ffrobot.mbs.model.measures import joint_coordinate
-from ffrobot.mbs.model.model import Assembly, ModalLoad
+from ffrobot.mbs.model.model import MechanismSystem, ModalLoad
 from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.linearisation import Linearisation, held_by_motors, linearise
 
@@ -35,7 +35,7 @@ def driven(model, outcome, row, tau=None):
         ModalLoad(body.name, outcome.F_p[row, outcome.modal_columns(body.name)], constant(1.0)) for body in model.bodies
     )
     model = replace(model, loads=loads, modal_loads=modal)
-    return Assembly(model, model.joints, model.loads)
+    return MechanismSystem(model, model.joints, model.loads)
 
 
 def state_of(model, near, s, s_dot):
@@ -43,8 +43,8 @@ def state_of(model, near, s, s_dot):
     k = len(model.motors)
     held = held_by_motors(model, near)
     shifted = [replace(c, target=constant(float(value))) for c, value in zip(held, s[:k], strict=True)]
-    assembly = Assembly(model, [*model.joints, *shifted])
-    frames = assembly.rigid_coordinates
+    assembly = MechanismSystem(model, [*model.joints, *shifted])
+    frames = assembly.frame_coordinates
     modes = np.setdiff1d(np.arange(len(near)), frames)
     q, v, rest = near.copy(), np.zeros_like(near), np.zeros_like(near)
     q[modes], v[modes] = s[k:], s_dot[k:]
@@ -60,7 +60,7 @@ def motor_jets(model, assembly, q, v, a):
     """Values, rates and accelerations of s."""
     oracle = oracle_of(assembly)
     rows = [oracle.row(row, q, v) for row in model.motors.values()]
-    modes = np.setdiff1d(np.arange(len(q)), assembly.rigid_coordinates)
+    modes = np.setdiff1d(np.arange(len(q)), assembly.frame_coordinates)
     value = np.concatenate([[row.value for row in rows], q[modes]])
     rate = np.concatenate([[row.rate for row in rows], v[modes]])
     return value, rate, np.concatenate([[row.gradient @ a + row.bias for row in rows], a[modes]])
@@ -112,7 +112,7 @@ def with_motors(model, *names):
     """The model with motors on these joints, and where it starts."""
     joints = {joint.name: joint for joint in model.scene.joint}
     model = replace(model, motors={name: joint_coordinate(model.scene, joints[name]) for name in names})
-    return model, undeformed_state(Assembly(model, model.joints)).q
+    return model, undeformed_state(MechanismSystem(model, model.joints)).q
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_independent_coordinates(name, motors, expected):
     model, q = with_motors(zoo.build(name, trajectory=()), *motors)
     names = Linearisation(model, q).names
     rows = [name for name in names if not name.startswith("modal/")]
-    assert len(names) == model.rigid_freedom + sum(body.n_modes for body in model.bodies)
+    assert len(names) == model.degrees_of_freedom + sum(body.n_modes for body in model.bodies)
     assert [row.partition("/")[0] for row in rows] == [row.partition("/")[0] for row in expected]
     assert [row for row in rows if row.startswith("joint")] == [row for row in expected if row.startswith("joint")]
 

@@ -8,9 +8,9 @@ from material_points import random_cloud
 from mechanisms import assemble, make_model, random_state, relative
 from oracle import Mechanism
 
-from ffrobot.mbs._core import RowKind
+from ffrobot.mbs._core import MeasureKind
 from ffrobot.mbs.fields.time_functions import parse_expression
-from ffrobot.mbs.model.measures import End, Row
+from ffrobot.mbs.model.measures import Marker, Measure
 from ffrobot.mbs.model.planar_body import from_rigid_body, with_payload
 from ffrobot.mbs.scene.mechanism_records import RigidBody
 
@@ -22,8 +22,8 @@ def welded(body, mass, inertia, gravity):
     rigid = RigidBody(mass=mass, inertia=1.0, center=(0.0, 0.0), points={"root": (0.0, 0.0)})
     load = from_rigid_body("load", rigid)
     load = replace(load, inertia=inertia)  # scene files refuse zero, where nothing would hold it
-    ends, zero = (End(body.name, "tip"), End("load", "root")), parse_expression("0")
-    rows = [(Row(k, getattr(RowKind, k), *ends), zero) for k in ("x", "y", "angle")]
+    ends, zero = (Marker(body.name, "tip"), Marker("load", "root")), parse_expression("0")
+    rows = [(Measure(k, getattr(MeasureKind, k), *ends), zero) for k in ("x", "y", "angle")]
     return Mechanism([body, load], gravity, rows)
 
 
@@ -40,7 +40,7 @@ def test_payload_moves_as_a_welded_body(seed, inertia):
 
     apart = welded(body, MASS, inertia, (0.0, -9.81))
     q_body, v_body = (np.concatenate([x[:3], T @ x[3:]]) for x in (q, v))
-    tip = apart.marker(End("body", "tip"), np.append(q_body, np.zeros(3)), np.append(v_body, np.zeros(3)))
+    tip = apart.marker(Marker("body", "tip"), np.append(q_body, np.zeros(3)), np.append(v_body, np.zeros(3)))
     q_apart, v_apart = np.concatenate([q_body, tip.position]), np.concatenate([v_body, tip.velocity])
     a_apart, _ = apart.solve(0.0, q_apart, v_apart)
     assert relative(np.concatenate([a[:3], T @ a[3:]]), a_apart[:-3]) < 1e-10

@@ -10,7 +10,7 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.analyses import run_forward
 from ffrobot.mbs.analysis.motors_only import is_minimum_phase, path_error, run_motors_only
-from ffrobot.mbs.analysis.replay import Equipment
+from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.mbs.solve import stable_inversion
@@ -45,7 +45,7 @@ def at_rest(model, factor=1.0):
 def exact_forward(model, outcome, **keys):
     """The motors' moments without the path."""
     analysis = forward(actuation="inverse", apply="joints", **keys)
-    replayed = run_forward(model, analysis, outcome, Equipment(), always)
+    replayed = run_forward(model, analysis, outcome, ActuatorSet(), always)
     assert replayed.status == "completed"
     return replayed
 
@@ -78,14 +78,14 @@ def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
     p = iter(equilibrium(servo, servo.core(), 0.0))
     shape = [[TimeFunction.constant(next(p)) for _ in body.stiffness] for body in model.bodies]
     q = servo.core().outputs([0.0], shape, servo.resolver()).q[0]
-    modes = np.setdiff1d(np.arange(len(q)), servo.path.rigid_coordinates)
+    modes = np.setdiff1d(np.arange(len(q)), servo.path.frame_coordinates)
 
     def keeps(assembly):
         mechanism = oracle_of(assembly)
         rows = np.array([row.gradient for row in mechanism.rows(q, np.zeros_like(q))])
         basis = np.zeros((len(q), len(modes)))
         basis[modes] = np.eye(len(modes))
-        frames = assembly.rigid_coordinates
+        frames = assembly.frame_coordinates
         basis[frames] = -np.linalg.solve(rows[:, frames], rows[:, modes])
         return basis, mechanism.mass_matrix(q)
 

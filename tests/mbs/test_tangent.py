@@ -9,8 +9,8 @@ from mechanisms import assemble, oracle_of, random_state, relative
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.state_forces import state_function
-from ffrobot.mbs.model.measures import End
-from ffrobot.mbs.model.model import Assembly
+from ffrobot.mbs.model.measures import Marker
+from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 T = 0.37
@@ -66,7 +66,7 @@ def pull(t, position, velocity):
 def test_tangent_of_a_force_that_depends_on_the_motion(name):
     """What it adds to K and D; differences inside leave about 1e-9."""
     bare = assemble(zoo.build(name))
-    model = replace(bare.model, state_forces=((End("b2", "side"), state_function(pull)),))
+    model = replace(bare.model, state_forces=((Marker("b2", "side"), state_function(pull)),))
     q, v = random_state(np.random.default_rng(2), bare.system.coordinates)
     a, multipliers = np.zeros_like(q), np.zeros(len(bare.constraints))
 
@@ -115,7 +115,7 @@ def test_external_drives_take_part():
 def reduced_force(assembly, oracle, near, t):
     """Generalized forces on s = (motor coordinates, p) that a motion (s, ṡ, s̈) with closed joints needs."""
     rows = [c.row for c in assembly.constraints] + list(assembly.model.motors.values())
-    modes = np.setdiff1d(np.arange(oracle.size), assembly.rigid_coordinates)
+    modes = np.setdiff1d(np.arange(oracle.size), assembly.frame_coordinates)
     held, k = len(assembly.constraints), len(assembly.model.motors)
 
     def split(s):
@@ -148,10 +148,10 @@ def reduced_force(assembly, oracle, near, t):
 def test_reduction_is_the_derivative_of_the_equations_in_independent_coordinates(name):
     """About a motion far from equilibrium, so that every term with Ḣ and Ḧ counts."""
     model = zoo.build(name)
-    assembly = Assembly(model, model.joints, model.loads, list(model.motors.values()))
+    assembly = MechanismSystem(model, model.joints, model.loads, list(model.motors.values()))
     rng = np.random.default_rng(4)
     near = undeformed_state(assembly).q
-    modes = np.setdiff1d(np.arange(len(near)), assembly.rigid_coordinates)
+    modes = np.setdiff1d(np.arange(len(near)), assembly.frame_coordinates)
     near[modes] += 0.1 * rng.standard_normal(len(modes))
     s, force = reduced_force(assembly, oracle_of(assembly), near, T)
     s_dot, s_ddot = rng.standard_normal((2, len(s)))

@@ -12,7 +12,7 @@ from test_rigid_limit import rod
 
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
-from ffrobot.mbs.model.model import Assembly, ModalLoad
+from ffrobot.mbs.model.model import MechanismSystem, ModalLoad
 
 GROUP = "Growth of differences, open loop"
 
@@ -95,7 +95,7 @@ def steered(inverse, k):
         ModalLoad(body.name, inverse.F_p[k, inverse.modal_columns(body.name)], constant(1.0)) for body in model.bodies
     )
     moments = [(row, constant(tau)) for row, tau in zip(model.motors.values(), inverse.tau[k], strict=True)]
-    return Assembly(replace(model, modal_loads=modal), model.joints, moments)
+    return MechanismSystem(replace(model, modal_loads=modal), model.joints, moments)
 
 
 def test_replayed_actuation(record):

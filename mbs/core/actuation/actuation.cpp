@@ -4,7 +4,7 @@ namespace ffrobot {
 
 using Eigen::Index;
 
-ActuationResolver::ActuationResolver(const System &system, std::vector<bool> trajectory, std::vector<Row> motors)
+ActuatorForces::ActuatorForces(const System &system, std::vector<bool> trajectory, std::vector<Measure> motors)
     : system_(system), trajectory_(std::move(trajectory)), motors_(std::move(motors)), motor_rows_(motors_.size()),
       joint_system_(static_cast<Index>(system.bodies.size())) {
   rhs_ = solution_ = Eigen::VectorXd::Zero(static_cast<Index>(3 * system.bodies.size()));
@@ -33,12 +33,12 @@ void resultant(const System &system, const Workspace &w, const std::vector<Eigen
 
 } // namespace
 
-void ActuationResolver::resolve(const Workspace &w) {
+void ActuatorForces::resolve(const Workspace &w) {
   for (auto &wrench : wrench_)
     wrench.setZero();
   Index column = 0;
   for (std::size_t r = 0; r < trajectory_.size(); ++r) {
-    const Row &row = system_.constraints[r].row;
+    const Measure &row = system_.constraints[r].row;
     if (trajectory_[r])
       add_wrench(row, w.rows[r], -w.lambda[static_cast<Index>(r)], wrench_);
     else

@@ -15,11 +15,11 @@ namespace ffrobot {
 //     -C_sq^T lambda_s = C_mq^T nu + T_q^T tau + (0, 0, F_p)
 //
 // This is F_je = -D^T C_sq^T lambda_s (Eq. 21) with D eliminated: its (R, theta) rows give nu and tau, its p rows F_p.
-class ActuationResolver {
+class ActuatorForces {
 public:
   // trajectory[i]: whether constraint i is a specified trajectory (C_s) or a mechanical joint (C_m).
   // Needs as many motors as the mechanism with rigid links has degrees of freedom.
-  ActuationResolver(const System &system, std::vector<bool> trajectory, std::vector<Row> motors);
+  ActuatorForces(const System &system, std::vector<bool> trajectory, std::vector<Measure> motors);
 
   // After accelerations(): uses the kinematics and multipliers in w.
   void resolve(const Workspace &w);
@@ -30,8 +30,8 @@ public:
 private:
   const System &system_;
   std::vector<bool> trajectory_;
-  std::vector<Row> motors_;
-  std::vector<RowMotion> motor_rows_;
+  std::vector<Measure> motors_;
+  std::vector<MeasureMotion> motor_rows_;
   Eigen::VectorXd rhs_, solution_, tau_;
   FrameSystem joint_system_; // columns: joints, then motors
   std::vector<Eigen::VectorXd> F_p_;

@@ -64,7 +64,7 @@ private:
   Eigen::VectorXd Q_a_;
 };
 
-class Actuation final : public Steering {
+class Actuation final : public ExternalLoads {
 public:
   Actuation(std::shared_ptr<ActuationSource> source, std::vector<std::shared_ptr<Actuator>> actuators)
       : source_(std::move(source)), actuators_(std::move(actuators)) {}

@@ -58,7 +58,7 @@ void FullyConstrained::set_target(double t, std::size_t constraint, const Jet &t
 
 void FullyConstrained::update_jacobian() {
   for (std::size_t r = 0; r < system_.constraints.size(); ++r) {
-    const Row &row = system_.constraints[r].row;
+    const Measure &row = system_.constraints[r].row;
     evaluate(row, workspace_.bodies, workspace_.rows[r]);
     if (r < system_.held)
       gradients_.set_column(static_cast<Index>(r), row, workspace_.rows[r], workspace_.bodies);
@@ -172,7 +172,7 @@ VectorXd modal_stiffness(const System &system) {
 } // namespace
 
 FcidOutputs collect(const FullyConstrained &motion, const std::vector<double> &times,
-                    const std::function<bool(double)> &solve, ActuationResolver *resolver) {
+                    const std::function<bool(double)> &solve, ActuatorForces *resolver) {
   const System &system = motion.system();
   const auto T = static_cast<Index>(times.size()), m = static_cast<Index>(system.constraints.size());
   const Index n = total_modes(system);
@@ -212,8 +212,7 @@ FcidOutputs collect(const FullyConstrained &motion, const std::vector<double> &t
 }
 
 FcidOutputs fully_constrained(const System &system, const std::vector<double> &times,
-                              const std::vector<ModalShape> &shape, const VectorXd &guess,
-                              ActuationResolver *resolver) {
+                              const std::vector<ModalShape> &shape, const VectorXd &guess, ActuatorForces *resolver) {
   FullyConstrained motion(system, guess);
   const auto solve = [&](double t) {
     motion.set_shape(t, shape);
@@ -223,7 +222,7 @@ FcidOutputs fully_constrained(const System &system, const std::vector<double> &t
 }
 
 MatrixXd static_shape(const System &system, const std::vector<double> &times, const VectorXd &guess,
-                      ActuationResolver *resolver) {
+                      ActuatorForces *resolver) {
   constexpr int most_iterations = 100;
   constexpr double tolerance = 1e-14; // of the shape's size
   const Index n = total_modes(system);

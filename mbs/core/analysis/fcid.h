@@ -77,17 +77,17 @@ struct FcidOutputs {
 // What is reported of `motion` at `times`; solve(t) makes it that of time t. resolver may be null; F_p then stays
 // empty.
 FcidOutputs collect(const FullyConstrained &motion, const std::vector<double> &times,
-                    const std::function<bool(double)> &solve, ActuationResolver *resolver);
+                    const std::function<bool(double)> &solve, ActuatorForces *resolver);
 
 // resolver may be null, as above.
 FcidOutputs fully_constrained(const System &system, const std::vector<double> &times,
                               const std::vector<ModalShape> &shape, const Eigen::VectorXd &guess,
-                              ActuationResolver *resolver);
+                              ActuatorForces *resolver);
 
 // The shape in which the links, at rest relative to their frames, need no modal forces beside those of motors and
 // joints (of the trajectory forces without a resolver): they sag under gravity and inertia as they would by themselves.
 // Rows p of all bodies, one per time; fewer where the iteration p <- p - K^-1 F_p(p) does not converge.
 Eigen::MatrixXd static_shape(const System &system, const std::vector<double> &times, const Eigen::VectorXd &guess,
-                             ActuationResolver *resolver);
+                             ActuatorForces *resolver);
 
 } // namespace ffrobot

@@ -7,7 +7,7 @@ namespace ffrobot {
 using Eigen::Index;
 
 ActuationSource::ActuationSource(const System &system, std::vector<bool> is_trajectory,
-                                 std::optional<ActuationResolver> resolver)
+                                 std::optional<ActuatorForces> resolver)
     : is_trajectory_(std::move(is_trajectory)), resolver_(std::move(resolver)) {
   for (const auto &body : system.bodies)
     modal_zero_.emplace_back(Eigen::VectorXd::Zero(body.modes()));
@@ -59,7 +59,7 @@ void RecordedMotion::state(double t, double *y) {
 }
 
 RecordedActuation::RecordedActuation(const System &system, const Recording &recording, std::vector<bool> is_trajectory,
-                                     std::optional<ActuationResolver> resolver)
+                                     std::optional<ActuatorForces> resolver)
     : ActuationSource(system, std::move(is_trajectory), std::move(resolver)), system_(system),
       motion_(system, recording), workspace_(system), y_(2 * system.coordinates), a_(system.coordinates) {}
 
@@ -72,7 +72,7 @@ void RecordedActuation::find(double t) {
 
 FullyConstrainedActuation::FullyConstrainedActuation(const System &system, std::vector<ModalShape> shape,
                                                      Eigen::VectorXd guess, std::vector<bool> is_trajectory,
-                                                     std::optional<ActuationResolver> resolver)
+                                                     std::optional<ActuatorForces> resolver)
     : ActuationSource(system, std::move(is_trajectory), std::move(resolver)), system_(system),
       motion_(system, std::move(guess)), shape_(std::move(shape)) {}
 

@@ -35,7 +35,7 @@ public:
 
 protected:
   // resolver: empty where the motors do not fit the mechanism; then neither tau nor modal forces are asked for.
-  ActuationSource(const System &system, std::vector<bool> is_trajectory, std::optional<ActuationResolver> resolver);
+  ActuationSource(const System &system, std::vector<bool> is_trajectory, std::optional<ActuatorForces> resolver);
 
   virtual void find(double t) = 0;
   void resolve(); // tau and F_p from the workspace
@@ -43,7 +43,7 @@ protected:
 private:
   double time_ = std::numeric_limits<double>::quiet_NaN();
   std::vector<bool> is_trajectory_;
-  std::optional<ActuationResolver> resolver_;
+  std::optional<ActuatorForces> resolver_;
   Eigen::VectorXd tau_;
   std::vector<Eigen::VectorXd> modal_force_, modal_zero_;
 };
@@ -72,7 +72,7 @@ private:
 class RecordedActuation final : public ActuationSource {
 public:
   RecordedActuation(const System &system, const Recording &recording, std::vector<bool> is_trajectory,
-                    std::optional<ActuationResolver> resolver);
+                    std::optional<ActuatorForces> resolver);
 
   const System &system() const override { return system_; }
   const Workspace &workspace() const override { return workspace_; }
@@ -91,7 +91,7 @@ private:
 class FullyConstrainedActuation final : public ActuationSource {
 public:
   FullyConstrainedActuation(const System &system, std::vector<ModalShape> shape, Eigen::VectorXd guess,
-                            std::vector<bool> is_trajectory, std::optional<ActuationResolver> resolver);
+                            std::vector<bool> is_trajectory, std::optional<ActuatorForces> resolver);
 
   const System &system() const override { return system_; }
   const Workspace &workspace() const override { return motion_.workspace(); }

@@ -4,8 +4,8 @@ namespace ffrobot {
 
 using Eigen::Index;
 
-OutputEvaluator::OutputEvaluator(const System &system, std::size_t count, Steering *steering,
-                                 ActuationResolver *resolver)
+OutputEvaluator::OutputEvaluator(const System &system, std::size_t count, ExternalLoads *steering,
+                                 ActuatorForces *resolver)
     : system_(system), workspace_(system), steering_(steering), resolver_(resolver), y_(2 * system.coordinates),
       a_(system.coordinates) {
   const auto T = static_cast<Index>(count), m = static_cast<Index>(system.constraints.size());
@@ -66,7 +66,7 @@ Outputs OutputEvaluator::take(std::size_t reached) {
 }
 
 Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
-        const IntegrationControls &controls, Steering *steering, ActuationResolver *resolver,
+        const IntegrationControls &controls, ExternalLoads *steering, ActuatorForces *resolver,
         const std::function<bool(double)> &carry_on, Recording *recording, Checkpoint *checkpoint) {
   OutputEvaluator evaluate(motion.system(), times.size(), steering, resolver);
   Eigen::VectorXd y(2 * q.size());

@@ -28,13 +28,13 @@ struct Run {
 // Integrates `motion` from (q, v) over `times`. `resolver`, `recording` and `checkpoint` may be null. Where the run
 // goes on from a `checkpoint`, rows of outputs that were delivered before are left as they are: undefined.
 Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
-        const IntegrationControls &controls, Steering *steering, ActuationResolver *resolver,
+        const IntegrationControls &controls, ExternalLoads *steering, ActuatorForces *resolver,
         const std::function<bool(double)> &carry_on, Recording *recording, Checkpoint *checkpoint);
 
 // Evaluates the reported quantities of one state into row i of `outputs` (already sized).
 class OutputEvaluator {
 public:
-  OutputEvaluator(const System &system, std::size_t count, Steering *steering, ActuationResolver *resolver);
+  OutputEvaluator(const System &system, std::size_t count, ExternalLoads *steering, ActuatorForces *resolver);
 
   void operator()(std::size_t i, double t, const double *y);
   Outputs take(std::size_t reached);
@@ -42,8 +42,8 @@ public:
 private:
   const System &system_;
   Workspace workspace_;
-  Steering *steering_;
-  ActuationResolver *resolver_;
+  ExternalLoads *steering_;
+  ActuatorForces *resolver_;
   Eigen::VectorXd y_, a_, value_, rate_;
   Outputs outputs_;
 };

@@ -18,7 +18,7 @@ Sensing::Sensing(const System &system, std::vector<AlongRow> rows, std::vector<O
 const VectorXd &Sensing::read(const double *q, const double *v, const double *a) {
   update_kinematics(system_, q, v, workspace_);
   Index i = 0;
-  RowMotion motion;
+  MeasureMotion motion;
   for (const auto &[row, order] : rows_) {
     evaluate(row, workspace_.bodies, motion);
     readings_[i++] = order == 0   ? motion.value

@@ -13,7 +13,7 @@ namespace ffrobot {
 class Sensing {
 public:
   struct AlongRow {
-    Row row;
+    Measure row;
     int order; // 0 value, 1 rate, 2 acceleration
   };
   struct OfModes {
@@ -40,7 +40,7 @@ private:
 };
 
 // Motor forces on the first drives, in their order, and voltages of patches, all as they were last set.
-class HeldCommands final : public Steering {
+class HeldCommands final : public ExternalLoads {
 public:
   using Patches = std::pair<std::size_t, Eigen::MatrixXd>; // body, Phi_V (n, k)
 

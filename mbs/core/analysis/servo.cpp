@@ -7,18 +7,18 @@ namespace ffrobot {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-MotorsOnly::MotorsOnly(const System &path, std::vector<Row> motors, const System &driven,
-                       std::vector<std::size_t> motor_constraint, double factor, std::vector<TimeFunction> offset,
-                       VectorXd guess)
+ServoConstraint::ServoConstraint(const System &path, std::vector<Measure> motors, const System &driven,
+                                 std::vector<std::size_t> motor_constraint, double factor,
+                                 std::vector<TimeFunction> offset, VectorXd guess)
     : path_system_(path), driven_system_(driven), motors_(std::move(motors)),
       motor_constraint_(std::move(motor_constraint)), factor_(factor), offset_(std::move(offset)),
       guess_(std::move(guess)), path_(path, guess_), driven_(driven, guess_) {
   residual_ = p_ = p_dot_ = p_ddot_ = VectorXd::Zero(path.coordinates - static_cast<Index>(3 * path.bodies.size()));
 }
 
-void MotorsOnly::restart() { path_.start_at(guess_); }
+void ServoConstraint::restart() { path_.start_at(guess_); }
 
-bool MotorsOnly::solve(double t, const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
+bool ServoConstraint::solve(double t, const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
   output_p_ = factor_ * p;
   output_p_dot_ = factor_ * p_dot;
   output_p_ddot_ = factor_ * p_ddot;
@@ -33,7 +33,7 @@ bool MotorsOnly::solve(double t, const VectorXd &p, const VectorXd &p_dot, const
   if (!path_.move(t))
     return false;
   const Workspace &w = path_.workspace();
-  RowMotion motion;
+  MeasureMotion motion;
   for (std::size_t i = 0; i < motors_.size(); ++i) {
     evaluate(motors_[i], w.bodies, motion);
     const double acceleration =
@@ -52,7 +52,7 @@ bool MotorsOnly::solve(double t, const VectorXd &p, const VectorXd &p_dot, const
   return true;
 }
 
-bool MotorsOnly::solve(double t, const std::vector<ModalShape> &shape) {
+bool ServoConstraint::solve(double t, const std::vector<ModalShape> &shape) {
   Index k = 0;
   for (const auto &of_body : shape)
     for (const auto &function : of_body) {
@@ -67,7 +67,7 @@ bool MotorsOnly::solve(double t, const std::vector<ModalShape> &shape) {
 namespace {
 
 // r at one node; NaN where no position is found
-VectorXd residual(MotorsOnly &servo, double t, const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
+VectorXd residual(ServoConstraint &servo, double t, const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
   if (servo.solve(t, p, p_dot, p_ddot))
     return servo.residual();
   servo.restart();
@@ -76,7 +76,7 @@ VectorXd residual(MotorsOnly &servo, double t, const VectorXd &p, const VectorXd
 
 } // namespace
 
-RowMajorMatrix servo_residuals(MotorsOnly &servo, const std::vector<double> &times, const RowMajorMatrix &p,
+RowMajorMatrix servo_residuals(ServoConstraint &servo, const std::vector<double> &times, const RowMajorMatrix &p,
                                const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot) {
   RowMajorMatrix r(p.rows(), p.cols());
   servo.restart();
@@ -85,7 +85,7 @@ RowMajorMatrix servo_residuals(MotorsOnly &servo, const std::vector<double> &tim
   return r;
 }
 
-InternalDynamics servo_derivatives(MotorsOnly &servo, const std::vector<double> &times, const RowMajorMatrix &p,
+InternalDynamics servo_derivatives(ServoConstraint &servo, const std::vector<double> &times, const RowMajorMatrix &p,
                                    const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot) {
   constexpr double step = 1e-5;
   const Index N = p.rows(), n = p.cols();
@@ -113,18 +113,18 @@ InternalDynamics servo_derivatives(MotorsOnly &servo, const std::vector<double> 
   return d;
 }
 
-FcidOutputs servo_outputs(MotorsOnly &servo, const std::vector<double> &times, const std::vector<ModalShape> &shape,
-                          ActuationResolver &resolver) {
+FcidOutputs servo_outputs(ServoConstraint &servo, const std::vector<double> &times,
+                          const std::vector<ModalShape> &shape, ActuatorForces &resolver) {
   servo.restart();
   return collect(servo.motion(), times, [&](double t) { return servo.solve(t, shape); }, &resolver);
 }
 
-MotorsOnlyActuation::MotorsOnlyActuation(const System &driven, MotorsOnly servo, std::vector<ModalShape> shape,
-                                         std::vector<bool> is_motor, ActuationResolver resolver)
+ServoActuation::ServoActuation(const System &driven, ServoConstraint servo, std::vector<ModalShape> shape,
+                               std::vector<bool> is_motor, ActuatorForces resolver)
     : ActuationSource(driven, std::move(is_motor), std::move(resolver)), system_(driven), servo_(std::move(servo)),
       shape_(std::move(shape)) {}
 
-void MotorsOnlyActuation::find(double t) {
+void ServoActuation::find(double t) {
   servo_.solve(t, shape_); // was found at all output times before; a failure in between shows as a refused step
   resolve();
 }

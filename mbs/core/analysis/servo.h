@@ -20,14 +20,14 @@
 
 namespace ffrobot {
 
-class MotorsOnly {
+class ServoConstraint {
 public:
   // path: under C_m and the specified trajectories; motors: their rows in it. driven: the same bodies under C_m and the
   // motors' rows, motor i being constraint motor_constraint[i]. offset: one function per mode of all bodies, or empty.
   // guess: coordinates the first position is found from. Both systems must outlive this.
-  MotorsOnly(const System &path, std::vector<Row> motors, const System &driven,
-             std::vector<std::size_t> motor_constraint, double factor, std::vector<TimeFunction> offset,
-             Eigen::VectorXd guess);
+  ServoConstraint(const System &path, std::vector<Measure> motors, const System &driven,
+                  std::vector<std::size_t> motor_constraint, double factor, std::vector<TimeFunction> offset,
+                  Eigen::VectorXd guess);
 
   Eigen::Index modes() const { return residual_.size(); }
 
@@ -41,7 +41,7 @@ public:
 
 private:
   const System &path_system_, &driven_system_;
-  std::vector<Row> motors_;
+  std::vector<Measure> motors_;
   std::vector<std::size_t> motor_constraint_;
   double factor_;
   std::vector<TimeFunction> offset_;
@@ -50,7 +50,7 @@ private:
 };
 
 // r (N, n) at N nodes: times (N), p, p_dot, p_ddot (N, n), all modes of all bodies. NaN where no position is found.
-RowMajorMatrix servo_residuals(MotorsOnly &servo, const std::vector<double> &times, const RowMajorMatrix &p,
+RowMajorMatrix servo_residuals(ServoConstraint &servo, const std::vector<double> &times, const RowMajorMatrix &p,
                                const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot);
 
 // Derivatives of r at N nodes, each (N, n n), row after row. r is linear in p_ddot and quadratic in p_dot, so
@@ -58,18 +58,18 @@ RowMajorMatrix servo_residuals(MotorsOnly &servo, const std::vector<double> &tim
 struct InternalDynamics {
   RowMajorMatrix M, D, K;
 };
-InternalDynamics servo_derivatives(MotorsOnly &servo, const std::vector<double> &times, const RowMajorMatrix &p,
+InternalDynamics servo_derivatives(ServoConstraint &servo, const std::vector<double> &times, const RowMajorMatrix &p,
                                    const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot);
 
 // Motion and forces for p(t), one row per time that was reached; shape_force is the residual.
-FcidOutputs servo_outputs(MotorsOnly &servo, const std::vector<double> &times, const std::vector<ModalShape> &shape,
-                          ActuationResolver &resolver);
+FcidOutputs servo_outputs(ServoConstraint &servo, const std::vector<double> &times,
+                          const std::vector<ModalShape> &shape, ActuatorForces &resolver);
 
 // The motors' forces for p(t), solved anew at every time.
-class MotorsOnlyActuation final : public ActuationSource {
+class ServoActuation final : public ActuationSource {
 public:
-  MotorsOnlyActuation(const System &driven, MotorsOnly servo, std::vector<ModalShape> shape, std::vector<bool> is_motor,
-                      ActuationResolver resolver);
+  ServoActuation(const System &driven, ServoConstraint servo, std::vector<ModalShape> shape, std::vector<bool> is_motor,
+                 ActuatorForces resolver);
 
   const System &system() const override { return system_; }
   const Workspace &workspace() const override { return servo_.motion().workspace(); }
@@ -81,7 +81,7 @@ protected:
 
 private:
   const System &system_;
-  MotorsOnly servo_;
+  ServoConstraint servo_;
   std::vector<ModalShape> shape_;
 };
 

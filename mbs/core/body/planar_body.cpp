@@ -346,7 +346,7 @@ Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyState &s, I
   return acceleration;
 }
 
-void respond(const PlanarBody &body, PlanarBodyState &s, double *dq) {
+void apply_inverse_mass(const PlanarBody &body, PlanarBodyState &s, double *dq) {
   const Vector3d x = frame_response(s, s.none);
   for (int i = 0; i < 3; ++i)
     s.z_response[i] = -x[i];

@@ -73,7 +73,7 @@ struct PlanarBodyState {
   // Ports, in global axes: the translations and rotations of markers by which constraints hold the body (PackedRows).
   Eigen::VectorXd port_acceleration; // before constraint forces
   Eigen::MatrixXd mobility;          // acceleration of a port per unit force on another; from each diagonal entry down
-  Eigen::VectorXd port_force;        // of constraints; set before accelerations and respond
+  Eigen::VectorXd port_force;        // of constraints; set before accelerations and apply_inverse_mass
 
   // internals of the elimination
   Eigen::MatrixXd W;              // (3 + 3 markers, n), as it is at p
@@ -111,7 +111,7 @@ Eigen::Vector3d marker_acceleration(const PlanarBody &body, const PlanarBodyStat
                                     const double *q, const double *a, double &size);
 
 // M^-1 times the generalized force of state.port_force (mass metric of the last free_motion).
-void respond(const PlanarBody &body, PlanarBodyState &state, double *dq);
+void apply_inverse_mass(const PlanarBody &body, PlanarBodyState &state, double *dq);
 
 // Generalized force on p of wrenches on the markers (global axes): F_p += sum Phi_k^T A^T f_k + ...
 void add_modal_force(const PlanarBody &body, const PlanarBodyState &state, const Eigen::Matrix3Xd &wrench,

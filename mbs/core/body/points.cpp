@@ -16,7 +16,7 @@ void driving_force(const System &system, const Workspace &w, const std::function
   Q_a = VectorXd::Zero(3 + n);
   Q_a.tail(n) = shape_force;
   for (std::size_t r = 0; r < system.held; ++r) {
-    const Row &row = system.constraints[r].row;
+    const Measure &row = system.constraints[r].row;
     if (!is_trajectory(r) || (row.a.body != static_cast<int>(body) && row.b.body != static_cast<int>(body)))
       continue;
     gradient.setZero();

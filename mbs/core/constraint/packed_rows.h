@@ -21,7 +21,7 @@ struct PackedRows {
   Eigen::Index rows() const { return W.rows(); }
   Eigen::Index port(Eigen::Index row) const { return place[static_cast<std::size_t>(row)] - first_port; }
 
-  // Row `row` of W has moved with p.
+  // Measure `row` of W has moved with p.
   void replace(Eigen::Index row, const Eigen::Ref<const Eigen::RowVectorXd> &values);
 
   // elastic_force, Wp, Wp_dot, Wk, p_p and p_p_dot

@@ -11,7 +11,7 @@ using Eigen::Index;
 namespace {
 
 // Terms of a row at one of its markers: one where its direction is fixed to the axes, all it may need otherwise.
-void add_terms(const Row &row, std::size_t r, bool of_b, const std::vector<PlanarBodyState> &bodies,
+void add_terms(const Measure &row, std::size_t r, bool of_b, const std::vector<PlanarBodyState> &bodies,
                std::vector<PortTerm> &terms) {
   const MarkerReference &m = of_b ? row.b : row.a;
   if (m.body < 0)
@@ -24,7 +24,7 @@ void add_terms(const Row &row, std::size_t r, bool of_b, const std::vector<Plana
   }
 }
 
-double coefficient(const PortTerm &term, const RowMotion &motion) {
+double coefficient(const PortTerm &term, const MeasureMotion &motion) {
   return (term.of_b ? motion.coefficient_b : motion.coefficient_a)[term.component];
 }
 
@@ -33,11 +33,11 @@ double coefficient(const PortTerm &term, const RowMotion &motion) {
 PortCouplings::PortCouplings(const std::vector<PlanarBodyState> &bodies, const std::vector<Constraint> &constraints,
                              const EnvelopeMatrix<double> &schur) {
   for (std::size_t r = 0; r < constraints.size(); ++r) {
-    const Row &row = constraints[r].row;
+    const Measure &row = constraints[r].row;
     const std::size_t first = terms_.size();
     add_terms(row, r, true, bodies, terms_);
     add_terms(row, r, false, bodies, terms_);
-    RowMotion motion;
+    MeasureMotion motion;
     evaluate(row, bodies, motion);
     for (std::size_t i = first; i < terms_.size(); ++i)
       coefficient_.push_back(coefficient(terms_[i], motion));
@@ -57,7 +57,7 @@ PortCouplings::PortCouplings(const std::vector<PlanarBodyState> &bodies, const s
     }
 }
 
-void PortCouplings::update(const std::vector<RowMotion> &rows) {
+void PortCouplings::update(const std::vector<MeasureMotion> &rows) {
   if (moving_rows_.empty())
     return;
   for (std::size_t i = 0; i < terms_.size(); ++i)

@@ -32,7 +32,7 @@ public:
                 const EnvelopeMatrix<double> &schur);
 
   // Coefficients of rows whose directions move, from rows[i]; those of all others stay as they are.
-  void update(const std::vector<RowMotion> &rows);
+  void update(const std::vector<MeasureMotion> &rows);
   const std::vector<std::size_t> &moving_rows() const { return moving_rows_; }
 
   void assemble(const std::vector<PlanarBodyState> &bodies, EnvelopeMatrix<double> &schur) const; // adds

@@ -5,26 +5,26 @@ namespace ffrobot {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMotion &motion) {
+void evaluate(const Measure &row, const std::vector<PlanarBodyState> &bodies, MeasureMotion &motion) {
   const MarkerMotion &a = row.a.motion(bodies), &b = row.b.motion(bodies);
   motion.bias = 0; // what a slide evaluated before may have left
   switch (row.kind) {
-  case RowKind::x:
-  case RowKind::y: {
-    const int i = row.kind == RowKind::x ? 0 : 1;
+  case MeasureKind::x:
+  case MeasureKind::y: {
+    const int i = row.kind == MeasureKind::x ? 0 : 1;
     motion.value = b.position[i] - a.position[i] - row.offset;
     motion.rate = b.velocity[i] - a.velocity[i];
     motion.coefficient_b = Vector3d::Unit(i);
     motion.coefficient_a = -Vector3d::Unit(i);
     return;
   }
-  case RowKind::angle:
+  case MeasureKind::angle:
     motion.value = b.angle - a.angle - row.offset;
     motion.rate = b.angular_velocity - a.angular_velocity;
     motion.coefficient_b = Vector3d::UnitZ();
     motion.coefficient_a = -Vector3d::UnitZ();
     return;
-  case RowKind::slide: {
+  case MeasureKind::slide: {
     const double c = std::cos(a.angle), s = std::sin(a.angle), w = a.angular_velocity;
     const Vector2d n(c * row.direction.x() - s * row.direction.y(), s * row.direction.x() + c * row.direction.y());
     const Vector2d dn(-n.y(), n.x()); // derivative with respect to the angle of a
@@ -36,7 +36,7 @@ void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMot
     motion.coefficient_a << -n, dn.dot(d);
     return;
   }
-  case RowKind::gear: {
+  case MeasureKind::gear: {
     const double n_b = row.direction.x(), n_a = row.direction.y();
     motion.value = n_b * b.angle - n_a * a.angle - row.offset;
     motion.rate = n_b * b.angular_velocity - n_a * a.angular_velocity;
@@ -47,14 +47,14 @@ void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMot
   }
 }
 
-void add_wrench(const Row &row, const RowMotion &motion, double force, std::vector<Eigen::Matrix3Xd> &wrench) {
+void add_wrench(const Measure &row, const MeasureMotion &motion, double force, std::vector<Eigen::Matrix3Xd> &wrench) {
   if (row.b.body >= 0)
     wrench[static_cast<std::size_t>(row.b.body)].col(row.b.marker) += force * motion.coefficient_b;
   if (row.a.body >= 0)
     wrench[static_cast<std::size_t>(row.a.body)].col(row.a.marker) += force * motion.coefficient_a;
 }
 
-void jacobian(const Row &row, const RowMotion &motion, const std::vector<PlanarBody> &bodies,
+void jacobian(const Measure &row, const MeasureMotion &motion, const std::vector<PlanarBody> &bodies,
               const std::vector<PlanarBodyState> &states, const std::vector<Eigen::Index> &first_coordinate,
               Eigen::Ref<Eigen::VectorXd> gradient) {
   const auto add = [&](const MarkerReference &m, const Vector3d &coefficient) {
@@ -74,7 +74,7 @@ void jacobian(const Row &row, const RowMotion &motion, const std::vector<PlanarB
   add(row.b, motion.coefficient_b);
 }
 
-void add_frame_gradient(const Row &row, const RowMotion &motion, const std::vector<PlanarBodyState> &states,
+void add_frame_gradient(const Measure &row, const MeasureMotion &motion, const std::vector<PlanarBodyState> &states,
                         Eigen::Ref<Eigen::VectorXd> gradient) {
   const auto add = [&](const MarkerReference &m, const Vector3d &coefficient) {
     if (m.body < 0)

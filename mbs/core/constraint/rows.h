@@ -22,7 +22,7 @@ struct MarkerReference {
   }
 };
 
-enum class RowKind {
+enum class MeasureKind {
   x,     // (r_b - r_a)_x, global
   y,     // (r_b - r_a)_y, global
   angle, // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
@@ -32,13 +32,13 @@ enum class RowKind {
 };
 
 // Whether the directions of such rows, and with them their coefficients below, move with the bodies.
-constexpr bool moves(RowKind kind) { return kind == RowKind::slide; }
+constexpr bool moves(MeasureKind kind) { return kind == MeasureKind::slide; }
 
 // The only coefficient (x, y, angle) that is not zero in rows that do not move.
-constexpr int component_of(RowKind kind) { return kind == RowKind::gear ? 2 : static_cast<int>(kind); }
+constexpr int component_of(MeasureKind kind) { return kind == MeasureKind::gear ? 2 : static_cast<int>(kind); }
 
-struct Row {
-  RowKind kind;
+struct Measure {
+  MeasureKind kind;
   MarkerReference a, b;
   Eigen::Vector2d direction = Eigen::Vector2d::Zero(); // of a slide, in the axes of a; of a gear (n_b, n_a)
   double offset = 0;                                   // the row's value at its zero
@@ -46,23 +46,23 @@ struct Row {
 
 // value, its rate, and acceleration = coefficient_b . (acceleration of b) + coefficient_a . (… of a) + bias, with
 // marker accelerations (x, y, angular). The transposed coefficients spread a force along the row over the markers.
-struct RowMotion {
+struct MeasureMotion {
   double value = 0, rate = 0, bias = 0;
   Eigen::Vector3d coefficient_a = Eigen::Vector3d::Zero(), coefficient_b = Eigen::Vector3d::Zero();
 };
 
-void evaluate(const Row &row, const std::vector<PlanarBodyState> &bodies, RowMotion &motion);
+void evaluate(const Measure &row, const std::vector<PlanarBodyState> &bodies, MeasureMotion &motion);
 
 // Adds the wrench of a generalized force of size `force` along the row to its two markers.
-void add_wrench(const Row &row, const RowMotion &motion, double force, std::vector<Eigen::Matrix3Xd> &wrench);
+void add_wrench(const Measure &row, const MeasureMotion &motion, double force, std::vector<Eigen::Matrix3Xd> &wrench);
 
 // Partial derivatives of the row with respect to the coordinates (R, theta, p) of all bodies.
-void jacobian(const Row &row, const RowMotion &motion, const std::vector<PlanarBody> &bodies,
+void jacobian(const Measure &row, const MeasureMotion &motion, const std::vector<PlanarBody> &bodies,
               const std::vector<PlanarBodyState> &states, const std::vector<Eigen::Index> &first_coordinate,
               Eigen::Ref<Eigen::VectorXd> gradient);
 
 // The part of it that belongs to the frames: (R, theta) of all bodies, three entries each. Adds to `gradient`.
-void add_frame_gradient(const Row &row, const RowMotion &motion, const std::vector<PlanarBodyState> &states,
+void add_frame_gradient(const Measure &row, const MeasureMotion &motion, const std::vector<PlanarBodyState> &states,
                         Eigen::Ref<Eigen::VectorXd> gradient);
 
 } // namespace ffrobot

@@ -18,7 +18,7 @@ public:
   // Estimate of order 5, and the factor that the estimate of order 3 brings it down by: together they shrink as h^8.
   double estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 8; }
-  double share(double fraction) const override { return std::sqrt(fraction) / 8; }
+  double error_share(double fraction) const override { return std::sqrt(fraction) / 8; }
 
   bool lands_on_outputs() const override { return false; }
   void prepare_dense(double t, const double *y, double h) override; // three more slopes

@@ -16,7 +16,7 @@ public:
   bool correct(double t) override { return system_.correct(t, end_.data()); }
   double estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 5; }
-  double share(double fraction) const override { return std::sqrt(fraction) / 8; }
+  double error_share(double fraction) const override { return std::sqrt(fraction) / 8; }
 
   bool lands_on_outputs() const override { return false; }
   void prepare_dense(double t, const double *y, double h) override;

@@ -18,7 +18,7 @@ public:
   bool correct(double t) override { return project_(t, end_.data()); }
   double estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 3; }
-  double share(double fraction) const override { return 4 * fraction; }
+  double error_share(double fraction) const override { return 4 * fraction; }
   void accept(double h) override;
   void restart() override {
     started_ = false;

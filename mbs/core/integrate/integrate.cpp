@@ -44,7 +44,7 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
   IntegrationReport report;
   double t = times.front(), t_asked = t;
   double usual_step = 0, reserve = 1; // the largest of late; in terms of the tolerance
-  bool settles = method.damps();      // vibrations of the start
+  bool in_transient = method.damps(); // vibrations of the start
   double h = method.damps() ? end - t : std::min(system.initial_step(), end - t);
   const auto record = [&] {
     if (recording) {
@@ -70,8 +70,8 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     usual_step = checkpoint->stepping[1];
     reserve = checkpoint->stepping[2];
     control.go_on(checkpoint->stepping[3], checkpoint->stepping[4]);
-    settles = checkpoint->stepping[5] != 0;
-    system.gather(checkpoint->gathered);
+    in_transient = checkpoint->stepping[5] != 0;
+    system.restore(checkpoint->gathered);
     system.slope(t, y.data(), method.first_slope());
     report.outputs = checkpoint->outputs;
   } else {
@@ -114,13 +114,13 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     const double step = next_step(h, target - t, lands);
     const double t_end = step == target - t ? target : t + step;
     constexpr double rounding = 2e-14; // what estimates see of it: shorter steps would not help
-    const double regular = method.share(step / duration);
-    const bool once = settles || step < much_shorter * usual_step;
+    const double regular = method.error_share(step / duration);
+    const bool once = in_transient || step < much_shorter * usual_step;
     const double part = once ? std::max(regular, part_of_reserve * reserve) : regular;
     const double share = std::max(controls.tolerance * part, rounding);
     const double regular_share = std::max(controls.tolerance * regular, rounding);
     double size = NAN;
-    if (method.step(t, y.data(), step, settles ? regular_share : share) && method.correct(t_end)) {
+    if (method.step(t, y.data(), step, in_transient ? regular_share : share) && method.correct(t_end)) {
       system.slope(t_end, method.end(), method.last_slope());
       const double damping = method.estimate(step, error);
       size = system.error_size(t_end, method.end(), error.data()) * damping / share;
@@ -132,11 +132,11 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     }
     ++report.steps;
     usual_step = std::max(step, 0.8 * usual_step);
-    if (part > regular && (!settles || size * share > regular_share))
+    if (part > regular && (!in_transient || size * share > regular_share))
       reserve -= size * part;
-    if (settles) {
+    if (in_transient) {
       size *= share / regular_share; // the steps after this one should do without the reserve
-      settles = size > 1;
+      in_transient = size > 1;
     }
     bool dense = false;
     for (; report.outputs < times.size() && times[report.outputs] <= t_end; ++report.outputs) {
@@ -172,8 +172,8 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
   }
   if (checkpoint) {
     Eigen::VectorXd stepping(6);
-    stepping << h, usual_step, reserve, control.previous_step(), control.previous_error(), settles;
-    *checkpoint = {t, y, stepping, system.gathered(), report.outputs};
+    stepping << h, usual_step, reserve, control.previous_step(), control.previous_error(), in_transient;
+    *checkpoint = {t, y, stepping, system.save(), report.outputs};
   }
   report.time = t;
   report.evaluations = system.evaluations();

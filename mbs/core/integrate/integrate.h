@@ -23,7 +23,7 @@ struct Recording {
 struct Checkpoint {
   double time = 0;
   Eigen::VectorXd state;    // empty: the run has not begun
-  Eigen::VectorXd stepping; // step size, of late the largest, reserve, previous step, its error, settles
+  Eigen::VectorXd stepping; // step size, of late the largest, reserve, previous step, its error, in_transient
   Eigen::VectorXd gathered; // of the system
   std::size_t outputs = 0;  // delivered
 };

@@ -30,7 +30,7 @@ public:
   // Part of the tolerance that the estimate of one step may take, which covers `fraction` of the run. The estimates of
   // single steps add up like a random walk where errors scatter, step by step where they all point the same way;
   // factors are from tests/mbs/test_integrator.py, errors against tolerances.
-  virtual double share(double fraction) const = 0;
+  virtual double error_share(double fraction) const = 0;
 
   // Whether a step leaves little of vibrations that it does not resolve. They are an error once, not at every step.
   virtual bool damps() const { return false; }

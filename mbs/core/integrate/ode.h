@@ -26,8 +26,8 @@ public:
   virtual void accepted(double t, const double *y, const double *dy) = 0;
 
   // What accepted() has gathered since the start, and the same given back to a run that goes on.
-  virtual Eigen::VectorXd gathered() const = 0;
-  virtual void gather(const Eigen::VectorXd &gathered) = 0;
+  virtual Eigen::VectorXd save() const = 0;
+  virtual void restore(const Eigen::VectorXd &gathered) = 0;
 
   // Whether y is still something that the equations describe; where it is not, the run ends as diverged.
   virtual bool is_sensible(const double *y) const = 0;

@@ -16,7 +16,7 @@ public:
   bool correct(double t) override;
   double estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 6; }
-  double share(double fraction) const override { return 3 * fraction; }
+  double error_share(double fraction) const override { return 3 * fraction; }
   bool damps() const override { return true; }
   void accept(double h) override;
   void restart() override { previous_step_ = 0; }

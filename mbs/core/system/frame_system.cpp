@@ -23,7 +23,7 @@ FrameSystem::FrameSystem(Index bodies) : is_dense_(3 * bodies <= largest_dense) 
     columns_.resize(static_cast<std::size_t>(size));
 }
 
-void FrameSystem::set_column(Index column, const Row &row, const RowMotion &motion,
+void FrameSystem::set_column(Index column, const Measure &row, const MeasureMotion &motion,
                              const std::vector<PlanarBodyState> &bodies) {
   if (is_dense_) {
     dense_.col(column).setZero();

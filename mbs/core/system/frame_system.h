@@ -17,7 +17,7 @@ class FrameSystem {
 public:
   explicit FrameSystem(Eigen::Index bodies);
 
-  void set_column(Eigen::Index column, const Row &row, const RowMotion &motion,
+  void set_column(Eigen::Index column, const Measure &row, const MeasureMotion &motion,
                   const std::vector<PlanarBodyState> &bodies);
   void factorise();
 

@@ -104,7 +104,7 @@ void IterationMatrix<Scalar>::factorise(const Workspace &w, const Eigen::VectorX
   Matrix3 E;
   const System::Coupling *at = nullptr; // E is its mobility
   for (const auto &c : system_.couplings) {
-    const RowMotion &r = rows_[static_cast<std::size_t>(c.r)], &s = rows_[static_cast<std::size_t>(c.s)];
+    const MeasureMotion &r = rows_[static_cast<std::size_t>(c.r)], &s = rows_[static_cast<std::size_t>(c.s)];
     const auto &cr = c.r_is_b ? r.coefficient_b : r.coefficient_a;
     const auto &cs = c.s_is_b ? s.coefficient_b : s.coefficient_a;
     if (!at || at->body != c.body || at->k != c.k || at->l != c.l)
@@ -132,7 +132,7 @@ template <class Scalar> void IterationMatrix<Scalar>::free_response(const Scalar
 }
 
 template <class Scalar> Scalar IterationMatrix<Scalar>::along_row(std::size_t i) const {
-  const Row &row = system_.constraints[i].row;
+  const Measure &row = system_.constraints[i].row;
   Scalar sum(0);
   for (const auto &[m, h] : {std::pair(&row.b, &rows_[i].coefficient_b), std::pair(&row.a, &rows_[i].coefficient_a)})
     if (m->body >= 0) {
@@ -164,7 +164,7 @@ template <class Scalar> void IterationMatrix<Scalar>::solve(const Scalar *r, con
     nu_[static_cast<Index>(i)] = along_row(i) - (c ? c[i] : Scalar(0));
   schur_.solve(nu_.data());
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    const Row &row = system_.constraints[i].row;
+    const Measure &row = system_.constraints[i].row;
     for (const auto &[m, h] : {std::pair(&row.b, &rows_[i].coefficient_b), std::pair(&row.a, &rows_[i].coefficient_a)})
       if (m->body >= 0)
         bodies_[static_cast<std::size_t>(m->body)].wrench.col(m->marker) -= nu_[static_cast<Index>(i)] * *h;

@@ -56,7 +56,7 @@ private:
 
   const System &system_;
   std::vector<Body> bodies_;
-  std::vector<RowMotion> rows_;
+  std::vector<MeasureMotion> rows_;
   Scalar damping_factor_ = NAN, stiffness_factor_ = NAN; // of the e at hand
   EnvelopeMatrix<Scalar> schur_;
   Vector nu_;

@@ -10,7 +10,7 @@ using Eigen::Index;
 using VectorMap = Eigen::Map<const Eigen::VectorXd>;
 
 ConstrainedMotion::ConstrainedMotion(const System &system, std::vector<int> group, std::vector<bool> moment,
-                                     Steering *steering)
+                                     ExternalLoads *steering)
     : system_(system), workspace_(system), group_(std::move(group)), steering_(steering),
       body_peaks_(system.bodies.size()), lambda_(workspace_.lambda), shifted_(2 * system.coordinates),
       shifted_slope_(2 * system.coordinates) {
@@ -164,7 +164,7 @@ void ConstrainedMotion::accepted(double, const double *y, const double *dy) {
   multiplier_peaks_ = multiplier_peaks_.cwiseMax(group_now_);
 }
 
-Eigen::VectorXd ConstrainedMotion::gathered() const {
+Eigen::VectorXd ConstrainedMotion::save() const {
   Eigen::VectorXd peaks(7 * static_cast<Index>(body_peaks_.size()) + multiplier_peaks_.size());
   Index i = 0;
   for (const BodyPeaks &peak : body_peaks_) {
@@ -176,7 +176,7 @@ Eigen::VectorXd ConstrainedMotion::gathered() const {
   return peaks;
 }
 
-void ConstrainedMotion::gather(const Eigen::VectorXd &gathered) {
+void ConstrainedMotion::restore(const Eigen::VectorXd &gathered) {
   const double *peak = gathered.data();
   for (BodyPeaks &of : body_peaks_) {
     of = {peak[0], peak[1], peak[2], peak[3], peak[4], peak[5], peak[6]};

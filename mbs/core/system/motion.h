@@ -11,9 +11,9 @@
 namespace ffrobot {
 
 // Steers a system from outside: sets workspace.external_drive and external_modal for time t.
-class Steering {
+class ExternalLoads {
 public:
-  virtual ~Steering() = default;
+  virtual ~ExternalLoads() = default;
   virtual void steer(double t, Workspace &workspace) = 0;
 };
 
@@ -21,7 +21,7 @@ class ConstrainedMotion final : public ImplicitSystem {
 public:
   // group[i]: constraints whose multipliers are judged together (the force of a joint, the moment of a joint …);
   // moment[i]: whether constraint i carries a moment. steering may be null.
-  ConstrainedMotion(const System &system, std::vector<int> group, std::vector<bool> moment, Steering *steering);
+  ConstrainedMotion(const System &system, std::vector<int> group, std::vector<bool> moment, ExternalLoads *steering);
 
   // How long the motion will last: what is slow or small is judged by it. Before the first accepted().
   void plan(double duration);
@@ -31,8 +31,8 @@ public:
   bool correct(double t, double *y) override;
   double error_size(double t, const double *y, const double *e) override;
   void accepted(double t, const double *y, const double *dy) override;
-  Eigen::VectorXd gathered() const override;
-  void gather(const Eigen::VectorXd &gathered) override;
+  Eigen::VectorXd save() const override;
+  void restore(const Eigen::VectorXd &gathered) override;
   bool is_sensible(const double *y) const override;
   double initial_step() const override;
   unsigned long evaluations() const override { return workspace_.evaluations; }
@@ -58,7 +58,7 @@ private:
   Workspace workspace_;
   std::vector<int> group_;
   std::vector<bool> group_is_moment_;
-  Steering *steering_;
+  ExternalLoads *steering_;
   double rate_ = 1;                        // 1/s: rates far below it do not count
   std::vector<Eigen::VectorXd> frequency_; // of each body's modes, rad/s
   Eigen::VectorXd stiffness_, damping_;    // diagonals over all coordinates

@@ -9,7 +9,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-Reduction::Reduction(const System &system, std::vector<Row> independent)
+Reduction::Reduction(const System &system, std::vector<Measure> independent)
     : system_(system), independent_(std::move(independent)), tangent_(system.coordinates),
       rows_(static_cast<Index>(3 * system.bodies.size()), system.coordinates) {
   for (std::size_t b = 0; b < system.bodies.size(); ++b)

@@ -15,7 +15,7 @@ class Reduction {
 public:
   // independent: with the constraints as many rows as the frames have coordinates.
   // Throws std::invalid_argument where that does not hold. Keeps a reference to the system.
-  Reduction(const System &system, std::vector<Row> independent);
+  Reduction(const System &system, std::vector<Measure> independent);
 
   // About a motion (q, v, a) that meets the constraints and their derivatives; external drives as they are in w.
   void reduce(double t, const double *q, const double *v, const double *a, Workspace &w);
@@ -31,7 +31,7 @@ private:
   void scatter_frames(const Eigen::MatrixXd &frames, Eigen::MatrixXd &into) const;
 
   const System &system_;
-  std::vector<Row> independent_;
+  std::vector<Measure> independent_;
   std::vector<Eigen::Index> frames_, modes_; // numbers of the coordinates (R, theta) and p in q
   Tangent tangent_;
   RowTangents rows_;

@@ -27,17 +27,17 @@ void System::finish() {
     for (const auto *m : {&row.a, &row.b})
       if (m->body >= 0) {
         int &used = bodies[static_cast<std::size_t>(m->body)].marker_rows[static_cast<std::size_t>(m->marker)];
-        used = std::max(used, row.kind == RowKind::x || row.kind == RowKind::y ? 2 : 3);
+        used = std::max(used, row.kind == MeasureKind::x || row.kind == MeasureKind::y ? 2 : 3);
       }
   }
   couplings.clear();
   envelope.clear();
   const auto count = static_cast<int>(constraints.size());
   for (int r = 0; r < count; ++r) {
-    const Row &row = constraints[static_cast<std::size_t>(r)].row;
+    const Measure &row = constraints[static_cast<std::size_t>(r)].row;
     Index first = r;
     for (int s = 0; s <= r; ++s) {
-      const Row &other = constraints[static_cast<std::size_t>(s)].row;
+      const Measure &other = constraints[static_cast<std::size_t>(s)].row;
       for (const bool r_is_b : {false, true})
         for (const bool s_is_b : {false, true}) {
           const MarkerReference &m = r_is_b ? row.b : row.a, &o = s_is_b ? other.b : other.a;
@@ -101,7 +101,7 @@ void apply_drives(const System &system, double t, Workspace &w) {
     }
     for (const StateForce &force : system.state_forces)
       w.wrench[static_cast<std::size_t>(force.marker.body)].col(force.marker.marker) += force(t, w.bodies);
-    RowMotion motor, joint;
+    MeasureMotion motor, joint;
     for (const Spring &spring : system.springs) {
       evaluate(spring.motor, w.bodies, motor);
       evaluate(spring.joint, w.bodies, joint);
@@ -172,7 +172,7 @@ void constraint_residuals(const System &system, double t, const double *q, const
                           double *rate) {
   update_kinematics(system, q, v, w);
   update_targets(system, t, w);
-  RowMotion motion;
+  MeasureMotion motion;
   for (std::size_t r = 0; r < system.held; ++r) {
     evaluate(system.constraints[r].row, w.bodies, motion);
     value[r] = motion.value - w.targets[r].value;
@@ -184,9 +184,9 @@ void constraint_residuals(const System &system, double t, const double *q, const
 
 double acceleration_residual(const System &system, const double *q, const double *a, const Workspace &w) {
   double worst = 0;
-  RowMotion motion;
+  MeasureMotion motion;
   for (std::size_t r = 0; r < system.held; ++r) {
-    const Row &row = system.constraints[r].row;
+    const Measure &row = system.constraints[r].row;
     evaluate(row, w.bodies, motion);
     double residual = motion.bias - w.targets[r].acceleration, scale = 1 + std::abs(w.targets[r].acceleration);
     for (const auto &[m, c] : {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)}) {
@@ -223,8 +223,8 @@ void required_force(const System &system, double t, const double *q, const doubl
   }
 }
 
-double row_acceleration(const System &system, const Row &row, const RowMotion &motion, const double *q, const double *a,
-                        const Workspace &w) {
+double row_acceleration(const System &system, const Measure &row, const MeasureMotion &motion, const double *q,
+                        const double *a, const Workspace &w) {
   double acceleration = motion.bias;
   for (const auto &[m, coefficient] :
        {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)}) {
@@ -255,7 +255,7 @@ double project(const System &system, double t, double *q, double *v, Workspace &
     w.lambda = residual;
     solve_multipliers(w);
     for (std::size_t b = 0; b < system.bodies.size(); ++b)
-      respond(system.bodies[b], w.bodies[b], w.correction.data() + system.first_coordinate[b]);
+      apply_inverse_mass(system.bodies[b], w.bodies[b], w.correction.data() + system.first_coordinate[b]);
     x += w.correction;
   };
   double left = 0, previous = 1e300;
@@ -280,7 +280,7 @@ Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w) {
   const auto m = static_cast<Index>(system.held);
   Eigen::MatrixXd C_q = Eigen::MatrixXd::Zero(system.coordinates, m); // transposed: gradients are columns
   for (std::size_t r = 0; r < system.held; ++r) {
-    RowMotion motion;
+    MeasureMotion motion;
     evaluate(system.constraints[r].row, w.bodies, motion);
     jacobian(system.constraints[r].row, motion, system.bodies, w.bodies, system.first_coordinate,
              C_q.col(static_cast<Index>(r)));
@@ -291,7 +291,7 @@ Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w) {
 JointEnergy joint_energy(const System &system, const double *q, const double *v, Workspace &w) {
   update_kinematics(system, q, v, w);
   JointEnergy result;
-  RowMotion motion;
+  MeasureMotion motion;
   for (std::size_t r = system.held; r < system.constraints.size(); ++r) {
     evaluate(system.constraints[r].row, w.bodies, motion);
     result.kinetic += motion.rate * motion.rate / (2 * system.constraints[r].compliance);
@@ -301,7 +301,7 @@ JointEnergy joint_energy(const System &system, const double *q, const double *v,
       evaluate(drive.row, w.bodies, motion);
       result.dissipated_power += drive.friction.resistance(motion.rate) * motion.rate;
     }
-  RowMotion of_joint;
+  MeasureMotion of_joint;
   for (const Spring &spring : system.springs) {
     evaluate(spring.motor, w.bodies, motion);
     evaluate(spring.joint, w.bodies, of_joint);

@@ -22,7 +22,7 @@ namespace ffrobot {
 // -1/J on the diagonal: d^T q_ddot - mu/J = 0 beside M q_ddot + d mu = Q. C M^-1 C^T gets 1/J there and stays positive
 // definite. Nothing holds such a row: as a constraint its value and rate are 0.
 struct Constraint {
-  Row row;
+  Measure row;
   TimeFunction target;
   double compliance = 0;
 };
@@ -41,7 +41,7 @@ struct Friction {
 
 // Generalized force `size(t)` along a row: joint moments, point forces, with the same directions as constraints.
 struct Drive {
-  Row row;
+  Measure row;
   TimeFunction size;
   Friction friction = {};
 };
@@ -49,10 +49,10 @@ struct Drive {
 // Spring and damper of a gear: the moment k delta + c delta_dot, delta = motor - joint, pulls the motor back and the
 // joint along. Both rows are angles, which do not move with the bodies.
 struct Spring {
-  Row motor, joint;
+  Measure motor, joint;
   double stiffness = 0, damping = 0;
 
-  double moment(const RowMotion &of_motor, const RowMotion &of_joint) const {
+  double moment(const MeasureMotion &of_motor, const MeasureMotion &of_joint) const {
     return stiffness * (of_motor.value - of_joint.value) + damping * (of_motor.rate - of_joint.rate);
   }
 };
@@ -93,8 +93,8 @@ struct Workspace {
 
   std::vector<PlanarBodyState> bodies;
   // Of the constraints, at the last evaluation; values and rates only where coefficients move.
-  std::vector<RowMotion> rows;
-  std::vector<RowMotion> drive_rows;
+  std::vector<MeasureMotion> rows;
+  std::vector<MeasureMotion> drive_rows;
   std::vector<Jet> targets; // of the constraints at target_time
   double target_time = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> external_drive;          // added to the drives' own sizes; set by whoever steers the system
@@ -134,8 +134,8 @@ void required_force(const System &system, double t, const double *q, const doubl
 void update_kinematics(const System &system, const double *q, const double *v, Workspace &w);
 
 // Acceleration of any row's value, without its target. Uses kinematics in w and the row's motion there.
-double row_acceleration(const System &system, const Row &row, const RowMotion &motion, const double *q, const double *a,
-                        const Workspace &w);
+double row_acceleration(const System &system, const Measure &row, const MeasureMotion &motion, const double *q,
+                        const double *a, const Workspace &w);
 
 // Accelerations C_ddot (constraints, rotors too) for accelerations a of the coordinates. Uses kinematics, rows and
 // targets in w.

@@ -16,7 +16,7 @@ namespace {
 
 // n of a slide, its derivative with respect to the angle of a, and the way from a to b.
 struct SlideAxes {
-  SlideAxes(const Row &row, const MarkerMotion &a, const MarkerMotion &b) : d(b.position - a.position) {
+  SlideAxes(const Measure &row, const MarkerMotion &a, const MarkerMotion &b) : d(b.position - a.position) {
     const double c = std::cos(a.angle), s = std::sin(a.angle);
     n << c * row.direction.x() - s * row.direction.y(), s * row.direction.x() + c * row.direction.y();
     n_alpha << -n.y(), n.x();
@@ -53,12 +53,13 @@ Vector3d acceleration_of(const System &system, const Workspace &w, const MarkerR
 
 // The curvature of a slide beyond that of its markers: x^T alpha_q + alpha_q^T x, x = n_alpha . d_q - (n . d)
 // alpha_q/2.
-void add_slide_curvature(const System &system, const Row &row, double multiplier, const Workspace &w, Ref<MatrixXd> K) {
+void add_slide_curvature(const System &system, const Measure &row, double multiplier, const Workspace &w,
+                         Ref<MatrixXd> K) {
   if (row.a.body < 0)
     return;
   const SlideAxes axes(row, row.a.motion(w.bodies), row.b.motion(w.bodies));
   VectorXd x = VectorXd::Zero(system.coordinates), alpha = x;
-  RowMotion of_x, of_alpha;
+  MeasureMotion of_x, of_alpha;
   of_x.coefficient_b << axes.n_alpha, 0;
   of_x.coefficient_a << -axes.n_alpha, -0.5 * axes.n.dot(axes.d);
   of_alpha.coefficient_a = Vector3d::UnitZ();
@@ -70,8 +71,9 @@ void add_slide_curvature(const System &system, const Row &row, double multiplier
 
 } // namespace
 
-void add_row_curvature(const System &system, const Row &row, double multiplier, const Workspace &w, Ref<MatrixXd> K) {
-  RowMotion motion;
+void add_row_curvature(const System &system, const Measure &row, double multiplier, const Workspace &w,
+                       Ref<MatrixXd> K) {
+  MeasureMotion motion;
   evaluate(row, w.bodies, motion);
   for (const auto &[m, coefficient] :
        {std::pair(&row.a, &motion.coefficient_a), std::pair(&row.b, &motion.coefficient_b)}) {
@@ -82,20 +84,20 @@ void add_row_curvature(const System &system, const Row &row, double multiplier, 
     add_marker_curvature(system.bodies[b], w.bodies[b], m->marker, multiplier * *coefficient,
                          K.block(first, first, size, size));
   }
-  if (row.kind == RowKind::slide)
+  if (row.kind == MeasureKind::slide)
     add_slide_curvature(system, row, multiplier, w, K);
 }
 
-void row_tangent(const System &system, const Row &row, const double *q, const double *v, const double *a,
+void row_tangent(const System &system, const Measure &row, const double *q, const double *v, const double *a,
                  const Workspace &w, Index i, RowTangents &result) {
   result.by_acceleration.row(i).setZero();
   result.by_velocity.row(i).setZero();
   result.by_position.row(i).setZero();
-  RowMotion motion;
+  MeasureMotion motion;
   evaluate(row, w.bodies, motion);
   // of velocities and positions of the markers a and b
   Vector3d velocity_a = Vector3d::Zero(), velocity_b = velocity_a, position_a = velocity_a, position_b = velocity_a;
-  if (row.kind == RowKind::slide) {
+  if (row.kind == MeasureKind::slide) {
     const MarkerMotion &m_a = row.a.motion(w.bodies), &m_b = row.b.motion(w.bodies);
     const SlideAxes axes(row, m_a, m_b);
     const Vector3d a_a = acceleration_of(system, w, row.a, q, a), a_b = acceleration_of(system, w, row.b, q, a);
@@ -116,7 +118,7 @@ namespace {
 
 // Springs between angles, whose gradients are constant.
 void add_springs(const System &system, const Workspace &w, Tangent &result) {
-  RowMotion motion;
+  MeasureMotion motion;
   for (const Spring &spring : system.springs) {
     VectorXd motor = VectorXd::Zero(system.coordinates), joint = motor;
     evaluate(spring.motor, w.bodies, motion);
@@ -133,9 +135,9 @@ void add_springs(const System &system, const Workspace &w, Tangent &result) {
 void add_built_joints(const System &system, const double *q, const double *v, const double *a, Workspace &w,
                       Tangent &result) {
   RowTangents row(1, system.coordinates);
-  RowMotion motion;
+  MeasureMotion motion;
   VectorXd gradient(system.coordinates);
-  const auto look_at = [&](const Row &r) {
+  const auto look_at = [&](const Measure &r) {
     evaluate(r, w.bodies, motion);
     row_tangent(system, r, q, v, a, w, 0, row);
     gradient = row.by_acceleration.row(0).transpose();
@@ -173,12 +175,12 @@ void add_state_force(const System &system, const StateForce &force, double t, co
   const Vector3d steps = small * Vector3d(system.length, system.length, 1), now = force(t, position, rate);
   Eigen::Matrix3d by_position, by_rate;
   RowTangents rows(3, system.coordinates);
-  const RowKind kinds[] = {RowKind::x, RowKind::y, RowKind::angle};
+  const MeasureKind kinds[] = {MeasureKind::x, MeasureKind::y, MeasureKind::angle};
   for (Index i = 0; i < 3; ++i) {
     const Vector3d step = steps[i] * Vector3d::Unit(i);
     by_position.col(i) = (force(t, position + step, rate) - force(t, position - step, rate)) / (2 * steps[i]);
     by_rate.col(i) = (force(t, position, rate + step) - force(t, position, rate - step)) / (2 * steps[i]);
-    const Row row{kinds[i], ground, force.marker};
+    const Measure row{kinds[i], ground, force.marker};
     row_tangent(system, row, q, v, a, w, i, rows);
     add_row_curvature(system, row, -now[i], w, result.K);
   }

@@ -34,11 +34,11 @@ void tangent(const System &system, double t, const double *q, const double *v, c
              Tangent &result);
 
 // K += multiplier d2(row)/dq2: what a force -multiplier along the row adds. After tangent.
-void add_row_curvature(const System &system, const Row &row, double multiplier, const Workspace &w,
+void add_row_curvature(const System &system, const Measure &row, double multiplier, const Workspace &w,
                        Eigen::Ref<Eigen::MatrixXd> K);
 
-// Row i of `result`. After tangent, or anything else that sets the kinematics of (q, v).
-void row_tangent(const System &system, const Row &row, const double *q, const double *v, const double *a,
+// Measure i of `result`. After tangent, or anything else that sets the kinematics of (q, v).
+void row_tangent(const System &system, const Measure &row, const double *q, const double *v, const double *a,
                  const Workspace &w, Eigen::Index i, RowTangents &result);
 
 // M, D, K of one body (its block of the system's), without applied loads. After kinematics.
