@@ -6,15 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array, Booleans
 from ..mbs.analysis.analyses import Outcome
 from ..mbs.quantities.joint_space import motor_rates
 from ..mbs.scene.mechanism_records import Joint
 from .patches.patches import PatchArray
 from .patches.voltages import Voltages, voltage_gain
-
-Array = NDArray[np.float64]
 
 MOST_PATCHES = 200  # that are tried on one link
 
@@ -158,7 +156,7 @@ def judge_motors(outcome: Outcome, joints: dict[str, Joint]) -> dict[str, MotorF
     return judged
 
 
-def _first_time(time: Array, beyond: NDArray[np.bool_]) -> Array:
+def _first_time(time: Array, beyond: Booleans) -> Array:
     """The first of the times (T,) at which each column of `beyond` (T, k) holds; NaN where it never does."""
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 

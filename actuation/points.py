@@ -7,8 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..fe_models.modal_body import ModalBody
 from ..mbs import _core
@@ -16,8 +16,6 @@ from ..mbs.analysis.analyses import Outcome
 from ..mbs.analysis.replay import PointActuator
 from ..mbs.model.planar_body import PlanarBody, PlanarPoint
 from ..mbs.scene.actuator_records import ActuationPoints
-
-Array = NDArray[np.float64]
 
 DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same
 AXES = {"axial": (1.0, 0.0), "transverse": (0.0, 1.0)}

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array
 from ..mbs.analysis.analyses import Outcome
 from ..mbs.quantities.joint_space import held_joint_motion
 from ..mbs.quantities.observation import rotated
 from .patches.voltages import Voltages
-
-Array = NDArray[np.float64]
 
 
 def unmet_modal_forces(outcome: Outcome, voltages: Mapping[str, Voltages]) -> Array:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array
 from .link_records import Link
 
-Floats = NDArray[np.float64]
 
-
-def damping_ratio(link: Link, omega: Floats) -> Floats:
+def damping_ratio(link: Link, omega: Array) -> Array:
     """(n,) ζ as given, or of Rayleigh damping D = aM + bK: ζ = a/(2ω) + bω/2."""
     if link.damping.rayleigh is not None:
         a, b = link.damping.rayleigh

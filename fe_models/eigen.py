@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
+from ..common.arrays import Array
 from ..common.errors import SolveError
-
-Floats = NDArray[np.float64]
 
 # Multipliers amplify relative errors of the model data some 400 times within 0.2 s of the two-link case.
 TOLERANCE = 1e-13
@@ -20,7 +18,7 @@ TOLERANCE = 1e-13
 ROUNDING_LIMIT = 1e-6
 
 
-def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, count: int) -> tuple[Floats, Floats]:
+def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, count: int) -> tuple[Array, Array]:
     """Lowest eigenpairs of K x = ω² M x by Krylov–Schur, shift-inverted at zero, K factorised by Cholesky.
 
     MechanismSystem rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
@@ -57,7 +55,7 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
     return omega2[order], X[:, order]
 
 
-def orthonormalised(M: sp.csr_matrix, X: Floats) -> Floats:
+def orthonormalised(M: sp.csr_matrix, X: Array) -> Array:
     """X (m, n), lowest mode first, made orthonormal in M (m, m) to rounding, the lowest changed least."""
     for _ in range(2):  # twice is enough (Kahan; Parlett, The Symmetric Eigenvalue Problem, §6.9)
         gram = X.T @ (M @ X)
@@ -65,7 +63,7 @@ def orthonormalised(M: sp.csr_matrix, X: Floats) -> Floats:
     return X
 
 
-def _krylov_schur(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> Floats:
+def _krylov_schur(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> Array:
     """Eigenvectors (m, count). PETSc's own Cholesky, ordered to a narrow band, has no fill on the matrices of beams."""
     solver = SLEPc.EPS().create(MPI.COMM_SELF)
     solver.setOperators(_petsc(K), _petsc(M))

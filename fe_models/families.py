@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array, Integers
 from .link_records import FAMILIES
 from .solid.functionals import Averages
-
-Floats = NDArray[np.float64]
 
 LOCAL = "local"
 # Relative distance up to which neighbouring ω² are one repeated value.
@@ -37,24 +35,24 @@ class SectionMotion:
         families: by the order of `FAMILIES`, (rows, n) each.
     """
 
-    families: tuple[Floats, ...]
+    families: tuple[Array, ...]
 
-    def energy(self) -> Floats:
+    def energy(self) -> Array:
         """(4, n) share of each family in the modal mass."""
         return np.array([np.sum(rows**2, axis=0) for rows in self.families])
 
-    def turned(self, Q: Floats) -> SectionMotion:
+    def turned(self, Q: Array) -> SectionMotion:
         """Of the modes Φ Q."""
         return SectionMotion(tuple(rows @ Q for rows in self.families))
 
 
 def section_motion(
     averages: Averages,
-    x: Floats,
-    element: NDArray[np.int64],
-    translation: Floats,
-    rotation: Floats,
-    attached: Sequence[tuple[Floats, Floats]] = (),
+    x: Array,
+    element: Integers,
+    translation: Array,
+    rotation: Array,
+    attached: Sequence[tuple[Array, Array]] = (),
 ) -> SectionMotion:
     """Motion of the sections at x (k,), stations of `element` (e, 4); translation and rotation (k, 3, n).
 
@@ -82,7 +80,7 @@ def names(motion: SectionMotion) -> list[str]:
     return [FAMILIES[i] if whole >= 0.5 else LOCAL for whole, i in zip(total, first, strict=True)]
 
 
-def aligned(omega2: Floats, motion: SectionMotion, wanted: str) -> Floats:
+def aligned(omega2: Array, motion: SectionMotion, wanted: str) -> Array:
     """(n, n) Q that turns modes of equal frequency into the families, so that the basis is reproducible; orthogonal.
 
     Args:
@@ -103,7 +101,7 @@ def aligned(omega2: Floats, motion: SectionMotion, wanted: str) -> Floats:
     return Q
 
 
-def _turn(families: Sequence[Floats], wanted: str) -> Floats:
+def _turn(families: Sequence[Array], wanted: str) -> Array:
     """(m, m): principal axes of the families' energies, each weighted by its number so that none are equal."""
     weights = [4.0, 3.0, 2.0, 1.0] if wanted == "all" else [float(name == wanted) for name in FAMILIES]
     energy = sum(weight * rows.T @ rows for weight, rows in zip(weights, families, strict=True))

@@ -15,15 +15,14 @@ import scipy.sparse as sp
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
-from numpy.typing import NDArray
 
+from ..common.arrays import Array, Integers
 from ..mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
 from .beam.beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
 from .link_records import BeamLink
 
-Floats = NDArray[np.float64]
 # N in N at x (m), and at which cell by its middle: N may jump from cell to cell.
-AxialForce = Callable[[Floats, Floats], Floats]
+AxialForce = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True)
@@ -31,11 +30,11 @@ class Invariants:
     """Shapes and meaning as in `ModalBody`."""
 
     mass: float
-    first_moment: Floats
-    second_moment: Floats
-    S_bar: Floats
-    I_bar: Floats
-    S_bar_kl: Floats
+    first_moment: Array
+    second_moment: Array
+    S_bar: Array
+    I_bar: Array
+    S_bar_kl: Array
 
 
 @dataclass(frozen=True)
@@ -50,9 +49,9 @@ class StationSpace:
     """
 
     space: fem.FunctionSpace
-    order: NDArray[np.int64]
-    x: Floats
-    element: NDArray[np.int64]
+    order: Integers
+    x: Array
+    element: Integers
 
     def matrix(self, form: ufl.Form) -> sp.csr_matrix:
         """(k, k): a bilinear form of two fields given by their values at the stations."""
@@ -71,7 +70,7 @@ def station_space(mesh: Mesh) -> StationSpace:
     return StationSpace(space, order, x[order], element[np.argsort(element[:, 0])])
 
 
-def shape_integrals(link: BeamLink, stations: StationSpace, fields: Floats) -> Invariants:
+def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> Invariants:
     """Integrals of formulation.md, section 3, over axis and cross section.
 
     With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
@@ -131,8 +130,8 @@ def _weighted(link: BeamLink, stations: StationSpace, moment: Property, rho: flo
 
 
 def geometric_stiffness(
-    link: BeamLink, stations: StationSpace, fields: Floats, interfaces: dict[str, float]
-) -> dict[str, Floats]:
+    link: BeamLink, stations: StationSpace, fields: Array, interfaces: dict[str, float]
+) -> dict[str, Array]:
     """(n, n) ∫N(x) (v'v' + w'w') dx of the axial force N that each unit load causes, positive in tension.
 
     Loads (formulation.md, section 3) on the undeformed link, held axially at its root: inertia of unit frame
@@ -160,7 +159,7 @@ def geometric_stiffness(
     return matrices
 
 
-def _stiffness_of(stations: StationSpace, fields: Floats, axial_force: AxialForce) -> Floats:
+def _stiffness_of(stations: StationSpace, fields: Array, axial_force: AxialForce) -> Array:
     """∫N (v'v' + w'w') dx for N = axial_force(x, middle of the cell of x), at most quadratic in each cell."""
     mesh = stations.space.mesh
     N = fem.Function(function_space(mesh, "P", 2, discontinuous=True))
@@ -174,12 +173,12 @@ def _stiffness_of(stations: StationSpace, fields: Floats, axial_force: AxialForc
     return np.asarray(0.5 * (total + total.T))
 
 
-def _up_to(position: float, x: Floats, middle: Floats) -> Floats:
+def _up_to(position: float, x: Array, middle: Array) -> Array:
     """1 in the cells between the root and `position`, 0 beyond."""
     return np.where(middle < position, 1.0, 0.0)
 
 
-def _mass_beyond(link: BeamLink, x: Floats, power: int) -> Floats:
+def _mass_beyond(link: BeamLink, x: Array, power: int) -> Array:
     """∫_x^L ρA sᵖ ds for each x, in kg·mᵖ."""
     total = np.zeros_like(x)
     points = link.geometry.breakpoints

@@ -12,16 +12,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array
 from ..mesh.records import InterfaceRecord
 from .modal_body import Interface
 from .solid.tensors import LEVI_CIVITA
 
 if TYPE_CHECKING:
     from .invariants import Invariants
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -37,20 +35,20 @@ class Lump:
     name: str
     at: Interface
     mass: float
-    inertia: Floats
+    inertia: Array
 
     @property
-    def weights(self) -> Floats:
+    def weights(self) -> Array:
         """(6,) m, m, m, J_x, J_y, J_z: M gains Bᵀ diag(weights) B, B (6, dofs) the motion of the interface."""
         return lump_weights(self.mass, self.inertia)
 
     @property
-    def spread(self) -> Floats:
+    def spread(self) -> Array:
         """E (3, 3) = ½ tr(J) I − J in kg·m²."""
         return np.diag(0.5 * self.inertia.sum() - self.inertia)
 
 
-def lump_weights(mass: float, inertia: Iterable[float]) -> Floats:
+def lump_weights(mass: float, inertia: Iterable[float]) -> Array:
     """(6,) what multiplies the squares of the three velocities and three angular velocities of an interface."""
     return np.array([mass, mass, mass, *inertia])
 
@@ -85,7 +83,7 @@ def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invar
     return integrals
 
 
-def with_lumped_loads(geometric_stiffness: Mapping[str, Floats], attached: Iterable[Lump]) -> dict[str, Floats]:
+def with_lumped_loads(geometric_stiffness: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:
     """Geometric stiffness of unit frame motions, the inertia of the lumps included.
 
     A lump loads the link by its inertia force and moment at its interface, whose unit loads `force/NAME/x` …,
@@ -105,7 +103,7 @@ def with_lumped_loads(geometric_stiffness: Mapping[str, Floats], attached: Itera
     return total
 
 
-def _inertia_loads(lump: Lump) -> dict[str, tuple[Floats, Floats]]:
+def _inertia_loads(lump: Lump) -> dict[str, tuple[Array, Array]]:
     """D'Alembert force (3,) and moment (3,) about its center of a lump, for each unit motion of the frame.
 
     Frame acceleration a, angular acceleration α and angular velocity ω (Newton and Euler): force
@@ -113,7 +111,7 @@ def _inertia_loads(lump: Lump) -> dict[str, tuple[Floats, Floats]]:
     """
     m, x, J = lump.mass, lump.at.position, np.diag(lump.inertia)
     e = np.eye(3)
-    loads: dict[str, tuple[Floats, Floats]] = {}
+    loads: dict[str, tuple[Array, Array]] = {}
     for k, axis in enumerate("xyz"):
         loads[f"t_{axis}"] = (-m * e[k], np.zeros(3))
         loads[f"r_{axis}"] = (-m * np.cross(e[k], x), -J @ e[k])

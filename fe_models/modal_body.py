@@ -8,15 +8,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array, Integers
 from ..common.errors import InputError
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 # m_ff = I and the identities between invariants must hold to this.
 IDENTITY_TOLERANCE = 1e-8
@@ -32,9 +30,9 @@ class Interface:
         rotation: (3, n) small rotation of the cross section, in rad per unit of modal coordinate.
     """
 
-    position: Floats
-    translation: Floats
-    rotation: Floats
+    position: Array
+    translation: Array
+    rotation: Array
 
     def __post_init__(self) -> None:
         _freeze(self)
@@ -55,12 +53,12 @@ class Stations:
             known.
     """
 
-    position: Floats
-    translation: Floats
-    rotation: Floats
-    height: Floats
+    position: Array
+    translation: Array
+    rotation: Array
+    height: Array
     element: Integers | None = None
-    outline: Floats | None = None
+    outline: Array | None = None
 
     def __post_init__(self) -> None:
         _freeze(self)
@@ -77,9 +75,9 @@ class PictureMesh:
         edges: (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture.
     """
 
-    points: Floats
+    points: Array
     cells: Integers
-    mode_shapes: Floats
+    mode_shapes: Array
     edges: Integers | None = None
 
     def __post_init__(self) -> None:
@@ -96,9 +94,9 @@ class StressPoint:
         strain: (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain.
     """
 
-    position: Floats
-    stress: Floats
-    strain: Floats
+    position: Array
+    stress: Array
+    strain: Array
 
     def __post_init__(self) -> None:
         _freeze(self)
@@ -116,10 +114,10 @@ class OutlinedPatches:
         bottom: (k, n) likewise.
     """
 
-    edges: Floats
+    edges: Array
     width: float
-    top: Floats | None = None
-    bottom: Floats | None = None
+    top: Array | None = None
+    bottom: Array | None = None
 
     def __post_init__(self) -> None:
         _freeze(self)
@@ -167,22 +165,22 @@ class ModalBody:
     reference_condition: str
     length: float
     mass: float
-    first_moment: Floats
-    second_moment: Floats
-    frequency: Floats
-    stiffness: Floats
-    modal_mass: Floats
-    damping_ratio: Floats
+    first_moment: Array
+    second_moment: Array
+    frequency: Array
+    stiffness: Array
+    modal_mass: Array
+    damping_ratio: Array
     family: tuple[str, ...]
-    S_bar: Floats
-    I_bar: Floats
-    S_bar_kl: Floats
+    S_bar: Array
+    I_bar: Array
+    S_bar_kl: Array
     interfaces: Mapping[str, Interface]
     stations: Stations
     mesh: PictureMesh
-    geometric_stiffness: Mapping[str, Floats] = field(default_factory=dict)
+    geometric_stiffness: Mapping[str, Array] = field(default_factory=dict)
     stress: Mapping[str, StressPoint] = field(default_factory=dict)
-    surface_stress: Floats | None = None
+    surface_stress: Array | None = None
     surface_patches: OutlinedPatches | None = None
     input_hash: str = ""
     modes_hash: str = ""
@@ -304,7 +302,7 @@ def _check(body: ModalBody) -> None:
     _check_identities(body, np.eye(n))
 
 
-def _check_identities(body: ModalBody, unit: Floats) -> None:
+def _check_identities(body: ModalBody, unit: Array) -> None:
     squares = (2 * np.pi * body.frequency) ** 2
     total = body.S_bar_kl[0, 0] + body.S_bar_kl[1, 1] + body.S_bar_kl[2, 2]
     identities = [

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from .modal_body import Interface, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
@@ -125,8 +126,8 @@ def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any
     return {name: group[name][()] for name, needed in required.items() if needed or name in group}
 
 
-def _geometric_stiffness(file: h5py.File) -> dict[str, NDArray[np.float64]]:
-    found: dict[str, NDArray[np.float64]] = {}
+def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
+    found: dict[str, Array] = {}
 
     def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if isinstance(item, h5py.Dataset):
@@ -137,7 +138,7 @@ def _geometric_stiffness(file: h5py.File) -> dict[str, NDArray[np.float64]]:
     return found
 
 
-def _array(group: h5py.Group, name: str) -> NDArray[np.float64]:
+def _array(group: h5py.Group, name: str) -> Array:
     return np.asarray(group[name][()], dtype=np.float64)
 
 

@@ -65,9 +65,9 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
-        from importlib.metadata import version
+        from .common.version import program_version
 
-        value: object = version("ffrobot")
+        value: object = program_version()
     elif name in _HOME:
         value = getattr(import_module(_HOME[name], __name__), name)
     else:

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from ..common.arrays import Array, Integers
+
 CellName = Literal["tetrahedron", "hexahedron"]
 
 
@@ -28,7 +27,7 @@ class Cell:
         nodes: number of nodes by degree.
     """
 
-    corners: Floats
+    corners: Array
     facets: Integers
     edges: Integers
     nodes: dict[int, int]

@@ -7,11 +7,10 @@ from typing import NoReturn
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from ..common.arrays import Array, Booleans
 from ..common.errors import InputError
-from .cells import Floats
 from .jacobian import SLIVER, cell_quality, jacobians, reference_nodes
 from .part_mesh import PartMesh, facet_keys
 from .records import SolidGeometry
@@ -119,18 +118,18 @@ def straightened(part: PartMesh) -> PartMesh:
     return part.moved(points)
 
 
-def _determinants(part: PartMesh) -> Floats:
+def _determinants(part: PartMesh) -> Array:
     """(c, s) determinants of the Jacobian at the corners, and in curved cells at the other nodes of degree 2 too."""
     at = reference_nodes(part.cell, part.degree)
-    determinants: Floats = np.linalg.det(jacobians(part.points[part.cells], part.cell, part.degree, at))
+    determinants: Array = np.linalg.det(jacobians(part.points[part.cells], part.cell, part.degree, at))
     return determinants
 
 
-def _reject_cells(part: PartMesh, bad: NDArray[np.bool_], what: str, expected: str, where: str) -> NoReturn:
+def _reject_cells(part: PartMesh, bad: Booleans, what: str, expected: str, where: str) -> NoReturn:
     middles = part.points[part.corners[bad]].mean(axis=1)
     listed = ", ".join(_show(middle) for middle in middles[:3])
     raise InputError(f"{where}: expected {expected}, found {np.sum(bad)} {what} of {len(bad)}, e.g. at {listed} m")
 
 
-def _show(point: Floats) -> str:
+def _show(point: Array) -> str:
     return f"({', '.join(f'{value:.4g}' for value in point)})"

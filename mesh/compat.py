@@ -13,8 +13,8 @@ from typing import Any, Literal
 import numpy as np
 import petsc4py
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from ..common.arrays import Array, Integers
 from ..common.errors import SolveError
 from .cells import CellName
 
@@ -36,8 +36,6 @@ if _OLD:
 else:
     from basix import ufl as basix_ufl
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 ElementName = Literal["Hermite", "P"]
 
 _INTERVAL = basix.CellType.interval
@@ -62,7 +60,7 @@ def function_space(mesh: Mesh, family: ElementName, degree: int, *, discontinuou
         return fem.functionspace(mesh, basix_ufl.element(_FAMILIES[family], _INTERVAL, degree, **options))
 
 
-def create_interval_mesh(points: Floats, cells: Integers) -> Mesh:
+def create_interval_mesh(points: Array, cells: Integers) -> Mesh:
     """Serial dolfinx mesh of intervals on a line.
 
     Args:
@@ -77,15 +75,15 @@ def create_interval_mesh(points: Floats, cells: Integers) -> Mesh:
         return create_mesh(MPI.COMM_SELF, np.asarray(cells, dtype=np.int64), points.reshape(-1, 1), domain)
 
 
-def cell_vertices(mesh: Mesh) -> Floats:
+def cell_vertices(mesh: Mesh) -> Array:
     """(c, 2) coordinates of each cell's vertices, in the order of the reference cell."""
     dofmap = mesh.geometry.dofmap
     corners = dofmap.array.reshape(-1, 2) if _OLD else np.asarray(dofmap)
-    vertices: Floats = mesh.geometry.x[corners, 0]
+    vertices: Array = mesh.geometry.x[corners, 0]
     return vertices
 
 
-def create_solid_mesh(comm: MPI.Comm, cell: CellName, degree: int, cells: Integers, points: Floats) -> Mesh:
+def create_solid_mesh(comm: MPI.Comm, cell: CellName, degree: int, cells: Integers, points: Array) -> Mesh:
     """Mesh of tetrahedra or hexahedra, distributed over `comm` without ghost cells.
 
     Args:

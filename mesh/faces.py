@@ -16,14 +16,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from ..common.arrays import Array, Integers
 from ..common.errors import InputError
 from ..common.validation import did_you_mean, quoted
-from .cells import Floats, Integers
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
 from .records import InterfaceRecord, RectangleSection, SolidGeometry, SurfacePatches
 from .source import Source
 
-Choice = NDArray[np.int64]
+Choice = Integers
 
 # A facet lies in a plane when its corners are closer to it than this, relative to the length of the link: files carry
 # as few as five digits.
@@ -47,11 +47,11 @@ class Boundary:
         area: (b,) in m², of the straight facets.
     """
 
-    points: Floats
+    points: Array
     facets: Integers
-    centroid: Floats
-    normal: Floats
-    area: Floats
+    centroid: Array
+    normal: Array
+    area: Array
 
     @classmethod
     def of(cls, part: PartMesh) -> Boundary:
@@ -76,10 +76,10 @@ class SmoothFace:
     """
 
     facets: Choice
-    center: Floats
+    center: Array
     area: float
-    normal: Floats
-    axis: Floats | None
+    normal: Array
+    axis: Array | None
 
     @classmethod
     def of(cls, boundary: Boundary, facets: Choice) -> SmoothFace:
@@ -94,14 +94,14 @@ class SmoothFace:
         center = weights @ boundary.centroid[facets]
         return cls(facets, center, float(boundary.area[facets].sum()), normal, axis)
 
-    def faces_along(self, direction: Floats) -> bool:
+    def faces_along(self, direction: Array) -> bool:
         """Whether its outward normal, or its axis in either sense, is (nearly) `direction` (3,), a unit vector."""
         if self.axis is not None:
             return abs(float(self.axis @ direction)) > _ALONG
         size = float(np.linalg.norm(self.normal))
         return size > 0.5 and bool(self.normal @ direction > _ALONG * size)
 
-    def distance(self, boundary: Boundary, position: Floats) -> float:
+    def distance(self, boundary: Boundary, position: Array) -> float:
         """From `position` (3,) to the nearest of its facets, roughly; of a bore, to its center."""
         if self.axis is not None:
             return float(np.linalg.norm(self.center - position))
@@ -275,6 +275,6 @@ def _reject(where: str, expected: str, found: str, boundary: Boundary) -> NoRetu
     raise InputError(f"{where}: expected {expected}, found {found}. The part's faces:{listed}{more}")
 
 
-def _show(vector: Floats) -> str:
+def _show(vector: Array) -> str:
     # Below a micrometre, or in a unit vector, there is nothing to tell; adding zero turns −0 into 0.
     return f"({', '.join(f'{value:.4g}' for value in np.round(vector, 6) + 0.0)})"

@@ -15,8 +15,8 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
+from ..common.arrays import Array, Integers
 from ..common.errors import InputError
-from .cells import Floats, Integers
 from .defaults import CIRCLE, GROWTH
 from .jacobian import SLIVER, cell_quality
 from .source import RawMesh
@@ -189,7 +189,7 @@ def _group_name(dim: int, tag: int) -> str:
     return gmsh.model.getPhysicalName(dim, tag) or str(tag)
 
 
-def _points() -> tuple[Integers, Floats]:
+def _points() -> tuple[Integers, Array]:
     """Measure of each node tag of gmsh, and (p, 3) coordinates."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .compat import Floats, cell_vertices, create_interval_mesh
+from ..common.arrays import Array, Integers
+from .compat import cell_vertices, create_interval_mesh
 
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 COINCIDENT = 1e-9
 
 
-def graded_nodes(breakpoints: Sequence[float], elements: int) -> Floats:
+def graded_nodes(breakpoints: Sequence[float], elements: int) -> Array:
     """Nodes of `elements` elements between the first and the last of `breakpoints`, with a node at each of them.
 
     Within a segment the elements are equal; they are shared out so that the longest is as short as possible. A uniform
@@ -46,7 +46,7 @@ def graded_nodes(breakpoints: Sequence[float], elements: int) -> Floats:
     return np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)])
 
 
-def with_points(nodes: Floats, points: Sequence[float]) -> Floats:
+def with_points(nodes: Array, points: Sequence[float]) -> Array:
     """`nodes` (m,) and `points` in one ascending list (≥ m,); a point that coincides with a node adds nothing."""
     length = nodes[-1] - nodes[0]
     merged = list(nodes)
@@ -56,7 +56,7 @@ def with_points(nodes: Floats, points: Sequence[float]) -> Floats:
     return np.sort(np.asarray(merged, dtype=np.float64))
 
 
-def interval_mesh(nodes: Floats, flipped: Sequence[int] = ()) -> Mesh:
+def interval_mesh(nodes: Array, flipped: Sequence[int] = ()) -> Mesh:
     """Mesh of the intervals between neighbouring `nodes` (m,), ascending, in m.
 
     Args:
@@ -68,7 +68,7 @@ def interval_mesh(nodes: Floats, flipped: Sequence[int] = ()) -> Mesh:
     return create_interval_mesh(nodes, cells)
 
 
-def cells_containing(mesh: Mesh, points: Floats) -> tuple[NDArray[np.int64], Floats]:
+def cells_containing(mesh: Mesh, points: Array) -> tuple[Integers, Array]:
     """Cell and reference coordinate X ∈ [0, 1] of each of `points` (k,) in m: two arrays (k,).
 
     A point on a boundary belongs to either of its cells. Points must lie on the mesh.

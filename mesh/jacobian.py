@@ -7,14 +7,15 @@ from itertools import product
 
 import numpy as np
 
-from .cells import CELLS, CellName, Floats
+from ..common.arrays import Array
+from .cells import CELLS, CellName
 
 # Quality below which a cell is flat.
 SLIVER = 1e-3
 
 
 @lru_cache
-def reference_nodes(cell: CellName, degree: int) -> Floats:
+def reference_nodes(cell: CellName, degree: int) -> Array:
     """(v, 3) nodes on the reference cell: corners, then middles of edges, faces and (hexahedra) the cell."""
     shape = CELLS[cell]
     if degree == 1:
@@ -32,19 +33,19 @@ def _exponents(cell: CellName, degree: int) -> list[tuple[int, ...]]:
     return [powers for powers in all_of if cell == "hexahedron" or sum(powers) <= degree]
 
 
-def shape_functions(cell: CellName, degree: int, X: Floats) -> Floats:
+def shape_functions(cell: CellName, degree: int, X: Array) -> Array:
     """(q, v) values at `X` (q, 3)."""
     return _monomials(cell, degree, X) @ _coefficients(cell, degree)
 
 
-def jacobians(nodes: Floats, cell: CellName, degree: int, X: Floats) -> Floats:
+def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:
     """(c, q, 3, 3) derivatives ∂x_i/∂X_d of cells with `nodes` (c, v, 3), at `X` (q, 3)."""
     slopes = _monomial_slopes(cell, degree, X) @ _coefficients(cell, degree)  # (3, q, v)
-    J: Floats = np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
+    J: Array = np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
     return J
 
 
-def cell_quality(corners: Floats, cell: CellName) -> Floats:
+def cell_quality(corners: Array, cell: CellName) -> Array:
     """(c,) 1 for regular tetrahedra and cubes, 0 for flat cells.
 
     Volume of a tetrahedron relative to that of the regular one with the same mean square edge; smallest determinant of
@@ -59,22 +60,22 @@ def cell_quality(corners: Floats, cell: CellName) -> Floats:
     if cell == "tetrahedron":
         edges = corners[:, CELLS[cell].edges]
         squares = np.sum((edges[:, :, 1] - edges[:, :, 0]) ** 2, axis=2)
-        quality: Floats = np.sqrt(2) * determinants.min(axis=1) / np.maximum(squares.mean(axis=1), 1e-200) ** 1.5
+        quality: Array = np.sqrt(2) * determinants.min(axis=1) / np.maximum(squares.mean(axis=1), 1e-200) ** 1.5
         return quality
     sides = np.prod(np.linalg.norm(J, axis=2), axis=2)
-    scaled: Floats = np.min(determinants / np.maximum(sides, 1e-300), axis=1)
+    scaled: Array = np.min(determinants / np.maximum(sides, 1e-300), axis=1)
     return scaled
 
 
-def _coefficients(cell: CellName, degree: int) -> Floats:
+def _coefficients(cell: CellName, degree: int) -> Array:
     return np.linalg.inv(_monomials(cell, degree, reference_nodes(cell, degree)))
 
 
-def _monomials(cell: CellName, degree: int, X: Floats) -> Floats:
+def _monomials(cell: CellName, degree: int, X: Array) -> Array:
     return np.stack([np.prod(X**powers, axis=1) for powers in _exponents(cell, degree)], axis=1)
 
 
-def _monomial_slopes(cell: CellName, degree: int, X: Floats) -> Floats:
+def _monomial_slopes(cell: CellName, degree: int, X: Array) -> Array:
     slopes = np.zeros((3, len(X), len(_exponents(cell, degree))))
     for k, powers in enumerate(_exponents(cell, degree)):
         for d in range(3):

@@ -12,8 +12,9 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import Booleans, Integers
 from ..common.errors import InputError
-from .cells import HEXAHEDRON, Integers
+from .cells import HEXAHEDRON
 from .source import RawMesh
 
 _VOLUMES = re.compile(r"tetra|hexahedron|wedge|pyramid|polyhedron")
@@ -71,7 +72,7 @@ def read_foreign(path: Path, where: str) -> RawMesh:
 Labels = NDArray[np.object_]
 
 
-def _by_label(labels: Labels) -> Iterator[tuple[str | None, NDArray[np.bool_]]]:
+def _by_label(labels: Labels) -> Iterator[tuple[str | None, Booleans]]:
     for label in dict.fromkeys(labels.tolist()):
         yield label, np.array([item == label for item in labels], dtype=bool)
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..common.arrays import Array
 from ..common.errors import InputError
-from .cells import Floats
 from .checks import METRES, check_connected, check_quality, check_shape, oriented, straightened
 from .defaults import default_order, default_size
 from .faces import named_faces
@@ -133,7 +133,7 @@ def _box(geometry: SolidGeometry, record: SolidMeshRecord) -> PartMesh:
     return structured_box(geometry.length, *ends, divisions, cell)
 
 
-def _divisions(length: float, ends: Floats, record: SolidMeshRecord) -> Divisions:
+def _divisions(length: float, ends: Array, record: SolidMeshRecord) -> Divisions:
     """Layers along x, y, z that come nearest to the wanted size; `ends` (2, 2) are height and width at root and tip."""
     height, width = ends.mean(axis=0)
     volume, surface = length * height * width, 2 * (length * (height + width) + height * width)

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import CELLS, Cell, CellName, Floats, Integers
+from ..common.arrays import Array, Integers
+from .cells import CELLS, Cell, CellName
 
 Tags = NDArray[np.int32]
 
@@ -29,7 +30,7 @@ class PartMesh:
         faces: name → tag in `facet_tag`; two names may share a face.
     """
 
-    points: Floats
+    points: Array
     cells: Integers
     cell: CellName
     degree: int
@@ -49,7 +50,7 @@ class PartMesh:
         """(c, 4 or 8) corners of each cell."""
         return self.cells[:, : len(self.shape.corners)]
 
-    def moved(self, points: Floats) -> PartMesh:
+    def moved(self, points: Array) -> PartMesh:
         """The same mesh at other `points` (p, 3)."""
         return replace(self, points=points)
 
@@ -75,7 +76,7 @@ def boundary_facets(part: PartMesh) -> tuple[Integers, Integers]:
     return facets[alone], alone // len(part.shape.facets)
 
 
-def facet_geometry(points: Floats, facets: Integers) -> tuple[Floats, Floats, Floats]:
+def facet_geometry(points: Array, facets: Integers) -> tuple[Array, Array, Array]:
     """Centroid (f, 3), unit outward normal (f, 3) and area (f,) of straight facets; quadrilaterals as two triangles."""
     fan = [facets[:, [0, k, k + 1]] for k in range(1, facets.shape[1] - 1)]
     vectors = [np.cross(points[t[:, 1]] - points[t[:, 0]], points[t[:, 2]] - points[t[:, 0]]) / 2 for t in fan]

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 import basix
 import numpy as np
-from numpy.typing import NDArray
 
-from .cells import HEXAHEDRON, KUHN, TETRAHEDRON, Floats, Integers
+from ..common.arrays import Array, Booleans, Integers
+from .cells import HEXAHEDRON, KUHN, TETRAHEDRON
 from .compat import coordinate_element, geometry_degree, geometry_nodes
 
 if TYPE_CHECKING:
@@ -41,9 +41,9 @@ class SectionQuadrature:
     """
 
     cells: Integers
-    X: Floats
-    weights: Floats
-    points: Floats
+    X: Array
+    weights: Array
+    points: Array
     y_range: tuple[float, float]
 
 
@@ -72,7 +72,7 @@ def section_quadrature(mesh: Mesh, x: float, degree: int) -> SectionQuadrature:
     return _integrate(cells, _march(cells, at_end, tolerance), degree)
 
 
-def _above(f: Floats, at_end: bool, tolerance: float) -> NDArray[np.bool_]:
+def _above(f: Array, at_end: bool, tolerance: float) -> Booleans:
     """Which points at distance `f` count as lying above the plane: those in it do only at the end of the part."""
     return f >= -tolerance if at_end else f > tolerance
 
@@ -90,18 +90,18 @@ def _extent(mesh: Mesh) -> tuple[float, float]:
 class _Cells:
     """The cells that a plane cuts: `index` (k,) local numbers, `nodes` (k, v, 3) and distances `f` (k, v) of nodes."""
 
-    def __init__(self, mesh: Mesh, index: Integers, nodes: Floats, f: Floats) -> None:
+    def __init__(self, mesh: Mesh, index: Integers, nodes: Array, f: Array) -> None:
         self.index, self.nodes, self.f = index, nodes, f
         self.element = coordinate_element(mesh)
         self.tetrahedral = self.element.cell_type == basix.CellType.tetrahedron
         self.affine = self.tetrahedral and geometry_degree(mesh) == 1
 
-    def basis(self, X: Floats, derivatives: int) -> Floats:
+    def basis(self, X: Array, derivatives: int) -> Array:
         """(1 + 3 or 1, q, v) values, and derivatives along X, of the shape functions at `X` (q, 3)."""
-        table: Floats = self.element.tabulate(derivatives, X)[..., 0]
+        table: Array = self.element.tabulate(derivatives, X)[..., 0]
         return table
 
-    def distance(self, cell: Integers, X: Floats) -> tuple[Floats, Floats]:
+    def distance(self, cell: Integers, X: Array) -> tuple[Array, Array]:
         """Distance from the plane (q,) and its gradient (q, 3) along X, at `X` (q, 3) in `cell` (q,)."""
         table = np.einsum("dqv,qv->dq", self.basis(X, 1), self.f[cell])
         return table[0], table[1:].T
@@ -118,8 +118,8 @@ class _Triangles:
     """
 
     cell: Integers
-    ends: Floats
-    corners: Floats
+    ends: Array
+    corners: Array
 
 
 # Edges (above, below) that carry the corners of the triangles, by how many of a tetrahedron's four corners lie above;
@@ -156,7 +156,7 @@ def _march(cells: _Cells, at_end: bool, tolerance: float) -> _Triangles:
 
 
 @lru_cache
-def _lattice(tetrahedral: bool, affine: bool, degree: int) -> tuple[Floats, Integers]:
+def _lattice(tetrahedral: bool, affine: bool, degree: int) -> tuple[Array, Integers]:
     """The reference cell as tetrahedra: points (l, 3) and corners (m, 4). Curved cells are divided once more."""
     if affine:
         return TETRAHEDRON.corners, np.arange(4).reshape(1, 4)
@@ -172,7 +172,7 @@ def _lattice(tetrahedral: bool, affine: bool, degree: int) -> tuple[Floats, Inte
     return points, corners.reshape(-1, 4)
 
 
-def _onto_plane(cells: _Cells, cell: Integers, X: Floats, along: Floats) -> Floats:
+def _onto_plane(cells: _Cells, cell: Integers, X: Array, along: Array) -> Array:
     """Move reference points `X` (q, 3) onto the plane in the directions `along` (q, 3), by Newton."""
     for _ in range(4):
         f, gradient = cells.distance(cell, X)
@@ -202,7 +202,7 @@ def _integrate(cells: _Cells, triangles: _Triangles, degree: int) -> SectionQuad
     return SectionQuadrature(cells.index[cell[kept]], flat[kept], weights[kept], points[kept], y_range)
 
 
-def _with_mid_sides(cells: _Cells, triangles: _Triangles) -> Floats:
+def _with_mid_sides(cells: _Cells, triangles: _Triangles) -> Array:
     """(t, 6, 3): corners and mid-sides, in the order of basix's triangle of degree 2.
 
     The two corners of a side lie on two edges of one face of a tetrahedron (or on opposite edges): moving along the sum
@@ -217,7 +217,7 @@ def _with_mid_sides(cells: _Cells, triangles: _Triangles) -> Floats:
 
 
 @lru_cache
-def _triangle_rule(nodes_degree: int, degree: int) -> tuple[Floats, Floats, Floats]:
+def _triangle_rule(nodes_degree: int, degree: int) -> tuple[Array, Array, Array]:
     """Shape functions (q, a), their derivatives (2, q, a) and weights (q,) on the reference triangle."""
     variant = basix.LagrangeVariant.equispaced
     element = basix.create_element(basix.ElementFamily.P, basix.CellType.triangle, nodes_degree, variant)
@@ -226,7 +226,7 @@ def _triangle_rule(nodes_degree: int, degree: int) -> tuple[Floats, Floats, Floa
     return table[0], table[1:], weights
 
 
-def _y_range(cells: _Cells, cell: NDArray[np.int64], nodes: Floats) -> tuple[float, float]:
+def _y_range(cells: _Cells, cell: Integers, nodes: Array) -> tuple[float, float]:
     if not cell.size:
         return np.inf, -np.inf
     table = cells.basis(nodes.reshape(-1, 3), 0)[0]

@@ -14,8 +14,9 @@ import numpy as np
 from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
+from ..common.arrays import Integers
 from ..common.errors import FfrobotError, InputError
-from .cells import CellName, Integers
+from .cells import CellName
 from .compat import create_solid_mesh, geometry_nodes
 from .part import kept_or_new
 from .part_mesh import PartMesh, facet_keys

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..common.arrays import Array, Integers
 from ..common.errors import InputError
-from .cells import CELLS, CellName, Floats, Integers
+from .cells import CELLS, CellName
 from .part_mesh import PartMesh
 
 _SUPPORTED: dict[str, tuple[CellName, int]] = {
@@ -37,7 +38,7 @@ class RawMesh:
         surface_elements: how many triangles and quadrilaterals there are.
     """
 
-    points: Floats
+    points: Array
     blocks: Sequence[tuple[str, Integers, str | None]]
     facet_groups: Mapping[str, Sequence[Integers]]
     point_groups: Mapping[str, Integers]
@@ -107,7 +108,7 @@ def _only_kind(raw: RawMesh, where: str) -> str:
     return next(iter(counts))
 
 
-def _is_straight(points: Floats, cells: Integers, cell: CellName) -> bool:
+def _is_straight(points: Array, cells: Integers, cell: CellName) -> bool:
     """Whether all nodes on edges are the middles of these."""
     shape = CELLS[cell]
     corners = points[cells[:, : len(shape.corners)]]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .cells import KUHN, CellName, Floats, Integers
+from ..common.arrays import Array, Integers
+from .cells import KUHN, CellName
 from .part_mesh import PartMesh
 
 Divisions = tuple[int, int, int]
@@ -25,7 +26,7 @@ def structured_box(
     x, y, z = np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in divisions), indexing="ij")
     height = root[0] + (tip[0] - root[0]) * x
     width = root[1] + (tip[1] - root[1]) * x
-    points: Floats = np.stack([length * x, height * (y - 0.5), width * (z - 0.5)], axis=-1).reshape(-1, 3)
+    points: Array = np.stack([length * x, height * (y - 0.5), width * (z - 0.5)], axis=-1).reshape(-1, 3)
     cells = _hexahedra(divisions)
     if cell == "tetrahedron":
         cells = cells[:, KUHN].reshape(-1, 4)

@@ -13,7 +13,7 @@ import basix
 import numpy as np
 from dolfinx.mesh import exterior_facet_indices
 
-from .cells import Floats, Integers
+from ..common.arrays import Array, Integers
 from .compat import coordinate_element, geometry_nodes
 
 if TYPE_CHECKING:
@@ -39,12 +39,12 @@ class Surface:
         X: (k, 3) reference coordinates there.
     """
 
-    points: Floats
+    points: Array
     triangles: Integers
     edges: Integers
     rows: Integers
     cells: Integers
-    X: Floats
+    X: Array
 
 
 def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
@@ -88,19 +88,19 @@ def surface_of(mesh: Mesh) -> Surface:
 
 
 def _positions(
-    mesh: Mesh, element: basix.finite_element.FiniteElement, cells: Integers, X: Floats
-) -> tuple[Floats, Floats]:
+    mesh: Mesh, element: basix.finite_element.FiniteElement, cells: Integers, X: Array
+) -> tuple[Array, Array]:
     """(b, l, 3) positions of the reference points `X` (b, l, 3), and (b, 3) from each facet to its cell's middle."""
     if not cells.size:
         return np.empty((0, X.shape[1], 3)), np.empty((0, 3))
     nodes = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     table = element.tabulate(0, X.reshape(-1, 3))[0, ..., 0].reshape(*X.shape[:2], -1)
-    points: Floats = np.einsum("blv,bvi->bli", table, nodes)
+    points: Array = np.einsum("blv,bvi->bli", table, nodes)
     return points, nodes.mean(axis=1) - points.mean(axis=1)
 
 
 @lru_cache
-def _lattice(corners: int, n: int) -> tuple[Floats, Integers, Integers]:
+def _lattice(corners: int, n: int) -> tuple[Array, Integers, Integers]:
     """A facet divided into n × n triangles (or twice that).
 
     Returns:
@@ -122,7 +122,7 @@ def _lattice(corners: int, n: int) -> tuple[Floats, Integers, Integers]:
     return weights, triangles, sides[count == 1]
 
 
-def _gathered(mesh: Mesh, points: Floats, triangles: Integers, edges: Integers, cells: Integers, X: Floats) -> Surface:
+def _gathered(mesh: Mesh, points: Array, triangles: Integers, edges: Integers, cells: Integers, X: Array) -> Surface:
     """One numbering for the points of all processes; a point that several have belongs to the first of them."""
     comm = mesh.comm
     counts = comm.allgather(len(points))

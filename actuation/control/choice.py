@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...mbs.model.model import Model
 from ...mbs.scene.analysis_records import Analysis
 from ...mbs.scene.loop_records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
@@ -15,8 +15,6 @@ from ..patches.patches import PatchArray
 from .controllers import Controller, Setup, joint_pid, modal_velocity
 from .python_controller import PythonControl, load_function
 from .rigid_arm import ComputedTorqueControl, RigidArm
-
-Array = NDArray[np.float64]
 
 
 def needed_sensors(model: Model, analysis: Analysis, patches: Mapping[str, PatchArray]) -> Iterator[Sensor]:

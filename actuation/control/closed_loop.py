@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...mbs import _core
 from ...mbs.analysis.analyses import STATUS, Outcome, Progress, as_long_as, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
@@ -25,7 +25,6 @@ from .controllers import Controller, Setup
 from .metrics import Metrics, measure
 from .signals import Signal, input_names, merged, sensing, signals
 
-Array = NDArray[np.float64]
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.validation import quoted
 from ...mbs.analysis.analyses import Outcome
@@ -17,8 +17,6 @@ from ...mbs.scene.loop_records import JointPid, ModalVelocity
 from ..patches.patches import PatchArray
 from ..patches.voltages import voltage_gain
 from .signals import volts_per_modal_coordinate
-
-Array = NDArray[np.float64]
 
 
 class Controller(Protocol):
@@ -56,11 +54,11 @@ class Setup:
     feed_forward: Array
     source: Outcome
 
-    def columns(self, *names: str) -> NDArray[np.intp]:
+    def columns(self, *names: str) -> Indices:
         """Where these readings are in y."""
         return np.array([self.outputs.index(name) for name in names], dtype=int)
 
-    def places(self, *names: str) -> NDArray[np.intp]:
+    def places(self, *names: str) -> Indices:
         """Where these commands are in u. Raises `InputError` for a joint without a motor."""
         missing = [name for name in names if name not in self.inputs]
         if missing:
@@ -70,7 +68,7 @@ class Setup:
             )
         return np.array([self.inputs.index(name) for name in names], dtype=int)
 
-    def patch_places(self, body: str) -> NDArray[np.intp]:
+    def patch_places(self, body: str) -> Indices:
         """Where the voltages of a body's patches are in u."""
         return self.places(*(f"pzt/{body}/{k}" for k in range(1, len(self.patches[body].edges) + 1)))
 
@@ -143,7 +141,7 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
     )
 
 
-def modal_columns(sensor: str, setup: Setup, body: str, m: int, ending: str = "/rate") -> NDArray[np.intp]:
+def modal_columns(sensor: str, setup: Setup, body: str, m: int, ending: str = "/rate") -> Indices:
     """The readings from which the lowest m modes of a body are known."""
     if sensor == "pzt":
         return setup.columns(*(f"pzt/{body}/{k}" for k in range(1, len(setup.patches[body].edges) + 1)))

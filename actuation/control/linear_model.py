@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, ComplexArray
 from ...common.errors import InputError
 from ...common.files import write_atomically
 from ...common.validation import did_you_mean, quoted
@@ -19,8 +19,7 @@ from ..patches.patches import PatchArray
 if TYPE_CHECKING:
     import control
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+ComplexArray = ComplexArray
 Names = str | Sequence[str]
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ...mbs.scene.loop_records import JointPid, Lqr
 from ...mbs.solve.linearisation import LinearMechanism, linearise
@@ -15,7 +15,6 @@ from .controllers import Setup, modal_columns, modal_estimate
 from .linear_model import LinearModel, linear_model
 from .modes import controllability, observability
 
-Array = NDArray[np.float64]
 MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion
 
 

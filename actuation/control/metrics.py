@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...mbs.analysis.analyses import Outcome
 from ...mbs.quantities.joint_space import motor_rates
 from ...mbs.quantities.observation import point_motion
@@ -16,7 +16,6 @@ from .controllers import Setup
 if TYPE_CHECKING:
     from .closed_loop import Loop
 
-Array = NDArray[np.float64]
 SETTLED = 0.05  # of the largest error
 WINDOW, CUBIC = 0.1, 3  # s, over which motion that a cubic follows is no vibration: below about 80 rad/s
 GROWTH = 4.0  # of the vibration's peak, from the second quarter of a run to its last

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, ComplexArray, Indices
 from .linear_model import LinearModel, Names
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+ComplexArray = ComplexArray
 
 RIGID = 1e-6  # of the highest frequency, below which a mode counts as without stiffness: rounding of a double zero
 OUT_OF_REACH = 1e-7  # of the largest effect that a unit input can have on a mode
@@ -73,7 +72,7 @@ def robot_modes(model: LinearModel) -> RobotModes:
     return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex))
 
 
-def _pairs(poles: ComplexArray) -> NDArray[np.intp]:
+def _pairs(poles: ComplexArray) -> Indices:
     """Numbers (f, 2) of poles that belong together: conjugates, and real ones in the order of their size."""
     complex_ones = np.flatnonzero(poles.imag > 0.0)
     conjugates = [int(np.abs(poles - poles[i].conjugate()).argmin()) for i in complex_ones]

@@ -12,8 +12,8 @@ from math import ceil, comb
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.planar_body import PlanarBody
@@ -21,9 +21,6 @@ from ...mbs.scene.actuator_records import PztLayout
 from ...mbs.scene.control_records import Placement
 from ..patches.patches import PatchArray, patch_array
 from .linear_model import LinearModel
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.intp]
 
 SHARE = 0.1  # of a mode's strain energy in the link, for the mode to be its business
 CHUNK = 200  # sets whose voltages over the path are held in memory together
@@ -184,8 +181,8 @@ def _voltages(shape: Array, Phi_V: Array, F_p: Array) -> Array:
 
 
 def _search(
-    candidates: Candidates, count: int, most_sets: int, judge: Callable[[Integers], Array]
-) -> tuple[Integers, int, str]:
+    candidates: Candidates, count: int, most_sets: int, judge: Callable[[Indices], Array]
+) -> tuple[Indices, int, str]:
     """The best set of candidates (count,), how many were compared and how.
 
     y_1 ≤ y_2 ≤ … are the candidates less the room that the patches before them take: every such set is free of overlap.
@@ -197,7 +194,7 @@ def _search(
         return sets[int(np.argmax(judge(sets)))], len(sets), "all sets"
     from scipy.optimize import differential_evolution
 
-    def decoded(y: Array) -> Integers:
+    def decoded(y: Array) -> Indices:
         return np.asarray(np.sort(np.round(y), axis=0).astype(np.intp).T + offset)
 
     compared = 0

@@ -20,12 +20,10 @@ import runpy
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from .controllers import Setup
-
-Array = NDArray[np.float64]
 
 
 class PythonControl:

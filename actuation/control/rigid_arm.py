@@ -6,8 +6,8 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ...mbs import _core
 from ...mbs.analysis.analyses import Outcome
@@ -17,7 +17,6 @@ from ...mbs.scene.loop_records import ComputedTorque
 from ...mbs.solve.initial_state import undeformed_state
 from .controllers import Setup
 
-Array = NDArray[np.float64]
 TOLERANCE, MOST_ITERATIONS = 1e-10, 20
 
 

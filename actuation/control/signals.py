@@ -6,15 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...mbs import _core
 from ...mbs.model.measures import Marker, Measure, joint_coordinate
 from ...mbs.model.model import MechanismSystem, Model
 from ...mbs.scene.loop_records import PERMITTIVITY, Sensor
 from ..patches.patches import PatchArray
 
-Array = NDArray[np.float64]
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 
 

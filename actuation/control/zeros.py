@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, ComplexArray
 from ...common.errors import InputError
 from .linear_model import LinearModel, Names
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+ComplexArray = ComplexArray
 
 INFINITE = 1e3  # times the largest pole: zeros beyond belong to modes that the model has not
 MARGIN = 1e-6  # of a zero's size (and MARGIN of the largest pole, for those near 0): real parts below are rounding

@@ -7,14 +7,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.planar_body import PlanarBody
 from ...mbs.scene.actuator_records import PztLayout
-
-Array = NDArray[np.float64]
 
 STEP = 0.1  # of the height, from one station to the next; less is a taper
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
@@ -62,7 +60,7 @@ class PatchArray:
         return float(np.linalg.cond(self.Phi_V))
 
     @property
-    def unreached_modes(self) -> NDArray[np.intp]:
+    def unreached_modes(self) -> Indices:
         """Numbers (from 0) of the modes that take part in what no voltages can produce."""
         left, sizes, _ = np.linalg.svd(self.Phi_V)
         rank = int(np.count_nonzero(sizes > sizes[0] / SINGULAR))

@@ -6,14 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...fe_models.modal_body import Interface, ModalBody
 from ...mbs.model.planar_body import PlanarBody, PlanarPoint, with_masses
 from ...mbs.scene.actuator_records import PztLayout
 from .patches import patch_edges, section_height
-
-Array = NDArray[np.float64]
 
 GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...mbs import _core
 from .patches import PatchArray
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

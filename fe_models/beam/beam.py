@@ -15,15 +15,13 @@ import scipy.sparse as sp
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
-from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
+from ...common.arrays import Array, Integers
 from ...mesh.compat import ElementName, assemble_matrix, basix_element, cell_dofs, cell_vertices, function_space
 from ...mesh.interval import cells_containing
 from ..link_records import BeamLink, Family
 from .section import Section
-
-Floats = NDArray[np.float64]
 
 # Rows of a station: displacement and rotation of the cross section about x, y, z.
 U_X, U_Y, U_Z, R_X, R_Y, R_Z = range(6)
@@ -45,7 +43,7 @@ class FamilyModel:
     fields: Mapping[int, sp.csr_matrix]
 
 
-def family_model(link: BeamLink, family: Family, mesh: Mesh, stations: Floats) -> FamilyModel:
+def family_model(link: BeamLink, family: Family, mesh: Mesh, stations: Array) -> FamilyModel:
     """The eigenproblem of `family` on the interval `mesh`, read at `stations` (k,) in m."""
     if family == "axial":
         return _rod(link, mesh, stations, U_X, lambda s: link_modulus(link) * s.area, lambda s: s.area)
@@ -84,7 +82,7 @@ def cellwise(link: BeamLink, mesh: Mesh, quantity: Property) -> fem.Function:
     return function
 
 
-def _rod(link: BeamLink, mesh: Mesh, stations: Floats, row: int, stiffness: Property, inertia: Property) -> FamilyModel:
+def _rod(link: BeamLink, mesh: Mesh, stations: Array, row: int, stiffness: Property, inertia: Property) -> FamilyModel:
     """Axial or torsional motion on cubic Lagrange elements: K = ∫EA u' v' dx, M = ∫ρA u v dx; root held, tip free."""
     V = function_space(mesh, "P", 3)
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
@@ -102,7 +100,7 @@ def _rod(link: BeamLink, mesh: Mesh, stations: Floats, row: int, stiffness: Prop
 Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]
 
 
-def _euler_bernoulli(link: BeamLink, mesh: Mesh, stations: Floats, second_moment: Property) -> Bending:
+def _euler_bernoulli(link: BeamLink, mesh: Mesh, stations: Array, second_moment: Property) -> Bending:
     """K = ∫EI w'' v'' dx, M = ∫ρA w v dx on cubic Hermite elements; stations read w and w'.
 
     Basix scales Hermite's derivative degrees of freedom on the reference cell, so neighbours of different size (or
@@ -139,7 +137,7 @@ def _nodal_to_cell(V: fem.FunctionSpace) -> sp.csr_matrix:
     return sp.csr_matrix((entries.ravel(), (rows.ravel(), columns.ravel())))
 
 
-def _timoshenko(link: BeamLink, mesh: Mesh, stations: Floats, second_moment: Property) -> Bending:
+def _timoshenko(link: BeamLink, mesh: Mesh, stations: Array, second_moment: Property) -> Bending:
     """K = ∫EI θ' η' + kGA (w' − θ)(v' − η) dx, M = ∫ρA w v + ρI θ η dx; w cubic, θ quadratic: no locking.
 
     Stations read w and the section's rotation θ.
@@ -177,7 +175,7 @@ def _timoshenko(link: BeamLink, mesh: Mesh, stations: Floats, second_moment: Pro
 
 
 def _values(
-    V: fem.FunctionSpace, element: ElementName, degree: int, points: Floats, derivative: int = 0
+    V: fem.FunctionSpace, element: ElementName, degree: int, points: Array, derivative: int = 0
 ) -> sp.csr_matrix:
     """(k, dofs): value, or x-derivative, of a function of V at `points` (k,) from its degrees of freedom."""
     cells, X = cells_containing(V.mesh, points)
@@ -212,5 +210,5 @@ def _dof_at(V: fem.FunctionSpace, x: float) -> int:
     return int(np.argmin(np.abs(V.tabulate_dof_coordinates()[:, 0] - x)))
 
 
-def _all_but(size: int, held: list[int]) -> NDArray[np.int64]:
+def _all_but(size: int, held: list[int]) -> Integers:
     return np.setdiff1d(np.arange(size), held)

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ... import __version__
+from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.version import program_version
 
 # First of all that load dolfinx: mesh.compat sets PETSc up.
 from ...mesh.interval import graded_nodes, interval_mesh, with_points
@@ -29,7 +29,6 @@ from .stress import beam_stresses, segments
 # Elements are not cut closer to their ends than this fraction of their length.
 SLIVER = 0.01
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 
@@ -38,7 +37,7 @@ class Mode(NamedTuple):
 
     omega2: float
     family: Family
-    x: Floats
+    x: Array
 
 
 def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progress) -> ModalBody:
@@ -66,7 +65,7 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
     interfaces = {name: _interface(stations, fields, place) for name, place in named.items()}
     attached = lumps(link.interface, interfaces)
     integrals = with_lumped_masses(shape_integrals(link, stations, fields), attached)
-    omega: Floats = np.sqrt([mode.omega2 for mode in modes])
+    omega: Array = np.sqrt([mode.omega2 for mode in modes])
     translation, rotation = np.moveaxis(fields[:R_X], 0, 1), np.moveaxis(fields[R_X:], 0, 1)
     position = _on_axis(stations.x)
     segment = segments(link, stations.x)
@@ -91,11 +90,11 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         input_hash=input_hash,
         modes_hash=modes_hash(link),
-        ffrobot_version=__version__,
+        ffrobot_version=program_version(),
     )
 
 
-def _loaded(model: FamilyModel, link: BeamLink, stations: Floats) -> FamilyModel:
+def _loaded(model: FamilyModel, link: BeamLink, stations: Array) -> FamilyModel:
     """The eigenproblem with the masses on interfaces: M ← M + Σ m w wᵀ + J θ θᵀ, w and θ the motion there."""
     M = model.M
     for record in link.interface:
@@ -121,7 +120,7 @@ def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[
     return [modes[number - 1] for number in wanted]
 
 
-def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], stations: int) -> Floats:
+def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], stations: int) -> Array:
     """(6, k, n) displacement and rotation, rows U_X … R_Z, of n modes at k stations."""
     fields = np.zeros((6, stations, len(modes)))
     for k, mode in enumerate(modes):
@@ -130,7 +129,7 @@ def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], 
     return fields
 
 
-def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> Floats:
+def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> Array:
     """(n, n) m_ff = xᵀMx as assembled; families do not couple."""
     products = np.zeros((len(modes), len(modes)))
     for i, one in enumerate(modes):
@@ -140,7 +139,7 @@ def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> F
     return products
 
 
-def canonical(fields: Floats) -> Floats:
+def canonical(fields: Array) -> Array:
     """`fields` (6, k, n) with the sign of each mode as formulation.md, section 1, wants it.
 
     The dominant translation is positive at the station nearest the root where it exceeds half its largest value; of a
@@ -149,7 +148,7 @@ def canonical(fields: Floats) -> Floats:
     return fields * canonical_signs(fields)
 
 
-def canonical_signs(fields: Floats) -> Floats:
+def canonical_signs(fields: Array) -> Array:
     """(n,) 1 or −1: what `canonical` multiplies each mode by."""
     signs = np.ones(fields.shape[2])
     for k in range(signs.size):
@@ -161,7 +160,7 @@ def canonical_signs(fields: Floats) -> Floats:
     return signs
 
 
-def _element_boundaries(link: BeamLink) -> Floats:
+def _element_boundaries(link: BeamLink) -> Array:
     """As the link file wants them, and one more at each attached mass: shear and moment jump there."""
     if link.mesh.nodes is not None:
         nodes = np.array(link.mesh.nodes)
@@ -191,10 +190,10 @@ def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) ->
     return wanted
 
 
-def _interface(stations: StationSpace, fields: Floats, position: float) -> Interface:
+def _interface(stations: StationSpace, fields: Array, position: float) -> Interface:
     station = int(np.argmin(np.abs(stations.x - position)))
     return Interface(_on_axis(np.array([position]))[0], fields[:R_X, station], fields[R_X:, station])
 
 
-def _on_axis(x: Floats) -> Floats:
+def _on_axis(x: Array) -> Array:
     return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...mesh.records import RectangleSection, SectionRecord
 
 ROUND_CORNERS = 16  # of the polygon that stands for a circle; divisible by 4
 
-Floats = NDArray[np.float64]
 
-
-def section_outlines(sections: Sequence[SectionRecord]) -> Floats:
+def section_outlines(sections: Sequence[SectionRecord]) -> Array:
     """(s, q, 2) corners (y, z) in m of each section's outer outline, the same number of all, counter-clockwise about x.
 
     Four where all are rectangles; otherwise rectangles have further ones along their sides.
@@ -23,7 +21,7 @@ def section_outlines(sections: Sequence[SectionRecord]) -> Floats:
     return np.array([_outline(section, q) for section in sections])
 
 
-def _outline(section: SectionRecord, q: int) -> Floats:
+def _outline(section: SectionRecord, q: int) -> Array:
     if isinstance(section, RectangleSection):
         half = 0.5 * np.array([section.height, section.width])
         corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])

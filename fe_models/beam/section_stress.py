@@ -9,12 +9,10 @@ from __future__ import annotations
 from math import hypot, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...mesh.records import CircleSection, RectangleSection, SectionRecord, TubeSection
 from .section import Section
-
-Floats = NDArray[np.float64]
 
 TERMS = 2000  # of the series for rectangles: 2e-4 of the largest stress at their corners, far less elsewhere
 
@@ -28,7 +26,7 @@ def contains(record: SectionRecord, y: float, z: float) -> bool:
     return inner * (1 - slack) <= hypot(y, z) <= outer * (1 + slack)
 
 
-def section_stress(record: SectionRecord, section: Section, F: Floats, M: Floats, y: float, z: float) -> Floats:
+def section_stress(record: SectionRecord, section: Section, F: Array, M: Array, y: float, z: float) -> Array:
     """(6, n) stress, rows xx, yy, zz, yz, xz, xy, in Pa.
 
     Args:

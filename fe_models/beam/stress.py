@@ -11,16 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
+from ...common.arrays import Array, Booleans, Integers
 from ..link_records import BeamLink
 from ..lumped_masses import Lump
 from ..modal_body import Stations, StressPoint
 from .section_stress import section_stress
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -33,11 +30,11 @@ class ModalLoads:
         moment: (q, 3, n) in N·m.
     """
 
-    x: Floats
-    force: Floats
-    moment: Floats
+    x: Array
+    force: Array
+    moment: Array
 
-    def beyond(self, x: float, side: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    def beyond(self, x: float, side: Booleans) -> tuple[Array, Array]:
         """Force and moment about the axis at x, (3, n) each, of the loads where `side` (q,) is true."""
         force, arm = self.force[side], (self.x[side] - x)[:, None]
         moment = self.moment[side].sum(axis=0)
@@ -47,7 +44,7 @@ class ModalLoads:
 
 
 def beam_stresses(
-    link: BeamLink, stations: Stations, omega2: Floats, attached: Sequence[Lump]
+    link: BeamLink, stations: Stations, omega2: Array, attached: Sequence[Lump]
 ) -> dict[str, StressPoint]:
     """Modal stresses and strains at the points that the link file names, which lie in the beam.
 
@@ -75,8 +72,8 @@ def beam_stresses(
 
 
 def _section_forces(
-    link: BeamLink, stations: Stations, omega2: Floats, attached: Sequence[Lump], x: float
-) -> tuple[Floats, Floats]:
+    link: BeamLink, stations: Stations, omega2: Array, attached: Sequence[Lump], x: float
+) -> tuple[Array, Array]:
     """Force (3, n) in N and moment (3, n) in N·m that the part beyond x exerts on the section there, in each mode."""
     length = link.geometry.length
     loads = _with_support(link, _inertia(link, stations, omega2, attached, x))
@@ -84,7 +81,7 @@ def _section_forces(
     return loads.beyond(x, (loads.x > x) | (loads.x == length))
 
 
-def _inertia(link: BeamLink, stations: Stations, omega2: Floats, attached: Sequence[Lump], x: float) -> ModalLoads:
+def _inertia(link: BeamLink, stations: Stations, omega2: Array, attached: Sequence[Lump], x: float) -> ModalLoads:
     """ω² times mass times motion: of the beam at Gauss points of its elements, of which one ends at x; of the lumps."""
     assert stations.element is not None
     nodes = stations.position[stations.element, 0]
@@ -116,7 +113,7 @@ def _inertia(link: BeamLink, stations: Stations, omega2: Floats, attached: Seque
     )
 
 
-def _line_inertia(link: BeamLink, segments: Integers) -> tuple[Floats, Floats]:
+def _line_inertia(link: BeamLink, segments: Integers) -> tuple[Array, Array]:
     """(e,) ρA in kg/m and (e, 3) ρI about x, y, z in kg·m; Euler–Bernoulli beams have the one of twisting alone."""
     rho = link.material.density
     mass = rho * np.array([section.area for section in link.sections])
@@ -126,7 +123,7 @@ def _line_inertia(link: BeamLink, segments: Integers) -> tuple[Floats, Floats]:
     return mass[segments], inertia[segments]
 
 
-def segments(link: BeamLink, x: Floats) -> Integers:
+def segments(link: BeamLink, x: Array) -> Integers:
     """Number of the segment at each x; at a step of the section, of the one beyond it."""
     return np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")
 
@@ -145,7 +142,7 @@ def _with_support(link: BeamLink, loads: ModalLoads) -> ModalLoads:
     )
 
 
-def _lagrange(nodes: Floats, s: Floats) -> Floats:
+def _lagrange(nodes: Array, s: Array) -> Array:
     """(e, g, 4) values at s (e, g) of the cubics that are 1 at one of `nodes` (e, 4) and 0 at the others."""
     values = np.ones((*s.shape, 4))
     for i in range(4):

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ..link_records import Material, OrthotropicMaterial
 
-Floats = NDArray[np.float64]
 
-
-def stiffness(material: Material | OrthotropicMaterial) -> Floats:
+def stiffness(material: Material | OrthotropicMaterial) -> Array:
     """(6, 6) C with σ = C ε in Pa; rows σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy, columns ε_xx … and 2ε_yz, 2ε_xz, 2ε_xy.
 
     Inverse of the compliance of Jones, Mechanics of Composite Materials (1999), eq. 2.26; isotropy is the case of equal
@@ -40,7 +38,7 @@ def _constants(material: Material | OrthotropicMaterial) -> tuple[Triple, Triple
     return (E, E, E), (nu, nu, nu), (G, G, G)
 
 
-def _normal_compliance(E: Triple, nu: Triple) -> Floats:
+def _normal_compliance(E: Triple, nu: Triple) -> Array:
     """(3, 3) ε_xx, ε_yy, ε_zz under unit σ_xx, σ_yy, σ_zz, in 1/Pa."""
     return np.array(
         [

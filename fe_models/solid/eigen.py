@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
+from ...common.arrays import Array
 from ...common.errors import SolveError
 from .elasticity import SolidModel
 from .supports import Flexibility
-
-Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-13
 
@@ -31,14 +29,14 @@ class Mass:
         attached: for each attached mass B (6, 3 owned), the mean motion of its interface, and w (6,), its weights.
     """
 
-    def __init__(self, model: SolidModel, attached: Sequence[tuple[Floats, Floats]] = ()) -> None:
+    def __init__(self, model: SolidModel, attached: Sequence[tuple[Array, Array]] = ()) -> None:
         self.model, self.attached = model, attached
 
-    def __matmul__(self, U: Floats) -> Floats:
+    def __matmul__(self, U: Array) -> Array:
         """M U of U (3 owned, n); collective."""
         return self._with_attached(self.model.mass @ U, U)
 
-    def motion_of_attached(self, U: Floats) -> list[tuple[Floats, Floats]]:
+    def motion_of_attached(self, U: Array) -> list[tuple[Array, Array]]:
         """For each attached mass its motion (6, n) and weights (6,); collective."""
         return [(self.model.total(B @ U), weights) for B, weights in self.attached]
 
@@ -47,7 +45,7 @@ class Mass:
         product = self.model.mass.apply(u).reshape(-1, 1)
         result.array[:] = self._with_attached(product, u.array_r[:, None])[:, 0]
 
-    def _with_attached(self, product: Floats, U: Floats) -> Floats:
+    def _with_attached(self, product: Array, U: Array) -> Array:
         for B, weights in self.attached:
             product = product + B.T @ (weights[:, None] * self.model.total(B @ U))
         return product
@@ -63,7 +61,7 @@ class _Inverse:
         self.flexibility.apply(load, result)
 
 
-def lowest_modes(flexibility: Flexibility, mass: Mass, count: int, known: Floats) -> Floats:
+def lowest_modes(flexibility: Flexibility, mass: Mass, count: int, known: Array) -> Array:
     """The `count` lowest modes besides those `known` (3 owned, m), M-orthonormal with them to rounding; collective.
 
     Returns:
@@ -108,7 +106,7 @@ def lowest_modes(flexibility: Flexibility, mass: Mass, count: int, known: Floats
     return orthonormalised(mass, np.concatenate([known, found], axis=1))
 
 
-def orthonormalised(mass: Mass, X: Floats) -> Floats:
+def orthonormalised(mass: Mass, X: Array) -> Array:
     """X (3 owned, n) made orthonormal in M to rounding, the first columns changed least; collective."""
     for _ in range(2):  # twice is enough (Kahan; Parlett, The Symmetric Eigenvalue Problem, §6.9)
         gram = mass.model.total(X.T @ (mass @ X))
@@ -116,7 +114,7 @@ def orthonormalised(mass: Mass, X: Floats) -> Floats:
     return X
 
 
-def _petsc(model: SolidModel, x: Floats) -> PETSc.Vec:
+def _petsc(model: SolidModel, x: Array) -> PETSc.Vec:
     vector = model.vector()
     vector.array[:] = x
     return vector

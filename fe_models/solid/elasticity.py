@@ -21,12 +21,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ...common.arrays import Array, Integers
 from ...mesh.compat import compiled_form, constant_space, geometry_degree, lagrange_space, node_map
 from ..link_records import Material, OrthotropicMaterial
 from .constitutive import stiffness
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 AnyMaterial = Material | OrthotropicMaterial
 
 
@@ -40,8 +39,8 @@ class MaterialMap:
         of_cell: (c,) row of `C` and `density`.
     """
 
-    C: Floats
-    density: Floats
+    C: Array
+    density: Array
     of_cell: Integers
 
 
@@ -60,7 +59,7 @@ class ScalarMass:
     foreign: PETSc.Vec
     comm: Any
 
-    def __matmul__(self, U: Floats) -> Floats:
+    def __matmul__(self, U: Array) -> Array:
         """M U of displacements U (3 owned, n), the same matrix for each component; collective."""
         n = U.shape[1]
         if self.scatter is None:
@@ -72,7 +71,7 @@ class ScalarMass:
             result[:, k] = self.apply(vector).ravel()
         return result
 
-    def apply(self, vector: PETSc.Vec) -> Floats:
+    def apply(self, vector: PETSc.Vec) -> Array:
         """(owned, 3) M u of the displacements in `vector`; collective."""
         own = vector.array_r.reshape(-1, 3)
         if self.scatter is None:
@@ -101,7 +100,7 @@ class SolidModel:
     mesh: Mesh
     order: int
     V: fem.FunctionSpace
-    x: Floats
+    x: Array
     nodes: Integers
     materials: MaterialMap
     mass: ScalarMass
@@ -124,7 +123,7 @@ class SolidModel:
         """A vector of displacements: three for each node."""
         return PETSc.Vec().createMPI((3 * self.owned, None), bsize=3, comm=self.comm)
 
-    def total(self, part: Floats) -> Floats:
+    def total(self, part: Array) -> Array:
         """Sum of each rank's `part`; collective."""
         part = np.ascontiguousarray(part, dtype=np.float64)
         if self.comm.size == 1:
@@ -133,7 +132,7 @@ class SolidModel:
         self.comm.Allreduce(part, result)
         return result
 
-    def to_owners(self, parts: Floats) -> Floats:
+    def to_owners(self, parts: Array) -> Array:
         """(r, owned) of (r, owned + ghosts): what several processes have for a node is added; collective."""
         if self.comm.size == 1:
             return parts
@@ -147,7 +146,7 @@ class SolidModel:
             target[:] = vector.array_r
         return result
 
-    def with_ghosts(self, U: Floats) -> Floats:
+    def with_ghosts(self, U: Array) -> Array:
         """(3 (owned + ghosts), n) degrees of freedom of U (3 owned, n), ghosts from their owners; collective."""
         if self.comm.size == 1:
             return U
@@ -250,7 +249,7 @@ def _stiffness_form(V: fem.FunctionSpace, materials: MaterialMap, degree: int) -
     return ufl.dot(voigt(ufl.grad(v)), law * voigt(ufl.grad(u))) * dx
 
 
-def _cellwise(mesh: Mesh, values: Floats, of_cell: Integers) -> fem.Function:
+def _cellwise(mesh: Mesh, values: Array, of_cell: Integers) -> fem.Function:
     """The function that is values[of_cell[c]] in cell c."""
     function = fem.Function(constant_space(mesh, values.shape[1:]))
     cells = node_map(function.function_space)[:, 0]

@@ -15,14 +15,12 @@ import scipy.sparse as sp
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import meshtags
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...mesh.compat import compiled_form, geometry_degree, lagrange_element, lagrange_space, node_map
 from ...mesh.slices import section_quadrature
 from .elasticity import SolidModel
 from .tensors import LEVI_CIVITA
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -39,13 +37,13 @@ class Averages:
     """
 
     weights: sp.csr_matrix
-    area: Floats
-    centroid: Floats
-    inertia: Floats
-    height: Floats
-    density: Floats
+    area: Array
+    centroid: Array
+    inertia: Array
+    height: Array
+    density: Array
 
-    def of(self, model: SolidModel, modes: Floats) -> tuple[Floats, Floats]:
+    def of(self, model: SolidModel, modes: Array) -> tuple[Array, Array]:
         """Translation and rotation (k, 3, n) of `modes` (3 (owned + ghosts), n); collective."""
         n = modes.shape[1]
         moments = model.total(self.weights @ modes.reshape(-1, 3 * n)).reshape(-1, 4, 3, n)
@@ -55,7 +53,7 @@ class Averages:
         shift = np.einsum("abc,kb,kcn->kan", LEVI_CIVITA, self.centroid, moments[:, 0])
         return translation, np.linalg.solve(self.inertia, about_origin - shift)
 
-    def rows(self, model: SolidModel) -> Floats:
+    def rows(self, model: SolidModel) -> Array:
         """B (k, 6, 3 owned): translation and rotation as rows over this rank's own degrees of freedom; collective."""
         weights = model.to_owners(self.weights.toarray()).reshape(-1, 4, model.owned)
         result = np.zeros((weights.shape[0], 6, model.owned, 3))
@@ -75,7 +73,7 @@ def face_averages(model: SolidModel, facet_tags: object, tags: Sequence[int]) ->
     return _averages(model, weights, np.array([m for _, m in parts]), nothing, nothing)
 
 
-def section_averages(model: SolidModel, x: Floats) -> Averages:
+def section_averages(model: SolidModel, x: Array) -> Averages:
     """Mean motion of the cross sections at `x` (k,) in m; collective."""
     element, nodes = lagrange_element(model.V), node_map(model.V)
     degree = model.order + geometry_degree(model.mesh)
@@ -101,7 +99,7 @@ def section_averages(model: SolidModel, x: Floats) -> Averages:
     return averages
 
 
-def _averages(model: SolidModel, weights: sp.csr_matrix, moments: Floats, height: Floats, mass: Floats) -> Averages:
+def _averages(model: SolidModel, weights: sp.csr_matrix, moments: Array, height: Array, mass: Array) -> Averages:
     """`moments` (k, 4, 4): this rank's part of ∫ (1, x)ᵀ(1, x) ds; `mass` (k,) of ∫ρ ds."""
     moments = model.total(moments)
     area = moments[:, 0, 0]
@@ -111,7 +109,7 @@ def _averages(model: SolidModel, weights: sp.csr_matrix, moments: Floats, height
     return Averages(weights, area, centroid, inertia, height, model.total(mass) / area)
 
 
-def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Floats, Floats]:
+def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Array, Array]:
     """Of this rank, ∫N, ∫xN, ∫yN, ∫zN over a face, (4, owned + ghosts), and of ∫ (1, x)ᵀ(1, x) ds."""
     mesh = model.mesh
     facets = facet_tags.find(tag)  # type: ignore[attr-defined]
@@ -135,7 +133,7 @@ def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Floa
     return np.array(weights), moments
 
 
-def _extremes(model: SolidModel, ranges: Floats) -> tuple[Floats, Floats]:
+def _extremes(model: SolidModel, ranges: Array) -> tuple[Array, Array]:
     """Over all ranks, of `ranges` (k, 2) each."""
     every = np.array(model.comm.allgather(ranges))
     return every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)

@@ -9,19 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ..invariants import Invariants
 from .elasticity import SolidModel
 from .strain_energy import geometric_stiffness, internal_forces
 from .supports import Flexibility
 
-Floats = NDArray[np.float64]
-
 PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 
-def shape_integrals(model: SolidModel, modes: Floats) -> Invariants:
+def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
     """Integrals of the part alone, of modes (3 owned, n); collective."""
     n, x = modes.shape[1], model.x
     Phi = modes.reshape(-1, 3, n)
@@ -40,7 +38,7 @@ def shape_integrals(model: SolidModel, modes: Floats) -> Invariants:
     )
 
 
-def unit_loads(model: SolidModel, interfaces: Mapping[str, Floats]) -> dict[str, Floats]:
+def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, Array]:
     """(3 owned,) consistent nodal forces of each unit load of formulation.md, section 3; collective.
 
     D'Alembert forces −ρ(a + α × x + ω × (ω × x)) of unit a, α and products of ω (of xy, the terms of ω_x ω_y and
@@ -51,7 +49,7 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Floats]) -> dict[str,
         interfaces: B (6, 3 owned), mean motion of each; its transpose spreads a force.
     """
     x, e = model.x, np.eye(3)
-    fields: dict[str, Floats] = {}
+    fields: dict[str, Array] = {}
     for k, axis in enumerate("xyz"):
         fields[f"t_{axis}"] = np.broadcast_to(-e[k], x.shape)
         fields[f"r_{axis}"] = -np.cross(e[k], x)
@@ -66,7 +64,7 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Floats]) -> dict[str,
     return loads
 
 
-def prestressed(flexibility: Flexibility, modes: Floats, interfaces: Mapping[str, Floats]) -> dict[str, Floats]:
+def prestressed(flexibility: Flexibility, modes: Array, interfaces: Mapping[str, Array]) -> dict[str, Array]:
     """(n, n) geometric stiffness by unit load, the body held by its reference condition; collective.
 
     Args:

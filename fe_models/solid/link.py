@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
-from numpy.typing import NDArray
 
-from ... import __version__
+from ...common.arrays import Array, Integers
 from ...common.errors import InputError
+from ...common.version import program_version
 
 # First of all that load dolfinx: mesh.compat sets PETSc up.
 from ...mesh.compat import lagrange_element, node_map
@@ -35,7 +35,6 @@ from .stress import point_stresses, surface_stresses
 from .supports import Flexibility, RigidFace
 from .surface_patches import outlined_patches
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 # Cubic elements of the stations: as many as there are cells along the axis, within these bounds.
@@ -52,9 +51,9 @@ class Places(NamedTuple):
     """The interfaces by name: their mean motion, of modes and as rows B (6, 3 owned)."""
 
     averages: dict[str, Averages]
-    rows: dict[str, Floats]
+    rows: dict[str, Array]
 
-    def motion(self, model: SolidModel, modes: Floats) -> dict[str, Interface]:
+    def motion(self, model: SolidModel, modes: Array) -> dict[str, Interface]:
         """What `modes` (3 (owned + ghosts), n) do at each; collective."""
         found = {}
         for name, averages in self.averages.items():
@@ -139,7 +138,7 @@ def solid_modal_body(
         ),
         input_hash=input_hash,
         modes_hash=modes_hash(link),
-        ffrobot_version=__version__,
+        ffrobot_version=program_version(),
     )
 
 
@@ -196,7 +195,7 @@ def _loaded(link: SolidLink, model: SolidModel, places: Places) -> Mass:
     return Mass(model, [(places.rows[name], w) for name, w in weights.items() if np.any(w)])
 
 
-def _station_grid(link: SolidLink, solid: SolidMesh) -> tuple[Floats, NDArray[np.int64]]:
+def _station_grid(link: SolidLink, solid: SolidMesh) -> tuple[Array, Integers]:
     """Stations x (3e + 1,) in m and the four of each cubic element (e, 4); vertices at the middle and at sections."""
     length = link.geometry.length
     elements = int(np.clip(np.ceil(length / solid.size), *ELEMENTS))
@@ -207,7 +206,7 @@ def _station_grid(link: SolidLink, solid: SolidMesh) -> tuple[Floats, NDArray[np
     return np.append(inner.ravel(), length), element
 
 
-def _stations(sections: Averages, x: Floats, element: NDArray[np.int64], u: Floats, turn: Floats) -> Stations:
+def _stations(sections: Averages, x: Array, element: Integers, u: Array, turn: Array) -> Stations:
     """Height from each station on: that in the middle of the way to the next, as the stations' two heights give it."""
     height = np.append(0.5 * (sections.height[:-1] + sections.height[1:]), sections.height[-1])
     centroid = sections.centroid.copy()
@@ -215,7 +214,7 @@ def _stations(sections: Averages, x: Floats, element: NDArray[np.int64], u: Floa
     return Stations(centroid, u, turn, height, element)
 
 
-def _picture(solid: SolidMesh, model: SolidModel, modes: Floats) -> PictureMesh:
+def _picture(solid: SolidMesh, model: SolidModel, modes: Array) -> PictureMesh:
     """The surface with what `modes` (3 (owned + ghosts), n) do at its points; collective."""
     surface, n = solid.surface, modes.shape[1]
     shapes = lagrange_element(model.V).tabulate(0, surface.X)[0, :, :, 0]

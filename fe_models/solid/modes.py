@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ..families import NEARLY, SectionMotion, aligned, names
 from ..link_records import SolidLink
@@ -16,9 +16,8 @@ from .elasticity import SolidModel
 from .strain_energy import strain_energy
 from .supports import Flexibility
 
-Floats = NDArray[np.float64]
 # Mean motion of the sections, of modes (3 owned, n).
-Reader = Callable[[Floats], SectionMotion]
+Reader = Callable[[Array], SectionMotion]
 
 
 @dataclass(frozen=True)
@@ -31,9 +30,9 @@ class SolidModes:
         X: (3 owned, n), Xᵀ M X = I.
     """
 
-    omega2: Floats
+    omega2: Array
     families: list[str]
-    X: Floats
+    X: Array
 
 
 def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Reader, where: str) -> SolidModes:
@@ -72,19 +71,19 @@ def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Re
         batch = int(np.ceil((needed - len(hits)) / share)) + 2
 
 
-def _settled(omega2: Floats) -> int:
+def _settled(omega2: Array) -> int:
     """How many of the modes found lie below the last gap: the others may belong with one that is yet to be found."""
     gaps = np.flatnonzero(np.diff(omega2) > NEARLY * omega2[1:])
     return int(gaps[-1]) + 1 if gaps.size else 0
 
 
-def _ritz(model: SolidModel, X: Floats) -> tuple[Floats, Floats]:
+def _ritz(model: SolidModel, X: Array) -> tuple[Array, Array]:
     """ω² and modes in the space of X, from strain energies."""
     omega2, Q = np.linalg.eigh(strain_energy(model, model.with_ghosts(X)))
     return omega2, X @ Q
 
 
-def _chosen(omega2: Floats, X: Floats, Q: Floats, kinds: list[str]) -> SolidModes:
+def _chosen(omega2: Array, X: Array, Q: Array, kinds: list[str]) -> SolidModes:
     """Modes X Q, uncoupled among each other."""
     K = (Q.T * omega2) @ Q
     order = np.argsort(np.diag(K), kind="stable")

@@ -13,12 +13,10 @@ from dataclasses import dataclass, replace
 import basix
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...mesh.compat import coordinate_element, geometry_degree, geometry_nodes, lagrange_element, node_map
 from .elasticity import SolidModel, strain_degree
-
-Floats = NDArray[np.float64]
 
 # Numbers that a chunk of gradients may have: some 10 MB, which stay in the cache.
 CHUNK = 1_000_000
@@ -40,16 +38,16 @@ class Gradients:
     """
 
     cells: slice
-    weights: Floats
-    values: Floats
-    inverse: Floats
-    shapes: Floats
+    weights: Array
+    values: Array
+    inverse: Array
+    shapes: Array
 
     def only(self, fields: slice) -> Gradients:
         """Of some of the fields."""
         return replace(self, values=self.values[..., fields])
 
-    def forces(self, stress: Floats) -> Floats:
+    def forces(self, stress: Array) -> Array:
         """(c, d, 3, k) ∫ σ : ∇N_a dV at the nodes of each cell, of stresses (c, 6, q, k) times weights."""
         c, _, q, k = stress.shape
         tensor = np.empty((c, 3, q, 3, k))
@@ -62,14 +60,14 @@ class Gradients:
         slopes = self.shapes.reshape(-1, self.shapes.shape[2]).T
         return np.asarray(slopes @ reference.reshape(c, 3 * q, -1)).reshape(c, -1, 3, k)
 
-    def strains(self) -> Floats:
+    def strains(self) -> Array:
         """(c, 6, q, k) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy."""
         g = self.values
         rows = [g[:, j, :, i] if i == j else g[:, j, :, i] + g[:, i, :, j] for i, j in VOIGT]
         return np.stack(rows, axis=1)
 
 
-def gradients(model: SolidModel, fields: Floats) -> Iterator[Gradients]:
+def gradients(model: SolidModel, fields: Array) -> Iterator[Gradients]:
     """Gradients of `fields` (3 (owned + ghosts), k) in all cells that this rank owns, a chunk at a time."""
     mesh, k = model.mesh, fields.shape[1]
     cell = lagrange_element(model.V).cell_type
@@ -96,13 +94,13 @@ def gradients(model: SolidModel, fields: Floats) -> Iterator[Gradients]:
         yield Gradients(part, weights, physical.reshape(len(weights), 3, len(rule), 3, k), inverse, shapes)
 
 
-def stresses(model: SolidModel, piece: Gradients, strains: Floats) -> Floats:
+def stresses(model: SolidModel, piece: Gradients, strains: Array) -> Array:
     """(c, 6, q, k) σ = C ε in the cells of `piece`."""
     C = model.materials.C[model.materials.of_cell[piece.cells]]
     return np.asarray((C @ strains.reshape(*strains.shape[:2], -1)).reshape(strains.shape))
 
 
-def strain_energy(model: SolidModel, modes: Floats) -> Floats:
+def strain_energy(model: SolidModel, modes: Array) -> Array:
     """(n, n) K_ff = ∫ ε(Φ_i) : C : ε(Φ_j) dV of `modes` (3 (owned + ghosts), n); collective."""
     n = modes.shape[1]
     total = np.zeros((n, n))
@@ -114,7 +112,7 @@ def strain_energy(model: SolidModel, modes: Floats) -> Floats:
     return 0.5 * (total + total.T)
 
 
-def internal_forces(model: SolidModel, fields: Floats) -> Floats:
+def internal_forces(model: SolidModel, fields: Array) -> Array:
     """(3 owned, k) K u of displacements `fields` (3 (owned + ghosts), k), by their strains; collective."""
     k = fields.shape[1]
     nodes = node_map(model.V)
@@ -127,7 +125,7 @@ def internal_forces(model: SolidModel, fields: Floats) -> Floats:
     return np.ascontiguousarray(model.to_owners(total.T).T).reshape(-1, k)
 
 
-def geometric_stiffness(model: SolidModel, modes: Floats, prestress: Floats) -> Floats:
+def geometric_stiffness(model: SolidModel, modes: Array, prestress: Array) -> Array:
     """(l, n, n) ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV for the stresses σ of each of l displacement fields; collective.
 
     Second variation of the work of a stress σ on the quadratic part of Green's strain (Bathe, Finite Element

@@ -7,13 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from dolfinx.fem import FunctionSpace
 from dolfinx.mesh import Mesh
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ...common.arrays import Array, Integers
 from ...mesh.compat import coordinate_element, geometry_nodes, lagrange_element, node_map
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 CHUNK = 4096  # points at a time: some 50 MB with 20 modes on cubic tetrahedra
 NEWTON_STEPS = 10
@@ -21,7 +18,7 @@ NEWTON_STEPS = 10
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
-def modal_strains(space: FunctionSpace, cells: Integers, X: Floats, modes: Floats) -> Floats:
+def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array) -> Array:
     """(q, 6, n) strains ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of modes at points of cells.
 
     Args:
@@ -45,14 +42,14 @@ def modal_strains(space: FunctionSpace, cells: Integers, X: Floats, modes: Float
     return strains
 
 
-def jacobians(mesh: Mesh, cells: Integers, X: Floats) -> Floats:
+def jacobians(mesh: Mesh, cells: Integers, X: Array) -> Array:
     """(q, 3, 3) J = ∂x/∂X at reference coordinates X (q, 3) in each of `cells` (q,)."""
     shapes = coordinate_element(mesh).tabulate(1, X)[1:, :, :, 0]
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     return np.asarray(np.einsum("kqv,qvi->qik", shapes, corners))
 
 
-def locate(mesh: Mesh, points: Floats, slack: float) -> tuple[Integers, Integers, Floats]:
+def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers, Array]:
     """All cells owned by this process that contain each of `points` (k, 3), in m.
 
     Args:
@@ -86,7 +83,7 @@ def locate(mesh: Mesh, points: Floats, slack: float) -> tuple[Integers, Integers
     return point[inside], cell[inside], X[inside]
 
 
-def pulled_back(mesh: Mesh, cells: Integers, points: Floats) -> Floats:
+def pulled_back(mesh: Mesh, cells: Integers, points: Array) -> Array:
     """(q, 3) reference coordinates of `points` (q, 3) in `cells` (q,); far outside a curved cell anything."""
     element = coordinate_element(mesh)
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]

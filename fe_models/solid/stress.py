@@ -14,21 +14,18 @@ import numpy as np
 import scipy.sparse as sp
 from dolfinx.fem import FunctionSpace
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ..modal_body import StressPoint
 from .strains import locate, modal_strains
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 # Fractions of a cell's size: rounding, and how far a point on a curved face may be off the mesh of that face.
 INSIDE, ON_CURVED_FACE = 1e-6, 0.02
 
 
 def point_stresses(
-    space: FunctionSpace, C: Floats, modes: Floats, points: Mapping[str, tuple[float, float, float]], path: Path
+    space: FunctionSpace, C: Array, modes: Array, points: Mapping[str, tuple[float, float, float]], path: Path
 ) -> dict[str, StressPoint]:
     """Modal stresses and strains at named points.
 
@@ -54,7 +51,7 @@ def point_stresses(
     return {name: StressPoint(positions[k], stress[k], strain[k]) for k, name in enumerate(points)}
 
 
-def surface_stresses(space: FunctionSpace, C: Floats, modes: Floats, points: Floats) -> Floats:
+def surface_stresses(space: FunctionSpace, C: Array, modes: Array, points: Array) -> Array:
     """(p, 6, n) modal stresses at `points` (p, 3), the same on all processes: those of the picture mesh.
 
     Raises:
@@ -67,7 +64,7 @@ def surface_stresses(space: FunctionSpace, C: Floats, modes: Floats, points: Flo
     return stress
 
 
-def _averages(space: FunctionSpace, C: Floats, modes: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
+def _averages(space: FunctionSpace, C: Array, modes: Array, points: Array) -> tuple[Array, Array, Array]:
     """How many cells hold each point (k,), and the means of their strains and stresses, (k, 6, n) each."""
     comm = space.mesh.comm
     shape = (len(points), 6, modes.shape[1])
@@ -88,7 +85,7 @@ def _averages(space: FunctionSpace, C: Floats, modes: Floats, points: Floats) ->
     return count, strain / each, stress / each
 
 
-def _nearest(space: FunctionSpace, point: Floats) -> tuple[float, Floats]:
+def _nearest(space: FunctionSpace, point: Array) -> tuple[float, Array]:
     """Distance in m from `point` to the nearest node of the mesh, and that node."""
     nodes = space.mesh.geometry.x
     distances = np.linalg.norm(nodes - point, axis=1)

@@ -23,10 +23,9 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ...common.arrays import Array, Integers
 from ...common.errors import SolveError
 from .elasticity import SolidModel, stiffness_matrix
-
-Floats = NDArray[np.float64]
 
 # Beyond this size MUMPS orders by approximate minimum fill: its default takes too long and too much.
 LARGE, AMF = 50_000, 2
@@ -42,8 +41,8 @@ class RigidFace:
         free: (k,) which of its translations (0 … 2) and rotations (3 … 5) no support holds.
     """
 
-    nodes: NDArray[np.int64]
-    centroid: Floats
+    nodes: Integers
+    centroid: Array
     free: Sequence[int]
 
 
@@ -59,7 +58,7 @@ class Flexibility:
         SolveError: the supported stiffness is not positive definite.
     """
 
-    def __init__(self, model: SolidModel, faces: Sequence[RigidFace], B: Floats | None) -> None:
+    def __init__(self, model: SolidModel, faces: Sequence[RigidFace], B: Array | None) -> None:
         self.model = model
         self.R = rigid_motions(model.x)
         self.B = B
@@ -92,7 +91,7 @@ class Flexibility:
         seen[: self.model.owned] = False
         return np.flatnonzero(seen).astype(np.int32)
 
-    def _condense(self, T: Floats, KT: Floats) -> None:
+    def _condense(self, T: Array, KT: Array) -> None:
         """W and S⁻¹; where only mean supports hold the body, springs on the first face make S positive definite."""
         self.W, self._S_inverse = T, np.empty((0, 0))
         if not T.shape[1]:
@@ -105,9 +104,9 @@ class Flexibility:
             S[:6, :6] += np.diag(np.diag(S)[:6])
         self._S_inverse = np.linalg.inv(S)
 
-    def __matmul__(self, loads: Floats) -> Floats:
+    def __matmul__(self, loads: Array) -> Array:
         """F f of loads (3 owned, k); collective."""
-        result: Floats = self._projected(self._condensed_solve(self._projected_load(loads)))
+        result: Array = self._projected(self._condensed_solve(self._projected_load(loads)))
         return result
 
     @property
@@ -120,26 +119,26 @@ class Flexibility:
         """As above, of one PETSc vector."""
         result.array[:] = (self @ load.array_r[:, None])[:, 0]
 
-    def _condensed_solve(self, loads: Floats) -> Floats:
+    def _condensed_solve(self, loads: Array) -> Array:
         """G f."""
         result = self._solve(np.where(self.clamped[:, None], 0.0, loads))
         if self.W.shape[1]:
             result += self.W @ (self._S_inverse @ self.model.total(self.W.T @ loads))
         return result
 
-    def _projected(self, U: Floats) -> Floats:
+    def _projected(self, U: Array) -> Array:
         """P U."""
         if self.B is None:
             return U
         return np.asarray(U - self.R @ (self._BR_inverse @ self.model.total(self.B @ U)))
 
-    def _projected_load(self, loads: Floats) -> Floats:
+    def _projected_load(self, loads: Array) -> Array:
         """Pᵀ f."""
         if self.B is None:
             return loads
         return np.asarray(loads - self.B.T @ (self._BR_inverse.T @ self.model.total(self.R.T @ loads)))
 
-    def _solve(self, loads: Floats) -> Floats:
+    def _solve(self, loads: Array) -> Array:
         """K_0⁻¹ f, all columns at once: several times as fast as one by one."""
         rows, columns = loads.shape
         if columns == 1:
@@ -160,19 +159,19 @@ class Flexibility:
         return np.asarray(result)
 
 
-def rigid_motions(x: Floats) -> Floats:
+def rigid_motions(x: Array) -> Array:
     """R (3p, 6): translations along, and rotations about, the axes through the origin, of nodes x (p, 3)."""
     return _plate(x, np.zeros(3)).reshape(-1, 6)
 
 
-def _plate(x: Floats, center: Floats) -> Floats:
+def _plate(x: Array, center: Array) -> Array:
     """(p, 3, 6) displacement of points x (p, 3) under unit translations, and rotations about `center`."""
     unit = np.eye(3)
     turns = [np.cross(axis, x - center) for axis in unit]
     return np.stack([*(np.broadcast_to(axis, x.shape) for axis in unit), *turns], axis=2)
 
 
-def _plate_motions(model: SolidModel, faces: Sequence[RigidFace]) -> Floats:
+def _plate_motions(model: SolidModel, faces: Sequence[RigidFace]) -> Array:
     """T (3 owned, m): each face's nodes under its free unit motions, all else at rest."""
     columns = []
     for face in faces:
@@ -182,7 +181,7 @@ def _plate_motions(model: SolidModel, faces: Sequence[RigidFace]) -> Floats:
     return np.concatenate([np.empty((3 * model.owned, 0)), *columns], axis=1)
 
 
-def _times_stiffness(model: SolidModel, T: Floats) -> Floats:
+def _times_stiffness(model: SolidModel, T: Array) -> Array:
     """K T, with the free stiffness."""
     K = stiffness_matrix(model)
     u, f = K.createVecs()
@@ -217,7 +216,7 @@ def _factorised(K: PETSc.Mat) -> PETSc.KSP:
     return solver
 
 
-def _add_springs(model: SolidModel, K: PETSc.Mat, R: Floats) -> None:
+def _add_springs(model: SolidModel, K: PETSc.Mat, R: Array) -> None:
     """Springs on six degrees of freedom that hold the body: pivots of its rigid motions, the largest left each time."""
     diagonal = K.getDiagonal().array_r
     stiffness = float(model.comm.allreduce(diagonal.sum())) / K.getSize()[0]

@@ -15,8 +15,8 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import meshtags
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...common.errors import SolveError
 from ...mesh.compat import compiled_form
 from ...mesh.records import SurfacePatches
@@ -25,7 +25,6 @@ from ..modal_body import OutlinedPatches
 if TYPE_CHECKING:
     from dolfinx.mesh import MeshTags  # 0.5 has no such name
 
-Floats = NDArray[np.float64]
 
 AREA_TOLERANCE = 1e-9
 
@@ -36,7 +35,7 @@ def outlined_patches(
     faces: Mapping[str, int],
     record: SurfacePatches,
     length: float,
-    modes: Floats,
+    modes: Array,
     path: Path,
 ) -> OutlinedPatches:
     """Modal forces of the patches of a link file; collective, the same on every process.
@@ -55,7 +54,7 @@ def outlined_patches(
     """
     edges = record.edges(length)
     sides = ("top", "bottom") if record.faces == "both" else (record.faces,)
-    forces: dict[str, Floats] = {}
+    forces: dict[str, Array] = {}
     for side in sides:
         rows = []
         for k in range(len(edges)):
@@ -71,7 +70,7 @@ def outlined_patches(
     return OutlinedPatches(np.array(edges), record.width, **forces)
 
 
-def _membrane(space: fem.FunctionSpace, facet_tags: MeshTags, tag: int, modes: Floats) -> tuple[float, Floats]:
+def _membrane(space: fem.FunctionSpace, facet_tags: MeshTags, tag: int, modes: Array) -> tuple[float, Array]:
     """Area in m² of the facets tagged `tag`, and (n,) ∫ ε_xx(Φ) ds over them."""
     mesh = space.mesh
     facets = facet_tags.find(tag)

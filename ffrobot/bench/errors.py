@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array
 from ..results.file import Results
-
-Array = NDArray[np.float64]
 
 KINDS = ("displacement", "force", "moment", "voltage")
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..common.arrays import Array
 from ..mbs import _core
 from ..mbs.model.model import MechanismSystem
 
-Array = NDArray[np.float64]
 State = tuple[MechanismSystem, Array, Array]
 """Equations, q and v."""
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.validation import did_you_mean, quoted
 from ..mbs.scene.analysis_records import Analysis
@@ -13,7 +14,7 @@ from ..mbs.scene.scene import Scene
 from ..results.file import Results
 from ..results.write import results_image
 from ..run.solution import Watcher, solve
-from .errors import Array, histories
+from .errors import histories
 
 INTEGRATED = ("pcid", "forward")
 UNLIMITED = 10**12  # steps: the budget ends a run

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 
+from ..common.arrays import Array
 from ..common.errors import SolveError
 from ..mbs.scene.analysis_records import TIGHTEST_TOLERANCE
 from ..mbs.scene.scene import Scene
 from ..run.solution import Watcher
-from .errors import KINDS, Array, errors
+from .errors import KINDS, errors
 from .measuring import Run, run, with_analysis
 
 INTEGRATORS = ("dopri5", "dop853", "radau", "generalized-alpha", "auto")

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..fe_models.modal_body import Floats, Integers, ModalBody, PictureMesh
+from ..common.arrays import Array, Integers
+from ..fe_models.modal_body import ModalBody, PictureMesh
 
 AMPLITUDE = 0.1  # of the length: the largest displacement of a mode as drawn
 
@@ -14,11 +15,11 @@ AMPLITUDE = 0.1  # of the length: the largest displacement of a mode as drawn
 class DrawnMode(NamedTuple):
     """A mode as large as pictures show it: displacement (p, 3) in m, and its size (p,) relative to the largest."""
 
-    displacement: Floats
-    size: Floats
+    displacement: Array
+    size: Array
 
 
-def drawn_mode(shape: Floats, length: float) -> DrawnMode:
+def drawn_mode(shape: Array, length: float) -> DrawnMode:
     """A mode (p, 3) of a body of `length` scaled to the same largest displacement as every other; zero stays zero."""
     size = np.linalg.norm(shape, axis=1)
     largest = float(size.max()) or 1.0

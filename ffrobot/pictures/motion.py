@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..results.file import Array, Results
-
-Indices = NDArray[np.intp]
+from ..common.arrays import Array, Indices
+from ..results.file import Results
 
 GROUND = "ground"
 VISIBLE_DEFORMATION = 0.05  # of the mechanism's size

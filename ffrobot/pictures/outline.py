@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
-from ..results.file import Array
 
 CURVE_POINTS = 41
 

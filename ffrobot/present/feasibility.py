@@ -7,14 +7,11 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console, Group
 from rich.table import Table
 
 from ..common.errors import InputError
 from ..common.validation import quoted
-
-Array = NDArray[np.float64]
 
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:

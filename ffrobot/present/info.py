@@ -9,10 +9,10 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
@@ -58,7 +58,7 @@ def _modal_body(body: ModalBody) -> str:
     return "\n".join(lines) + "\n" + _rendered(modes)
 
 
-def _place(body: ModalBody, position: NDArray[np.float64]) -> str:
+def _place(body: ModalBody, position: Array) -> str:
     """Coordinates (3,) as text, rounding errors of solids as what they are: 0."""
     x, y, z = np.where(np.abs(position) < 1e-12 * body.length, 0.0, position)
     return f"({x:.6g}, {y:.6g}, {z:.6g}) m"

@@ -44,9 +44,9 @@ def _log_file(context: click.Context, parameter: click.Parameter, path: Path | N
         _add(logging.FileHandler(path, encoding="utf-8"), "%(asctime)s %(levelname)s %(message)s")
     except OSError as error:
         raise click.BadParameter(f"cannot write {path}: {error.strerror}") from None
-    from .. import __version__
+    from ..common.version import program_version
 
-    LOGGER.info("ffrobot %s, Python %s, %s", __version__, platform.python_version(), platform.platform())
+    LOGGER.info("ffrobot %s, Python %s, %s", program_version(), platform.python_version(), platform.platform())
     LOGGER.info("%s", " ".join(sys.argv))
 
 

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.validation import did_you_mean
 from ..fe_models.modal_body import ModalBody
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from ..actuation.control.linear_model import LinearModel
 
-Array = NDArray[np.float64]
 
 COLUMN = re.compile(r"(?P<dataset>.*?)\[(?P<column>\d+)\]")
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from ..actuation.control.linear_analysis import LinearAnalysis
 from ..actuation.control.linear_model import LinearModel, save_arrays
 from ..actuation.control.placement import Placed
 from ..actuation.control.zeros import Zeros
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.validation import quoted
 from ..mbs.analysis.analyses import Outcome
@@ -100,7 +100,7 @@ def export_linear(results_path: Path, analysis: str | None, path: Path) -> str:
         models[0].save(path)
     else:
         arrays = models[0].arrays()
-        stacked: dict[str, NDArray[np.float64]] = {
+        stacked: dict[str, Array] = {
             key: np.array([getattr(model, key) for model in models]) for key in (*MATRICES, "time")
         }
         save_arrays(arrays | stacked, path)

@@ -8,12 +8,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .. import __version__
 from ..actuation.feasibility import Feasibility
 from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointForces, PointSet
 from ..common.files import write_atomically
+from ..common.version import program_version
 from ..mbs.analysis.analyses import Outcome
 from ..mbs.analysis.motors_only import is_minimum_phase, path_error
 from ..mbs.model.truncation import modes_kept
@@ -48,7 +48,7 @@ def results_image(solution: Solution) -> bytes:
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
-        file.attrs["ffrobot_version"] = __version__
+        file.attrs["ffrobot_version"] = program_version()
         file.attrs["name"] = solution.scene.name
         file.attrs["scene"] = solution.scene.text
         file.attrs["skipped"] = list(solution.skipped)

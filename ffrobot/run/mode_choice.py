@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.truncation import loaded_points, with_fewer_modes
 from ..mbs.quantities.observation import joint_forces, point_motion, trajectory_force
@@ -20,7 +20,6 @@ from ..mbs.scene.scene import Scene
 if TYPE_CHECKING:
     from .solution import Solution
 
-Array = NDArray[np.float64]
 Reported = Mapping[str, Mapping[str, Array]]
 """Quantities of an analysis by kind and name, (T, …)."""
 Errors = Mapping[str, Mapping[str, float]]

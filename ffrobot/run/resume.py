@@ -16,9 +16,9 @@ from typing import Any
 
 import h5py
 
-from .. import __version__
 from ..common.errors import InputError
 from ..common.validation import key_path
+from ..common.version import program_version
 from ..mbs import _core
 from ..mbs.analysis.analyses import Outcome
 from ..mbs.analysis.earlier_run import COUNTS, ROWS, EarlierRun
@@ -137,8 +137,8 @@ def _check_same_input(solution: Solution, file: Results) -> None:
 
 def _changes(solution: Solution, file: Results) -> Iterator[str]:
     """What of the input is not that of the results file."""
-    if file.ffrobot_version != __version__:
-        yield f"ffrobot {file.ffrobot_version}, now {__version__},"
+    if file.ffrobot_version != program_version():
+        yield f"ffrobot {file.ffrobot_version}, now {program_version()},"
     then, now = _without_limits(file.scene), _without_limits(tomllib.loads(solution.scene.text))
     loc = _first_difference(then, now)
     if loc is not None:

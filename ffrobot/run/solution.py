@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..actuation.control.closed_loop import LoopRecord, run_closed_loop
 from ..actuation.control.linear_analysis import LinearAnalysis, analyse, linear_models
@@ -19,6 +18,7 @@ from ..actuation.patches.patches import PatchArray, check_reach, patch_array
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.patches.voltages import Voltages, allocation, solve_voltages
 from ..actuation.points import PointForces, PointSet, point_set, with_points
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..mbs.analysis.analyses import Outcome, run_forward, run_pcid, run_static
 from ..mbs.analysis.earlier_run import EarlierRun
@@ -39,8 +39,6 @@ from .evaluation import ALLOCATED, evaluate, place_patches
 from .interruption import Interruption
 from .mode_choice import ErrorEstimate, ModeChoice, error_tolerances, reported, truncation_levels
 from .omissions import skipped as skipped_lines
-
-Array = NDArray[np.float64]
 
 logger = logging.getLogger(__name__)
 

@@ -12,14 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.parallel import environment_without_mpi
 from ..results.file import Results
-
-Array = NDArray[np.float64]
 
 ROW, SCENE, RESULTS = "row.json", "scene.toml", "results.h5"
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
-from ..model.model import ZERO, Array, MechanismSystem, Model
+from ..model.model import ZERO, MechanismSystem, Model
 from ..scene.analysis_records import Analysis
 from ..solve.diagnosis import find_cause, lost_inertia
 from ..solve.initial_state import State, check_reach, undeformed_state

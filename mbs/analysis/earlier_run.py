@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...common.arrays import Array
 from .. import _core
-from ..model.model import Array
 from ..solve.integrators import Choice
 
 if TYPE_CHECKING:

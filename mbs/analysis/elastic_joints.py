@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from .. import _core
 from ..fields.time_functions import spline
 from ..model.measures import Marker, Measure
-from ..model.model import ZERO, Array, Constraint, MechanismSystem, Model
+from ..model.model import ZERO, Constraint, MechanismSystem, Model
 from ..model.planar_body import PlanarBody, from_rigid_body
 from ..model.transmissions import Gear, joint_gears, joint_rotors
 from ..scene.analysis_records import Analysis

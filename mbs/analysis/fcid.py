@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
 from ..fields.time_functions import spline
-from ..model.model import ZERO, Array, MechanismSystem, Model
+from ..model.model import ZERO, MechanismSystem, Model
 from ..model.planar_body import PlanarBody
 from ..scene.analysis_records import Analysis
 from ..solve.initial_state import check_reach, undeformed_state

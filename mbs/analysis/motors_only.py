@@ -14,9 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ..fields.time_functions import spline
-from ..model.model import Array, Model
+from ..model.model import Model
 from ..scene.analysis_records import Analysis
 from ..solve.initial_state import check_reach, undeformed_state
 from ..solve.integrators import Choice

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.validation import quoted
 from .. import _core
 from ..model.measures import Marker, Measure
-from ..model.model import Array, Model
+from ..model.model import Model
 from ..scene.analysis_records import Analysis
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from .._core import Op, TimeFunction
 
@@ -319,7 +320,7 @@ def load_waypoints(path: Path) -> Waypoints:
     return Waypoints(float(table[0, 0]), float(table[-1, 0]), components)
 
 
-def _read_table(path: Path) -> tuple[list[str], NDArray[np.float64]]:
+def _read_table(path: Path) -> tuple[list[str], Array]:
     """Column names and the numbers (rows, columns) of the CSV table at `path`."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -352,9 +353,7 @@ def _numbers(path: Path, line: int, row: list[str], count: int) -> list[float]:
     return numbers
 
 
-def spline(
-    nodes: NDArray[np.float64], values: NDArray[np.float64], degree: int = 5, at_rest: bool = False
-) -> list[TimeFunction]:
+def spline(nodes: Array, values: Array, degree: int = 5, at_rest: bool = False) -> list[TimeFunction]:
     """The interpolating splines through the columns of `values` (T, n); `at_rest` without rate at both ends."""
     from scipy.interpolate import make_interp_spline
 
@@ -366,7 +365,7 @@ def spline(
     return [TimeFunction.polynomial(breaks, of_one) for of_one in coefficients]
 
 
-def check_domain(function: TimeFunction, times: NDArray[np.float64], describe: str, derivatives: int = 2) -> None:
+def check_domain(function: TimeFunction, times: Array, describe: str, derivatives: int = 2) -> None:
     """Make sure `function` and its first `derivatives` time derivatives exist at all `times` (T,), in s.
 
     Raises `InputError`, starting with `describe` (file and key), at the first time where one is missing or infinite: a

@@ -13,13 +13,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ...common.arrays import Array, Indices
 
 if TYPE_CHECKING:
     from ...fe_models.modal_body import ModalBody
     from ..analysis.analyses import Outcome
 
-Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-12
 NOTABLE = 0.01  # relative change of a mode's stiffness from which on the summary warns, and "auto" switches it on
 
@@ -57,7 +57,7 @@ class GeometricStiffening:
         )
 
 
-def from_modal_body(body: ModalBody, in_plane: NDArray[np.intp]) -> GeometricStiffening | None:
+def from_modal_body(body: ModalBody, in_plane: Indices) -> GeometricStiffening | None:
     """What the file of a modal body holds for planar motion; None where it holds nothing of the kind."""
     K = {load: matrix[np.ix_(in_plane, in_plane)] for load, matrix in body.geometric_stiffness.items()}
     if "omega_zz" not in K:

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.validation import did_you_mean, quoted
 from .. import _core
@@ -19,7 +19,6 @@ from .measures import FRAME, Marker, Measure, joint_coordinate, joint_rows, moto
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
 from .transmissions import Friction, Gear, joint_frictions, joint_rotors
 
-Array = NDArray[np.float64]
 ZERO = _core.TimeFunction.constant(0.0)
 
 
@@ -204,9 +203,9 @@ class MechanismSystem:
         self.first = np.array(self.system.first_coordinate, dtype=int)
 
     @property
-    def frame_coordinates(self) -> NDArray[np.intp]:
+    def frame_coordinates(self) -> Indices:
         """Indices of (R, θ) of all bodies in q (3 bodies,)."""
-        indices: NDArray[np.intp] = (self.first[:, None] + np.arange(3)).ravel()
+        indices: Indices = (self.first[:, None] + np.arange(3)).ravel()
         return indices
 
     @property

@@ -8,14 +8,12 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
 from ..scene.mechanism_records import RigidBody
 from . import geometric_stiffening
 from .geometric_stiffening import GeometricStiffening
-
-Array = NDArray[np.float64]
 
 # Terms below this fraction of their natural size are rounding of the FE stage: they are left out of the equations.
 NEGLIGIBLE = 1e-12

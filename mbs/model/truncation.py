@@ -11,9 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...common.arrays import Array
 from ..fields.field_types import GROUND, split_point
 from ..scene.scene import SceneKeys
-from .planar_body import Array, PlanarBody, Reduction, transformed
+from .planar_body import PlanarBody, Reduction, transformed
 
 IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is rounding
 DEPENDENT = 1e-8  # static shapes below this fraction of the first one, in energy, say nothing new

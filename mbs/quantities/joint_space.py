@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...common.arrays import Array
 from ..analysis.analyses import Outcome
-from ..model.model import ZERO, Array, Constraint, MechanismSystem
+from ..model.model import ZERO, Constraint, MechanismSystem
 
 
 def motor_rates(outcome: Outcome) -> Array:

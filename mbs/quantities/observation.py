@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...common.arrays import Array
 from .. import _core
 from ..analysis.analyses import Outcome
 from ..fields.field_types import split_point
 from ..model.geometric_stiffening import second_order_displacement
 from ..model.measures import Marker
-from ..model.model import Array, Constraint, MechanismSystem
+from ..model.model import Constraint, MechanismSystem
 from ..model.planar_body import PlanarBody
 
 

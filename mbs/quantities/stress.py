@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
-
-Array = NDArray[np.float64]
 
 CHUNK_BYTES = 32e6  # of surface stresses at a time; more leaves the cache
 

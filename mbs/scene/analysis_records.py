@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ...common.arrays import Array
 from ..fields.field_types import Expression, Name, NotNegative, PointReference, Positive
 from .control_records import Placement
 from .loop_records import ClosedLoopKeys
@@ -130,7 +130,7 @@ class Analysis(ClosedLoopKeys):
             raise ValueError(f'expected the key "factor" only with output = "redefined", found "{self.output}"')
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Array:
         """Output times (T,), in s: exact multiples of the output step; `end` is one of them, exactly.
 
         From 0 to `end`, and the pre- and post-actuation besides where they are known.

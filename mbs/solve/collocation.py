@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..model.model import Array
+from ...common.arrays import Array
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model.model import Array, MechanismSystem
+from ...common.arrays import Array
+from ..model.model import MechanismSystem
 from .initial_state import State, frame_gradients
 from .path_checks import JUMP
 from .vibration import system_mass_matrix

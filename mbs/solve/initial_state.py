@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ..fields.field_types import GROUND, split_point
 from ..model.measures import FRAME, Marker
-from ..model.model import Array, Constraint, MechanismSystem
+from ..model.model import Constraint, MechanismSystem
 from ..model.transmissions import Gear
 from ..scene.mechanism_records import Joint
 
@@ -278,7 +278,7 @@ def _one_side_placed(joint: Joint, placed: set[str]) -> bool:
     return sum(side.partition(".")[0] in placed for side in joint.between) == 1
 
 
-def _arm(assembly: MechanismSystem, q: Array, side: str) -> tuple[Array, NDArray[np.float64]]:
+def _arm(assembly: MechanismSystem, q: Array, side: str) -> tuple[Array, Array]:
     """A x of a point of an undeformed body, and A_θ x."""
     end = Marker(*split_point(side))
     assert end.body is not None

@@ -7,8 +7,9 @@ from functools import partial
 
 import numpy as np
 
+from ...common.arrays import Array
 from .. import _core
-from ..model.model import Array, MechanismSystem
+from ..model.model import MechanismSystem
 from ..scene.analysis_records import Analysis
 from .initial_state import State
 from .vibration import modal_excitation, vibrations

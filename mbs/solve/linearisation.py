@@ -13,11 +13,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
 from ..fields.field_types import split_point
 from ..model.measures import FRAME, Marker, Measure, joint_coordinate
-from ..model.model import ZERO, Array, Constraint, MechanismSystem, Model
+from ..model.model import ZERO, Constraint, MechanismSystem, Model
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
 

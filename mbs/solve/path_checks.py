@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import InputError
 from .._core import TimeFunction
-from ..model.model import Array, MechanismSystem
+from ..model.model import MechanismSystem
 
 SAMPLES = 2001
 LOOKED_INTO = 5  # intervals between samples, the roughest ones

@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, Booleans, ComplexArray
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
 from ..model.measures import Measure
-from ..model.model import ZERO, Array, Constraint, MechanismSystem, Model
+from ..model.model import ZERO, Constraint, MechanismSystem, Model
 from .initial_state import undeformed_state
 
 MOST_ITERATIONS = 50
@@ -149,13 +149,13 @@ def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:
     return A
 
 
-def zeros(dynamics: LinearDynamics, scale: Array) -> NDArray[np.complex128]:
+def zeros(dynamics: LinearDynamics, scale: Array) -> ComplexArray:
     """Zeros (N, 2n) from motors to path, 1/s, of the equations frozen at each node; the slowest first."""
     s = np.linalg.eigvals(np.array([first_order(dynamics, k, scale) for k in range(len(dynamics.times))]))
-    found: NDArray[np.complex128] = np.take_along_axis(s, np.argsort(np.abs(s), axis=1, kind="stable"), axis=1)
+    found: ComplexArray = np.take_along_axis(s, np.argsort(np.abs(s), axis=1, kind="stable"), axis=1)
     return found
 
 
-def is_unstable(s: NDArray[np.complex128]) -> NDArray[np.bool_]:
+def is_unstable(s: ComplexArray) -> Booleans:
     """Zeros in the right half plane, beyond rounding."""
     return s.real > CENTRE * np.abs(s)

@@ -13,11 +13,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, ComplexArray
 from ...common.errors import SolveError
 from .. import _core
-from ..model.model import Array
 from .collocation import GAUSS, Boundary, Found, Problem, collocate
 from .servo import LinearDynamics, Servo, equilibrium, first_order, is_unstable, linear_dynamics, zeros
 
@@ -45,7 +44,7 @@ class Linearisation:
 
     dynamics: LinearDynamics
     shape: Array
-    zeros: NDArray[np.complex128]  # (N, 2n) 1/s
+    zeros: ComplexArray  # (N, 2n) 1/s
 
     @property
     def times(self) -> Array:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
-from ..model.model import Array, MechanismSystem
+from ..model.model import MechanismSystem
 from .initial_state import State, with_rates
 
 MOST_ITERATIONS = 60

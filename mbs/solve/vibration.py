@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...common.arrays import Array
 from .. import _core
-from ..model.model import Array, MechanismSystem
+from ..model.model import MechanismSystem
 from ..model.planar_body import PlanarBody
 from .initial_state import State
 

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ffrobot.common.arrays import Array
 from ffrobot.common.errors import SolveError
-from ffrobot.mbs.model.model import Array, MechanismSystem
+from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.solve.initial_state import State
 
 MOST_ITERATIONS = 20

@@ -11,16 +11,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from ...common.arrays import Array, Integers
 from ...fe_models.modal_body import ModalBody
 from ..body_surface import AMPLITUDE, drawn_mode
 from ..projection import RIGHT, UP, VIEWER
 from .palette import COLORS
 from .style import ORDERED
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 WIDTH = 7.0  # inches: both columns of a page
 MODES = 6  # that are drawn at most

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from ...results.file import Array, Results
+from ...common.arrays import Array
+from ...results.file import Results
 from ..outline import points_outline
 from .figure_file import FigureRecord
 from .path import draw_paths

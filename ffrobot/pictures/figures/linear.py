@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ...common.arrays import Array
 from ...common.errors import InputError
-from ...results.file import Array, Results
+from ...results.file import Results
 from ...results.linear import read_linear
 from .configurations import body_shape
 from .figure_file import FigureRecord

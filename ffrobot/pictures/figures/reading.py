@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import InputError
-from ...results.file import Array
 
 
 def read_points(path: Path, column: str) -> tuple[Array, Array]:

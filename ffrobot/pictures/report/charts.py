@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...results.file import Array
+from ...common.arrays import Array
 from ..figures.palette import COLORS
 
 MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...results.file import Array, Results
+from ...common.arrays import Array
+from ...results.file import Results
 from ..figures.figure_file import Curve, FigureRecord
 from ..figures.standard import file_name, standard_figures
 from .charts import DASHES, Chart, shades, style

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ...common.arrays import Indices
 from ...common.errors import InputError
 from ..figures.palette import COLORS
-from ..motion import GROUND, BodyMotion, Indices, body_motion, hanging, ordered_bodies, visible_exaggeration
+from ..motion import GROUND, BodyMotion, body_motion, hanging, ordered_bodies, visible_exaggeration
 from ..outline import Outline, body_outline, points_outline
 from .charts import encoded, plain
 from .runs import Run, Target, targets

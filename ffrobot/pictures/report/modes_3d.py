@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...fe_models.modal_body import Floats, Integers, ModalBody
+from ...common.arrays import Array, Indices, Integers
+from ...fe_models.modal_body import ModalBody
 from ..body_surface import AMPLITUDE, body_surface, drawn_mode
 from ..projection import UP, VIEWER
 from .charts import encoded
@@ -31,7 +31,7 @@ def modes_3d(links: Sequence[LinkModes]) -> dict[str, Any]:
     return {"links": entries, "up": UP.tolist(), "viewer": VIEWER.tolist()}
 
 
-def _entry(link: LinkModes, points: Floats, triangles: Integers, shapes: Floats) -> dict[str, Any]:
+def _entry(link: LinkModes, points: Array, triangles: Integers, shapes: Array) -> dict[str, Any]:
     """Points (p, 3) in m, triangles (t, 3), and modes (m, p, 3) of which the largest displacement is 1."""
     body, (kept, triangles) = link.body, coarsened(points, triangles)
     count = min(body.mode_count, MODES)
@@ -56,7 +56,7 @@ def _triangles(cells: Integers) -> Integers:
     return cells if cells.shape[1] == 3 else np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
 
 
-def coarsened(points: Floats, triangles: Integers, limit: int = MAX_TRIANGLES) -> tuple[NDArray[np.intp], Integers]:
+def coarsened(points: Array, triangles: Integers, limit: int = MAX_TRIANGLES) -> tuple[Indices, Integers]:
     """Which of many points (p, 3) remain, and triangles (at most `limit`, 3) on those.
 
     Points in the same box of a grid become the one nearest to their mean (vertex clustering: Rossignac & Borrel, 1993),
@@ -76,7 +76,7 @@ def coarsened(points: Floats, triangles: Integers, limit: int = MAX_TRIANGLES) -
     return used[found[0]], found[1]
 
 
-def _clustered(points: Floats, triangles: Integers, size: Floats) -> tuple[NDArray[np.intp], Integers]:
+def _clustered(points: Array, triangles: Integers, size: Array) -> tuple[Indices, Integers]:
     """Points that remain with boxes of `size` (3,), and the triangles whose corners stay apart."""
     box = np.floor((points - points.min(axis=0)) / np.where(size > 0.0, size, 1.0)).astype(np.int64)
     cluster = np.unique(box, axis=0, return_inverse=True)[1].ravel()

@@ -8,9 +8,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from ... import __version__
 from ...common.errors import InputError, SolveError
 from ...common.files import write_atomically
+from ...common.version import program_version
 from ...results.file import Results
 from .histories import history_charts
 from .mechanism import mechanism
@@ -55,7 +55,7 @@ def report(files: Sequence[Results]) -> str:
         modes_3d_js=(HERE / "modes_3d.js").read_text(encoding="utf-8"),
         mechanism_js=(HERE / "mechanism.js").read_text(encoding="utf-8"),
         page_css=(HERE / "page.css").read_text(encoding="utf-8"),
-        ffrobot_version=__version__,
+        ffrobot_version=program_version(),
     )
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...results.file import Array, Results
+from ...common.arrays import Array
+from ...results.file import Results
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...results.file import Array, Results
+from ...common.arrays import Array
+from ...results.file import Results
 from .histories import path_error
 from .runs import Run, sources, targets
 

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...common.arrays import Array, Indices, Integers
 from ...common.errors import InputError
-from ...fe_models.modal_body import Integers, ModalBody
+from ...fe_models.modal_body import ModalBody
 from ...mbs.quantities.stress import von_mises
-from ...results.file import Array, Results
+from ...results.file import Results
 from ..body_surface import body_surface
-from ..motion import BodyMotion, Indices, body_motion, carried, ordered_bodies, rotated
+from ..motion import BodyMotion, body_motion, carried, ordered_bodies, rotated
 from ..outline import points_outline
 from .vtkhdf import Grid
 

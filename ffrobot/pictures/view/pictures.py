@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.errors import SolveError
-from ...results.file import Array
 from ..body_surface import drawn_mode
 from ..projection import RIGHT, UP, VIEWER
 

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ...common.arrays import Indices
 from ...common.errors import InputError, SolveError
 from ...common.files import check_folder, write_atomically
 from ...common.validation import did_you_mean
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from ..figures.standard import file_name
-from ..motion import Indices, visible_exaggeration
+from ..motion import visible_exaggeration
 from .grids import modes_grid, results_grid
 from .pictures import Picture, draw_pictures
 from .vtkhdf import Grid, vtkhdf_image

@@ -13,8 +13,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ...fe_models.modal_body import Integers
-from ...results.file import Array
+from ...common.arrays import Array, Integers
 
 # VTK's number of the cell with so many corners: vertex, line, triangle, quadrilateral.
 CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
