@@ -5,13 +5,13 @@ Run and compare on a quiet machine:
     .venv/bin/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only
     … --benchmark-autosave, later --benchmark-compare
 
-In the ordinary test run (--benchmark-disable, see pyproject.toml) each runs once, and the ratios are checked: bounds are
-two to three times what was measured, so that a slip in an algorithm is found and a busy machine is not.
+In the ordinary test run (--benchmark-disable, see pyproject.toml) each runs once, and the ratios are checked: bounds
+are two to three times what was measured, so that a slip in an algorithm is found and a busy machine is not.
 
 * right-hand side: accelerations and multipliers of the two-link model, 26 coordinates and 6 constraints; the time is
   that of 1000 evaluations (milliseconds there are microseconds each). Aim: 1 µs each.
-* pcid: one second of the two-link model at tolerance 1e-6. Aim: under 0.5 s. An evaluation in the run, with what the integrator
-  does to it, takes 2.3 times a bare one.
+* pcid: one second of the two-link model at tolerance 1e-6. Aim: under 0.5 s. An evaluation in the run, with what the
+  integrator does to it, takes 2.3 times a bare one.
 * process: `ffrobot solve` with the inverse analysis only and modal files up to date, from start to exit; extra_info has
   what is left after taking off the solver's own wall_seconds. Aim: 0.5 s left; 3 times the import of its libraries.
 * fcid: 1000 outputs of the two-link model with straight links, and with sagging ones; extra_info has the solver's

@@ -1,15 +1,10 @@
 """`mpirun -n 2 ffrobot link` makes the file that one process makes."""
 
 import subprocess
-import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "fe_models"))
-
 from solids import write_solid
 
 

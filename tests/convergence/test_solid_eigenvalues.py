@@ -1,15 +1,9 @@
 """NAFEMS benchmarks (formulation.md, section 11) with solids, refined; the paper's links against Timoshenko's beam."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import eigsh
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "fe_models"))
-
 from solids import body_of, model_of, write_solid
 
 from ffrobot.fe_models.beam.link import beam_modal_body
