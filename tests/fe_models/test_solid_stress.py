@@ -14,13 +14,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.fe_models.link_records import Material
+from ffrobot.fe_models.link_records import Material, SurfacePatches
 from ffrobot.fe_models.solid.constitutive import stiffness
 from ffrobot.fe_models.solid.strains import locate, pulled_back
 from ffrobot.fe_models.solid.stress import point_stresses, surface_stresses
 from ffrobot.fe_models.solid.surface_patches import outlined_patches
 from ffrobot.mesh.compat import create_solid_mesh, geometry_nodes, lagrange_space
-from ffrobot.mesh.records import SurfacePatches
 
 E, NU = 2.0e11, 0.3
 C = stiffness(Material(youngs_modulus=E, poissons_ratio=NU, density=7850.0))
