@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import InputError, SolveError
-from ..mbs.model.model import MechanismSystem, Model
+from ..mbs.model.model import Model
 from ..mbs.model.planar_body import PlanarBody
+from ..mbs.model.system import MechanismSystem
 from ..mbs.solve.initial_state import undeformed_state
 from .evaluation import State
 

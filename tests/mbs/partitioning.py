@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ffrobot.common.arrays import Array
 from ffrobot.common.errors import SolveError
-from ffrobot.mbs.model.model import MechanismSystem
-from ffrobot.mbs.solve.initial_state import State
+from ffrobot.mbs.model.system import MechanismSystem
+from ffrobot.mbs.solve.state import State
 
 MOST_ITERATIONS = 20
 TOLERANCE = 1e-13

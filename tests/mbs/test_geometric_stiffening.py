@@ -9,8 +9,8 @@ from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
-from ffrobot.mbs.model.geometric_stiffening import estimated_effect
 from ffrobot.mbs.quantities.observation import energies, point_motion
+from ffrobot.mbs.quantities.stiffening import estimated_effect
 
 # Wu and Haug's spin-up (formulation.md, section 11)
 LENGTH, MASS, EI, SPEED, RISE = 8.0, 8.0 * 0.2019, 566.6, 4.0, 15.0

@@ -8,7 +8,7 @@ from mechanisms import always, make_model, pcid, relative, revolute
 from ffrobot.mbs.analysis.analyses import run_pcid
 from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.quantities.observation import joint_forces, trajectory_force
-from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.scene.bodies import RigidBody
 
 G = 9.81
 
