@@ -140,7 +140,7 @@ def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> A
 
 
 def canonical(fields: Array) -> Array:
-    """`fields` (6, k, n) with the sign of each mode as formulation.md, section 1, wants it.
+    """`fields` (6, k, n) with the sign of each mode made definite.
 
     The dominant translation is positive at the station nearest the root where it exceeds half its largest value; of a
     mode without translation, the twist.

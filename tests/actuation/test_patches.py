@@ -33,7 +33,7 @@ def tip_deflection(planar, array, voltage):
 
 
 def test_moment_per_volt(cantilever):
-    np.testing.assert_allclose(patches(cantilever(10)).moment_per_volt, 1.364344e-3, rtol=1e-6)  # formulation, sec. 9
+    np.testing.assert_allclose(patches(cantilever(10)).moment_per_volt, 1.364344e-3, rtol=1e-6)  # c of docs/theory.md
     np.testing.assert_allclose(patches(cantilever(10)).moment_per_volt, C, rtol=1e-12)
 
 
