@@ -110,6 +110,12 @@ def quoted(words: Iterable[str]) -> str:
     return ", ".join(f'"{word}"' for word in words) or "none"
 
 
+def either(words: Iterable[str]) -> str:
+    """`"a", "b" or "c"`."""
+    *first, last = (f'"{word}"' for word in words)
+    return f"{', '.join(first)} or {last}" if first else last
+
+
 class _Problem(NamedTuple):
     key: str
     expected: str
@@ -149,8 +155,7 @@ _EXPECTED = {
     "greater_than_equal": "a number of at least {ge:g}",
     "less_than": "a number less than {lt:g}",
     "less_than_equal": "a number of at most {le:g}",
-    "union_tag_invalid": "one of {expected_tags}",
-    "union_tag_not_found": "a table with the key {discriminator}",
+    "union_tag_invalid": "{expected_tags}",
 }
 
 
@@ -160,6 +165,14 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
     key = key_path(loc, data, kind)
     if kind == "value_error":
         return _Problem(key, str(context["error"]), "")
+    if kind in ("extra_forbidden", "missing") and (alternative := _alternative(record, loc)) is not None:
+        table = key_path(loc[:-1], data)
+        (tag_key, tag), others = alternative
+        if kind == "missing":
+            return _Problem(table, f'expected the key "{loc[-1]}" in {tag_key} = "{tag}"', ", found none")
+        if others:
+            expected = f'expected the key "{loc[-1]}" only in {tag_key} = {either(others)}'
+            return _Problem(table, expected, f', found {tag_key} = "{tag}"')
     if kind == "extra_forbidden":
         known = _known_keys(record, loc[:-1])
         return _Problem(
@@ -172,9 +185,12 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
     if kind == "missing":
         return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
     found = item["input"]
-    if kind == "union_tag_invalid":
-        key = f"{key}.{context['discriminator']}".replace("'", "")
-        found = context["tag"]
+    if kind.startswith("union_tag"):
+        inside = ": " if isinstance(loc[-1], int) else "."
+        key = f"{key}{inside}{context['discriminator']}".replace("'", "")
+        if kind == "union_tag_not_found":
+            return _Problem(key, f"expected {_EXPECTED['missing']}", ", found none")
+        found, context = context["tag"], context | {"expected_tags": _in_words(context["expected_tags"])}
     template = _EXPECTED.get(kind)
     expected = template.format_map(context) if template else item["msg"].removeprefix("Input should be ")
     expected = expected.replace("'", '"')  # as TOML writes it
@@ -217,6 +233,16 @@ def _label(table: dict[str, Any], index: int) -> str:
 
 def _known_keys(record: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
     """The keys of the table at `loc`."""
+    return list(dict.fromkeys(key for candidate in _records_at(record, loc) for key in _keys(candidate)))
+
+
+def _keys(record: type[BaseModel]) -> list[str]:
+    """As files have them."""
+    return [field.alias or name for name, field in record.model_fields.items()]
+
+
+def _records_at(record: type[BaseModel], loc: Sequence[int | str]) -> list[type[BaseModel]]:
+    """What the table at `loc` may be."""
     candidates = [record]
     for part in loc:
         if not isinstance(part, str):
@@ -225,9 +251,36 @@ def _known_keys(record: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
             model for c in candidates if part in c.model_fields for model in _models(c.model_fields[part].annotation)
         ]
         # A part that is no key tells which alternative of a union was taken.
-        tagged = [c for c in candidates if any(part in get_args(f.annotation) for f in c.model_fields.values())]
+        tagged = [c for c in candidates if _tag_key(c, part) is not None]
         candidates = inner or tagged or candidates
-    return list(dict.fromkeys(field.alias or name for c in candidates for name, field in c.model_fields.items()))
+    return candidates
+
+
+def _tag_key(record: type[BaseModel], tag: str) -> str | None:
+    """The key whose only value in this alternative of a union is `tag`."""
+    return next((name for name, field in record.model_fields.items() if get_args(field.annotation) == (tag,)), None)
+
+
+def _alternative(record: type[BaseModel], loc: Sequence[int | str]) -> tuple[tuple[str, str], list[str]] | None:
+    """Of a key at `loc` in a table whose kind tells its keys: (key of the kind, kind), and the kinds that have the key.
+
+    None where the table is of no such kind.
+    """
+    *place, tag, key = loc if len(loc) > 1 else (0, 0)
+    if not isinstance(tag, str):
+        return None
+    kinds = _records_at(record, place)
+    tag_key = next((found for kind in kinds if (found := _tag_key(kind, tag)) is not None), None)
+    if tag_key is None or len(kinds) < 2:
+        return None
+    others = [kind for kind in kinds if key in _keys(kind)]
+    return (tag_key, tag), [get_args(kind.model_fields[tag_key].annotation)[0] for kind in others]
+
+
+def _in_words(tags: str) -> str:
+    """`'a', 'b' or 'c'` for pydantic's list of them."""
+    *first, last = tags.split(", ")
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def _models(annotation: object) -> list[type[BaseModel]]:

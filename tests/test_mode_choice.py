@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.scene.load import make_scene
 from ffrobot.present.summary import print_summary, summary_console
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.mode_choice import ErrorEstimate, difference, reported
-from ffrobot.run.solution import solve
+from ffrobot.run.solve import solve
+from ffrobot.scene.load import make_scene
 
 CASE = Path(__file__).parents[1] / "cases" / "two_link"
 S = "(10*t**3-15*t**4+6*t**5)"  # from rest to rest with zero acceleration at both ends

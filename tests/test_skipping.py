@@ -13,9 +13,10 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.analysis import fcid
 from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.model.planar_body import core_arguments, vanishing_terms
-from ffrobot.mbs.scene.load import make_scene
 from ffrobot.results.write import results_image
-from ffrobot.run.solution import prepare, solve
+from ffrobot.run.prepare import prepare
+from ffrobot.run.solve import solve
+from ffrobot.scene.load import make_scene
 
 LINK = """
 name = "{name}"
@@ -120,7 +121,7 @@ def test_algebraic_analyses_integrate_nothing(folder, monkeypatch):
     analysis = {"name": "stiff", "kind": "fcid", "shape": "static", "end": 0.1, "output_step": 0.01}
     solution = solve(arm(folder, "bending", analysis=[analysis]))
     outcome = solution.outcomes["stiff"]
-    assert outcome.steps == outcome.evaluations == 0
+    assert outcome.statistics.steps == outcome.statistics.evaluations == 0
     assert outcome.q.shape[0] == 11
     assert np.abs(outcome.lambda_).max() > 1.0
     assert "integration of stiff, algebraic" in solution.skipped
@@ -130,10 +131,10 @@ def test_only_runs_that_are_replayed_are_recorded(folder):
     run = {"kind": "pcid", "end": 0.02, "output_step": 0.01, "tolerance": 1e-4}
     forward = {"name": "back", "kind": "forward", "actuation": "first", "apply": "joints"}
     solution = solve(arm(folder, "bending", analysis=[run | {"name": "first"}, run | {"name": "second"}, forward]))
-    assert solution.outcomes["first"].recording is not None
-    assert solution.outcomes["second"].recording is None
-    assert not solution.stresses["first"]  # the modal body file has no modal stresses
-    assert not solution.voltages["first"]  # no patches
+    assert solution.outcomes["first"].continuation.recording is not None
+    assert solution.outcomes["second"].continuation.recording is None
+    assert not solution.analyses["first"].stresses  # the modal body file has no modal stresses
+    assert not solution.analyses["first"].voltages  # no patches
 
 
 def test_no_analysis_loads_finite_elements_or_plotting(folder):

@@ -11,8 +11,8 @@ from ...common.arrays import Array
 from ...mbs import _core
 from ...mbs.model.measures import Marker, Measure, joint_coordinate
 from ...mbs.model.model import MechanismSystem, Model
-from ...mbs.scene.loop_records import PERMITTIVITY, Sensor
 from ..patches.patches import PatchArray
+from .records import PERMITTIVITY, Sensor
 
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 

@@ -18,7 +18,7 @@ from ...common.arrays import Array, Indices
 
 if TYPE_CHECKING:
     from ...fe_models.modal_body import ModalBody
-    from ..analysis.analyses import Outcome
+    from ..analysis.outcome import Outcome
 
 NEGLIGIBLE = 1e-12
 NOTABLE = 0.01  # relative change of a mode's stiffness from which on the summary warns, and "auto" switches it on

@@ -8,8 +8,8 @@ import numpy as np
 
 from .. import _core
 from ..fields.field_types import GROUND, split_point
+from ..scene.mechanism import MechanismKeys, MechanismScene
 from ..scene.mechanism_records import Joint, Trajectory
-from ..scene.scene import Scene, SceneKeys
 
 FRAME = ""  # instead of a point's name: the frame of the body itself
 
@@ -40,7 +40,7 @@ class Measure:
         return bool(self.kind in (_core.MeasureKind.angle, _core.MeasureKind.gear))
 
 
-def joint_rows(scene: Scene, joint: Joint) -> tuple[Measure, ...]:
+def joint_rows(scene: MechanismScene, joint: Joint) -> tuple[Measure, ...]:
     """The constraints C_m of a joint. Welds and prismatic joints keep the relative angle of the initial guess."""
     a, b = (_end(side, joint.at) for side in joint.between)
     label = f'joint "{joint.name}"'
@@ -55,7 +55,7 @@ def joint_rows(scene: Scene, joint: Joint) -> tuple[Measure, ...]:
     return (Measure(f"{label}, across the axis", _core.MeasureKind.slide, a, b, direction=(-y, x)), aligned)
 
 
-def joint_coordinate(scene: Scene, joint: Joint) -> Measure:
+def joint_coordinate(scene: MechanismScene, joint: Joint) -> Measure:
     """The joint's own coordinate: angle of the second on the first (as `motors` defines it), or way along the axis."""
     a, b = (_end(side, joint.at) for side in joint.between)
     label = f'joint "{joint.name}"'
@@ -66,7 +66,7 @@ def joint_coordinate(scene: Scene, joint: Joint) -> Measure:
     return Measure(f"{label}, angle", _core.MeasureKind.angle, a, b)
 
 
-def trajectory_rows(scene: Scene, trajectory: Trajectory) -> dict[str, Measure]:
+def trajectory_rows(scene: MechanismScene, trajectory: Trajectory) -> dict[str, Measure]:
     """The specified-trajectory constraints C_s by component ("x", "y" or "value"); their values equal the target."""
     label, ground = f'trajectory "{trajectory.name}"', Marker(None)
     if trajectory.joint is not None:
@@ -81,7 +81,7 @@ def trajectory_rows(scene: Scene, trajectory: Trajectory) -> dict[str, Measure]:
     return {c: Measure(f"{label}, {c}", getattr(_core.MeasureKind, c), ground, end) for c in trajectory.components}
 
 
-def is_open_chain(scene: SceneKeys) -> bool:
+def is_open_chain(scene: MechanismKeys) -> bool:
     """Whether the joints form trees: no joint closes a loop."""
     part_of = {name: name for name in (GROUND, *(body.name for body in scene.body))}
 
@@ -98,7 +98,7 @@ def is_open_chain(scene: SceneKeys) -> bool:
     return True
 
 
-def motor_joints(scene: SceneKeys) -> tuple[Joint, ...]:
+def motor_joints(scene: MechanismKeys) -> tuple[Joint, ...]:
     """Joints with a motor: by default all that move in an open chain, and none in a closed loop."""
     default = is_open_chain(scene)
     return tuple(
@@ -110,7 +110,7 @@ def _end(side: str, at: tuple[float, float]) -> Marker:
     return Marker(None, FRAME, at) if side == GROUND else Marker(*split_point(side))
 
 
-def _guessed_angle(scene: Scene, end: Marker) -> float:
+def _guessed_angle(scene: MechanismScene, end: Marker) -> float:
     return 0.0 if end.body is None else scene.initial.angles.get(end.body, 0.0)
 
 

@@ -12,9 +12,9 @@ from ...common.errors import InputError
 from ...common.validation import did_you_mean, quoted
 from .. import _core
 from .._core import StateFunction, TimeFunction
-from ..fields.field_types import GROUND, split_point
+from ..fields.field_types import split_point
+from ..scene.mechanism import MechanismScene
 from ..scene.mechanism_records import Load
-from ..scene.scene import Scene
 from .measures import FRAME, Marker, Measure, joint_coordinate, joint_rows, motor_joints, trajectory_rows
 from .planar_body import PlanarBody, PlanarPoint, core_arguments
 from .transmissions import Friction, Gear, joint_frictions, joint_rotors
@@ -46,7 +46,7 @@ class ModalLoad:
 class Model:
     """A scene with its bodies: everything analyses share."""
 
-    scene: Scene
+    scene: MechanismScene
     bodies: tuple[PlanarBody, ...]
     modal_loads: tuple[ModalLoad, ...]
     joints: tuple[Constraint, ...]
@@ -73,7 +73,7 @@ class Model:
         return 3 * len(self.bodies) - len(self.joints) - len(self.gears)
 
 
-def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequence[ModalLoad] = ()) -> Model:
+def build_model(scene: MechanismScene, bodies: Sequence[PlanarBody], modal_loads: Sequence[ModalLoad] = ()) -> Model:
     """Check every reference of the scene to points of its bodies and lay out rows.
 
     Raises `InputError` when a point does not exist, or named motors do not fit the mechanism.
@@ -104,7 +104,7 @@ def build_model(scene: Scene, bodies: Sequence[PlanarBody], modal_loads: Sequenc
     return model
 
 
-def load_rows(scene: Scene, loads: Sequence[Load]) -> Iterator[tuple[Measure, TimeFunction]]:
+def load_rows(scene: MechanismScene, loads: Sequence[Load]) -> Iterator[tuple[Measure, TimeFunction]]:
     """Directions of given loads and their sizes."""
     kinds = {"x": _core.MeasureKind.x, "y": _core.MeasureKind.y, "moment": _core.MeasureKind.angle}
     joints = {joint.name: joint for joint in scene.joint}
@@ -121,39 +121,29 @@ def load_rows(scene: Scene, loads: Sequence[Load]) -> Iterator[tuple[Measure, Ti
                 )
 
 
-def _state_forces(scene: Scene) -> Iterator[tuple[Marker, StateFunction]]:
+def _state_forces(scene: MechanismScene) -> Iterator[tuple[Marker, StateFunction]]:
     for load in scene.load:
         if load.point is not None and load.force is not None:
             yield Marker(*split_point(load.point)), load.force
 
 
-def _check_points(scene: Scene, bodies: dict[str, PlanarBody]) -> None:
+def _check_points(scene: MechanismScene, bodies: dict[str, PlanarBody]) -> None:
     """Raise `InputError` for a reference to a point that its body has not."""
-    references = [(f'joint "{joint.name}": between', side) for joint in scene.joint for side in joint.between]
-    references += [(f'trajectory "{t.name}": point', t.point) for t in scene.trajectory if t.point]
-    references += [(f'trajectory "{t.name}": angle', t.angle) for t in scene.trajectory if t.angle and "." in t.angle]
-    references += [("load: point", load.point) for load in scene.load if load.point]
-    for analysis in scene.analysis:
-        key = f'analysis "{analysis.name}"'
-        references += [(f"{key}: sensor: point", sensor.point) for sensor in analysis.sensor if sensor.point]
-        references += [(f"{key}: disturbance: point", load.point) for load in analysis.disturbance if load.point]
-        references += [(f"{key}: tip", analysis.tip)] if analysis.tip else []
-    references += [(f'analysis "{a.name}": points', point) for a in scene.analysis for point in a.points or ()]
-    for key, reference in references:
-        if reference == GROUND:
+    for reference in scene.references():
+        if not reference.needs_marker or reference.body_and_point is None:
             continue
-        body, point = split_point(reference)
+        body, point = reference.body_and_point
         known = bodies[body].points
         if point not in known:
             raise InputError(
-                f'{scene.path}: {key}: expected a point of "{body}" ({quoted(known)}), found "{reference}"'
-                + did_you_mean(point, known)
+                f'{scene.path}: {reference.key}: expected a point of "{body}" ({quoted(known)}), found'
+                f' "{reference.name}"{did_you_mean(point, known)}'
             )
         stiffening = bodies[body].stiffening
         if stiffening is not None and point not in stiffening.K_points:
             raise InputError(
-                f"{scene.path}: {key}: expected, with geometric_stiffening, a point whose loads' geometric stiffness is"
-                f' in the modal body file ({quoted(stiffening.K_points)}), found "{reference}"'
+                f"{scene.path}: {reference.key}: expected, with geometric_stiffening, a point whose loads' geometric"
+                f' stiffness is in the modal body file ({quoted(stiffening.K_points)}), found "{reference.name}"'
             )
 
 

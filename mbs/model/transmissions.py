@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from .. import _core
+from ..scene.mechanism import MechanismScene
 from ..scene.mechanism_records import Joint
-from ..scene.scene import Scene
 from .measures import Marker, Measure, joint_coordinate
 
 
@@ -20,7 +20,7 @@ class Friction:
     speed: float
 
 
-def joint_rotors(scene: Scene) -> Iterator[tuple[Measure, float]]:
+def joint_rotors(scene: MechanismScene) -> Iterator[tuple[Measure, float]]:
     """Rows whose rate u is that of a rotor, and the inertia J of its kinetic energy ½ J u².
 
     A rotor on the first body a of a joint turns at N α̇_b − (N − 1) α̇_a behind a gear of ratio N (Spong 1987 neglects
@@ -59,20 +59,20 @@ class Gear:
     coordinate: Measure
 
 
-def joint_gears(scene: Scene) -> Iterator[Gear]:
+def joint_gears(scene: MechanismScene) -> Iterator[Gear]:
     """The gears that give."""
     for joint in scene.joint:
         if joint.stiffness is not None:
             yield _gear(scene, joint, joint.stiffness)
 
 
-def _gear(scene: Scene, joint: Joint, stiffness: float) -> Gear:
+def _gear(scene: MechanismScene, joint: Joint, stiffness: float) -> Gear:
     row, N, rotor = joint_coordinate(scene, joint), joint.gear_ratio, f"{joint.name}/rotor"
     motor = Measure(f'motor of joint "{joint.name}"', _core.MeasureKind.gear, row.a, Marker(rotor), (1.0, 1 / N))
     return Gear(joint.name, rotor, N, joint.rotor_inertia, stiffness, joint.damping, motor, row)
 
 
-def joint_frictions(scene: Scene) -> Iterator[tuple[Measure, Friction]]:
+def joint_frictions(scene: MechanismScene) -> Iterator[tuple[Measure, Friction]]:
     """The joint coordinates on which friction acts."""
     for joint in scene.joint:
         if joint.viscous_friction or joint.coulomb_friction:

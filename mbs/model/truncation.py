@@ -13,7 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..fields.field_types import GROUND, split_point
-from ..scene.scene import SceneKeys
+from ..scene.mechanism import MechanismKeys
 from .planar_body import PlanarBody, Reduction, transformed
 
 IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is rounding
@@ -48,7 +48,7 @@ def modes_kept(body: PlanarBody) -> str:
     return f"{lowest} of {body.reduction.whole.n_modes} modes{shapes}"
 
 
-def loaded_points(scene: SceneKeys, body: str) -> list[str]:
+def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
     """Points of a body at which joints, trajectories and loads of the scene act."""
     sides = [side for joint in scene.joint for side in joint.between]
     sides += [reference for t in scene.trajectory for reference in (t.point, t.angle) if reference is not None]

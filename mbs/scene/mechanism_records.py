@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -26,6 +27,7 @@ from ..fields.field_types import (
     present,
     split_point,
 )
+from ..fields.references import Reference, marker_reference
 from ..fields.state_forces import state_function
 
 
@@ -239,6 +241,12 @@ class Load(Record):
         if self.force is not None and len(found) > 1:
             raise ValueError(f'expected "force" alone beside "point", found {quoted(found)}')
         return self
+
+    def references(self) -> Iterator[Reference]:
+        """Where it acts."""
+        yield from marker_reference("point", self.point, loaded=True)
+        if self.joint is not None:
+            yield Reference("joint", self.joint, "joint")
 
     @property
     def components(self) -> dict[str, TimeFunction]:

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 from oracle import Mechanism
 
+from ffrobot.mbs.analysis.forward import Forward
+from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.model.model import MechanismSystem, build_model
-from ffrobot.mbs.scene.analysis_records import Analysis
-from ffrobot.mbs.scene.scene import Scene
+from ffrobot.scene.scene import Scene
 
 PLACEHOLDER = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # the bodies themselves are passed beside the scene
 
@@ -30,11 +31,11 @@ def make_model(bodies, modal_loads=(), **keys):
 
 
 def pcid(name="inverse", end=1.0, output_step=0.01, **keys):
-    return Analysis(name=name, kind="pcid", end=end, output_step=output_step, **keys)
+    return Pcid(name=name, kind="pcid", end=end, output_step=output_step, **keys)
 
 
 def forward(name="forward", end=1.0, output_step=0.01, **keys):
-    return Analysis(name=name, kind="forward", end=end, output_step=output_step, **keys)
+    return Forward(name=name, kind="forward", end=end, output_step=output_step, **keys)
 
 
 def revolute(name, first, second, **keys):

@@ -7,7 +7,8 @@ from links import arm, arm_links
 from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
 from scipy.integrate import simpson
 
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.quantities.observation import energies
 
 OUTPUT_STEP = 2.5e-4  # fine enough that Simpson's rule errs by less than 1e-10 here

@@ -5,7 +5,7 @@ import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic
 from mechanisms import always, make_model, pcid, relative, revolute
 
-from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.quantities.observation import joint_forces, trajectory_force
 from ffrobot.mbs.scene.mechanism_records import RigidBody

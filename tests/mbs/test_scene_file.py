@@ -8,7 +8,7 @@ import pytest
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.fields.field_types import split_point
-from ffrobot.mbs.scene.load import load_scene
+from ffrobot.scene.load import load_scene
 
 SCENE = """
 name = "two_link"

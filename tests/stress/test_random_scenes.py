@@ -8,7 +8,8 @@ from links import arm, quintic, ritz_link
 from mechanisms import always, assemble, forward, oracle_of, pcid, random_state, relative
 from test_forward import FULL
 
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 
 GROUP = "Random scenes"
 SCENES = 40

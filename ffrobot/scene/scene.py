@@ -2,45 +2,40 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import Field
+from ..actuation.patches.records import PztLayout
+from ..actuation.points import ActuationPoints
+from ..mbs.fields.field_types import NotEmpty
+from ..mbs.fields.references import Reference, under
+from ..mbs.scene.mechanism import MechanismKeys, MechanismScene
+from .kinds import Analysis
 
-from ...common.validation import Record
-from ..fields.field_types import NotEmpty, Vector2
-from .actuator_records import ActuationPoints, PztLayout
-from .analysis_records import Analysis
-from .mechanism_records import Body, Initial, Joint, Load, Payload, Trajectory
 
-
-class SceneKeys(Record):
+class SceneKeys(MechanismKeys):
     """Everything a scene file may contain; lists of tables keep the singular name they have in the file.
 
     `geometric_stiffening` "auto": where the loads of a run change the stiffness of a mode by more than 1 %.
     """
 
-    name: Annotated[str, Field(min_length=1)]
-    space: Literal["planar", "spatial"] = "planar"
-    gravity: Vector2
-    motors: Literal["section", "frame"] = "section"
-    geometric_stiffening: bool | Literal["auto"] = False
-    body: Annotated[tuple[Body, ...], NotEmpty]
-    joint: tuple[Joint, ...] = ()
-    trajectory: tuple[Trajectory, ...] = ()
     pzt: tuple[PztLayout, ...] = ()
     actuation_points: tuple[ActuationPoints, ...] = ()
-    load: tuple[Load, ...] = ()
-    payload: tuple[Payload, ...] = ()
-    initial: Initial = Initial()
     analysis: Annotated[tuple[Analysis, ...], NotEmpty]
 
+    def references(self) -> Iterator[Reference]:
+        """All that records of the scene refer to, with their full keys."""
+        yield from super().references()
+        for layout in self.pzt:
+            yield from under(f'pzt "{layout.body}"', layout.references())
+        for points in self.actuation_points:
+            yield from under(f'actuation_points "{points.body}"', points.references())
+        for analysis in self.analysis:
+            yield from under(f'analysis "{analysis.name}"', analysis.references())
 
-class Scene(SceneKeys):
+
+class Scene(SceneKeys, MechanismScene):
     """A validated scene, with the absolute `path` of its file and the raw `text` that results files carry."""
-
-    path: Path
-    text: str
 
     def __repr__(self) -> str:
         names = {
