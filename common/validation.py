@@ -166,7 +166,7 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
     if kind == "value_error":
         return _Problem(key, str(context["error"]), "")
     if kind in ("extra_forbidden", "missing") and (alternative := _alternative(record, loc)) is not None:
-        table = key_path(loc[:-1], data)
+        table = key_path(loc[:-1], data, kind="")
         (tag_key, tag), others = alternative
         if kind == "missing":
             return _Problem(table, f'expected the key "{loc[-1]}" in {tag_key} = "{tag}"', ", found none")

@@ -94,9 +94,7 @@ def _tip_error(outcome: Outcome, source: Outcome, point: str) -> Array:
     for trajectory in outcome.assembly.model.scene.trajectory:
         if trajectory.point == point:  # held where it is before the path and after it
             for component, target in trajectory.components.items():
-                place[:, "xy".index(component)] = target.sample(np.clip(outcome.time, 0.0, outcome.analysis.last_time))[
-                    0
-                ]
+                place[:, "xy".index(component)] = target.sample(on_path)[0]
     error: Array = point_motion(outcome, point).position - place
     return error
 

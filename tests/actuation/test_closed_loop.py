@@ -70,7 +70,8 @@ def test_a_sampled_loop_is_its_exact_discrete_model(delay, resolution):
     source = run_pcid(solution.model, inverse, True, lambda _: True)
     source.v[0, 2] = 0.3  # the run starts from here
     start, source.v[1:, 2] = 0.3, 0.0
-    outcome, record = run_closed_loop(solution.model, analysis, source, {}, lambda _: True)
+    outcome = run_closed_loop(solution.model, analysis, source, {}, lambda _: True)
+    record = outcome.details
     assert outcome.status == "completed"
 
     A, B = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1 / INERTIA]])

@@ -328,7 +328,7 @@ def test_split_point():
 
 
 def test_import_stays_light():
-    code = "import sys, ffrobot.mbs.scene.load; print(*sys.modules)"
+    code = "import sys, ffrobot.scene.load; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert "ffrobot.mbs.scene.load" in loaded
+    assert "ffrobot.scene.load" in loaded
     assert not {"scipy", "h5py", "dolfinx", "gmsh", "petsc4py", "mpi4py", "matplotlib", "rich"} & set(loaded)
