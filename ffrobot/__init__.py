@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .common.errors import FfrobotError, InputError, SolveError
     from .fe_models.modal_body import ModalBody
     from .results.file import Results
+    from .run.watcher import Watcher
     from .scene.load import make_scene
     from .scene.scene import Scene
 
@@ -43,6 +44,7 @@ _HOME = {
     "make_scene": ".scene.load",
     "Scene": ".scene.scene",
     "Results": ".results.file",
+    "Watcher": ".run.watcher",
 }
 
 __all__ = [
@@ -52,6 +54,7 @@ __all__ = [
     "Results",
     "Scene",
     "SolveError",
+    "Watcher",
     "load_scene",
     "make_link",
     "make_scene",
