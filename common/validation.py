@@ -25,6 +25,19 @@ class Record(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
+    @classmethod
+    def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
+        """What to say of a key that only `others` of the records have that may stand in the place of this one.
+
+        Nothing where it is to be called an unknown key.
+        """
+        return ""
+
+    @classmethod
+    def demand_key(cls, key: str) -> str:
+        """What to say where `key` is missing; nothing where the general words do."""
+        return ""
+
 
 R = TypeVar("R", bound=Record)
 
@@ -155,7 +168,6 @@ _EXPECTED = {
     "greater_than_equal": "a number of at least {ge:g}",
     "less_than": "a number less than {lt:g}",
     "less_than_equal": "a number of at most {le:g}",
-    "union_tag_invalid": "{expected_tags}",
 }
 
 
@@ -165,16 +177,10 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
     key = key_path(loc, data, kind)
     if kind == "value_error":
         return _Problem(key, str(context["error"]), "")
-    if kind in ("extra_forbidden", "missing") and (alternative := _alternative(record, loc)) is not None:
-        table = key_path(loc[:-1], data, kind="")
-        (tag_key, tag), others = alternative
-        if kind == "missing":
-            return _Problem(table, f'expected the key "{loc[-1]}" in {tag_key} = "{tag}"', ", found none")
-        if others:
-            expected = f'expected the key "{loc[-1]}" only in {tag_key} = {either(others)}'
-            return _Problem(table, expected, f', found {tag_key} = "{tag}"')
     if kind == "extra_forbidden":
-        known = _known_keys(record, loc[:-1])
+        if refusal := _refusal(record, loc):
+            return _Problem(key_path(loc[:-1], data, kind=""), refusal, "")
+        known = _known_keys(_alternatives(record, loc[:-1])[0])
         return _Problem(
             key,
             f"expected one of the keys {', '.join(known)}",
@@ -183,21 +189,25 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
     if kind == "missing" and isinstance(loc[-1], int):
         return _Problem(key, "expected a list with more entries", f", found {_show(item['input'])}")
     if kind == "missing":
+        if demand := _demand(record, loc):
+            return _Problem(key_path(loc[:-1], data, kind=""), demand, "")
         return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
     found = item["input"]
-    if kind.startswith("union_tag"):
-        inside = ": " if isinstance(loc[-1], int) else "."
-        key = f"{key}{inside}{context['discriminator']}".replace("'", "")
-        if kind == "union_tag_not_found":
-            return _Problem(key, f"expected {_EXPECTED['missing']}", ", found none")
-        found, context = context["tag"], context | {"expected_tags": _in_words(context["expected_tags"])}
+    if kind == "union_tag_not_found":
+        key = key_path((*loc, context["discriminator"].replace("'", "")), data)
+        return _Problem(key, f"expected {_EXPECTED['missing']}", ", found none")
+    if kind == "union_tag_invalid":
+        tags = context["expected_tags"].replace("'", "").split(", ")
+        key = key_path((*loc, context["discriminator"].replace("'", "")), data)
+        return _Problem(
+            key, f"expected {either(tags)}", f", found {_show(context['tag'])}{did_you_mean(context['tag'], tags)}"
+        )
     template = _EXPECTED.get(kind)
     expected = template.format_map(context) if template else item["msg"].removeprefix("Input should be ")
     expected = expected.replace("'", '"')  # as TOML writes it
     hint = ""
-    if kind in ("literal_error", "union_tag_invalid") and isinstance(found, str):
-        choices = context.get("expected") or context.get("expected_tags", "")
-        hint = did_you_mean(found, choices.replace("'", "").replace(" or ", ", ").split(", "))
+    if kind == "literal_error" and isinstance(found, str):
+        hint = did_you_mean(found, context["expected"].replace("'", "").replace(" or ", ", ").split(", "))
     return _Problem(key, f"expected {expected}", f", found {_show(found)}{hint}")
 
 
@@ -231,19 +241,11 @@ def _label(table: dict[str, Any], index: int) -> str:
     return f'"{name}"' if isinstance(name, str) else f"no. {index + 1}"
 
 
-def _known_keys(record: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
-    """The keys of the table at `loc`."""
-    return list(dict.fromkeys(key for candidate in _records_at(record, loc) for key in _keys(candidate)))
-
-
-def _keys(record: type[BaseModel]) -> list[str]:
-    """As files have them."""
-    return [field.alias or name for name, field in record.model_fields.items()]
-
-
-def _records_at(record: type[BaseModel], loc: Sequence[int | str]) -> list[type[BaseModel]]:
-    """What the table at `loc` may be."""
-    candidates = [record]
+def _alternatives(
+    record: type[BaseModel], loc: Sequence[int | str]
+) -> tuple[list[type[BaseModel]], list[type[BaseModel]]]:
+    """The records that the table at `loc` may be, and all those that may stand there with another tag."""
+    candidates = allowed = [record]
     for part in loc:
         if not isinstance(part, str):
             continue
@@ -251,36 +253,28 @@ def _records_at(record: type[BaseModel], loc: Sequence[int | str]) -> list[type[
             model for c in candidates if part in c.model_fields for model in _models(c.model_fields[part].annotation)
         ]
         # A part that is no key tells which alternative of a union was taken.
-        tagged = [c for c in candidates if _tag_key(c, part) is not None]
+        tagged = [c for c in candidates if any(part in get_args(f.annotation) for f in c.model_fields.values())]
+        allowed = inner or allowed
         candidates = inner or tagged or candidates
-    return candidates
+    return candidates, allowed
 
 
-def _tag_key(record: type[BaseModel], tag: str) -> str | None:
-    """The key whose only value in this alternative of a union is `tag`."""
-    return next((name for name, field in record.model_fields.items() if get_args(field.annotation) == (tag,)), None)
+def _known_keys(records: Iterable[type[BaseModel]]) -> list[str]:
+    """The keys of tables."""
+    return list(dict.fromkeys(field.alias or name for c in records for name, field in c.model_fields.items()))
 
 
-def _alternative(record: type[BaseModel], loc: Sequence[int | str]) -> tuple[tuple[str, str], list[str]] | None:
-    """Of a key at `loc` in a table whose kind tells its keys: (key of the kind, kind), and the kinds that have the key.
-
-    None where the table is of no such kind.
-    """
-    *place, tag, key = loc if len(loc) > 1 else (0, 0)
-    if not isinstance(tag, str):
-        return None
-    kinds = _records_at(record, place)
-    tag_key = next((found for kind in kinds if (found := _tag_key(kind, tag)) is not None), None)
-    if tag_key is None or len(kinds) < 2:
-        return None
-    others = [kind for kind in kinds if key in _keys(kind)]
-    return (tag_key, tag), [get_args(kind.model_fields[tag_key].annotation)[0] for kind in others]
+def _refusal(record: type[BaseModel], loc: Sequence[int | str]) -> str:
+    """What a record itself says of the key at `loc`, which others in its place have."""
+    (taken, *more), allowed = _alternatives(record, loc[:-1])
+    others = [other for other in allowed if issubclass(other, Record) and str(loc[-1]) in _known_keys([other])]
+    return taken.refuse_key(str(loc[-1]), others) if others and not more and issubclass(taken, Record) else ""
 
 
-def _in_words(tags: str) -> str:
-    """`'a', 'b' or 'c'` for pydantic's list of them."""
-    *first, last = tags.split(", ")
-    return f"{', '.join(first)} or {last}" if first else last
+def _demand(record: type[BaseModel], loc: Sequence[int | str]) -> str:
+    """What a record itself says where its key at `loc` is missing."""
+    (taken, *more), _ = _alternatives(record, loc[:-1])
+    return taken.demand_key(str(loc[-1])) if not more and issubclass(taken, Record) else ""
 
 
 def _models(annotation: object) -> list[type[BaseModel]]:

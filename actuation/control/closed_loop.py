@@ -17,10 +17,11 @@ from ...mbs.analysis.outcome import Details, Forces, Outcome
 from ...mbs.analysis.replay import motor_limits, replay_times
 from ...mbs.fields.field_types import NotNegative, PointReference, Positive
 from ...mbs.fields.references import Reference, under
-from ...mbs.model.model import ZERO, MechanismSystem, Model, load_rows
+from ...mbs.model.model import ZERO, Model, load_measures
+from ...mbs.model.system import MechanismSystem
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
-from ...mbs.scene.mechanism_records import Load
-from ...mbs.solve.initial_state import State
+from ...mbs.scene.loads import Load
+from ...mbs.solve.state import State
 from ..context import ActuatedContext
 from ..patches.patches import PatchArray
 from ..patches.voltages import allocation
@@ -178,7 +179,7 @@ def _assembly(
     """The robot with its motors, loads and disturbances, and the rows along which sensors read."""
     loads = model.loads if source.details.loads is None else source.details.loads
     drives = [*((row, ZERO) for row in built.motors.values()), *loads]
-    drives += load_rows(built.scene, analysis.disturbance)
+    drives += load_measures(built.scene, analysis.disturbance)
     return MechanismSystem(built, built.joints, drives, [signal.row for signal in read if signal.row is not None])
 
 

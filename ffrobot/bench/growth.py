@@ -14,8 +14,9 @@ from types import MappingProxyType
 import numpy as np
 
 from ..mbs.analysis.pcid import Pcid, run_pcid
-from ..mbs.model.model import MechanismSystem, build_model
+from ..mbs.model.model import build_model
 from ..mbs.model.planar_body import PlanarBody, PlanarPoint
+from ..mbs.model.system import MechanismSystem
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
 from .evaluation import State, evaluation_seconds

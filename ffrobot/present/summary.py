@@ -15,8 +15,8 @@ from ..actuation.feasibility import Feasibility
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.model.geometric_stiffening import NOTABLE
 from ..mbs.model.truncation import modes_kept
+from ..mbs.quantities.stiffening import NOTABLE
 from ..run.solution import ModeChoice, Solution
 from .control import control_lines, control_tables
 from .tables import plain_table

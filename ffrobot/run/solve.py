@@ -12,7 +12,7 @@ from ..actuation.context import ActuatedContext
 from ..actuation.patches.voltages import allocation, solve_voltages
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import ActuatorSet
-from ..mbs.model.geometric_stiffening import NOTABLE, estimated_effect
+from ..mbs.quantities.stiffening import NOTABLE, estimated_effect
 from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
 from .evaluation import evaluated

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..common.validation import did_you_mean, quoted
 from ..mbs.fields.field_types import GROUND
-from ..mbs.fields.time_functions import check_domain
-from ..mbs.model.measures import motor_joints
+from ..mbs.fields.functions import check_domain
 from ..mbs.scene.analysis import Surroundings
 from .kinds import KINDS, AnyKind
 from .scene import SceneKeys
@@ -81,15 +80,18 @@ def _body_problems(scene: SceneKeys) -> Iterator[str]:
 
 
 def _joint_problems(scene: SceneKeys) -> Iterator[str]:
-    joints = [joint.name for joint in scene.joint]
-    elastic = [joint.name for joint in scene.joint if joint.stiffness is not None]
+    joints = {joint.name: joint for joint in scene.joint}
+    elastic = [name for name, joint in joints.items() if joint.elastic_gear("section")]
+    moving = [name for name, joint in joints.items() if joint.coordinate("section") is not None]
     for reference in scene.references():
-        name = reference.name
+        key, name = reference.key, reference.name
         if reference.kind == "elastic joint" and name not in elastic:
-            yield f'{reference.key}: expected a joint with stiffness ({quoted(elastic)}), found "{name}"'
-        if reference.kind == "joint" and name not in joints:
-            hint = did_you_mean(name, joints)
-            yield f'{reference.key}: expected one of the joints {quoted(joints)}, found "{name}"{hint}'
+            yield f'{key}: expected a joint with stiffness ({quoted(elastic)}), found "{name}"'
+        elif reference.kind == "joint" and name not in joints:
+            yield f'{key}: expected one of the joints {quoted(joints)}, found "{name}"{did_you_mean(name, joints)}'
+        elif reference.kind == "joint" and name not in moving:
+            found = f'"{name}", a {joints[name].type}'
+            yield f"{key}: expected a joint that moves ({quoted(moving)}), found {found}"
 
 
 def _flexible_body_problems(scene: SceneKeys) -> Iterator[str]:
@@ -134,7 +136,7 @@ def _unmet_needs(scene: SceneKeys, analysis: AnyKind) -> Iterator[str]:
     for need in analysis.needs():
         if not getattr(scene, need.table):
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'
-    if analysis.needs_actuators and not motor_joints(scene) and not scene.pzt:
+    if analysis.needs_actuators and not scene.motor_joints and not scene.pzt:
         yield (
             f'kind: expected motors or [[pzt]] for "{analysis.kind}", found neither: nothing to control the robot with'
         )

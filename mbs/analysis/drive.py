@@ -11,11 +11,12 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
-from ..model.model import MechanismSystem
+from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause, lost_inertia
-from ..solve.initial_state import State, undeformed_state
+from ..solve.initial_state import undeformed_state
 from ..solve.integrators import METHODS, Choice, beyond_order, choose_integrator
+from ..solve.state import State
 from ..solve.statics import static_equilibrium
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 
@@ -146,4 +147,4 @@ def resolver_of(assembly: MechanismSystem) -> _core.ActuatorForces | None:
     model = assembly.model
     if not model.trajectories or len(model.motors) != model.degrees_of_freedom:
         return None
-    return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_rows)
+    return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)

@@ -17,12 +17,14 @@ from .. import _core
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name
 from ..fields.references import Reference
-from ..fields.time_functions import spline
-from ..model.model import ZERO, MechanismSystem, Model
+from ..fields.waypoints import spline
+from ..model.model import ZERO, Model
 from ..model.planar_body import PlanarBody
+from ..model.system import MechanismSystem
 from ..scene.analysis import Need, TimedAnalysis
-from ..solve.initial_state import check_reach, undeformed_state
+from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
+from ..solve.reach import check_reach
 from .context import Context
 from .drive import motion_of, resolver_of
 from .elastic_joints import add_transmission

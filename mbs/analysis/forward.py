@@ -11,10 +11,11 @@ from pydantic import model_validator
 from ...common.errors import InputError
 from ...common.validation import either, quoted
 from .. import _core
-from ..model.measures import Marker, Measure
-from ..model.model import ZERO, MechanismSystem, Model
+from ..joints.measure import Marker, Measure
+from ..model.model import ZERO, Model
+from ..model.system import MechanismSystem
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
-from ..solve.initial_state import State
+from ..solve.state import State
 from .context import Context
 from .drive import Progress, drive, initial_state
 from .elastic_joints import drive_sizes, with_compliance, with_rotors
@@ -120,7 +121,7 @@ def applied_actuators(
     Raises `InputError` where the motors do not fit the mechanism, or a body has no actuation points.
     """
     if analysis.apply == "trajectory":
-        return [c.row for c in source.assembly.constraints if c.is_trajectory], [_core.TrajectoryForces(0)]
+        return [c.measure for c in source.assembly.constraints if c.is_trajectory], [_core.TrajectoryForces(0)]
     if analysis.apply == "points":
         return _point_actuators(model, analysis, source, actuator_set)
     if source.tau is None:
@@ -162,6 +163,6 @@ def _point_actuators(
 
 def is_driven(source: Outcome, body: str) -> bool:
     """Whether generalized driving forces Q_a can act on a body: a trajectory or prescribed modes are its own."""
-    trajectories = (c.row for c in source.assembly.constraints if c.is_trajectory)
+    trajectories = (c.measure for c in source.assembly.constraints if c.is_trajectory)
     prescribed = source.details.shape_force is not None and source.assembly.model.body(body).n_modes > 0
     return prescribed or any(body in (row.a.body, row.b.body) for row in trajectories)

@@ -21,12 +21,13 @@ from ...common.errors import InputError
 from .. import _core
 from .._core import TimeFunction
 from ..fields.field_types import NotNegative
-from ..fields.time_functions import spline
-from ..model.measures import Measure
+from ..fields.waypoints import spline
+from ..joints.measure import Measure
 from ..model.model import Model
 from ..scene.analysis import Need, TimedAnalysis, output_times
-from ..solve.initial_state import check_reach, undeformed_state
+from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice
+from ..solve.reach import check_reach
 from ..solve.servo import SINGULAR, Servo, is_unstable, make_servo
 from ..solve.stable_inversion import Inversion, Linearisation, invert, linearise
 from .context import Context

@@ -12,7 +12,8 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.validation import did_you_mean, quoted
 from ..fields.field_types import NotNegative
-from ..model.model import MechanismSystem, Model
+from ..model.model import Model
+from ..model.system import MechanismSystem
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 from ..solve.initial_state import undeformed_state
 from ..solve.linearisation import held_by_motors

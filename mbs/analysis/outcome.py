@@ -12,8 +12,8 @@ from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..model.measures import Measure
-from ..model.model import MechanismSystem
+from ..joints.measure import Measure
+from ..model.system import MechanismSystem
 from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
 
@@ -227,7 +227,7 @@ class Outcome:
         """What turned trajectory forces into motor and modal forces; None where motors do not fit the mechanism."""
         if self.tau is None:
             return None
-        return _core.ActuatorForces(self.assembly.system, self.assembly.is_trajectory, self.assembly.motor_rows)
+        return _core.ActuatorForces(self.assembly.system, self.assembly.is_trajectory, self.assembly.motor_measures)
 
     @property
     def failed(self) -> bool:

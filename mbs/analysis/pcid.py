@@ -6,10 +6,12 @@ from collections.abc import Iterator
 from typing import Literal
 
 from .. import _core
-from ..model.model import MechanismSystem, Model
+from ..model.model import Model
+from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis, Need
-from ..solve.initial_state import check_reach, undeformed_state
+from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
+from ..solve.reach import check_reach
 from .context import Context
 from .drive import Progress, drive, initial_state, resolver_of
 from .elastic_joints import add_transmission

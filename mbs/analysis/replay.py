@@ -34,8 +34,7 @@ class ActuatorSet:
 def motor_limits(model: Model) -> Array:
     """Largest moment (N·m, or N) of each motor, infinite where the scene gives none."""
     joints = {joint.name: joint for joint in model.scene.joint}
-    limits = [joints[name].moment_limit for name in model.motors]
-    return np.array([np.inf if limit is None else limit for limit in limits])
+    return np.array([joints[name].motor_limits.moment for name in model.motors])
 
 
 def actuation_source(source: Outcome) -> _core.ActuationSource:

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from .. import _core
-from ..model.model import MechanismSystem, Model
+from ..model.model import Model
+from ..model.system import MechanismSystem
 from ..scene.analysis import Analysis
 from ..solve.initial_state import undeformed_state
 from ..solve.integrators import METHODS, NOT_INTEGRATED

@@ -39,7 +39,7 @@ class Surroundings(NamedTuple):
     def replayable(self, way: str | None = None) -> str:
         """The kinds whose findings forward runs can apply, in this `way` or in any: `"pcid" or "fcid"`."""
         found = [kind for kind in self.kinds if (way in kind.applicable if way else kind.applicable)]
-        return either(get_args(kind.model_fields["kind"].annotation)[0] for kind in found)
+        return either(kind.kind_name() for kind in found)
 
 
 class Analysis(Record):
@@ -62,6 +62,23 @@ class Analysis(Record):
     takes_actuation: ClassVar[bool] = False  # whether it replays the actuation of its `source`
     applicable: ClassVar[tuple[str, ...]] = ()  # values of `apply` by which forward runs can replay what it finds
     findings: ClassVar[tuple[str, ...]] = ()  # ends before the last time that are results, not failures
+
+    @classmethod
+    def kind_name(cls) -> str:
+        """The value of `kind` of all analyses of this record."""
+        name: str = get_args(cls.model_fields["kind"].annotation)[0]
+        return name
+
+    @classmethod
+    def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
+        """Which kinds have the key."""
+        kinds = either(other.kind_name() for other in others if issubclass(other, Analysis))
+        return f'expected the key "{key}" only in kind = {kinds}, found kind = "{cls.kind_name()}"'
+
+    @classmethod
+    def demand_key(cls, key: str) -> str:
+        """With the kind that has to have the key."""
+        return f'expected the key "{key}" in kind = "{cls.kind_name()}", found none'
 
     @property
     def times(self) -> Array:

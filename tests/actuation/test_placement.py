@@ -13,8 +13,8 @@ from ffrobot.actuation.control.records import Placement
 from ffrobot.actuation.patches.patches import patch_array
 from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.model.planar_body import from_modal_body
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.linearisation import linearise
 

@@ -37,7 +37,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.drive import initial_state
 from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
 from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.model.model import MechanismSystem
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.run.prepare import prepare
 
 INVERSE = '\n[[analysis]]\nname = "inverse"\nkind = "pcid"\nend = 1.0\noutput_step = 0.001\ntolerance = 1e-6\n'

@@ -1,4 +1,4 @@
-"""NAFEMS benchmarks (formulation.md, section 11) with solids, refined; the paper's links against Timoshenko's beam."""
+"""NAFEMS benchmarks (Selected Benchmarks for Natural Frequency Analysis, 1987) with solids, refined; the paper's links against Timoshenko's beam."""
 
 import numpy as np
 import pytest

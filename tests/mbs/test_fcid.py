@@ -12,7 +12,8 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
 from ffrobot.mbs.analysis.outcome import Outcome
 from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.fields.time_functions import parse_expression, spline
+from ffrobot.mbs.fields.expressions import parse_expression
+from ffrobot.mbs.fields.waypoints import spline
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 OPEN = ["chain of 2", "backwards", "mixed", "mixed backwards", "tree", "loaded", "stiffened, driven"]

@@ -9,7 +9,7 @@ from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.quantities.observation import energies
-from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.scene.bodies import RigidBody
 
 CRANK, ROD = 0.2, 0.5
 

@@ -13,7 +13,8 @@ from rods import rod
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.model.model import MechanismSystem, ModalLoad
+from ffrobot.mbs.model.model import ModalLoad
+from ffrobot.mbs.model.system import MechanismSystem
 
 GROUP = "Growth of differences, open loop"
 

@@ -9,7 +9,7 @@ from rods import rod
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
-from ffrobot.mbs.fields.time_functions import load_waypoints
+from ffrobot.mbs.fields.waypoints import load_waypoints
 
 GROUP = "Rough inputs"
 ELBOW = (-0.2, 1.4)
