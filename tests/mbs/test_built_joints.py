@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, arm, arm_links
 from mechanisms import always, checked_scene, forward, make_model, pcid, relative, revolute
-from test_balances import OUTPUT_STEP, energy_and_losses
-from test_rigid_limit import rod
+from rods import rod
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs import _core
