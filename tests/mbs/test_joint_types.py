@@ -18,7 +18,7 @@ from ffrobot.mbs.joints.moving_joint import MovingJoint
 from ffrobot.mbs.joints.transmission import Rotor
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.model.planar_body import from_rigid_body
-from ffrobot.mbs.scene.scene import Scene
+from ffrobot.scene.scene import Scene
 
 
 class SlotJoint(MovingJoint):
