@@ -1,7 +1,7 @@
 """Inertia shape integrals of a solid, and the unit loads whose prestress stiffens it.
 
-With displacements and coordinates in the same space, every integral (docs/theory.md, Inertia shape integrals) is a product with the
-scalar mass matrix: x is its own nodal interpolation, so nothing is lumped and nothing is approximated.
+With displacements and coordinates in the same space, every integral of docs/theory.md is a product with the scalar mass
+matrix: x is its own nodal interpolation, so nothing is lumped and nothing is approximated.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...common.arrays import Array
-from ..modal_body.invariants import Invariants
+from ..invariants import Invariants
 from .elasticity import SolidModel
 from .strain_energy import geometric_stiffness, internal_forces
 from .supports import Flexibility

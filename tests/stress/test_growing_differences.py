@@ -9,6 +9,7 @@ from mechanisms import always, forward, make_model, pcid, revolute
 from patch_sets import FULL
 from robots import free_run
 from rods import rod
+from table import at_most
 
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import run_forward
@@ -117,9 +118,9 @@ def test_replayed_actuation(record):
     record(
         GROUP,
         "PCID round a circle, its moments and voltages replayed at a tolerance of 1e-6",
-        "departs by {second} rad after 1 s, grows at {rate} 1/s, linearised {expected} 1/s, ends at t = {t}",
+        "departs by at most {second} rad after 1 s, grows at {rate} 1/s, linearised {expected} 1/s, ends at t = {t}",
         'diverged; “"link2" is bent by … of its length …”',
-        second=departure[10],
+        second=at_most(1e-10, departure[10]),  # rounding, grown for a second
         rate=rate,
         expected=expected,
         t=replay.statistics.time_reached,
