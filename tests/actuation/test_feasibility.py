@@ -100,7 +100,7 @@ def test_patches_peak_by_peak(arm):
 
 
 def test_strain_under_a_static_load_is_that_of_the_beam(arm):
-    """ε = (t_b/2 + t_p) M(x)/EI with M of the weight, averaged along the patch (formulation: Euler–Bernoulli)."""
+    """ε = (t_b/2 + t_p) M(x)/EI with M of the weight, averaged along the patch (Euler–Bernoulli)."""
     solution = arm(times=f'shape = "static"\n{RUN}', trajectory='joint = "O"\nvalue = "0"')
     x = np.linspace(0.025, 0.075, 201)  # the first patch
     M = 7850.0 * 0.025 * 0.015 * 9.81 * (1 - x) ** 2 / 2

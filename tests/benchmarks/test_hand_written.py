@@ -53,7 +53,7 @@ def test_both_compute_the_same(two_link, program):
     assembly, q, v = general_state(two_link)
     a, lambda_ = assembly.system.evaluate(TIME, q, v)
     _, (force_x, force_y, alpha, _) = program(1, 0)
-    # the program takes displacements of 1e-12 m at supports for zero; forces amplify that (formulation.md, section 3)
+    # the program takes displacements of 1e-12 m at supports for zero; forces amplify that
     np.testing.assert_allclose(tip_force(assembly, lambda_), [force_x, force_y], rtol=1e-8)
     assert alpha == pytest.approx(a[assembly.first[0] + 2], abs=1e-8 * np.abs(a).max())
 

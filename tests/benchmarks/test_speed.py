@@ -36,7 +36,7 @@ from ffrobot.bench.hand_written import TIME, general_state
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.analyses import initial_state, run_pcid
 from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.model.model import MechanismSystem
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.run.solution import prepare
 

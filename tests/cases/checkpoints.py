@@ -89,7 +89,7 @@ def check_column(case, analysis, name, times, printed, relative):
 
 
 def check_layout(case, analyses, output_times, flexible, rigid):
-    """Names, shapes and attributes of interfaces.md, "Results file".
+    """Names, shapes and attributes of a results file (docs/reference/files.md).
 
     `flexible` maps bodies to mode numbers, `rigid` bodies to their points; `output_times` holds for every analysis.
     """

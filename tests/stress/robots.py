@@ -8,7 +8,7 @@ from rods import rod
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
 from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.quantities.observation import energies
-from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.scene.bodies import RigidBody
 
 CRANK, ROD = 0.2, 0.5
 

@@ -13,7 +13,8 @@ from table import at_most
 
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
-from ffrobot.mbs.model.model import MechanismSystem, ModalLoad
+from ffrobot.mbs.model.model import ModalLoad
+from ffrobot.mbs.model.system import MechanismSystem
 
 GROUP = "Growth of differences, open loop"
 

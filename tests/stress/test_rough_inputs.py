@@ -10,7 +10,7 @@ from table import at_most
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.fields.time_functions import load_waypoints
+from ffrobot.mbs.fields.waypoints import load_waypoints
 from ffrobot.mbs.scene.analysis_records import Analysis
 
 GROUP = "Rough inputs"
