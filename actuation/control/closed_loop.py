@@ -17,7 +17,7 @@ from ...mbs.model.model import ZERO, MechanismSystem, Model, load_rows
 from ...mbs.scene.analysis_records import Analysis
 from ...mbs.scene.loop_records import ComputedTorque, Lqr
 from ...mbs.solve.initial_state import State
-from ...mbs.solve.integrators import METHODS, choose_integrator
+from ...mbs.solve.integrators import choose_integrator, integration_controls
 from ..patches.patches import PatchArray
 from ..patches.voltages import allocation
 from .choice import make_controller, needed_sensors
@@ -153,9 +153,10 @@ def _integrate(
     integrator = choose_integrator(assembly, analysis, start)
     voltages = [(assembly.index[body], array.Phi_V) for body, array in patches.items()]
     run = _core.run_sampled(
-        assembly.system, assembly.groups, assembly.moments, analysis.times.tolist(), start.q, start.v,
-        analysis.tolerance, analysis.max_steps, METHODS[integrator.name], analysis.spectral_radius,
-        len(assembly.model.motors), voltages, loop.first, sensor, times.tolist(), analysis.delay, loop, progress,
+        system=assembly.system, groups=assembly.groups, moments=assembly.moments, times=analysis.times.tolist(),
+        q=start.q, v=start.v, controls=integration_controls(analysis, integrator), carry_on=progress,
+        motors=len(assembly.model.motors), patches=voltages, first_command=loop.first, sensing=sensor,
+        samples=times.tolist(), delay=analysis.delay, controller=loop,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     reached, held = len(run.q), len(assembly.constraints)

@@ -31,6 +31,13 @@ GROUP = "resume"  # in the group of an analysis
 KINDS = ("pcid", "forward")
 STOPPED = ("interrupted", "too many steps")
 IN_RESULTS = ("time", "residual")  # of ROWS, what results files hold anyway
+STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error", "in_transient")
+"""Of a `StepHistory`, all."""
+PEAKS = (
+    "velocity", "angular_velocity", "modal_velocity", "modal", "acceleration", "angular_acceleration",
+    "modal_acceleration", "groups",
+)  # fmt: skip
+"""Of `Peaks`, all."""
 MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 
@@ -94,9 +101,11 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
             group[name] = getattr(outcome, name)
     checkpoint, recording = outcome.checkpoint, outcome.recording
     assert checkpoint is not None
-    for name in ("state", "stepping", "gathered"):
-        group[f"checkpoint/{name}"] = getattr(checkpoint, name)
-    group["checkpoint"].attrs.update({"time": checkpoint.time, "outputs": checkpoint.outputs})
+    group["checkpoint/state"] = checkpoint.state
+    for name in PEAKS:
+        group[f"checkpoint/peaks/{name}"] = getattr(checkpoint.peaks, name)
+    about = {"time": checkpoint.time, "outputs": checkpoint.outputs}
+    group["checkpoint"].attrs.update(about | {name: getattr(checkpoint.steps, name) for name in STEPS})
     if recording is not None:
         group["recording/times"] = recording.times
         group["recording/states"] = recording.states
@@ -107,8 +116,6 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
     analysis = next(analysis for analysis in solution.scene.analysis if analysis.name == name)
     rows = {row: file[f"{group}/{row}"] for row in ROWS if file.has(f"{group}/{row}")}
     rows |= {"time": file.time(name), "residual": file[f"{name}/constraint_violation"]}
-    where = file.attributes(f"{group}/checkpoint")
-    state, stepping, gathered = (file[f"{group}/checkpoint/{key}"] for key in ("state", "stepping", "gathered"))
     recording = None
     if file.has(f"{group}/recording"):
         recording = _core.Recording(
@@ -120,8 +127,19 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
         rows,
         {count: about[count].item() for count in COUNTS},
         Choice(about["integrator"], about["integrator_reason"]),
-        _core.Checkpoint(where["time"], state, stepping, gathered, int(where["outputs"])),
+        _checkpoint(file, f"{group}/checkpoint"),
         recording,
+    )
+
+
+def _checkpoint(file: Results, group: str) -> _core.Checkpoint:
+    about = file.attributes(group)
+    return _core.Checkpoint(
+        time=about["time"],
+        state=file[f"{group}/state"],
+        steps=_core.StepHistory(**{name: about[name].item() for name in STEPS}),
+        peaks=_core.Peaks(**{name: file[f"{group}/peaks/{name}"] for name in PEAKS}),
+        outputs=int(about["outputs"]),
     )
 
 

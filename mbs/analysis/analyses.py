@@ -16,7 +16,7 @@ from ..model.model import ZERO, MechanismSystem, Model
 from ..scene.analysis_records import Analysis
 from ..solve.diagnosis import find_cause, lost_inertia
 from ..solve.initial_state import State, check_reach, undeformed_state
-from ..solve.integrators import METHODS, Choice, beyond_order, choose_integrator
+from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls
 from ..solve.path_checks import check_smooth
 from ..solve.statics import static_equilibrium
 from .earlier_run import EarlierRun
@@ -221,14 +221,14 @@ def _integrate(
     else:
         integrator, checkpoint, recording = earlier.integrator, earlier.checkpoint, earlier.recording
     run = _core.run(
-        assembly.system, assembly.groups, assembly.moments, steering, analysis.times.tolist(), start.q, start.v,
-        analysis.tolerance, analysis.max_steps, METHODS[integrator.name], analysis.spectral_radius, resolver, progress,
-        recording, checkpoint,
+        system=assembly.system, groups=assembly.groups, moments=assembly.moments, times=analysis.times.tolist(),
+        q=start.q, v=start.v, controls=integration_controls(analysis, integrator), carry_on=progress,
+        external_loads=steering, actuator_forces=resolver, recording=recording, checkpoint=checkpoint,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     reached, held, status = len(run.q), len(assembly.constraints), STATUS[run.status]
     failed = status not in ("completed", "interrupted")
-    cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2))) if failed else ""
+    cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, [assembly.system.n_q]))) if failed else ""
     if status == "step underflow" and not cause:
         cause = beyond_order(integrator, analysis)
     outcome = Outcome(

@@ -31,7 +31,8 @@ class Measure:
     kind: _core.MeasureKind
     a: Marker
     b: Marker
-    direction: tuple[float, float] = (0.0, 0.0)
+    direction: tuple[float, float] = (0.0, 0.0)  # of a slide: normal to its axis, in the axes of a
+    gear_ratios: tuple[float, float] = (0.0, 0.0)  # (n_b, n_a) of n_b α_b − n_a α_a
     offset: float = 0.0
 
     @property
@@ -72,7 +73,7 @@ def trajectory_rows(scene: Scene, trajectory: Trajectory) -> dict[str, Measure]:
     if trajectory.joint is not None:
         joint = next(joint for joint in scene.joint if joint.name == trajectory.joint)
         row = joint_coordinate(scene, joint)
-        return {"value": Measure(label, row.kind, row.a, row.b, row.direction)}
+        return {"value": Measure(label, row.kind, row.a, row.b, direction=row.direction)}
     if trajectory.angle is not None:
         body, _, point = trajectory.angle.partition(".")
         return {"value": Measure(label, _core.MeasureKind.angle, ground, Marker(body, point))}

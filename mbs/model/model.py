@@ -268,7 +268,8 @@ class MechanismSystem:
         return np.column_stack([np.cos(theta) * x - np.sin(theta) * y, np.sin(theta) * x + np.cos(theta) * y])
 
     def _core_row(self, row: Measure) -> _core.Measure:
-        return _core.Measure(row.kind, self._marker(row.a), self._marker(row.b), np.array(row.direction), row.offset)
+        a, b = self._marker(row.a), self._marker(row.b)
+        return _core.Measure(row.kind, a, b, np.array(row.direction), np.array(row.gear_ratios), row.offset)
 
     def _marker(self, end: Marker) -> _core.Marker:
         if end.body is None:

@@ -35,7 +35,7 @@ def joint_rotors(scene: Scene) -> Iterator[tuple[Measure, float]]:
             yield row, joint.rotor_inertia * N**2
         else:
             yield (
-                Measure(f'rotor of joint "{joint.name}"', _core.MeasureKind.gear, row.a, row.b, (N, N - 1)),
+                Measure(f'rotor of joint "{joint.name}"', _core.MeasureKind.gear, row.a, row.b, gear_ratios=(N, N - 1)),
                 joint.rotor_inertia,
             )
 
@@ -68,7 +68,8 @@ def joint_gears(scene: Scene) -> Iterator[Gear]:
 
 def _gear(scene: Scene, joint: Joint, stiffness: float) -> Gear:
     row, N, rotor = joint_coordinate(scene, joint), joint.gear_ratio, f"{joint.name}/rotor"
-    motor = Measure(f'motor of joint "{joint.name}"', _core.MeasureKind.gear, row.a, Marker(rotor), (1.0, 1 / N))
+    ratios = (1.0, 1 / N)
+    motor = Measure(f'motor of joint "{joint.name}"', _core.MeasureKind.gear, row.a, Marker(rotor), gear_ratios=ratios)
     return Gear(joint.name, rotor, N, joint.rotor_inertia, stiffness, joint.damping, motor, row)
 
 

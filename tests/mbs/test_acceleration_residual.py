@@ -2,9 +2,8 @@
 
 import numpy as np
 import zoo
-from mechanisms import always, assemble
+from mechanisms import assemble, core_run
 
-from ffrobot.mbs import _core
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 
@@ -12,10 +11,7 @@ def reported(name):
     assembly = assemble(zoo.build(name))
     start = undeformed_state(assembly)
     v = start.v + np.random.default_rng(0).standard_normal(len(start.v))
-    run = _core.run(
-        assembly.system, assembly.groups, assembly.moments, None, [0.0, 1e-6], start.q, v, 1e-6, 1,
-        _core.MethodKind.dop853, 0.8, None, always, None, None,
-    )  # fmt: skip
+    run = core_run(assembly, start.q, v, [0.0, 1e-6], max_steps=1)
     return assembly.system, run
 
 

@@ -48,7 +48,7 @@ public:
 
   // u: motors, then the patches of one body after the other.
   void set(const Eigen::VectorXd &u);
-  void steer(double t, Workspace &workspace) override;
+  void apply(double t, Workspace &workspace) override;
 
 private:
   std::vector<double> drive_;

@@ -6,7 +6,7 @@
 // one.
 #pragma once
 
-#include "core/constraint/packed_rows.h"
+#include "core/body/packed_rows.h"
 
 #include <Eigen/Core>
 #include <vector>

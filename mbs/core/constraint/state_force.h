@@ -1,7 +1,7 @@
 // A force of the user's on a marker, which may depend on how the marker moves.
 #pragma once
 
-#include "core/constraint/rows.h"
+#include "core/constraint/measure.h"
 
 #include <functional>
 
