@@ -22,7 +22,7 @@ def resolved(assembly, seed=0):
     q, v = start.q.copy(), start.v + rng.standard_normal(len(start.v))
     for body, first in zip(assembly.model.bodies, assembly.first, strict=True):
         q[first + 3 : first + 3 + body.n_modes] = 0.05 * rng.standard_normal(body.n_modes)
-    forces = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_rows)
+    forces = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
     run = core_run(assembly, q, v, [0.0, 1e-6], max_steps=1, actuator_forces=forces)
     assert run.residual[0].max() < 1e-12
     return run.q[0], run.v[0], run.multipliers[0], run.tau[0], run.F_p[0]

@@ -1,4 +1,4 @@
-"""Integrators on a state with an orientation: a heavy top, whose q is a quaternion (4) and v an angular velocity (3)."""
+"""Integrators on a state with an orientation: a heavy top with a quaternion (4) in q, angular velocities (3) in v."""
 
 import numpy as np
 import pytest

@@ -38,11 +38,21 @@ std::tuple<VectorXd, VectorXd, MatrixXd> constraints(const System &system, doubl
   check_size("q", q.size(), system.n_q());
   check_size("v", v.size(), system.n_v());
   Workspace w(system);
-  const auto m = static_cast<Eigen::Index>(system.rows.size());
-  VectorXd value(m), rate(m);
+  VectorXd value(static_cast<Eigen::Index>(system.rows.size())), rate(value);
   constraint_residuals(system, t, q.data(), v.data(), w, value.data(), rate.data());
-  const auto held = static_cast<Eigen::Index>(system.n_bilateral());
-  return {value.head(held), rate.head(held), constraint_jacobian(system, w)};
+  const auto m = static_cast<Eigen::Index>(system.n_bilateral());
+  return {value.head(m), rate.head(m), constraint_jacobian(system, w)};
+}
+
+// How far the accelerations a are from C_ddot = 0, relative to the terms that cancel in it
+double acceleration_violation(const System &system, double t, const VectorXd &q, const VectorXd &v, const VectorXd &a) {
+  check_size("q", q.size(), system.n_q());
+  check_size("v", v.size(), system.n_v());
+  check_size("a", a.size(), system.n_v());
+  Workspace w(system);
+  VectorXd value(static_cast<Eigen::Index>(system.rows.size())), rate(value);
+  constraint_residuals(system, t, q.data(), v.data(), w, value.data(), rate.data());
+  return acceleration_residual(system, q.data(), a.data(), w);
 }
 
 // (C_q rows of the rotors' angles, their inertias)
@@ -149,6 +159,8 @@ void bind_evaluations(nb::module_ &m, nb::class_<System> &system) {
       .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a, "external_loads"_a = nb::none(),
            "Accelerations (n_v,) and multipliers (constraints,).")
       .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q (constraints, n_v).")
+      .def("acceleration_violation", &acceleration_violation, "t"_a, "q"_a, "v"_a, "a"_a,
+           "The largest |C_ddot| for accelerations a (n_v,), relative to 1 and the terms that cancel in it.")
       .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, n_v) at q (T, n_q).")
       .def("rotor_rows", &rotor_rows, "q"_a, "Gradients (rotors, n_v) of the rotors' angles and inertias (rotors,).")
       .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces (n_v,) of gravity, elasticity, drives.")

@@ -7,7 +7,8 @@
 
 namespace ffrobot {
 
-// Writes force and moment (x, y, moment) at time t for position and rates (x, y, angle), all in global axes.
+// Writes force and moment (x, y, moment; N, N m) at time t (s) for position and rates (x, y, angle), all in global
+// axes.
 struct StateFunction {
   using Compiled = void (*)(double, const double *, const double *, double *);
 

@@ -10,7 +10,7 @@
 namespace ffrobot {
 
 // States y = (q, v) have n_q + n_v entries. Methods step in local coordinates z (see local_coordinates.h), their rates
-// and increments, 2 n_v each: they call them y, dy and so on, as formulas of vector spaces do. Where q consists of
+// and increments, 2 n_v each: they are y, dy and so on there, as in the formulas for vector spaces. Where q consists of
 // numbers alone, both are the same.
 class OdeSystem {
 public:

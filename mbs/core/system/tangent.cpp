@@ -1,5 +1,7 @@
 #include "core/system/tangent.h"
 
+#include "core/body/planar_tangent.h"
+
 #include <algorithm>
 
 namespace ffrobot {
