@@ -35,7 +35,13 @@ GROUP = "resume"  # in the group of an analysis
 STOPPED = ("interrupted", "too many steps")
 ROWS = ("q", "v", "a", "lambda_", "tau", "F_p")  # what results files do not hold anyway
 COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
-CHECKPOINT = ("state", "stepping", "gathered")
+STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error", "in_transient")
+"""Of a `StepHistory`, all."""
+PEAKS = (
+    "velocity", "angular_velocity", "modal_velocity", "modal", "acceleration", "angular_acceleration",
+    "modal_acceleration", "groups",
+)  # fmt: skip
+"""Of `Peaks`, all."""
 MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 
@@ -99,9 +105,11 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
             group[name] = rows
     assert outcome.continuation is not None
     checkpoint, recording = outcome.continuation.checkpoint, outcome.continuation.recording
-    for name in CHECKPOINT:
-        group[f"checkpoint/{name}"] = getattr(checkpoint, name)
-    group["checkpoint"].attrs.update({"time": checkpoint.time, "outputs": checkpoint.outputs})
+    group["checkpoint/state"] = checkpoint.state
+    for name in PEAKS:
+        group[f"checkpoint/peaks/{name}"] = getattr(checkpoint.peaks, name)
+    about = {"time": checkpoint.time, "outputs": checkpoint.outputs}
+    group["checkpoint"].attrs.update(about | {name: getattr(checkpoint.steps, name) for name in STEPS})
     if recording is not None:
         group["recording/times"] = recording.times
         group["recording/states"] = recording.states
@@ -124,9 +132,7 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
 
 def _continuation(solution: Solution, file: Results, name: str) -> Continuation:
     about, group = file.attributes(name), f"{name}/{GROUP}"
-    where = file.attributes(f"{group}/checkpoint")
-    state, stepping, gathered = (file[f"{group}/checkpoint/{key}"] for key in CHECKPOINT)
-    checkpoint = _core.Checkpoint(where["time"], state, stepping, gathered, int(where["outputs"]))
+    checkpoint = _checkpoint(file, f"{group}/checkpoint")
     if not file.has(f"{group}/recording"):
         return Continuation(checkpoint)
     analysis = next(analysis for analysis in solution.scene.analysis if analysis.name == name)
@@ -135,6 +141,17 @@ def _continuation(solution: Solution, file: Results, name: str) -> Continuation:
     method = METHODS[about["integrator"]]
     return Continuation(
         checkpoint, _core.Recording(times, states, method, analysis.spectral_radius, analysis.tolerance)
+    )
+
+
+def _checkpoint(file: Results, group: str) -> _core.Checkpoint:
+    about = file.attributes(group)
+    return _core.Checkpoint(
+        time=about["time"],
+        state=file[f"{group}/state"],
+        steps=_core.StepHistory(**{name: about[name].item() for name in STEPS}),
+        peaks=_core.Peaks(**{name: file[f"{group}/peaks/{name}"] for name in PEAKS}),
+        outputs=int(about["outputs"]),
     )
 
 

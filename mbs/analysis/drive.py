@@ -15,7 +15,7 @@ from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause, lost_inertia
 from ..solve.initial_state import undeformed_state
-from ..solve.integrators import METHODS, Choice, beyond_order, choose_integrator
+from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
@@ -83,17 +83,19 @@ def drive(
         continuation = Continuation(_core.Checkpoint(), recording)
     else:
         integrator, continuation = earlier.statistics.integrator, earlier.continuation
-    method, tolerance, most = METHODS[integrator.name], analysis.tolerance, analysis.max_steps
+    common = {
+        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments, "times": times.tolist(),
+        "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
+    }  # fmt: skip
     if control is None:
         run = _core.run(
-            assembly.system, assembly.groups, assembly.moments, steering, times.tolist(), start.q, start.v, tolerance,
-            most, method, analysis.spectral_radius, resolver, progress, continuation.recording, continuation.checkpoint,
+            **common, external_loads=steering, actuator_forces=resolver, recording=continuation.recording,
+            checkpoint=continuation.checkpoint,
         )  # fmt: skip
     else:
         run = _core.run_sampled(
-            assembly.system, assembly.groups, assembly.moments, times.tolist(), start.q, start.v, tolerance,
-            most, method, analysis.spectral_radius, control.motors, control.voltages, control.first, control.sensing,
-            control.times.tolist(), control.delay, control.controller, progress,
+            **common, motors=control.motors, patches=control.voltages, first_command=control.first,
+            sensing=control.sensing, samples=control.times.tolist(), delay=control.delay, controller=control.controller,
         )  # fmt: skip
     seconds = time.perf_counter() - began
     statistics = statistics_of(assembly, run, integrator, seconds)
@@ -120,7 +122,7 @@ def statistics_of(assembly: MechanismSystem, run: _core.Run, integrator: Choice,
     """How a run of the core went, and why it ended where it failed."""
     status, cause = STATUS[run.status], ""
     if status not in ("completed", "interrupted"):
-        cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2)))
+        cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, [assembly.system.n_q])))
     return Statistics(status, integrator, run.steps, run.rejected, run.evaluations, seconds, run.time_reached, cause)
 
 
