@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -83,7 +84,7 @@ def drive(
         continuation = Continuation(_core.Checkpoint(), recording)
     else:
         integrator, continuation = earlier.statistics.integrator, earlier.continuation
-    common = {
+    common: dict[str, Any] = {
         "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments, "times": times.tolist(),
         "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
     }  # fmt: skip

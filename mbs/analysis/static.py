@@ -43,7 +43,7 @@ def run_static(model: Model, analysis: Analysis) -> Outcome:
     held = [replace(c, target=_core.TimeFunction.constant(c.target(0.0)[0])) for c in model.trajectories]
     assembly = MechanismSystem(model, [*model.joints, *held], model.loads, list(model.motors.values()))
     state = static_equilibrium(assembly, undeformed_state(assembly))
-    at_rest, resolver, began = np.zeros_like(state.q), resolver_of(assembly), time.perf_counter()
+    at_rest, resolver, began = np.zeros_like(state.v), resolver_of(assembly), time.perf_counter()
     controls = _core.IntegrationControls(
         tolerance=analysis.tolerance, max_steps=1, method=METHODS["dop853"], spectral_radius=0.0
     )

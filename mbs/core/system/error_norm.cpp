@@ -100,7 +100,7 @@ Eigen::VectorXd ErrorNorm::applied_modal_force(std::size_t b, const Workspace &w
   return F_p;
 }
 
-void ErrorNorm::take(const double *z, const double *z_dot, const Workspace &w) {
+void ErrorNorm::take(const double *z, const double *z_dot, const Eigen::VectorXd &lambda, const Workspace &w) {
   const Index n = system_.n_v();
   const double length = system_.length;
   const auto raise = [](double &peak, double value) { peak = std::max(peak, value); };
@@ -127,7 +127,7 @@ void ErrorNorm::take(const double *z, const double *z_dot, const Workspace &w) {
                                            std::sqrt(system_.bodies[b].mass) * peak.velocity}));
     }
   }
-  measure_groups(w.lambda, group_now_);
+  measure_groups(lambda, group_now_);
   peaks_.groups = peaks_.groups.cwiseMax(group_now_);
 }
 

@@ -39,8 +39,8 @@ public:
   double of_multipliers(const Eigen::VectorXd &lambda, const Eigen::VectorXd &shifted);
   bool judges_multipliers() const { return !group_.empty(); }
 
-  // Peaks grow by the state z, its rate and the multipliers there; w: of the last evaluation.
-  void take(const double *z, const double *z_dot, const Workspace &w);
+  // Peaks grow by the state z, its rate and the multipliers there; w: loads as at the last evaluation.
+  void take(const double *z, const double *z_dot, const Eigen::VectorXd &lambda, const Workspace &w);
 
   const Peaks &peaks() const { return peaks_; }
   void set_peaks(Peaks peaks) { peaks_ = std::move(peaks); }

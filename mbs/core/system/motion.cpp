@@ -12,8 +12,8 @@ using VectorMap = Eigen::Map<const Eigen::VectorXd>;
 
 ConstrainedMotion::ConstrainedMotion(const System &system, ErrorNorm norm, ExternalLoads *external_loads)
     : ImplicitSystem(system.space), system_(system), workspace_(system), norm_(std::move(norm)),
-      external_loads_(external_loads), evaluated_at_(std::numeric_limits<double>::quiet_NaN()),
-      lambda_(workspace_.lambda), shifted_(size()), shifted_slope_(size()) {
+      external_loads_(external_loads), evaluated_at_(std::numeric_limits<double>::quiet_NaN()), shifted_(size()),
+      shifted_slope_(size()) {
   stiffness_ = damping_ = Eigen::VectorXd::Zero(n_v());
   for (std::size_t b = 0; b < system.bodies.size(); ++b) {
     const PlanarBody &body = system.bodies[b];
@@ -47,18 +47,20 @@ bool ConstrainedMotion::correct(double t, double *z) {
 double ConstrainedMotion::error_size(double t, const double *z, const double *e) {
   assert(evaluated_at_ == t);
   const double size = norm_.of_state(z, e);
+  lambda_ = workspace_.lambda;
   if (!norm_.judges_multipliers())
     return size;
   // Forces amplify errors of the state (stiffness times the error of a fast mode): measure what e does to them.
-  lambda_ = workspace_.lambda;
   shifted_ = VectorMap(z, this->size()) + VectorMap(e, this->size());
   slope(t, shifted_.data(), shifted_slope_.data());
   const double of_multipliers = norm_.of_multipliers(lambda_, workspace_.lambda);
-  workspace_.lambda = lambda_;
   return std::isnan(of_multipliers) ? of_multipliers : std::max(size, of_multipliers); // keeps NaN
 }
 
-void ConstrainedMotion::accepted(double, const double *z, const double *z_dot) { norm_.take(z, z_dot, workspace_); }
+// Stages of dense output may have been evaluated since the step was judged.
+void ConstrainedMotion::accepted(double, const double *z, const double *z_dot) {
+  norm_.take(z, z_dot, lambda_.size() ? lambda_ : workspace_.lambda, workspace_);
+}
 
 void ConstrainedMotion::factorise(double damping_factor, double stiffness_factor) {
   assert(!std::isnan(evaluated_at_));

@@ -61,7 +61,8 @@ private:
   Eigen::VectorXd stiffness_, damping_; // diagonals (n_v)
   std::unique_ptr<IterationMatrix<double>> real_;
   std::unique_ptr<IterationMatrix<Complex>> complex_;
-  Eigen::VectorXd lambda_, shifted_, shifted_slope_;
+  Eigen::VectorXd lambda_; // at the end of the step that error_size() has judged last; empty before
+  Eigen::VectorXd shifted_, shifted_slope_;
 };
 
 } // namespace ffrobot
