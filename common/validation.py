@@ -168,7 +168,6 @@ _EXPECTED = {
     "greater_than_equal": "a number of at least {ge:g}",
     "less_than": "a number less than {lt:g}",
     "less_than_equal": "a number of at most {le:g}",
-    "union_tag_not_found": "a table with the key {discriminator}",
 }
 
 
@@ -194,6 +193,9 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
             return _Problem(key_path(loc[:-1], data, kind=""), demand, "")
         return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
     found = item["input"]
+    if kind == "union_tag_not_found":
+        key = key_path((*loc, context["discriminator"].replace("'", "")), data)
+        return _Problem(key, f"expected {_EXPECTED['missing']}", ", found none")
     if kind == "union_tag_invalid":
         tags = context["expected_tags"].replace("'", "").split(", ")
         key = key_path((*loc, context["discriminator"].replace("'", "")), data)
