@@ -19,3 +19,11 @@ class SolveError(FfrobotError):
     """An analysis could not be completed: the message says where, why and what to try next."""
 
     exit_code = 1
+
+
+class Stopped(SolveError):
+    """A signal has ended a run, which has kept what it had computed."""
+
+    def __init__(self, message: str, number: int) -> None:
+        super().__init__(message)
+        self.exit_code = 128 + number  # as shells tell it

@@ -6,11 +6,13 @@ import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 from uuid import uuid4
 
 from .errors import InputError, SolveError
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+PIECE = 1 << 22  # bytes
 
 
 def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool = False) -> None:
@@ -19,21 +21,45 @@ def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool
     HDF5 files are handed over as images made in memory: a full disk then is an ordinary failed write, which HDF5
     itself does not survive. Raises `SolveError` naming the file, `what` it is, and the reason.
     """
-    target = path.resolve()  # a symbolic link stays one
-    temporary = target.with_name(f".{target.name}.{uuid4().hex}.tmp")
+    try:
+        target = path.resolve()  # a symbolic link stays one
+    except (OSError, RuntimeError) as error:  # links in a circle
+        raise SolveError(f"{path}: cannot write the {what}: {error}") from None
+    temporary = target.with_name(f".{target.name[:100]}.{uuid4().hex}.tmp")
     try:
         if make_folder:
             target.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("xb") as stream:
-            stream.write(content)
+        with _without_name(temporary) as stream:
+            for start in range(0, len(content), PIECE):  # Ctrl-C is answered between two
+                stream.write(content[start : start + PIECE])
             stream.flush()
             os.fsync(stream.fileno())
+            _name(stream, temporary)
         temporary.replace(target)
     except OSError as error:
         raise SolveError(f"{path}: cannot write the {what}: {error.strerror or error}") from None
     finally:  # after Ctrl-C too
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def _without_name(temporary: Path) -> BinaryIO:
+    """A file in the folder of `temporary` that is gone with this process, however that ends; named where need be."""
+    if hasattr(os, "O_TMPFILE") and os.path.isdir("/proc/self/fd"):
+        with suppress(OSError):  # not on this file system
+            return os.fdopen(os.open(temporary.parent, os.O_TMPFILE | os.O_RDWR, 0o666), "wb")
+    return temporary.open("xb")
+
+
+def _name(stream: BinaryIO, temporary: Path) -> None:
+    """Give a complete file without a name that of `temporary`."""
+    if temporary.exists():
+        return
+    folder = os.open(temporary.parent, os.O_RDONLY)
+    try:
+        os.link(f"/proc/self/fd/{stream.fileno()}", temporary.name, src_dir_fd=folder, dst_dir_fd=folder)
+    finally:
+        os.close(folder)
 
 
 def check_output(path: Path, file_format: str, *, force: bool = False) -> None:

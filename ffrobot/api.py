@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .fe_models.modal_body import ModalBody
     from .mbs.scene.scene import Scene
     from .results.file import Results
-    from .run.solution import Watcher
+    from .run.solution import Solution, Watcher
 
 AnyPath = str | PathLike[str]
 
@@ -36,21 +36,25 @@ def solve(
     from .run.resume import resume as run_on
     from .run.solution import solve as run
 
-    if output is not None:
-        check_output(Path(output), FORMAT)
+    path = None if output is None else Path(output)
+    if path is not None:
+        check_output(path, FORMAT)
     elif resume:
         raise InputError("solve: resume: expected the output of the run that was stopped, found none")
     scene = scene if isinstance(scene, Scene) else Path(scene)
-    solution = run_on(scene, Path(output), watcher) if output is not None and resume else run(scene, watcher)
+
+    def keep(solution: Solution) -> None:
+        if path is not None:
+            write_results(solution, path)
+
+    solution = run_on(scene, path, watcher, keep) if path is not None and resume else run(scene, watcher, keep)
     if solution is None:
-        assert output is not None
-        return Results(output)
-    if output is not None:
-        write_results(solution, Path(output))
+        assert path is not None
+        return Results(path)
     for outcome in solution.outcomes.values():
-        outcome.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if output is not None else "")
-    if output is not None:
-        return Results(output)
+        outcome.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if path is not None else "")
+    if path is not None:
+        return Results(path)
     return Results.from_image(results_image(solution), solution.scene.path)
 
 

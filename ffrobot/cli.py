@@ -8,7 +8,7 @@ import time
 import traceback
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,6 +16,9 @@ from .bench.command import bench
 from .common.errors import FfrobotError
 from .common.parallel import end_all, is_first, on_first
 from .present.logs import LOGGER, logging_options
+
+if TYPE_CHECKING:
+    from .run.solution import Solution
 
 FILE = click.Path(path_type=Path)
 
@@ -77,28 +80,41 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
 
     Ctrl-C keeps what was computed; --resume goes on from there, and from the start where there are no results yet.
     """
+    from .common.errors import SolveError, Stopped
     from .common.files import check_output
     from .present.progress import Display
     from .present.summary import print_summary, summary_console
     from .results.write import FORMAT, write_results
-    from .run.resume import how_to_go_on
+    from .run.resume import how_to_go_on, left_out
     from .run.resume import resume as resume_scene
     from .run.solution import solve as solve_scene
 
     path = output or scene_file.with_suffix(".results.h5")
     check_output(path, FORMAT)
+    writing = 0.0
+
+    def keep(solution: Solution) -> None:
+        nonlocal writing
+        began = time.perf_counter()
+        write_results(solution, path)
+        writing = time.perf_counter() - began
+
     with Display() as display:
-        solution = resume_scene(scene_file, path, display) if resume else solve_scene(scene_file, display)
+        solution = resume_scene(scene_file, path, display, keep) if resume else solve_scene(scene_file, display, keep)
     if solution is None:
         click.echo(f"{path}: complete, nothing to go on with")
         return
-    began = time.perf_counter()
-    write_results(solution, path)
-    seconds = {**solution.seconds, "writing": time.perf_counter() - began}
-    print_summary(solution, path, seconds, summary_console())
+    print_summary(solution, path, {**solution.seconds, "writing": writing}, summary_console())
     where = f" -o {output}" if output else ""
-    for outcome in solution.outcomes.values():
-        outcome.check_completed(how_to_go_on(solution, f"ffrobot solve {scene_file}{where} --resume"))
+    go_on = how_to_go_on(solution, f"ffrobot solve {scene_file}{where} --resume")
+    try:
+        for outcome in solution.outcomes.values():
+            outcome.check_completed(go_on)
+    except SolveError as error:
+        raise Stopped(str(error), display.signal) if display.signal else error from None
+    if display.signal:
+        done = "before all analyses" if left_out(solution) else "when all was computed and written"
+        raise Stopped(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
 
 
 @cli.command()
@@ -256,16 +272,20 @@ cli.add_command(bench)
 
 
 def main() -> None:
-    """Run the command line: exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C."""
-    stopped = False
+    """Run the command line.
+
+    Exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C, 143 after SIGTERM.
+    """
+    stopped = 0
 
     def stop(number: int, frame: FrameType | None) -> None:
         nonlocal stopped
-        stopped = True
+        stopped = number
         signal.default_int_handler(number, frame)
 
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
-    signal.signal(signal.SIGINT, stop)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
     try:
         cli(standalone_mode=False)
     except click.ClickException as error:
@@ -274,7 +294,7 @@ def main() -> None:
     except Exception as error:
         if stopped:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
             click.echo("ffrobot: stopped", err=True)
-            sys.exit(130)
+            sys.exit(128 + stopped)
         if not isinstance(error, FfrobotError):
             LOGGER.error("failed", exc_info=True)
             traceback.print_exc()

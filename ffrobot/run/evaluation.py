@@ -28,8 +28,11 @@ def evaluate(solution: Solution) -> None:
     """What follows from the motion and forces of all analyses."""
     for name, outcome in solution.outcomes.items():
         started = time.perf_counter()
-        _judge_actuation(solution, outcome)
-        solution.stresses[name] = _stresses(solution, outcome)
+        try:
+            _judge_actuation(solution, outcome)
+            solution.stresses[name] = _stresses(solution, outcome)
+        except Exception as error:  # raised once the analyses themselves are kept
+            solution.failures.append(error)
         solution.seconds[name] += time.perf_counter() - started
 
 

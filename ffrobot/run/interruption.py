@@ -1,9 +1,10 @@
-"""Ctrl-C while analyses run, or a cluster's end of time: a request to stop that keeps what has been computed."""
+"""Ctrl-C while a scene is solved, or a cluster's end of time: a request to stop that keeps what has been computed."""
 
 from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Callable
 from types import FrameType, TracebackType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -12,12 +13,15 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 class Interruption:
     """Within its context the first Ctrl-C (or SIGTERM) only sets `requested`; the next one interrupts as usual.
 
+    `tell` is called at once with the number of the signal.
+
     Python would raise `KeyboardInterrupt` anywhere, in the calls from the core too, and the outputs so far were lost.
     Signals reach the main thread only: in any other the context does nothing.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, tell: Callable[[int], None]) -> None:
         self.requested = False
+        self._tell = tell
         self._is_main = threading.current_thread() is threading.main_thread()
 
     def __enter__(self) -> Interruption:
@@ -32,6 +36,7 @@ class Interruption:
     def _request(self, number: int, frame: FrameType | None) -> None:
         self.requested = True
         self._restore()
+        self._tell(number)
 
     def _restore(self) -> None:
         for number, handler in self._previous.items():

@@ -25,7 +25,7 @@ from ..mbs.analysis.earlier_run import COUNTS, ROWS, EarlierRun
 from ..mbs.scene.scene import Scene
 from ..mbs.solve.integrators import METHODS, Choice
 from ..results.file import Results
-from .solution import Solution, Watcher, prepare, run_analyses, stiffened
+from .solution import Keep, Solution, Watcher, prepare, run_analyses, stiffened
 
 GROUP = "resume"  # in the group of an analysis
 KINDS = ("pcid", "forward")
@@ -34,7 +34,9 @@ IN_RESULTS = ("time", "residual")  # of ROWS, what results files hold anyway
 MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 
-def resume(scene: Scene | Path, results: Path, watcher: Watcher | None = None) -> Solution | None:
+def resume(
+    scene: Scene | Path, results: Path, watcher: Watcher | None = None, keep: Keep | None = None
+) -> Solution | None:
     """`solve`, going on from the results file `results`; None where that is complete. From the start if absent.
 
     Raises `InputError` where the file is not that of the same scene, modal bodies and waypoints; else as `solve`.
@@ -42,7 +44,7 @@ def resume(scene: Scene | Path, results: Path, watcher: Watcher | None = None) -
     watcher = watcher or Watcher()
     solution = prepare(scene, watcher)
     if not results.exists():
-        return run_analyses(solution, watcher)
+        return run_analyses(solution, watcher, keep)
     with Results(results) as file:
         _check_same_input(solution, file)
         status = [file.attributes(name)["status"] if file.has(name) else "" for name in _analyses(solution)]
@@ -52,13 +54,13 @@ def resume(scene: Scene | Path, results: Path, watcher: Watcher | None = None) -
             solution = stiffened(solution)
         kept = [name for name in file.analyses if file.has(f"{name}/{GROUP}")]
         solution = replace(solution, earlier={name: _earlier_run(solution, file, name) for name in kept})
-    return run_analyses(solution, watcher)
+    return run_analyses(solution, watcher, keep)
 
 
 def write_state(file: h5py.File, solution: Solution) -> None:
     """Add to a results file, where the run was stopped, what `resume` needs."""
     file.attrs["waypoint_files"] = json.dumps(_waypoint_files(solution.scene))
-    if not _stopped(solution):
+    if not _stopped(solution) and not left_out(solution):
         return
     for name, outcome in solution.outcomes.items():
         if _goes_on(solution, outcome):
@@ -69,10 +71,17 @@ def how_to_go_on(solution: Solution, command: str) -> str:
     """What a message about a run that was stopped adds; empty where it cannot be gone on with."""
     outcome = _stopped(solution)
     if outcome is None:
-        return ""
+        return "".join(f'; {command} goes on with "{name}"' for name in left_out(solution)[:1])
     if _goes_on(solution, outcome):
         return f"; {command} goes on from t = {outcome.time_reached:.9g} s"
     return f'; {command} runs "{outcome.analysis.name}" again from its start'
+
+
+def left_out(solution: Solution) -> list[str]:
+    """Analyses that were not begun when the run was stopped, or ended by an error."""
+    if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
+        return []
+    return [name for name in _analyses(solution) if name not in solution.outcomes]
 
 
 def _stopped(solution: Solution) -> Outcome | None:
@@ -81,7 +90,8 @@ def _stopped(solution: Solution) -> Outcome | None:
 
 def _goes_on(solution: Solution, outcome: Outcome) -> bool:
     """Whether `outcome` is of use to `resume`; a search for modes has bodies of its own and starts again."""
-    return solution.mode_choice is None and outcome.analysis.kind in KINDS
+    searched = any(body.modes == "auto" for body in solution.scene.body)
+    return not searched and outcome.analysis.kind in KINDS
 
 
 def _analyses(solution: Solution) -> list[str]:
@@ -93,7 +103,7 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
         if name not in IN_RESULTS and getattr(outcome, name) is not None:
             group[name] = getattr(outcome, name)
     checkpoint, recording = outcome.checkpoint, outcome.recording
-    assert checkpoint is not None
+    assert checkpoint is not None  # of the kinds that go on
     for name in ("state", "stepping", "gathered"):
         group[f"checkpoint/{name}"] = getattr(checkpoint, name)
     group["checkpoint"].attrs.update({"time": checkpoint.time, "outputs": checkpoint.outputs})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -53,6 +53,9 @@ class Watcher:
         """An analysis has reached time t of `end`; False stops it."""
         return True
 
+    def stopping(self, number: int) -> None:
+        """Signal `number` asks for an end: what has been computed is kept, unless another signal follows."""
+
 
 @dataclass(frozen=True)
 class Solution:
@@ -74,6 +77,7 @@ class Solution:
         stiffening_effects: by analysis, the largest relative change of a mode's stiffness by the loads of the run.
         skipped: what the scene did not need, one line each.
         earlier: runs of analyses to go on with, from a results file: see `resume`.
+        failures: what ended the run, where that was an error.
     """
 
     scene: Scene
@@ -97,29 +101,38 @@ class Solution:
     stiffened: bool = False
     stiffening_effects: dict[str, float] = field(default_factory=dict)
     earlier: Mapping[str, EarlierRun] = field(default_factory=dict)
+    failures: list[Exception] = field(default_factory=list)
 
 
-def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
+Keep = Callable[[Solution], None]
+
+
+def solve(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None = None) -> Solution:
     """Run every analysis of a scene or a scene file; stage 1 runs first for links that are not up to date.
 
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
-    So does Ctrl-C during an analysis.
+    So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised, and before Ctrl-C
+    interrupts again.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
     watcher = watcher or Watcher()
-    return run_analyses(prepare(scene, watcher), watcher)
+    return run_analyses(prepare(scene, watcher), watcher, keep)
 
 
-def run_analyses(solution: Solution, watcher: Watcher) -> Solution:
+def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """What `solve` does with everything prepared; analyses go on from where `solution.earlier` has them."""
-    with Interruption() as interruption:
+    with Interruption(watcher.stopping) as interruption:
         if any(body.modes == "auto" for body in solution.scene.body):
             solution = _with_enough_modes(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
-    evaluate(solution)
+        evaluate(solution)
+        if keep is not None and solution.outcomes:
+            keep(solution)
+    if solution.failures:
+        raise solution.failures[0]
     return solution
 
 
@@ -132,8 +145,12 @@ def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Inter
     while True:
         last = time.perf_counter()
         solution = _completed(_with_bodies(solution, every[k]), watcher, interruption)
+        if solution.failures:
+            return solution
         tried.append(sum(body.n_modes for body in every[k].values()))
-        completed = all(outcome.status == "completed" for outcome in solution.outcomes.values())
+        completed = len(solution.outcomes) == len(solution.scene.analysis) and all(
+            outcome.status == "completed" for outcome in solution.outcomes.values()
+        )
         if completed:
             estimate.add({name: reported(solution, name) for name in solution.outcomes})
         more = len(every) - 1 - k
@@ -179,7 +196,15 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
     stiffening = {name: body.planar.stiffening for name, body in solution.bodies.items()}
     for analysis in solution.scene.analysis:
         started = time.perf_counter()
-        outcome = _run(solution, analysis, watcher, interruption)
+        if interruption.requested and solution.outcomes:
+            break
+        try:
+            outcome = _run(solution, analysis, watcher, interruption)
+        except Exception as error:
+            if not solution.outcomes:
+                raise
+            solution.failures.append(error)  # raised once the analyses before it are kept
+            break
         effect = estimated_effect(outcome, stiffening)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
         if automatic and effect > NOTABLE and outcome.status != "interrupted":

@@ -3,6 +3,7 @@
 #include "core/integrate/step_control.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 namespace ffrobot {
@@ -10,6 +11,7 @@ namespace ffrobot {
 namespace {
 
 constexpr unsigned long steps_between_questions = 1000;
+constexpr std::chrono::milliseconds time_between_questions{200}; // where steps take long
 
 // A step size that collapses never quite reaches rounding where noise feeds its estimates. A run that would take this
 // many times the steps it is allowed, at the pace of its last thousand, is not worth going on with.
@@ -43,6 +45,7 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
   const double end = times.back(), duration = end - times.front();
   IntegrationReport report;
   double t = times.front(), t_asked = t;
+  auto asked = std::chrono::steady_clock::now();
   double usual_step = 0, reserve = 1; // the largest of late; in terms of the tolerance
   bool in_transient = method.damps(); // vibrations of the start
   double h = method.damps() ? end - t : std::min(system.initial_step(), end - t);
@@ -99,6 +102,13 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
       const double most = hopeless * static_cast<double>(controls.max_steps) / steps_between_questions;
       collapsed = collapsed || (taken > 0 && controls.max_steps && left > most * (t - t_asked));
       t_asked = t;
+      asked = std::chrono::steady_clock::now();
+    } else if (const auto now = std::chrono::steady_clock::now(); now - asked > time_between_questions) {
+      asked = now;
+      if (!carry_on(t)) {
+        report.status = IntegrationStatus::interrupted;
+        break;
+      }
     }
     if (collapsed) {
       report.status = IntegrationStatus::step_underflow;
