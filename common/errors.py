@@ -21,7 +21,7 @@ class SolveError(FfrobotError):
     exit_code = 1
 
 
-class Stopped(SolveError):
+class StoppedError(SolveError):
     """A signal has ended a run, which has kept what it had computed."""
 
     def __init__(self, message: str, number: int) -> None:

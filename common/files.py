@@ -10,21 +10,23 @@ from typing import BinaryIO
 from uuid import uuid4
 
 from .errors import InputError, SolveError
+from .outputs import DAMAGED, check_not_an_input, check_same_kind, kind_of_file
 
-HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 PIECE = 1 << 22  # bytes
 
 
-def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool = False) -> None:
+def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool = False, ours: bool = False) -> None:
     """Write `content` to a temporary name in the same folder, then rename it to `path`.
 
     HDF5 files are handed over as images made in memory: a full disk then is an ordinary failed write, which HDF5
-    itself does not survive. Raises `SolveError` naming the file, `what` it is, and the reason.
+    itself does not survive. Raises `SolveError` naming the file, `what` it is, and the reason; `InputError` where an
+    input of the command (see `outputs.protected`) would be lost, or a file of another kind, unless the name is `ours`
+    alone, as in the cache.
     """
-    try:
-        target = path.resolve()  # a symbolic link stays one
-    except (OSError, RuntimeError) as error:  # links in a circle
-        raise SolveError(f"{path}: cannot write the {what}: {error}") from None
+    check_not_an_input(path)
+    if not ours:
+        check_same_kind(path, content)
+    target = path.resolve()  # a symbolic link stays one
     temporary = target.with_name(f".{target.name[:100]}.{uuid4().hex}.tmp")
     try:
         if make_folder:
@@ -62,17 +64,18 @@ def _name(stream: BinaryIO, temporary: Path) -> None:
         os.close(folder)
 
 
-def check_output(path: Path, file_format: str, *, force: bool = False) -> None:
-    """Refuse, before any work is done, an output that could not be written or would cost a file of another kind.
+def check_output(path: Path, file_format: str) -> None:
+    """Refuse, before any work is done, an output that could not be written or would cost another file.
 
-    An existing file is replaced only where it is empty, an HDF5 file whose attribute `format` is `file_format`, or one
-    too damaged to tell; or any file if `force`. Raises `InputError`.
+    An existing file is replaced only where it is no input, and is empty, an HDF5 file whose attribute `format` is
+    `file_format`, or one too damaged to tell. Raises `InputError`.
     """
+    check_not_an_input(path)
     if path.is_dir():
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
-    if path.exists() and not (path.is_file() and (force or _is_of_format(path, file_format))):  # no device, ever
+    if path.exists() and not (path.is_file() and _is_of_format(path, file_format)):  # no device, ever
         raise InputError(
             f'{path}: output: expected a new name or an earlier file of format "{file_format}", found a file of another'
             " kind"
@@ -86,19 +89,10 @@ def check_output(path: Path, file_format: str, *, force: bool = False) -> None:
 
 def check_folder(folder: Path) -> None:
     """Refuse an output folder whose place a file has; one that is absent is made later. Raises `InputError`."""
+    check_not_an_input(folder)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: output: expected a folder, found a file")
 
 
 def _is_of_format(path: Path, file_format: str) -> bool:
-    with suppress(OSError), path.open("rb") as stream:
-        signature = stream.read(len(HDF5_SIGNATURE))
-        if signature != HDF5_SIGNATURE:
-            return signature == b""
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            return bool(file.attrs.get("format") == file_format)
-    except OSError:
-        return True
+    return kind_of_file(path) in ("empty", "unreadable", f"HDF5 {file_format}", DAMAGED)

@@ -90,16 +90,21 @@ def plot_results(results: AnyPath, folder: AnyPath, formats: Sequence[str] = ("p
 
     `formats` are "png", "pdf", "svg".
     """
+    from .common.hdf5 import reading
     from .pictures.figures.plot import plot_results
 
-    return plot_results(Path(results), Path(folder), formats)
+    with reading(Path(results)):
+        return plot_results(Path(results), Path(folder), formats)
 
 
 def write_report(results: Sequence[AnyPath], path: AnyPath) -> None:
     """Write one HTML page about results files: `ffrobot report`."""
+    from .common.hdf5 import reading
     from .pictures.report import write_report
 
-    write_report([Path(file) for file in results], Path(path))
+    paths = [Path(file) for file in results]
+    with reading(*paths):
+        write_report(paths, Path(path))
 
 
 def view_file(
@@ -117,6 +122,8 @@ def view_file(
     `frames` outputs at most of one `analysis`, or of all; the picture at `time` (s) with deflections `scale` times as
     large. `pictures`: whether to draw them; None: where PyVista can. Returns the files written.
     """
+    from .common.hdf5 import reading
     from .pictures.view.view import FRAMES, Options, view_file
 
-    return view_file(Path(file), Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths
+    with reading(Path(file)):
+        return view_file(Path(file), Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths

@@ -80,7 +80,7 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
 
     Ctrl-C keeps what was computed; --resume goes on from there, and from the start where there are no results yet.
     """
-    from .common.errors import SolveError, Stopped
+    from .common.errors import SolveError, StoppedError
     from .common.files import check_output
     from .present.progress import Display
     from .present.summary import print_summary, summary_console
@@ -111,19 +111,21 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
         for outcome in solution.outcomes.values():
             outcome.check_completed(go_on)
     except SolveError as error:
-        raise Stopped(str(error), display.signal) if display.signal else error from None
+        raise StoppedError(str(error), display.signal) if display.signal else error from None
     if display.signal:
         done = "before all analyses" if left_out(solution) else "when all was computed and written"
-        raise Stopped(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
+        raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
 
 
 @cli.command()
 @click.argument("file", metavar="FILE.h5", type=FILE)
 def info(file: Path) -> None:
     """Say what a modal body file or a results file holds."""
+    from .common.hdf5 import reading
     from .present.info import describe
 
-    click.echo(describe(file))
+    with reading(file):
+        click.echo(describe(file))
 
 
 @cli.command()
@@ -131,10 +133,12 @@ def info(file: Path) -> None:
 @click.option("--analysis", metavar="NAME", help="Of this analysis only.")
 def feasibility(results_file: Path, analysis: str | None) -> None:
     """Say whether motors and patches can do what the analyses of a results file ask of them, and what would do."""
+    from .common.hdf5 import reading
     from .present.feasibility import print_feasibility
     from .present.summary import summary_console
 
-    print_feasibility(results_file, analysis, summary_console())
+    with reading(results_file):
+        print_feasibility(results_file, analysis, summary_console())
 
 
 @cli.command()
@@ -146,9 +150,12 @@ def plot(file: Path, output: Path | None, formats: str) -> None:
 
     Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn.
     """
+    from .common.hdf5 import reading
     from .pictures.figures.plot import plot_file
 
-    for path in plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(",")):
+    with reading(file):
+        paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","))
+    for path in paths:
         click.echo(path)
 
 
@@ -165,9 +172,11 @@ def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN4
 
     Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies.
     """
+    from .common.hdf5 import reading
     from .pictures.view import Options, view_file
 
-    viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
+    with reading(file):
+        viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
     for path in viewed.paths:
         click.echo(path)
     for note in viewed.notes:
@@ -182,10 +191,12 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 
     Several results files come side by side, for comparison. The page needs no network and no other file.
     """
+    from .common.hdf5 import reading
     from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
-    write_report(results_files, path)
+    with reading(*results_files):
+        write_report(results_files, path)
     click.echo(path)
 
 
@@ -195,10 +206,12 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 @click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Where to write [RESULTS.npz].")
 def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
     """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
+    from .common.hdf5 import reading
     from .results.linear import export_linear
 
     path = output or results_file.with_suffix(".npz")
-    name = export_linear(results_file, analysis, path)
+    with reading(results_file):
+        name = export_linear(results_file, analysis, path)
     click.echo(f"{path}: linear model of {name}")
 
 

@@ -166,7 +166,7 @@ def node_map(space: FunctionSpace) -> Integers:
 
 @contextmanager
 def _compiling(comm: MPI.Comm) -> Iterator[dict[str, Any]]:
-    """Arguments that have dolfinx compile, and find what is compiled, by way of `form_cache`; its log and gcc's muted."""
+    """Arguments that have dolfinx compile, and find what is compiled, by way of `form_cache`; logs are muted."""
     before = logging.root.manager.disable
     logging.disable(logging.WARNING)
     try:

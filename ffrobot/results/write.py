@@ -12,6 +12,7 @@ from ..actuation.feasibility import Feasibility
 from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointForces, PointSet
+from ..common.checksum import MARK, METHOD, sealed
 from ..common.files import write_atomically
 from ..common.version import program_version
 from ..mbs.analysis.analyses import Outcome
@@ -40,7 +41,7 @@ FORMAT_VERSION = 1
 
 def write_results(solution: Solution, path: Path) -> None:
     """Write every analysis of a solution to `path`. Raises `SolveError` where that fails; no half file is left."""
-    write_atomically(path, results_image(solution), "results file")
+    write_atomically(path, sealed(results_image(solution)), "results file")
 
 
 def results_image(solution: Solution) -> bytes:
@@ -48,6 +49,7 @@ def results_image(solution: Solution) -> bytes:
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
+        file.attrs[MARK] = METHOD
         file.attrs["ffrobot_version"] = program_version()
         file.attrs["name"] = solution.scene.name
         file.attrs["scene"] = solution.scene.text

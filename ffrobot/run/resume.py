@@ -17,6 +17,7 @@ from typing import Any
 import h5py
 
 from ..common.errors import InputError
+from ..common.hdf5 import blaming
 from ..common.validation import key_path
 from ..common.version import program_version
 from ..mbs import _core
@@ -45,7 +46,7 @@ def resume(
     solution = prepare(scene, watcher)
     if not results.exists():
         return run_analyses(solution, watcher, keep)
-    with Results(results) as file:
+    with blaming(results), Results(results) as file:
         _check_same_input(solution, file)
         status = [file.attributes(name)["status"] if file.has(name) else "" for name in _analyses(solution)]
         if all(found == "completed" for found in status):
@@ -118,6 +119,11 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
     rows = {row: file[f"{group}/{row}"] for row in ROWS if file.has(f"{group}/{row}")}
     rows |= {"time": file.time(name), "residual": file[f"{name}/constraint_violation"]}
     where = file.attributes(f"{group}/checkpoint")
+    outputs = float(where["outputs"])
+    if outputs != len(rows["time"]) or about["status"] not in (*STOPPED, "completed"):
+        raise InputError(
+            f"{file.path}: {name}: expected as many outputs as times, {len(rows['time'])}, found {outputs:g}"
+        )
     state, stepping, gathered = (file[f"{group}/checkpoint/{key}"] for key in ("state", "stepping", "gathered"))
     recording = None
     if file.has(f"{group}/recording"):
@@ -132,6 +138,7 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
         Choice(about["integrator"], about["integrator_reason"]),
         _core.Checkpoint(where["time"], state, stepping, gathered, int(where["outputs"])),
         recording,
+        f"{file.path}: {group}",
     )
 
 

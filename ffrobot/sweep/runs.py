@@ -64,7 +64,7 @@ def perform(run: Run) -> Row:
     message = "" if done.returncode == 0 else _last_message(done.stderr, run.folder)
     quantities = _quantities(results, run.collect) if results.exists() else {}
     row = Row(run.number, run.values, status, message, quantities)
-    write_atomically(run.folder / ROW, json.dumps(asdict(row)).encode(), "row of the sweep")
+    write_atomically(run.folder / ROW, json.dumps(asdict(row)).encode(), "row of the sweep", ours=True)
     return row
 
 

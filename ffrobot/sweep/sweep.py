@@ -155,7 +155,7 @@ def _claim_folder(sweep: Sweep) -> None:
         raise InputError(f"{sweep.folder}: output: expected a new folder or one of this very sweep, found another's")
     if not path.exists() and sweep.folder.exists() and any(sweep.folder.iterdir()):
         raise InputError(f"{sweep.folder}: output: expected a new folder, found one that holds other files")
-    write_atomically(path, plan.encode(), "plan of the sweep", make_folder=True)
+    write_atomically(path, plan.encode(), "plan of the sweep", make_folder=True, ours=True)
 
 
 def forget_failures(sweep: Sweep) -> int:

@@ -211,6 +211,9 @@ def _integrate(
     progress: Progress,
     earlier: EarlierRun | None = None,
 ) -> Outcome:
+    if earlier is not None:
+        motors = len(assembly.motor_rows) if resolver is not None else None
+        earlier.check(assembly, analysis, motors, recording is not None)
     if earlier is not None and earlier.status == "completed":
         return _taken_over(assembly, analysis, earlier)
     if len(analysis.times) > 1 and (cause := lost_inertia(assembly, start.q)):
