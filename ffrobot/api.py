@@ -18,34 +18,46 @@ AnyPath = str | PathLike[str]
 
 
 def solve(
-    scene: Scene | AnyPath, output: AnyPath | None = None, watcher: Watcher | None = None, *, resume: bool = False
+    scene: Scene | AnyPath,
+    output: AnyPath | None = None,
+    watcher: Watcher | None = None,
+    *,
+    resume: bool = False,
+    allow_python: Sequence[AnyPath] = (),
 ) -> Results:
     """Run the analyses of a scene, or of a scene file, and return the results: `ffrobot solve`.
 
     They are written to `output` where one is given, and kept in memory otherwise. `watcher` is told how it goes.
+    Python files that a scene file names run from below its folder, and from `allow_python` (files and folders).
     `resume` goes on with a run that was stopped, from `output`; functions of Python have to be the same then.
     Raises `InputError` for anything wrong with the scene, `SolveError` where an analysis does not reach its end; what
     was computed until then is in `output` all the same.
     """
     from .common.errors import InputError
     from .common.files import check_output
+    from .common.outputs import protected
     from .mbs.scene.scene import Scene
     from .results.file import Results
     from .results.write import FORMAT, results_image, write_results
+    from .run.inputs import files_of_scene, files_of_tables
     from .run.resume import how_to_go_on
     from .run.resume import resume as run_on
     from .run.solution import solve as run
 
     path = None if output is None else Path(output)
+    inputs = files_of_scene(Path(scene)) if not isinstance(scene, Scene) else files_of_tables(scene.path, scene.text)
     if path is not None:
-        check_output(path, FORMAT)
+        with protected(inputs):
+            check_output(path, FORMAT)
     elif resume:
         raise InputError("solve: resume: expected the output of the run that was stopped, found none")
-    scene = scene if isinstance(scene, Scene) else Path(scene)
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene, allow_python=allow_python)
 
     def keep(solution: Solution) -> None:
         if path is not None:
-            write_results(solution, path)
+            with protected(inputs):
+                write_results(solution, path)
 
     solution = run_on(scene, path, watcher, keep) if path is not None and resume else run(scene, watcher, keep)
     if solution is None:
@@ -58,11 +70,13 @@ def solve(
     return Results.from_image(results_image(solution), solution.scene.path)
 
 
-def load_scene(path: AnyPath) -> Scene:
-    """Read and validate a scene file. Raises `InputError` with a line for each wrong key."""
+def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
+    """Read and validate a scene file, `allow_python` as in `solve`. Raises `InputError`, a line for each wrong key."""
+    from .common.python_files import python_allowed
     from .mbs.scene.load import load_scene
 
-    return load_scene(Path(path))
+    with python_allowed(Path(place) for place in allow_python):
+        return load_scene(Path(path))
 
 
 def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:

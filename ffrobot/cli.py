@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ import click
 from .bench.command import bench
 from .common.errors import FfrobotError
 from .common.parallel import end_all, is_first, on_first
-from .present.logs import LOGGER, logging_options
+from .present.logs import LOGGER, logging_options, python_option
 
 if TYPE_CHECKING:
     from .run.solution import Solution
@@ -48,7 +49,9 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     """
     from .fe_models.link import make_link
     from .present.progress import Display
+    from .run.inputs import files_of_link
 
+    _protect(files_of_link(link_file))
     with Display() as display:
         outcome = make_link(link_file, output, force, display.stage)
     if not is_first():
@@ -71,6 +74,7 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     help="Where to write [SCENE.results.h5 beside the input].",
 )
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped, from its results file.")
+@python_option
 @logging_options
 def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
     """Run the analyses of a scene (stage 2).
@@ -85,11 +89,13 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
     from .present.progress import Display
     from .present.summary import print_summary, summary_console
     from .results.write import FORMAT, write_results
+    from .run.inputs import files_of_scene
     from .run.resume import how_to_go_on, left_out
     from .run.resume import resume as resume_scene
     from .run.solution import solve as solve_scene
 
     path = output or scene_file.with_suffix(".results.h5")
+    _protect(files_of_scene(scene_file))
     check_output(path, FORMAT)
     writing = 0.0
 
@@ -225,6 +231,7 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
 @click.option("--retry", is_flag=True, help="Run again what failed before.")
 @click.option("--keep/--no-keep", default=True, show_default=True, help="Whether results files of the runs stay.")
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder of the sweep [SCENE.sweep beside the input].")
+@python_option
 @logging_options
 def sweep(
     scene_file: Path,
@@ -250,12 +257,16 @@ def sweep(
     """  # noqa: D301 (click wants the backspace itself)
     from .present.progress import Display
     from .present.summary import summary_console
-    from .sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep
+    from .run.inputs import files_of_scene
+    from .sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
 
     folder = output or scene_file.with_suffix(".sweep")
+    _protect(files_of_scene(scene_file))
     plan = on_first(lambda: plan_sweep(scene_file, vary, folder, sample, seed, collect))
     if retry and is_first():
         forget_failures(plan)
+    if is_first() and (changes := stale_rows(plan)):
+        click.echo(f"ffrobot: {changes}", err=True)
     with Display() as display:
         rows = run_sweep(plan, processes, display)
     if not is_first():
@@ -282,6 +293,13 @@ def schema(kind: str) -> None:
 
 
 cli.add_command(bench)
+
+
+def _protect(paths: Iterable[Path]) -> None:
+    """Write to none of these files as long as the command runs."""
+    from .common.outputs import protected
+
+    click.get_current_context().with_resource(protected(paths))
 
 
 def main() -> None:

@@ -6,7 +6,6 @@ On Ctrl-C and where `max_steps` is used up, the results file keeps what the next
 
 from __future__ import annotations
 
-import hashlib
 import json
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -26,6 +25,7 @@ from ..mbs.analysis.earlier_run import COUNTS, ROWS, EarlierRun
 from ..mbs.scene.scene import Scene
 from ..mbs.solve.integrators import METHODS, Choice
 from ..results.file import Results
+from .inputs import digest_of_file, named_files
 from .solution import Keep, Solution, Watcher, prepare, run_analyses, stiffened
 
 GROUP = "resume"  # in the group of an analysis
@@ -60,7 +60,7 @@ def resume(
 
 def write_state(file: h5py.File, solution: Solution) -> None:
     """Add to a results file, where the run was stopped, what `resume` needs."""
-    file.attrs["waypoint_files"] = json.dumps(_waypoint_files(solution.scene))
+    file.attrs["input_files"] = json.dumps(_input_files(solution.scene))
     if not _stopped(solution) and not left_out(solution):
         return
     for name, outcome in solution.outcomes.items():
@@ -163,10 +163,10 @@ def _changes(solution: Solution, file: Results) -> Iterator[str]:
     for name, body in solution.bodies.items():
         if body.path is not None and body.file_hash != file.modal_files[name].sha256:
             yield f'the modal body of "{name}"'
-    waypoints = json.loads(file.attributes("/").get("waypoint_files", "{}"))
-    for name, digest in _waypoint_files(solution.scene).items():
-        if waypoints.get(name) != digest:
-            yield f"the waypoints {name}"
+    files = json.loads(file.attributes("/").get("input_files", "{}"))
+    for name, digest in _input_files(solution.scene).items():
+        if files.get(name) != digest:
+            yield name
 
 
 def _without_limits(scene: Mapping[str, Any]) -> dict[str, Any]:
@@ -188,7 +188,10 @@ def _first_difference(then: object, now: object, loc: tuple[int | str, ...] = ()
     return next((place for place in found if place is not None), loc)
 
 
-def _waypoint_files(scene: Scene) -> dict[str, str]:
-    """SHA-256 of the waypoint files of a scene, by their name there."""
-    names = [entry.get("waypoints") for entry in tomllib.loads(scene.text).get("trajectory", [])]
-    return {n: hashlib.sha256((scene.path.parent / n).read_bytes()).hexdigest() for n in names if n is not None}
+def _input_files(scene: Scene) -> dict[str, str]:
+    """SHA-256 of the files that a scene names besides links and modal bodies, by what messages call them."""
+    tables, folder = tomllib.loads(scene.text), scene.path.parent
+    waypoints = {entry["waypoints"] for entry in tables.get("trajectory", []) if "waypoints" in entry}
+    calls = {folder / name: f"the waypoints {name}" for name in waypoints}
+    besides = {key: value for key, value in tables.items() if key != "body"}
+    return {calls.get(file, f"the file {file.name}"): digest_of_file(file) for file in named_files(besides, folder)}
