@@ -29,7 +29,7 @@ def _parts(value: Any, depth: int) -> Iterator[bytes]:  # noqa: ANN401 (whatever
     elif value is None or isinstance(value, bool | int | float | complex | str | bytes | np.generic):
         yield repr(value).encode()
     elif isinstance(value, list | tuple | set | frozenset):
-        for item in value:
+        for item in sorted(value, key=repr) if isinstance(value, set | frozenset) else value:
             yield from _parts(item, depth - 1)
     elif isinstance(value, dict):
         for key, item in value.items():
@@ -67,6 +67,8 @@ def _code(code: CodeType) -> Iterator[bytes]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from _code(constant)
+        elif isinstance(constant, frozenset):  # in another order in every process
+            yield repr(sorted(constant, key=repr)).encode()
         else:
             yield repr(constant).encode()
 

@@ -310,10 +310,8 @@ def _check_inertia(body: ModalBody) -> None:
     """Kinetic energy is positive in every motion: about the center of mass, and with what the modes carry along."""
     about_center = body.second_moment - np.outer(body.first_moment, body.first_moment) / body.mass
     relative = body.modal_mass - body.S_bar.T @ body.S_bar / body.mass
-    for name, matrix in (
-        ("second_moment about the center of mass", about_center),
-        ("modal_mass - S_barᵀ S_bar / mass", relative),
-    ):
+    matrices = {"second_moment, about the center of mass": about_center, "modal_mass, less S_bar": relative}
+    for name, matrix in matrices.items():
         lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
         if lowest < -POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0):
             _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
