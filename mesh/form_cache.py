@@ -42,8 +42,7 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
     if comm.rank != 0:
         yield Path(comm.bcast(None))
         return
-    shared = user_cache_path("ffrobot") / "forms" / f"{sys.implementation.cache_tag}-{platform.machine()}-{compiler}"
-    own = _own_folder(shared)
+    shared, own = _folders(compiler)
     if comm.size > 1:
         comm.bcast(str(own))
     with held(shared / "compiling.lock", PATIENCE):  # others wait, and find what this process compiles
@@ -54,8 +53,12 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
 
 
 @cache
-def _own_folder(shared: Path) -> Path:
-    """A new folder of this process, gone when it ends; those of processes that were killed are removed here."""
+def _folders(compiler: str) -> tuple[Path, Path]:
+    """The cache, and a new folder of this process, gone when it ends; those of processes that were killed are removed.
+
+    They are where the environment says at first: what has been loaded from there cannot move.
+    """
+    shared = user_cache_path("ffrobot") / "forms" / f"{sys.implementation.cache_tag}-{platform.machine()}-{compiler}"
     try:
         shared.mkdir(parents=True, exist_ok=True)
         for folder in shared.glob(f"{OWN}*"):
@@ -65,7 +68,7 @@ def _own_folder(shared: Path) -> Path:
     except OSError:  # read-only, full, or a file in its place
         own = tempfile.mkdtemp(prefix="ffrobot-forms-")
     atexit.register(shutil.rmtree, own, ignore_errors=True)
-    return Path(own)
+    return shared, Path(own)
 
 
 def _forget_unfinished(own: Path) -> None:
