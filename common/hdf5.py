@@ -43,13 +43,13 @@ def open_checked(path: Path) -> h5py.File:
 def check_links(file: h5py.File, path: Path) -> None:
     """Raise `InputError` where a member of the file is not in the file itself."""
 
-    def check(name: bytes, info: h5py.h5l.LinkInfo) -> None:
-        if info.type != h5py.h5l.TYPE_HARD:
-            raise InputError(
-                f"{path}: expected members in the file itself, found a link at {name.decode(errors='replace')}"
-            )
+    def leads_away(name: bytes, info: h5py.h5l.LinkInfo) -> bytes | None:
+        return None if info.type == h5py.h5l.TYPE_HARD else name
 
-    file.id.links.visit(check, info=True)
+    found = file.id.links.visit(leads_away, info=True)
+    if found is not None:
+        where = found.decode(errors="replace")
+        raise InputError(f"{path}: expected members in the file itself, found a link at {where}")
 
 
 def read(dataset: h5py.Dataset) -> Any:  # noqa: ANN401 (as h5py)

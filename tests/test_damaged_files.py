@@ -97,7 +97,10 @@ def _virtual(file):
         (_link("mass", h5py.ExternalLink("elsewhere.h5", "mass")), "found a link at mass"),
         (_link("mass", h5py.SoftLink("/length")), "found a link at mass"),
         (_virtual, "found a virtual or external dataset"),
-        (_replace("mass", shape=(), dtype="f8", external=[("elsewhere.bin", 0, 8)]), "virtual or external dataset"),
+        (
+            _replace("second_moment", shape=(3, 3), dtype="f8", external=[("elsewhere.bin", 0, 72)]),
+            "virtual or external dataset",
+        ),
         (_replace("mesh/points", shape=(10**7, 10**6), dtype="f8"), "expected 8e"),
         (_replace("second_moment", data=-np.eye(3)), "second_moment, about the center of mass: expected no negative"),
         (_replace("invariants/S_bar", data=np.full((3, 10), 9.0)), "modal_mass, less S_bar: expected no negative"),
@@ -131,7 +134,7 @@ body = [{ name = "arm", rigid = { mass = 1.0, inertia = 0.1, center = [0.5, 0.0]
 joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"] }]
 trajectory = [{ name = "turn", joint = "shoulder", value = "sin(9*t)" }]
 analysis = [
-    { name = "inverse", kind = "pcid", end = 1.0, output_step = 0.01, tolerance = 1e-9, max_steps = 30 },
+    { name = "inverse", kind = "pcid", end = 1.0, output_step = 0.01, tolerance = 1e-9, max_steps = 4 },
     { name = "forward", kind = "forward", actuation = "inverse", apply = "joints" },
 ]
 """

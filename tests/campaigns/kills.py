@@ -2,21 +2,21 @@
 
     python tests/campaigns/kills.py [TRIES] [SEED]
 
-Run by hand, some minutes. Each try starts a command in a folder of its own, sends SIGINT, SIGTERM or SIGKILL after a random part
-of the time that it takes, looks at every file, and runs the same command again, with the same cache. Exit code 1 where anything
-was found.
+Run by hand, some minutes. Each try starts a command in a folder of its own, sends SIGINT, SIGTERM or SIGKILL after a
+random part of the time that it takes, looks at every file, and runs the same command again, with the same cache. Exit
+code 1 where anything was found.
 """
 
 import os
 import random
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
 
 import numpy as np
 
@@ -81,12 +81,10 @@ class Campaign:
         (place / "arm.toml").write_text(LINK, encoding="utf-8")
         (place / "scene.toml").write_text(SCENE, encoding="utf-8")
 
-    def start(self, name: str, place: Path, cache: Path) -> subprocess.Popen[str]:
+    def start(self, name: str, place: Path, cache: Path) -> Popen[str]:
         environment = os.environ | {"XDG_CACHE_HOME": str(cache), "OMP_NUM_THREADS": "1"}
         command = [PROGRAM, *COMMANDS[name]]
-        return subprocess.Popen(
-            command, cwd=place, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-        )
+        return Popen(command, cwd=place, env=environment, stdout=DEVNULL, stderr=PIPE, text=True)
 
     def time(self, name: str) -> float:
         began = time.monotonic()
