@@ -15,6 +15,7 @@ from typing import Any
 
 import h5py
 
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.hdf5 import blaming
 from ..common.validation import key_path
@@ -124,11 +125,13 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
         raise InputError(
             f"{file.path}: {name}: expected as many outputs as times, {len(rows['time'])}, found {outputs:g}"
         )
-    state, stepping, gathered = (file[f"{group}/checkpoint/{key}"] for key in ("state", "stepping", "gathered"))
+    state, stepping, gathered = (
+        _vector(file, f"{group}/checkpoint/{key}") for key in ("state", "stepping", "gathered")
+    )
     recording = None
     if file.has(f"{group}/recording"):
         recording = _core.Recording(
-            file[f"{group}/recording/times"], file[f"{group}/recording/states"],
+            _vector(file, f"{group}/recording/times"), _vector(file, f"{group}/recording/states"),
             METHODS[about["integrator"]], analysis.spectral_radius, analysis.tolerance,
         )  # fmt: skip
     return EarlierRun(
@@ -140,6 +143,13 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
         recording,
         f"{file.path}: {group}",
     )
+
+
+def _vector(file: Results, name: str) -> Array:
+    values = file[name]
+    if values.ndim != 1:
+        raise InputError(f"{file.path}: {name}: expected a row of numbers, found an array of shape {values.shape}")
+    return values
 
 
 def _check_same_input(solution: Solution, file: Results) -> None:
