@@ -13,11 +13,12 @@ from ...mbs import _core
 from ...mbs.analysis.analyses import STATUS, Outcome, Progress, as_long_as, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
 from ...mbs.analysis.replay import actuation_source, motor_limits
-from ...mbs.model.model import ZERO, MechanismSystem, Model, load_rows
+from ...mbs.model.model import ZERO, Model, load_measures
+from ...mbs.model.system import MechanismSystem
 from ...mbs.scene.analysis_records import Analysis
 from ...mbs.scene.loop_records import ComputedTorque, Lqr
-from ...mbs.solve.initial_state import State
 from ...mbs.solve.integrators import METHODS, choose_integrator
+from ...mbs.solve.state import State
 from ..patches.patches import PatchArray
 from ..patches.voltages import allocation
 from .choice import make_controller, needed_sensors
@@ -107,7 +108,7 @@ def run_closed_loop(
     read = merged([s for sensor in analysis.sensor for s in signals(built, patches, sensor)], needed)
     rows = [signal.row for signal in read if signal.row is not None]
     drives = [*((row, ZERO) for row in built.motors.values()), *loads]
-    drives += load_rows(model.scene, analysis.disturbance)
+    drives += load_measures(model.scene, analysis.disturbance)
     assembly = MechanismSystem(built, built.joints, drives, rows)
     sensor = sensing(assembly, read)
 
