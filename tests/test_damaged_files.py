@@ -52,11 +52,11 @@ def test_random_damage(request, file, kind):
 
 def test_changes_by_other_programs_are_noticed(modal):
     with h5py.File(modal, "r+") as file:
-        file["interfaces/tip/translation"][...] *= 2
+        file["interfaces/tip/rotation"][...] *= 2
     with pytest.raises(InputError, match="damaged file: its content is not what its checksum was made of"):
         read_modal_body(modal)
     checksum.seal(modal)
-    with pytest.raises(InputError, match="interfaces/tip/translation: expected what stations say"):
+    with pytest.raises(InputError, match="interfaces/tip/rotation: expected what stations say"):
         read_modal_body(modal)
 
 

@@ -215,7 +215,7 @@ def _integrate(
     earlier: EarlierRun | None = None,
 ) -> Outcome:
     if earlier is not None:
-        motors = len(assembly.motor_rows) if resolver is not None else None
+        motors = len(assembly.motor_measures) if resolver is not None else None
         earlier.check(assembly, analysis, motors, recording is not None)
     if earlier is not None and earlier.status == "completed":
         return _taken_over(assembly, analysis, earlier)

@@ -14,7 +14,7 @@ from .. import _core
 from ..solve.integrators import Choice
 
 if TYPE_CHECKING:
-    from ..model.model import MechanismSystem
+    from ..model.system import MechanismSystem
     from ..scene.analysis_records import Analysis
     from .analyses import Outcome
 

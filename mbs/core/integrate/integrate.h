@@ -57,9 +57,9 @@ struct Breaks {
 };
 
 // Integrates y from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
-// carry_on(t) is asked every thousand steps, and about five times a second. y ends at the last accepted step. `breaks` may be null.
-// A `checkpoint` of an earlier call with the same `times` has the run go on from there: neither outputs nor the
-// `recording`, which has to be the same, begin again, and max_steps counts anew. It ends as that of this call.
+// carry_on(t) is asked every thousand steps, and about five times a second. y ends at the last accepted step. `breaks`
+// may be null. A `checkpoint` of an earlier call with the same `times` has the run go on from there: neither outputs
+// nor the `recording`, which has to be the same, begin again, and max_steps counts anew. It ends as that of this call.
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls,
                             const std::function<void(std::size_t, double, const double *)> &output,
