@@ -335,3 +335,6 @@ def main() -> None:
             LOGGER.error("%s", error)
             click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)
+    finally:  # nothing is left to keep: at the interpreter's end an interrupt would be a traceback
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)
