@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
-    from .mbs.scene.scene import Scene
     from .results.file import Results
-    from .run.solution import Solution, Watcher
+    from .run.solution import Solution
+    from .run.watcher import Watcher
+    from .scene.scene import Scene
 
 AnyPath = str | PathLike[str]
 
@@ -36,13 +37,13 @@ def solve(
     from .common.errors import InputError
     from .common.files import check_output
     from .common.outputs import protected
-    from .mbs.scene.scene import Scene
-    from .results.file import Results
-    from .results.write import FORMAT, results_image, write_results
+    from .results.file import FORMAT, Results
+    from .results.resume import how_to_go_on
+    from .results.resume import resume as run_on
+    from .results.write import results_image, write_results
     from .run.inputs import files_of_scene, files_of_tables
-    from .run.resume import how_to_go_on
-    from .run.resume import resume as run_on
-    from .run.solution import solve as run
+    from .run.solve import solve as run
+    from .scene.scene import Scene
 
     path = None if output is None else Path(output)
     inputs = files_of_scene(Path(scene)) if not isinstance(scene, Scene) else files_of_tables(scene.path, scene.text)
@@ -73,7 +74,7 @@ def solve(
 def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
     """Read and validate a scene file, `allow_python` as in `solve`. Raises `InputError`, a line for each wrong key."""
     from .common.python_files import python_allowed
-    from .mbs.scene.load import load_scene
+    from .scene.load import load_scene
 
     with python_allowed(Path(place) for place in allow_python):
         return load_scene(Path(path))

@@ -16,7 +16,7 @@ from ..common.files import check_folder, write_atomically
 from ..common.parallel import is_first, processes
 from ..common.python_files import allowed_python, python_allowed
 from ..run.inputs import PROGRAM, changed
-from ..run.solution import Watcher
+from ..run.watcher import Watcher
 from .files import RunFiles, run_files
 from .runs import RESULTS, ROW, Row, Run, collected, finished_row, keep_row, perform, stop_runs
 from .table import write_table
@@ -175,7 +175,7 @@ def _check_first(sweep: Sweep) -> None:
     from tempfile import TemporaryDirectory
 
     from ..fe_models.link_file import read_link
-    from ..mbs.scene.load import load_scene
+    from ..scene.load import load_scene
 
     with TemporaryDirectory() as folder:
         run = Run(0, sweep.points[0], Path(folder))
