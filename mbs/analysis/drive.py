@@ -19,6 +19,7 @@ from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
+from .earlier_check import check_earlier
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 
 Progress = Callable[[float], bool]
@@ -74,8 +75,12 @@ def drive(
     integration that ends early is kept with its cause. Raises `SolveError` for a start without inertia.
     """
     times = analysis.times if times is None else times
+    if earlier is not None:
+        motors = len(assembly.motor_measures) if resolver is not None else None
+        check_earlier(earlier, assembly, times, motors, recorded=recording is not None)
     if earlier is not None and earlier.statistics.status == "completed":
-        return Outcome(analysis, assembly, **vars(earlier))
+        motion, forces, run_before = earlier.motion, earlier.forces, earlier.statistics
+        return Outcome(analysis, assembly, motion, forces, run_before, continuation=earlier.continuation)
     if len(times) > 1 and (cause := lost_inertia(assembly, start.q)):
         raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()

@@ -3,6 +3,7 @@
 #include "core/integrate/step_control.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <memory>
 
@@ -11,6 +12,7 @@ namespace ffrobot {
 namespace {
 
 constexpr unsigned long steps_between_questions = 1000;
+constexpr std::chrono::milliseconds time_between_questions{200}; // where steps take long
 
 // A step size that collapses never quite reaches rounding where noise feeds its estimates. A run that would take this
 // many times the steps it is allowed, at the pace of its last thousand, is given up.
@@ -124,9 +126,13 @@ private:
       return end_as(IntegrationStatus::too_many_steps);
     const double left = end_ - t_;
     bool collapsed = steps_.next_step < 1e-13 * std::max(std::abs(t_), left);
-    if (taken % steps_between_questions == 0) {
+    const bool counted = taken % steps_between_questions == 0;
+    if (const auto now = std::chrono::steady_clock::now(); counted || now - asked_ > time_between_questions) {
+      asked_ = now;
       if (!carry_on_(t_))
         return end_as(IntegrationStatus::interrupted);
+    }
+    if (counted) {
       const double most = hopeless * static_cast<double>(controls_.max_steps) / steps_between_questions;
       collapsed = collapsed || (taken > 0 && controls_.max_steps && left > most * (t_ - t_asked_));
       t_asked_ = t_;
@@ -253,6 +259,7 @@ private:
   StepHistory steps_;
   IntegrationReport report_;
   double t_, t_asked_, end_, duration_;
+  std::chrono::steady_clock::time_point asked_ = std::chrono::steady_clock::now();
   std::size_t next_break_ = 0;
   Eigen::VectorXd z_, error_, z_output_; // local coordinates (ode.h)
 };

@@ -69,10 +69,10 @@ struct Breaks {
 };
 
 // Integrates y = (q, v) from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
-// carry_on(t) is asked about every thousand steps. y ends at the last accepted step. `recording`, `breaks` and
-// `checkpoint` may be null. Of a `checkpoint` that has begun in an earlier call with the same `times` the integration
-// goes on: neither outputs nor the `recording`, which has to be the same, begin again, and max_steps counts anew. It
-// ends as that of this call.
+// carry_on(t) is asked every thousand steps, and about five times a second. y ends at the last accepted step.
+// `recording`, `breaks` and `checkpoint` may be null. Of a `checkpoint` that has begun in an earlier call with the same
+// `times` the integration goes on: neither outputs nor the `recording`, which has to be the same, begin again, and
+// max_steps counts anew. It ends as that of this call.
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording,
