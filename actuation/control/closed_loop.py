@@ -10,10 +10,12 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mbs import _core
-from ...mbs.analysis.analyses import STATUS, Outcome, Progress, as_long_as, initial_state
+from ...mbs.analysis.analyses import STATUS, Outcome, Progress, as_long_as, in_coordinates_of, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
 from ...mbs.analysis.replay import actuation_source, motor_limits
+from ...mbs.model.measures import Measure
 from ...mbs.model.model import ZERO, MechanismSystem, Model, load_rows
+from ...mbs.model.raised_mass import coordinate_factors, integrated, mass_factors, modal_factors
 from ...mbs.scene.analysis_records import Analysis
 from ...mbs.scene.loop_records import ComputedTorque, Lqr
 from ...mbs.solve.initial_state import State
@@ -122,7 +124,7 @@ def run_closed_loop(
     limit = np.concatenate([motor_limits(model), *(array.limit for array in patches.values())])
     limit = np.full_like(limit, np.inf) if analysis.unlimited else limit
     loop = Loop(setup, read, acting, limit, analysis.seed)
-    outcome = _integrate(assembly, analysis, moved, model, patches, sensor, loop, times, progress)
+    outcome = _integrate(assembly, rows, read, analysis, moved, model, patches, loop, times, progress, drives)
     taken = slice(loop.taken)
     held = _held(outcome.time, times[taken] + analysis.delay, loop.commands[taken], loop.first)
     outcome = replace(outcome, tau=held[:, : len(model.motors)])
@@ -135,23 +137,33 @@ def run_closed_loop(
 
 
 def _integrate(
-    assembly: MechanismSystem,
+    reported: MechanismSystem,
+    rows: Sequence[Measure],
+    read: Sequence[Signal],
     analysis: Analysis,
     source: Outcome,
     rigid: Model,
     patches: Mapping[str, PatchArray],
-    sensor: _core.Sensing,
     loop: Loop,
     times: Array,
     progress: Progress,
+    drives: Sequence[tuple[Measure, _core.TimeFunction]],
 ) -> Outcome:
     began = time.perf_counter()
     start = State(source.q[0].copy(), source.v[0].copy())
     if analysis.start == "scene":
         start = initial_state(MechanismSystem(rigid, [*rigid.joints, *rigid.trajectories], rigid.loads))
-        start = rotors_like(assembly.model, start, source)
+        start = rotors_like(reported.model, start, source)
+    model = integrated(reported.model)
+    factors = {body.name: np.sqrt(mass_factors(body)) for body in reported.model.bodies}
+    if model is not reported.model:
+        all_factors = coordinate_factors(reported.model)
+        start = State(start.q * all_factors, start.v * all_factors)
+        read = [replace(s, vector=s.vector / factors[s.body]) if s.row is None else s for s in read]
+    assembly = MechanismSystem(model, model.joints, drives, rows)
+    sensor = sensing(assembly, read)
     integrator = choose_integrator(assembly, analysis, start)
-    voltages = [(assembly.index[body], array.Phi_V) for body, array in patches.items()]
+    voltages = [(assembly.index[body], array.Phi_V / factors[body][:, None]) for body, array in patches.items()]
     run = _core.run_sampled(
         assembly.system, assembly.groups, assembly.moments, analysis.times.tolist(), start.q, start.v,
         analysis.tolerance, analysis.max_steps, METHODS[integrator.name], analysis.spectral_radius,
@@ -159,10 +171,11 @@ def _integrate(
     )  # fmt: skip
     seconds = time.perf_counter() - began
     reached, held = len(run.q), len(assembly.constraints)
-    return Outcome(
+    outcome = Outcome(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers[:, :held], None, None,
         run.residual, STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, integrator,
     )  # fmt: skip
+    return in_coordinates_of(outcome, reported)
 
 
 def _at(times: Array, known: Array, values: Array) -> Array:
@@ -202,6 +215,8 @@ def _found(source: Outcome, times: Array) -> tuple[Array, Array | None]:
     if source.recording is None and source.shape is None:
         return _at(times, source.time, moments), None if F_p is None else _at(times, source.time, F_p)
     tau, F_p = actuation_source(source).sample(times.tolist())
+    if source.integrated is not None and F_p is not None:
+        F_p = F_p * modal_factors(source.assembly.model)
     return _at(times, source.time, moments) if source.gears else tau, F_p
 
 

@@ -14,6 +14,7 @@ from ..mbs.analysis.analyses import Outcome
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.motors_only import describe_zeros, is_minimum_phase, path_error
 from ..mbs.model.geometric_stiffening import NOTABLE
+from ..mbs.model.raised_mass import raised_in_words
 from ..mbs.model.truncation import modes_kept
 from ..mbs.solve.stable_inversion import Inversion
 from ..results.loop import HEADINGS, metrics_row
@@ -76,6 +77,8 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
             yield "motors only", f"{name}: {_inversion(outcome, outcome.inversion)}"
     if solution.mode_choice is not None:
         yield "modes", _modes(solution, solution.mode_choice)
+    if (raised := raised_in_words(solution.model)) and any(one.analysis.integrated for one in outcomes.values()):
+        yield "modes", raised
     warnings = [(name, line) for name, loop in solution.loops.items() for line in loop.warnings]
     warnings += [(name, line) for name, outcome in outcomes.items() for line in unresolved_gears(outcome.gears)]
     yield from (("warning", line) for line in _alike(warnings))

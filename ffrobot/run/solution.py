@@ -15,9 +15,11 @@ from ..actuation.control.linear_analysis import LinearAnalysis, analyse, linear_
 from ..actuation.control.placement import Placed
 from ..actuation.feasibility import Feasibility
 from ..actuation.patches.patches import PatchArray, check_reach, patch_array
+from ..actuation.patches.patches import with_factors as on_patches
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.patches.voltages import Voltages, allocation, solve_voltages
 from ..actuation.points import PointForces, PointSet, point_set, with_points
+from ..actuation.points import with_factors as on_points
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..mbs.analysis.analyses import Outcome, run_forward, run_pcid, run_static
@@ -30,6 +32,7 @@ from ..mbs.analysis.replay import ActuatorSet
 from ..mbs.model.geometric_stiffening import NOTABLE, estimated_effect
 from ..mbs.model.model import ModalLoad, Model, build_model
 from ..mbs.model.planar_body import PlanarBody
+from ..mbs.model.raised_mass import mass_factors
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.scene.analysis_records import Analysis
 from ..mbs.scene.load import load_scene
@@ -291,15 +294,19 @@ def _run(solution: Solution, analysis: Analysis, watcher: Watcher, interruption:
         outcome, loop = run_closed_loop(model, analysis, source, solution.patches, progress)
         solution.loops[analysis.name] = loop
         return outcome
-    return run_forward(model, analysis, source, _actuator_set(solution), progress, earlier)
+    prescribed = source is not None and source.shape is not None
+    return run_forward(model, analysis, source, _actuator_set(solution, raised=not prescribed), progress, earlier)
 
 
-def _actuator_set(solution: Solution) -> ActuatorSet:
-    """The actuators of the scene, fresh for one run."""
+def _actuator_set(solution: Solution, *, raised: bool) -> ActuatorSet:
+    """The actuators of the scene, fresh for one run; in coordinates with raised masses where these are integrated."""
+    factors = {body.name: np.sqrt(mass_factors(body)) if raised else np.ones(1) for body in solution.model.bodies}
+    patches = {name: on_patches(array, factors[name]) for name, array in solution.patches.items()}
+    points = {name: on_points(one, factors[name]) for name, one in solution.points.items()}
     return ActuatorSet(
-        {name: allocation(array, limited=False) for name, array in solution.patches.items()},
-        {name: allocation(array, limited=True) for name, array in solution.patches.items()},
-        {name: points.actuator() for name, points in solution.points.items()},
+        {name: allocation(array, limited=False) for name, array in patches.items()},
+        {name: allocation(array, limited=True) for name, array in patches.items()},
+        {name: one.actuator() for name, one in points.items()},
     )
 
 

@@ -13,6 +13,7 @@ from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
 from ..model.model import ZERO, MechanismSystem, Model
+from ..model.raised_mass import coordinate_factors, integrated, modal_factors
 from ..scene.analysis_records import Analysis
 from ..solve.diagnosis import find_cause, lost_inertia
 from ..solve.initial_state import State, check_reach, undeformed_state
@@ -78,6 +79,7 @@ class Outcome:
     inversion: Inversion | None = field(default=None, repr=False)  # motors-only alone
     checkpoint: _core.Checkpoint | None = field(default=None, repr=False)  # where an integration can be gone on with
     gears: Mapping[str, GearMotion] = field(default_factory=dict)  # by joint: inverse analyses with gears that give
+    integrated: MechanismSystem | None = field(default=None, repr=False)  # that of `recording`, with raised masses
 
     def coordinates(self, body: str) -> slice:
         """Columns of (R, θ, p) of a body in q, v and a."""
@@ -125,12 +127,17 @@ def run_pcid(
 
     Raises `InputError` where the trajectories cannot be followed.
     """
-    assembly = MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+
+    def system(of: Model) -> MechanismSystem:
+        return MechanismSystem(of, [*of.joints, *of.trajectories], of.loads, list(of.motors.values()))
+
+    assembly = system(integrated(model))
     start = initial_state(assembly)
     check_smooth(assembly, analysis.end)
     check_reach(assembly, undeformed_state(assembly), analysis.times)
     recording = _core.Recording() if keep_recording else None
-    return _integrate(assembly, analysis, start, None, resolver_of(assembly), recording, progress, earlier=earlier)
+    resolver = resolver_of(assembly)
+    return _integrate(assembly, system(model), analysis, start, None, resolver, recording, progress, earlier=earlier)
 
 
 def run_forward(
@@ -146,24 +153,29 @@ def run_forward(
     Where gears give, motors turn them, with the moments at the outputs of `source` and splines between these.
     It goes on with an `earlier` run of the same analysis.
     """
-    model = with_compliance(model)
+    exact = with_compliance(model)
+    # The shape that FCID prescribes goes with the masses as they are.
+    model = exact if source is not None and source.shape is not None else integrated(exact)
     if source is None:
-        assembly = MechanismSystem(model, model.joints, model.loads)
-        return _integrate(assembly, analysis, initial_state(assembly), None, None, None, progress, earlier=earlier)
+        assembly, reported = (MechanismSystem(of, of.joints, of.loads) for of in (model, exact))
+        start = initial_state(assembly)
+        return _integrate(assembly, reported, analysis, start, None, None, None, progress, earlier=earlier)
     analysis, loads = as_long_as(source, analysis), model.loads
     if source.inversion is not None:
         loads = source.inversion.servo.loads
     rows, actuators = applied_actuators(model, analysis, source, actuator_set)
-    sizes, moved = [ZERO] * len(rows), with_rotors(source, model)
+    sizes, moved = [ZERO] * len(rows), with_rotors(source, exact)
     if model.gears:
         check_applied(model, analysis)
         limits = motor_limits(model)
         sizes = drive_sizes(source, limits if analysis.limits else np.full_like(limits, np.inf))
         actuators = actuators[1:]  # without the motors
-    assembly = MechanismSystem(model, model.joints, [*zip(rows, sizes, strict=True), *loads])
+    drives = [*zip(rows, sizes, strict=True), *loads]
+    assembly, reported = (MechanismSystem(of, of.joints, drives) for of in (model, exact))
     steering = _core.Actuation(actuation_source(source), actuators) if actuators else None
-    start = State(moved.q[0].copy(), moved.v[0].copy())  # bodies and their order are the same
-    return _integrate(assembly, analysis, start, steering, None, None, progress, earlier)
+    factors = coordinate_factors(exact) if model is not exact else 1.0
+    start = State(moved.q[0] * factors, moved.v[0] * factors)  # bodies and their order are the same
+    return _integrate(assembly, reported, analysis, start, steering, None, None, progress, earlier)
 
 
 def as_long_as(source: Outcome, analysis: Analysis) -> Analysis:
@@ -182,7 +194,7 @@ def run_static(model: Model, analysis: Analysis) -> Outcome:
     assembly = MechanismSystem(model, [*model.joints, *held], model.loads, list(model.motors.values()))
     state = static_equilibrium(assembly, undeformed_state(assembly))
     at_rest = State(state.q, np.zeros_like(state.q))
-    return _integrate(assembly, analysis, at_rest, None, resolver_of(assembly), None, lambda _: True)
+    return _integrate(assembly, assembly, analysis, at_rest, None, resolver_of(assembly), None, lambda _: True)
 
 
 def initial_state(assembly: MechanismSystem) -> State:
@@ -203,6 +215,7 @@ def resolver_of(assembly: MechanismSystem) -> _core.ActuatorForces | None:
 
 def _integrate(
     assembly: MechanismSystem,
+    reported: MechanismSystem,
     analysis: Analysis,
     start: State,
     steering: _core.ExternalLoads | None,
@@ -211,8 +224,9 @@ def _integrate(
     progress: Progress,
     earlier: EarlierRun | None = None,
 ) -> Outcome:
+    """Integrate `assembly`; the outcome is in the coordinates of `reported`, the same with masses as they are."""
     if earlier is not None and earlier.status == "completed":
-        return _taken_over(assembly, analysis, earlier)
+        return replace(_taken_over(reported, analysis, earlier), integrated=assembly)
     if len(analysis.times) > 1 and (cause := lost_inertia(assembly, start.q)):
         raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
@@ -235,9 +249,21 @@ def _integrate(
         analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers[:, :held],
         run.tau if resolver else None, run.F_p if resolver else None, run.residual,
         status, run.steps, run.rejected, run.evaluations, seconds, integrator, run.time_reached, cause, recording,
-        checkpoint=checkpoint,
+        checkpoint=checkpoint, integrated=assembly,
     )  # fmt: skip
+    outcome = in_coordinates_of(outcome, reported)
     return outcome if earlier is None else earlier.followed_by(outcome)
+
+
+def in_coordinates_of(outcome: Outcome, reported: MechanismSystem) -> Outcome:
+    """A motion with raised masses as one of `reported`, the same mechanism without."""
+    if all(a is b for a, b in zip(outcome.assembly.model.bodies, reported.model.bodies, strict=True)):
+        return outcome
+    factors, F_p = coordinate_factors(reported.model), outcome.F_p
+    return replace(
+        outcome, assembly=reported, q=outcome.q / factors, v=outcome.v / factors, a=outcome.a / factors,
+        F_p=None if F_p is None else F_p * modal_factors(reported.model),
+    )  # fmt: skip
 
 
 def _taken_over(assembly: MechanismSystem, analysis: Analysis, earlier: EarlierRun) -> Outcome:

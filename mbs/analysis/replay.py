@@ -100,10 +100,10 @@ def is_driven(source: Outcome, body: str) -> bool:
 
 
 def actuation_source(source: Outcome) -> _core.ActuationSource:
-    """The findings of an inverse analysis at any time of it, not at its outputs alone."""
+    """The findings of an inverse analysis at any time of it, not at its outputs alone, in what was integrated."""
     if source.inversion is not None:
         return source.inversion.source()
-    assembly = source.assembly
+    assembly = source.integrated or source.assembly
     resolver = None
     if source.tau is not None:
         resolver = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_rows)
