@@ -25,6 +25,8 @@ from .modal_body import Interface
 TOLERANCE = 1e-3
 # Of the largest energy of a load: less is rounding, of a load that the supports carry.
 IMMOBILE = 1e-10
+# Times the highest eigenmode's frequency: stiffer shapes (of loads a hair's breadth apart) only spoil linear models.
+STIFFEST = 1e4
 # Coupling of families by stiffness, relative to their own: less is rounding.
 COUPLED = 1e-10
 # Eigenmodes of each family where the link file leaves their number out: attachment modes have the statics.
@@ -72,6 +74,11 @@ class ResidualModes:
     families: tuple[Family, ...]
     X: Array
 
+    def up_to(self, omega2: float) -> ResidualModes:
+        """Those with at most that ω²."""
+        count = int(np.searchsorted(self.omega2, omega2, side="right"))
+        return ResidualModes(self.omega2[:count], self.families[:count], self.X[:, :count])
+
 
 def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, inertia: Inertia) -> ResidualModes:
     """Attachment modes from static shapes, by family of their loads.
@@ -91,7 +98,8 @@ def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, inert
             found = _independent(shapes[:, moved] / np.sqrt(own[moved]), known, inertia)
             families += [family] * found.shape[1]
             known = np.concatenate([known, found], axis=1)
-    return _uncoupled(known[:, X.shape[1] :], families, inertia)
+    highest = np.diag(inertia.energy(X)).max() if X.shape[1] else np.inf
+    return _uncoupled(known[:, X.shape[1] :], families, inertia).up_to(STIFFEST**2 * highest)
 
 
 def _energies(shapes: Array, loads: Array, inertia: Inertia) -> Array:

@@ -192,7 +192,7 @@ def canonical_signs(fields: Array) -> Array:
 
 
 def _element_boundaries(link: BeamLink) -> Array:
-    """As the link file wants them, and one more at each attached mass: shear and moment jump there."""
+    """As the link file wants them, and one more at each attached mass, or load with a shape of its own: shear jumps."""
     if link.mesh.nodes is not None:
         nodes = np.array(link.mesh.nodes)
     else:
@@ -203,7 +203,8 @@ def _element_boundaries(link: BeamLink) -> Array:
         i = int(np.clip(np.searchsorted(nodes, place), 1, nodes.size - 1))
         nearest = np.min(np.abs(nodes[i - 1 : i + 1] - place))
         # Next to a node that jump does no harm, a sliver of an element does: its stiffness is all rounding.
-        if any(lump_weights(record.mass, record.inertia)) and nearest > SLIVER * (nodes[i] - nodes[i - 1]):
+        loaded = link.modes.attachment_modes or any(lump_weights(record.mass, record.inertia))
+        if loaded and nearest > SLIVER * (nodes[i] - nodes[i - 1]):
             nodes = with_points(nodes, [place])
     return nodes
 
