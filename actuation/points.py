@@ -10,6 +10,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError
+from ..common.plane import rotated
 from ..fe_models.modal_body import ModalBody
 from ..mbs import _core
 from ..mbs.analysis.analyses import Outcome
@@ -144,9 +145,8 @@ def driving_forces(outcome: Outcome, body: str) -> Array:
 
 
 def _to_global(theta: Array, Q: Array) -> Array:
-    c, s = np.cos(theta), np.sin(theta)
-    turned = np.column_stack([c * Q[:, 0] - s * Q[:, 1], s * Q[:, 0] + c * Q[:, 1]])
-    return np.hstack([turned, Q[:, 2:]])
+    """Forces Q (T, 3 + n) on (R, θ, p) of a body whose R part is in body axes, with it in global axes; θ (T,)."""
+    return np.hstack([rotated(theta, Q[:, :2]), Q[:, 2:]])
 
 
 def _automatic(key: str, name: str, body: ModalBody | None, planar: PlanarBody) -> PointSet:

@@ -18,9 +18,9 @@ import numpy as np
 from ..common.errors import InputError
 from ..common.validation import load_toml, validate
 from ..mesh.records import RectangleSection, SectionRecord, TubeSection
-from .attachment_modes import DEFAULT_COUNT
 from .beam.section_stress import contains
 from .link_records import BeamLink, Link, Material, OrthotropicMaterial, SolidLink
+from .modal_body.attachment_modes import DEFAULT_COUNT
 from .solid.constitutive import is_stable
 
 

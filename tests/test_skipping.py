@@ -11,8 +11,8 @@ import pytest
 from ffrobot.fe_models.link import make_link
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis import fcid
-from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.model.planar_body import core_arguments, vanishing_terms
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.scene.load import make_scene
 from ffrobot.results.write import results_image
 from ffrobot.run.solution import prepare, solve

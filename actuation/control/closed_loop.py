@@ -13,13 +13,14 @@ from ...mbs import _core
 from ...mbs.analysis.analyses import STATUS, Outcome, Progress, as_long_as, in_coordinates_of, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
 from ...mbs.analysis.replay import actuation_source, motor_limits
-from ...mbs.model.measures import Measure
-from ...mbs.model.model import ZERO, MechanismSystem, Model, load_rows
+from ...mbs.joints.measure import Measure
+from ...mbs.model.model import ZERO, Model, load_measures
 from ...mbs.model.raised_mass import coordinate_factors, integrated, mass_factors, modal_factors
+from ...mbs.model.system import MechanismSystem
 from ...mbs.scene.analysis_records import Analysis
 from ...mbs.scene.loop_records import ComputedTorque, Lqr
-from ...mbs.solve.initial_state import State
 from ...mbs.solve.integrators import METHODS, choose_integrator
+from ...mbs.solve.state import State
 from ..patches.patches import PatchArray
 from ..patches.voltages import allocation
 from .choice import make_controller, needed_sensors
@@ -109,7 +110,7 @@ def run_closed_loop(
     read = merged([s for sensor in analysis.sensor for s in signals(built, patches, sensor)], needed)
     rows = [signal.row for signal in read if signal.row is not None]
     drives = [*((row, ZERO) for row in built.motors.values()), *loads]
-    drives += load_rows(model.scene, analysis.disturbance)
+    drives += load_measures(model.scene, analysis.disturbance)
     assembly = MechanismSystem(built, built.joints, drives, rows)
     sensor = sensing(assembly, read)
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import Interface, ModalBody
-from ...mbs.model.planar_body import PlanarBody, PlanarPoint, with_masses
+from ...mbs.model.masses import with_masses
+from ...mbs.model.planar_body import PlanarBody, PlanarPoint
 from ...mbs.scene.actuator_records import PztLayout
 from .patches import patch_edges, section_height
 

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse.linalg import splu
 
 from ...common.arrays import Array
-from ..attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
 from ..link_records import Family
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
 from .beam import R_X, FamilyModel
 
 

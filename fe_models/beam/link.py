@@ -15,16 +15,16 @@ from ...common.version import program_version
 
 # First of all that load dolfinx: mesh.compat sets PETSc up.
 from ...mesh.interval import graded_nodes, interval_mesh, with_points
-from ..attachment_modes import DEFAULT_COUNT
-from ..damping import damping_ratio
-from ..eigen import lowest_modes
-from ..invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
 from ..link_records import FAMILIES, BeamLink, Family
-from ..lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
-from ..stages import modes_hash
+from ..modal_body.attachment_modes import DEFAULT_COUNT
+from ..modal_body.damping import damping_ratio
+from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
+from ..modal_body.signs import canonical_signs
 from .attachment_modes import attachment_modes
-from .beam import R_X, U_X, FamilyModel, family_model
+from .beam import R_X, FamilyModel, family_model
+from .eigen import lowest_modes
+from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
 from .section_outline import section_outlines
 from .stress import beam_stresses, segments
 
@@ -42,8 +42,8 @@ class Mode(NamedTuple):
     x: Array
 
 
-def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progress) -> ModalBody:
-    """Compute the modal body of `link`, read from `path`.
+def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody:
+    """Compute the modal body of `link`, read from `path`; its hashes are left empty.
 
     Raises:
         InputError: more modes are asked for than the mesh has.
@@ -67,7 +67,8 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         known = {family: _together(models[family], family, modes) for family in models}
         places = [int(np.argmin(np.abs(stations.x - place))) for place in named.values()]
         modes += [Mode(*mode) for mode in attachment_modes(models, known, places, length)]
-    fields = canonical(station_fields(models, modes, stations.x.size))
+    fields = station_fields(models, modes, stations.x.size)
+    fields = fields * canonical_signs(fields)
     progress(f"{link.name}: integrating the inertia")
     interfaces = {name: _interface(stations, fields, place) for name, place in named.items()}
     attached = lumps(link.interface, interfaces)
@@ -97,8 +98,6 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         stations=kept,
         stress=beam_stresses(link, kept, omega**2, attached, residual, interfaces),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
-        input_hash=input_hash,
-        modes_hash=modes_hash(link),
         ffrobot_version=program_version(),
     )
 
@@ -168,27 +167,6 @@ def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> A
             if one.family == other.family:
                 products[i, j] = products[j, i] = one.x @ (models[one.family].M @ other.x)
     return products
-
-
-def canonical(fields: Array) -> Array:
-    """`fields` (6, k, n) with the sign of each mode as formulation.md, section 1, wants it.
-
-    The dominant translation is positive at the station nearest the root where it exceeds half its largest value; of a
-    mode without translation, the twist.
-    """
-    return fields * canonical_signs(fields)
-
-
-def canonical_signs(fields: Array) -> Array:
-    """(n,) 1 or −1: what `canonical` multiplies each mode by."""
-    signs = np.ones(fields.shape[2])
-    for k in range(signs.size):
-        rows = fields[U_X:R_X, :, k]
-        if not np.any(rows):
-            rows = fields[R_X:, :, k]
-        dominant = rows[np.argmax(np.abs(rows).max(axis=1))]
-        signs[k] = np.sign(dominant[np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max())])
-    return signs
 
 
 def _element_boundaries(link: BeamLink) -> Array:

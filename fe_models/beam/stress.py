@@ -15,10 +15,10 @@ import numpy as np
 from scipy.special import roots_legendre
 
 from ...common.arrays import Array, Booleans, Integers
-from ..attachment_modes import interface_loads
 from ..link_records import BeamLink
-from ..lumped_masses import Lump
 from ..modal_body import Interface, Stations, StressPoint
+from ..modal_body.attachment_modes import interface_loads
+from ..modal_body.lumped_masses import Lump
 from .section_stress import section_stress
 
 

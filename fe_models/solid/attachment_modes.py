@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...common.arrays import Array
-from ..attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
 from ..link_records import Family
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
 from .eigen import Mass
 from .strain_energy import internal_forces, strain_energy
 from .supports import Flexibility

@@ -14,8 +14,9 @@ from types import MappingProxyType
 import numpy as np
 
 from ..mbs.analysis.analyses import run_pcid
-from ..mbs.model.model import MechanismSystem, build_model
+from ..mbs.model.model import build_model
 from ..mbs.model.planar_body import PlanarBody, PlanarPoint
+from ..mbs.model.system import MechanismSystem
 from ..mbs.scene.analysis_records import Analysis
 from ..mbs.scene.scene import Scene
 from ..run.solution import Watcher

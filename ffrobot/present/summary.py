@@ -13,9 +13,9 @@ from rich.table import Table
 from ..mbs.analysis.analyses import Outcome
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.motors_only import describe_zeros, is_minimum_phase, path_error
-from ..mbs.model.geometric_stiffening import NOTABLE
 from ..mbs.model.raised_mass import raised_in_words
 from ..mbs.model.truncation import modes_kept
+from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.solve.stable_inversion import Inversion
 from ..results.loop import HEADINGS, metrics_row
 from ..run.mode_choice import ModeChoice

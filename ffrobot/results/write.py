@@ -152,8 +152,8 @@ def _write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["reaction_moment"] = forces.reaction_moment
         if forces.motor is not None:
             entry["moment"] = forces.motor
-            if "gear_ratio" in joint.model_fields_set:
-                entry["motor_moment"] = forces.motor / joint.gear_ratio
+            if joint.given_gear_ratio is not None:
+                entry["motor_moment"] = forces.motor / joint.given_gear_ratio
         angle = motor_angle(outcome, joint.name)
         if angle is not None:
             entry["motor_angle"] = angle

@@ -29,10 +29,10 @@ from ..mbs.analysis.fcid import run_fcid
 from ..mbs.analysis.motors_only import run_motors_only
 from ..mbs.analysis.operating_points import operating_points
 from ..mbs.analysis.replay import ActuatorSet
-from ..mbs.model.geometric_stiffening import NOTABLE, estimated_effect
 from ..mbs.model.model import ModalLoad, Model, build_model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.raised_mass import mass_factors
+from ..mbs.quantities.stiffening import NOTABLE, estimated_effect
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.scene.analysis_records import Analysis
 from ..mbs.scene.load import load_scene

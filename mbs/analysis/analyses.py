@@ -12,13 +12,16 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
-from ..model.model import ZERO, MechanismSystem, Model
+from ..model.model import ZERO, Model
 from ..model.raised_mass import coordinate_factors, integrated, modal_factors
+from ..model.system import MechanismSystem
 from ..scene.analysis_records import Analysis
 from ..solve.diagnosis import find_cause, lost_inertia
-from ..solve.initial_state import State, check_reach, undeformed_state
+from ..solve.initial_state import undeformed_state
 from ..solve.integrators import METHODS, Choice, beyond_order, choose_integrator
 from ..solve.path_checks import check_smooth
+from ..solve.reach import check_reach
+from ..solve.state import State
 from ..solve.statics import static_equilibrium
 from .earlier_run import EarlierRun
 from .elastic_joints import GearMotion, check_applied, drive_sizes, with_compliance, with_rotors
@@ -210,7 +213,7 @@ def resolver_of(assembly: MechanismSystem) -> _core.ActuatorForces | None:
     model = assembly.model
     if not model.trajectories or len(model.motors) != model.degrees_of_freedom:
         return None
-    return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_rows)
+    return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
 
 
 def _integrate(

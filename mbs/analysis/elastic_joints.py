@@ -15,14 +15,17 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from .. import _core
-from ..fields.time_functions import spline
-from ..model.measures import Marker, Measure
-from ..model.model import ZERO, Constraint, MechanismSystem, Model
+from ..fields.waypoints import spline
+from ..joints.measure import Marker, Measure
+from ..joints.transmission import ElasticGear
+from ..model.model import ZERO, Constraint, Model
 from ..model.planar_body import PlanarBody, from_rigid_body
-from ..model.transmissions import Gear, joint_gears, joint_rotors
+from ..model.system import MechanismSystem
+from ..model.transmissions import joint_gears, joint_rotors
 from ..scene.analysis_records import Analysis
-from ..scene.mechanism_records import RigidBody
-from ..solve.initial_state import State, output_angle
+from ..scene.bodies import RigidBody
+from ..solve.initial_state import output_angle
+from ..solve.state import State
 
 if TYPE_CHECKING:
     from .analyses import Outcome
@@ -75,7 +78,7 @@ def with_compliance(model: Model) -> Model:
         for gear in gears
         for kind in (_core.MeasureKind.x, _core.MeasureKind.y)
     ]
-    firm = [joint for joint in model.scene.joint if joint.stiffness is None]
+    firm = [joint for joint in model.scene.joint if joint.elastic_gear("section") is None]
     rigid = model.scene.model_copy(update={"joint": tuple(firm)})
     turned = {gear.coordinate: gear.motor for gear in gears}
     return replace(
@@ -89,7 +92,7 @@ def with_compliance(model: Model) -> Model:
     )
 
 
-def _rotor(model: Model, gear: Gear) -> PlanarBody:
+def _rotor(model: Model, gear: ElasticGear) -> PlanarBody:
     """J N² about its center; its mass moves nowhere and only makes it as large as the body beside it."""
     beside = next(model.body(end.body) for end in (gear.coordinate.a, gear.coordinate.b) if end.body is not None)
     inertia = gear.inertia * gear.ratio**2
@@ -121,19 +124,19 @@ def add_transmission(outcome: Outcome) -> Outcome:
     return replace(outcome, gears=motions)
 
 
-def _angles(outcome: Outcome, gear: Gear) -> tuple[Array, Array]:
+def _angles(outcome: Outcome, gear: ElasticGear) -> tuple[Array, Array]:
     """γ and α_a with their rates and accelerations, each (T, 3)."""
     ground = Measure("", _core.MeasureKind.angle, Marker(None), gear.coordinate.a)
     rows = [gear.coordinate, *([] if gear.coordinate.a.body is None else [ground])]
     model = outcome.assembly.model
     assembly = MechanismSystem(model, model.joints, (), rows)
-    along = [(row, order) for row in assembly.motor_rows for order in range(3)]
+    along = [(row, order) for row in assembly.motor_measures for order in range(3)]
     x = (np.ascontiguousarray(values) for values in (outcome.q, outcome.v, outcome.a))
     read = _core.Sensing(assembly.system, along, []).read(*x)
     return read[:, :3], read[:, 3:] if len(rows) > 1 else np.zeros((len(read), 3))
 
 
-def _gear_motion(gear: Gear, time: Array, tau: Array, gamma: Array, alpha: Array) -> GearMotion:
+def _gear_motion(gear: ElasticGear, time: Array, tau: Array, gamma: Array, alpha: Array) -> GearMotion:
     J, N = gear.inertia, gear.ratio
     psi_ddot = N * gamma[:, 2] + alpha[:, 2]
     transmitted = tau - J * N * psi_ddot
@@ -147,7 +150,7 @@ def _gear_motion(gear: Gear, time: Array, tau: Array, gamma: Array, alpha: Array
     return GearMotion(transmitted, angle, rate, acceleration, moment, unresolved)
 
 
-def _twist(gear: Gear, time: Array, moment: Array) -> Array:
+def _twist(gear: ElasticGear, time: Array, moment: Array) -> Array:
     """δ, δ̇, δ̈ (T, 3) with k δ + c δ̇ = `moment` at all outputs, δ a quintic spline without knots next to the ends."""
     if len(time) <= DEGREE:
         return np.column_stack([moment / gear.stiffness, *np.zeros((2, len(time)))])

@@ -12,13 +12,15 @@ from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..fields.time_functions import spline
-from ..model.model import ZERO, MechanismSystem, Model
+from ..fields.waypoints import spline
+from ..model.model import ZERO, Model
 from ..model.planar_body import PlanarBody
+from ..model.system import MechanismSystem
 from ..scene.analysis_records import Analysis
-from ..solve.initial_state import check_reach, undeformed_state
+from ..solve.initial_state import undeformed_state
 from ..solve.integrators import NOT_INTEGRATED
 from ..solve.path_checks import check_smooth
+from ..solve.reach import check_reach
 from .analyses import Outcome, resolver_of
 
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more

@@ -16,11 +16,12 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..fields.time_functions import spline
+from ..fields.waypoints import spline
 from ..model.model import Model
 from ..scene.analysis_records import Analysis
-from ..solve.initial_state import check_reach, undeformed_state
+from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice
+from ..solve.reach import check_reach
 from ..solve.servo import SINGULAR, Servo, is_unstable, make_servo
 from ..solve.stable_inversion import Inversion, Linearisation, invert, linearise
 from .analyses import Outcome

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...common.errors import InputError
-from ..model.model import MechanismSystem, Model
+from ..model.model import Model
+from ..model.system import MechanismSystem
 from ..scene.analysis_records import Analysis
 from ..solve.initial_state import undeformed_state
 from ..solve.linearisation import held_by_motors

@@ -12,7 +12,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.validation import quoted
 from .. import _core
-from ..model.measures import Marker, Measure
+from ..joints.measure import Marker, Measure
 from ..model.model import Model
 from ..scene.analysis_records import Analysis
 
@@ -40,8 +40,7 @@ class ActuatorSet:
 def motor_limits(model: Model) -> Array:
     """Largest moment (N·m, or N) of each motor, infinite where the scene gives none."""
     joints = {joint.name: joint for joint in model.scene.joint}
-    limits = [joints[name].moment_limit for name in model.motors]
-    return np.array([np.inf if limit is None else limit for limit in limits])
+    return np.array([joints[name].motor_limits.moment for name in model.motors])
 
 
 def applied_actuators(
@@ -52,7 +51,7 @@ def applied_actuators(
     Raises `InputError` where the motors do not fit the mechanism, or a body has no actuation points.
     """
     if analysis.apply == "trajectory":
-        return [c.row for c in source.assembly.constraints if c.is_trajectory], [_core.TrajectoryForces(0)]
+        return [c.measure for c in source.assembly.constraints if c.is_trajectory], [_core.TrajectoryForces(0)]
     if analysis.apply == "points":
         return _point_actuators(model, analysis, source, actuator_set)
     if source.tau is None:
@@ -94,9 +93,9 @@ def _point_actuators(
 
 def is_driven(source: Outcome, body: str) -> bool:
     """Whether generalized driving forces Q_a can act on a body: a trajectory or prescribed modes are its own."""
-    trajectories = (c.row for c in source.assembly.constraints if c.is_trajectory)
+    trajectories = (c.measure for c in source.assembly.constraints if c.is_trajectory)
     prescribed = source.shape_force is not None and source.assembly.model.body(body).n_modes > 0
-    return prescribed or any(body in (row.a.body, row.b.body) for row in trajectories)
+    return prescribed or any(body in (measure.a.body, measure.b.body) for measure in trajectories)
 
 
 def actuation_source(source: Outcome) -> _core.ActuationSource:
@@ -106,7 +105,7 @@ def actuation_source(source: Outcome) -> _core.ActuationSource:
     assembly = source.integrated or source.assembly
     resolver = None
     if source.tau is not None:
-        resolver = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_rows)
+        resolver = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
     if source.shape is not None:
         return _core.FullyConstrainedActuation(
             assembly.system, source.shape, source.q[0], assembly.is_trajectory, resolver

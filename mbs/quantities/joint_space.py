@@ -6,7 +6,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..analysis.analyses import Outcome
-from ..model.model import ZERO, Constraint, MechanismSystem
+from ..model.model import ZERO, Constraint
+from ..model.system import MechanismSystem
 
 
 def motor_rates(outcome: Outcome) -> Array:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ...common.validation import did_you_mean, quoted
-from ..model.measures import motor_joints
 from .analysis_records import STATIC, Analysis
 from .scene import SceneKeys
 
 
 def linear_problems(scene: SceneKeys, analysis: Analysis, earlier: Sequence[Analysis]) -> Iterator[str]:
     """What is wrong with one, a line each."""
-    if analysis.kind == "linear" and not motor_joints(scene) and not scene.pzt:
+    if analysis.kind == "linear" and not scene.motor_joints and not scene.pzt:
         yield 'kind: expected motors or [[pzt]] for "linear", found neither: nothing to control the robot with'
     if analysis.placement is not None:
         yield from _placement_problems(scene, analysis, earlier)

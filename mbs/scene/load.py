@@ -15,11 +15,12 @@ from ...common.errors import InputError
 from ...common.validation import did_you_mean, load_toml, plain, quoted, validate
 from ...fe_models.link_file import LinkTable, read_link
 from ..fields.field_types import GROUND
-from ..fields.time_functions import check_domain
+from ..fields.functions import check_domain
 from .analysis_records import Analysis
 from .linear_checks import linear_problems
-from .mechanism_records import Load, Trajectory
+from .loads import Load
 from .scene import Scene, SceneKeys
+from .trajectories import Trajectory
 
 MADE_IN_PYTHON = "<scene made in Python>"
 
@@ -38,7 +39,7 @@ def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # n
     """A scene from Python, with the keys of a scene file: tables are dictionaries, arrays of tables lists of them.
 
     Files it names are looked for in `folder`. NumPy numbers and arrays, tuples and paths may stand for numbers, lists
-    and text; keys that are None are left out. Functions may stand for expressions: see `time_functions.user_function`.
+    and text; keys that are None are left out. Functions may stand for expressions: see `functions.user_function`.
     Raises `InputError` as `load_scene` does.
     """
     import tomli_w
@@ -101,7 +102,7 @@ def _problems(scene: SceneKeys) -> Iterator[str]:
     for kind in ("pzt", "actuation_points"):
         yield from _duplicates(kind, (layout.body for layout in getattr(scene, kind)))
     yield from _body_problems(scene)
-    yield from _joint_references(scene)
+    yield from _joint_problems(scene)
     yield from _pzt_problems(scene)
     yield from _stiffening_problems(scene)
     yield from _disturbance_problems(scene)
@@ -116,99 +117,53 @@ def _duplicates(kind: str, names: Iterable[str]) -> Iterator[str]:
             yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
 
 
-def _references(scene: SceneKeys) -> Iterator[tuple[str, str]]:
-    """Every (key, "BODY" or "BODY.POINT") in the scene."""
-    for joint in scene.joint:
-        for k, side in enumerate(joint.between):
-            if side != GROUND:
-                yield f'joint "{joint.name}": between[{k}]', side
-    for trajectory in scene.trajectory:
-        if trajectory.point is not None:
-            yield f'trajectory "{trajectory.name}": point', trajectory.point
-        if trajectory.angle is not None:
-            yield f'trajectory "{trajectory.name}": angle', trajectory.angle
-    for layout in scene.pzt:
-        yield f'pzt "{layout.body}": body', layout.body
-        for point in layout.point_weights or ():
-            yield f'pzt "{layout.body}": point_weights', f"{layout.body}.{point}"
-    for points in scene.actuation_points:
-        yield f'actuation_points "{points.body}": body', points.body
-        for place in (*points.axial, *points.transverse):
-            if isinstance(place, str):
-                yield f'actuation_points "{points.body}"', f"{points.body}.{place}"
-    for analysis in scene.analysis:
-        for body in analysis.modal or ():
-            yield f'analysis "{analysis.name}": modal', body
-        for point in analysis.points or ():
-            yield f'analysis "{analysis.name}": points', point
-        if analysis.placement is not None:
-            yield f'analysis "{analysis.name}": placement.body', analysis.placement.body
-    for k, load in enumerate(scene.load, 1):
-        if load.point is not None:
-            yield f"load no. {k}: point", load.point
-    for analysis in scene.analysis:
-        yield from _loop_references(analysis)
-    for k, payload in enumerate(scene.payload, 1):
-        yield f"payload no. {k}: point", payload.point
-    for table, guesses in (("angles", scene.initial.angles), ("rates", scene.initial.rates)):
-        for body in guesses:
-            yield f"initial.{table}", body
-
-
-def _loop_references(analysis: Analysis) -> Iterator[tuple[str, str]]:
-    """Likewise, in the keys of a closed loop."""
-    key = f'analysis "{analysis.name}"'
-    for k, sensor in enumerate(analysis.sensor, 1):
-        for reference in (sensor.point, sensor.pzt, sensor.modal):
-            if reference is not None:
-                yield f"{key}: sensor no. {k}", reference
-    for k, load in enumerate(analysis.disturbance, 1):
-        if load.point is not None:
-            yield f"{key}: disturbance no. {k}: point", load.point
-    for k, controller in enumerate(analysis.controller, 1):
-        for body in getattr(controller, "bodies", ()):
-            yield f"{key}: controller no. {k}: bodies", body
-    if analysis.tip is not None:
-        yield f"{key}: tip", analysis.tip
-
-
 def _body_problems(scene: SceneKeys) -> Iterator[str]:
     bodies = {body.name: body for body in scene.body}
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
-    for key, reference in _references(scene):
-        name, _, point = reference.partition(".")
+    for reference in scene.references():
+        if reference.kind != "body":
+            continue
+        name, _, point = reference.name.partition(".")
         if name not in bodies:
             hint = did_you_mean(name, bodies)
-            yield f'{key}: expected one of the bodies {quoted(bodies)}, found "{reference}"{hint}'
+            yield f'{reference.key}: expected one of the bodies {quoted(bodies)}, found "{reference.name}"{hint}'
             continue
         rigid = bodies[name].rigid
         if point and rigid is not None and point not in rigid.points:
             hint = did_you_mean(point, rigid.points)
-            yield f'{key}: expected one of the points {quoted(rigid.points)} of "{name}", found "{reference}"{hint}'
+            yield (
+                f'{reference.key}: expected one of the points {quoted(rigid.points)} of "{name}", found'
+                f' "{reference.name}"{hint}'
+            )
 
 
-def _joint_references(scene: SceneKeys) -> Iterator[str]:
-    joints = [joint.name for joint in scene.joint]
-    uses = [(f'trajectory "{trajectory.name}": joint', trajectory.joint) for trajectory in scene.trajectory]
-    uses += [(f"load no. {k}: joint", load.joint) for k, load in enumerate(scene.load, 1)]
-    for a in scene.analysis:
-        uses += [(f'analysis "{a.name}": sensor no. {k}: joint', s.joint) for k, s in enumerate(a.sensor, 1)]
-        for k, controller in enumerate(a.controller, 1):
-            gains = getattr(controller, "joints", ())
-            uses += [(f'analysis "{a.name}": controller no. {k}', name) for name in gains]
-    give = [joint.name for joint in scene.joint if joint.stiffness is not None]
+def _joint_problems(scene: SceneKeys) -> Iterator[str]:
+    joints = {joint.name: joint for joint in scene.joint}
+    yield from _elastic_joint_problems(scene, [name for name, joint in joints.items() if joint.elastic_gear("section")])
+    for reference in scene.references():
+        if reference.kind != "joint":
+            continue
+        if reference.name not in joints:
+            hint = did_you_mean(reference.name, joints)
+            yield f'{reference.key}: expected one of the joints {quoted(joints)}, found "{reference.name}"{hint}'
+        elif joints[reference.name].coordinate("section") is None:
+            moving = [name for name, joint in joints.items() if joint.coordinate("section") is not None]
+            yield (
+                f"{reference.key}: expected a joint that moves ({quoted(moving)}), found"
+                f' "{reference.name}", a {joints[reference.name].type}'
+            )
+
+
+def _elastic_joint_problems(scene: SceneKeys, elastic: list[str]) -> Iterator[str]:
     for a in scene.analysis:
         of_motors = [(f"sensor no. {k}: motor", s.motor) for k, s in enumerate(a.sensor, 1)]
         for k, controller in enumerate(a.controller, 1):
             if getattr(controller, "side", "joint") == "motor":
                 of_motors += [(f"controller no. {k}: side: motor", name) for name in getattr(controller, "joints", ())]
         for key, name in of_motors:
-            if name is not None and name not in give:
-                yield f'analysis "{a.name}": {key}: expected a joint with stiffness ({quoted(give)}), found "{name}"'
-    for key, name in uses:
-        if name is not None and name not in joints:
-            yield f'{key}: expected one of the joints {quoted(joints)}, found "{name}"{did_you_mean(name, joints)}'
+            if name is not None and name not in elastic:
+                yield f'analysis "{a.name}": {key}: expected a joint with stiffness ({quoted(elastic)}), found "{name}"'
 
 
 def _pzt_problems(scene: SceneKeys) -> Iterator[str]:

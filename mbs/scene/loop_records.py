@@ -9,7 +9,7 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from ...common.validation import Record, existing_file, quoted
 from ..fields.field_types import Name, NotEmpty, NotNegative, PointReference, Positive, one_of
-from .mechanism_records import Load
+from .loads import Load
 
 PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
 

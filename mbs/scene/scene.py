@@ -2,45 +2,40 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import Field
-
-from ...common.validation import Record
-from ..fields.field_types import NotEmpty, Vector2
+from ..fields.field_types import NotEmpty
+from ..fields.references import Reference
 from .actuator_records import ActuationPoints, PztLayout
 from .analysis_records import Analysis
-from .mechanism_records import Body, Initial, Joint, Load, Payload, Trajectory
+from .mechanism import MechanismKeys, MechanismScene
+from .references import analysis_references, patch_references, point_references
 
 
-class SceneKeys(Record):
+class SceneKeys(MechanismKeys):
     """Everything a scene file may contain; lists of tables keep the singular name they have in the file.
 
     `geometric_stiffening` "auto": where the loads of a run change the stiffness of a mode by more than 1 %.
     """
 
-    name: Annotated[str, Field(min_length=1)]
-    space: Literal["planar", "spatial"] = "planar"
-    gravity: Vector2
-    motors: Literal["section", "frame"] = "section"
-    geometric_stiffening: bool | Literal["auto"] = False
-    body: Annotated[tuple[Body, ...], NotEmpty]
-    joint: tuple[Joint, ...] = ()
-    trajectory: tuple[Trajectory, ...] = ()
     pzt: tuple[PztLayout, ...] = ()
     actuation_points: tuple[ActuationPoints, ...] = ()
-    load: tuple[Load, ...] = ()
-    payload: tuple[Payload, ...] = ()
-    initial: Initial = Initial()
     analysis: Annotated[tuple[Analysis, ...], NotEmpty]
 
+    def references(self) -> Iterator[Reference]:
+        """All that records of the scene refer to, with their full keys."""
+        yield from super().references()
+        for layout in self.pzt:
+            yield from patch_references(layout)
+        for points in self.actuation_points:
+            yield from point_references(points)
+        for analysis in self.analysis:
+            yield from analysis_references(analysis)
 
-class Scene(SceneKeys):
+
+class Scene(SceneKeys, MechanismScene):
     """A validated scene, with the absolute `path` of its file and the raw `text` that results files carry."""
-
-    path: Path
-    text: str
 
     def __repr__(self) -> str:
         names = {

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
-from ..model.model import MechanismSystem
+from ..model.system import MechanismSystem
 from ..scene.analysis_records import Analysis
-from .initial_state import State
+from .state import State
 from .vibration import modal_excitation, vibrations
 
 METHODS = {

@@ -7,12 +7,13 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from .._core import TimeFunction
-from ..model.model import MechanismSystem
+from ..model.system import MechanismSystem
 
 SAMPLES = 2001
 LOOKED_INTO = 5  # intervals between samples, the roughest ones
 HALVINGS = 25
 JUMP = 1e-4  # in terms of the largest value or velocity: less is rounded numbers in an expression
+RESTING = 1e-6  # of the largest value, within the run: a path that moves less stands still, and what jumps is rounding
 
 
 def check_smooth(assembly: MechanismSystem, end: float) -> None:
@@ -29,8 +30,8 @@ def check_smooth(assembly: MechanismSystem, end: float) -> None:
             if found is not None:
                 t, before, after = found
                 raise InputError(
-                    f"{assembly.model.scene.path}: {constraint.row.label}: expected a continuous {quantity}, found a"
-                    f" jump from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot"
+                    f"{assembly.model.scene.path}: {constraint.measure.label}: expected a continuous {quantity}, found"
+                    f" a jump from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot"
                     " follow; round it off (waypoints make a smooth curve)"
                 )
 
@@ -38,8 +39,9 @@ def check_smooth(assembly: MechanismSystem, end: float) -> None:
 def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float, float] | None:
     """Time, value before and after of the first jump that is found in a derivative of that order; None without one."""
     times = np.linspace(0.0, end, SAMPLES)
-    samples = function.sample(times)[order]
-    size = float(np.ptp(samples)) if order == 0 else float(np.abs(samples).max())
+    values, *_ = derivatives = function.sample(times)
+    samples, still = derivatives[order], RESTING * float(np.abs(values).max())
+    size = max(float(np.ptp(samples)), still) if order == 0 else max(float(np.abs(samples).max()), still / end)
     if not (np.isfinite(samples).all() and size > 0):
         return None
     jumps = []

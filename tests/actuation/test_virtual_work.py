@@ -231,7 +231,7 @@ def test_power_that_too_few_points_leave_unmet_is_residual_times_velocity(limite
 
 
 def test_checkpoint_of_voltages(solution):
-    """formulation.md, section 9, at t = 0.1 s: kilovolts, of which link 1 needs none with motors at the frames."""
+    """At t = 0.1 s: kilovolts, of which link 1 needs none with motors at the frames."""
     voltages = solution.voltages["inverse"]
     expected = {"section": [91903.83, 76997.78, 22644.86], "frame": [0.0, 0.0, 0.0]}[solution.scene.motors]
     np.testing.assert_allclose(voltages["link1"].required[-1, [0, 3, 9]], expected, atol=1e-5 * 92000)

@@ -1,4 +1,6 @@
-"""NAFEMS benchmarks (formulation.md, section 11) with solids, refined; the paper's links against Timoshenko's beam."""
+"""Solids, refined: NAFEMS' Selected Benchmarks for Natural Frequency Analysis (1987), and the paper's links against
+Timoshenko's beam.
+"""
 
 import sys
 from pathlib import Path

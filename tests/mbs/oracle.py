@@ -1,4 +1,4 @@
-"""The planar equations as formulation.md, section 4, states them: dense matrices, written to be read, not to be fast.
+"""The planar equations as docs/theory.md states them: dense matrices, written to be read, not to be fast.
 
 Shares nothing with the compiled core but its input: `PlanarBody`, rows (`ffrobot.mbs.model.measures.Measure`) and
 functions of time.

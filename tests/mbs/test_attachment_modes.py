@@ -10,7 +10,8 @@ from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.link_file import LinkTable
 from ffrobot.mbs.analysis.analyses import run_pcid
 from ffrobot.mbs.analysis.earlier_run import COUNTS, ROWS, EarlierRun
-from ffrobot.mbs.model.planar_body import from_modal_body, with_payload
+from ffrobot.mbs.model.masses import with_payload
+from ffrobot.mbs.model.planar_body import from_modal_body
 from ffrobot.mbs.model.raised_mass import LIMIT, mass_factors, with_raised_mass
 from ffrobot.mbs.model.truncation import with_fewer_modes
 from ffrobot.run.solution import prepare, solve

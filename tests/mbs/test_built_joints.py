@@ -2,23 +2,25 @@
 
 import numpy as np
 import pytest
+from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, arm, arm_links
-from mechanisms import always, forward, make_model, pcid, relative, revolute
-from test_balances import OUTPUT_STEP, energy_and_losses
-from test_rigid_limit import rod
+from mechanisms import always, checked_scene, forward, make_model, pcid, relative, revolute
+from rods import rod
 
+from ffrobot.common.errors import InputError
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid, run_static
 from ffrobot.mbs.analysis.fcid import run_fcid
 from ffrobot.mbs.analysis.motors_only import run_motors_only
 from ffrobot.mbs.analysis.replay import ActuatorSet, actuation_source
-from ffrobot.mbs.model.model import ZERO, MechanismSystem
+from ffrobot.mbs.model.masses import mass_matrix
+from ffrobot.mbs.model.model import ZERO
 from ffrobot.mbs.model.planar_body import from_rigid_body
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.quantities.observation import joint_forces
 from ffrobot.mbs.scene.analysis_records import Analysis
-from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.scene.bodies import RigidBody
 from ffrobot.mbs.solve.initial_state import undeformed_state
-from ffrobot.mbs.solve.vibration import mass_matrix
 
 G = 9.81
 AT_REST = {"state": "static", "angles": ANGLES}
@@ -195,13 +197,12 @@ def test_equilibrium_knows_neither_rotors_nor_friction():
 @pytest.mark.parametrize(
     ("keys", "expected"),
     [
-        ({"rotor_inertia": -1.0}, "greater than or equal to 0"),
+        ({"rotor_inertia": -1.0}, "a number of at least 0"),
         ({"gear_ratio": 0.0}, "greater than 0"),
         ({"friction_speed": 0.1}, "only beside coulomb_friction"),
-        ({"type": "weld", "viscous_friction": 1.0}, "in a weld"),
+        ({"type": "weld", "viscous_friction": 1.0}, "in a weld joint"),
     ],
 )
 def test_bad_keys_are_refused(keys, expected):
-    joint = revolute("O", "ground", "a.root") | keys
-    with pytest.raises(ValueError, match=expected):
-        make_model([rod("a", 1.0, 1.0)], joint=[joint])
+    with pytest.raises(InputError, match=expected):
+        checked_scene([revolute("O", "ground", "a.root") | keys])

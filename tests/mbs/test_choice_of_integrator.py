@@ -8,8 +8,10 @@ from mechanisms import always, assemble, forward, oracle_of, pcid
 
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet
-from ffrobot.mbs.solve.initial_state import State, undeformed_state
-from ffrobot.mbs.solve.vibration import mass_matrix, modal_excitation, vibrations
+from ffrobot.mbs.model.masses import mass_matrix
+from ffrobot.mbs.solve.initial_state import undeformed_state
+from ffrobot.mbs.solve.state import State
+from ffrobot.mbs.solve.vibration import modal_excitation, vibrations
 
 AT_REST = {"angles": ANGLES, "state": "static"}
 

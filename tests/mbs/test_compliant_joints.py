@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, TIP, arm, arm_links, quintic
-from mechanisms import always, forward, make_model, pcid, relative, revolute
+from mechanisms import always, checked_scene, forward, make_model, pcid, relative, revolute
+from rods import rod
 from scipy.integrate import simpson
-from test_balances import OUTPUT_STEP, energy_and_losses
-from test_rigid_limit import rod
 
 from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import robot_modes
@@ -207,8 +207,8 @@ def test_static_moments_are_those_of_the_gears():
     ],
 )
 def test_bad_keys_are_refused(keys, expected):
-    with pytest.raises(ValueError, match=expected):
-        make_model([rod("a", 1.0, 1.0)], joint=[revolute("O", "ground", "a.root") | keys])
+    with pytest.raises(InputError, match=expected):
+        checked_scene([revolute("O", "ground", "a.root") | keys])
 
 
 def test_what_does_not_go_is_refused():

@@ -11,7 +11,8 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.analyses import Outcome, run_pcid
 from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.fields.time_functions import parse_expression, spline
+from ffrobot.mbs.fields.expressions import parse_expression
+from ffrobot.mbs.fields.waypoints import spline
 from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.mbs.solve.initial_state import undeformed_state
 

@@ -72,7 +72,7 @@ def test_zeros_of_joint_motion_are_the_frequencies_with_the_joint_locked():
 
 
 def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
-    """M of r is Lᵀ M Z: Z keeps C_m and C_s, L C_m and the motors' coordinates (formulation.md, sections 5 and 8)."""
+    """M of r is Lᵀ M Z: Z keeps C_m and C_s, L C_m and the motors' coordinates (docs/theory.md, Motors alone)."""
     model = arm()
     servo, dynamics = at_rest(model)
     p = iter(equilibrium(servo, servo.core(), 0.0))

@@ -12,7 +12,7 @@ GROUP = "Geometric stiffening"
 
 
 def blade(modes, force, state="undeformed"):
-    """Wu and Haug's beam (formulation.md, section 11) turning freely at 1 rad/s, pushed at its tip."""
+    """Wu and Haug's beam (Int. J. Numer. Meth. Eng. 26, 1988) turning freely at 1 rad/s, pushed at its tip."""
     beam = ritz_link("beam", "cantilever", 8.0, 8 * 0.2019, 566.6, modes=modes, stiffening=True)
     joint = {"name": "hub", "type": "weld", "between": ("ground", "beam.root")}
     hub = revolute("hub", "ground", "beam.root") if state == "undeformed" else joint

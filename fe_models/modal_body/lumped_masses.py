@@ -2,24 +2,21 @@
 
 A lump of mass m sits with its center at the interface x_I and has the inertia tensor J = diag(J_x, J_y, J_z) there. Its
 material points x_I + ξ move by Φ0 + φ × ξ, with translation Φ0 and rotation φ (3, n) of the interface, and
-∫ρ ξ dV = 0, ∫ρ ξ ξᵀ dV = E = ½ tr(J) I − J. All else is formulation.md, section 3, with these.
+∫ρ ξ dV = 0, ∫ρ ξ ξᵀ dV = E = ½ tr(J) I − J. The integrals are those of docs/theory.md, Inertia shape integrals.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..common.arrays import Array
-from ..mesh.records import InterfaceRecord
-from .modal_body import Interface
-from .solid.tensors import LEVI_CIVITA
-
-if TYPE_CHECKING:
-    from .invariants import Invariants
+from ...common.arrays import Array
+from ..link_records import InterfaceRecord
+from .body import Interface
+from .invariants import Invariants
+from .tensors import LEVI_CIVITA
 
 
 @dataclass(frozen=True)

@@ -16,25 +16,14 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 
-from ..common.arrays import Array, Integers
-from ..mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
-from .beam.beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
-from .link_records import BeamLink
+from ...common.arrays import Array, Integers
+from ...mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
+from ..link_records import BeamLink
+from ..modal_body.invariants import Invariants
+from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
 
 # N in N at x (m), and at which cell by its middle: N may jump from cell to cell.
 AxialForce = Callable[[Array, Array], Array]
-
-
-@dataclass(frozen=True)
-class Invariants:
-    """Shapes and meaning as in `ModalBody`."""
-
-    mass: float
-    first_moment: Array
-    second_moment: Array
-    S_bar: Array
-    I_bar: Array
-    S_bar_kl: Array
 
 
 @dataclass(frozen=True)
@@ -71,7 +60,7 @@ def station_space(mesh: Mesh) -> StationSpace:
 
 
 def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> Invariants:
-    """Integrals of formulation.md, section 3, over axis and cross section.
+    """Inertia shape integrals (docs/theory.md) over axis and cross section.
 
     With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
     Φ0 = (u, v, w), Φy = (−θ_z, 0, φ), Φz = (θ_y, −φ, 0); principal axes leave ∫y = ∫z = ∫yz = 0.
@@ -134,7 +123,7 @@ def geometric_stiffness(
 ) -> dict[str, Array]:
     """(n, n) ∫N(x) (v'v' + w'w') dx of the axial force N that each unit load causes, positive in tension.
 
-    Loads (formulation.md, section 3) on the undeformed link, held axially at its root: inertia of unit frame
+    Loads (docs/theory.md, Geometric stiffness) on the undeformed link, held axially at its root: inertia of unit frame
     acceleration `t_x` … `t_z`, of unit angular acceleration `r_x` …, of unit products of angular velocity `omega_xx` …;
     `force/NAME/x` … and `moment/NAME/x` …. Those that load a straight axis across, or twist it, leave N = 0: zero.
 

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..common.arrays import Array, Integers
-from .link_records import FAMILIES, Family
-from .modal_body import Interface
+from ...common.arrays import Array, Integers
+from ..link_records import FAMILIES, Family
+from .body import Interface
 
 # Of the energy (its square root) of the static shape of a load, what a combination of residuals must have to be kept.
 TOLERANCE = 1e-3
