@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..common.arrays import Array, Booleans
-from ..mbs.analysis.analyses import Outcome
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.joints.joint import JointRecord
 from ..mbs.quantities.joint_space import motor_rates
 from .patches.patches import PatchArray

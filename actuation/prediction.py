@@ -8,7 +8,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.plane import rotated
-from ..mbs.analysis.analyses import Outcome
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.joint_space import held_joint_motion
 from .patches.voltages import Voltages
 

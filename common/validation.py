@@ -33,6 +33,11 @@ class Record(BaseModel):
         """
         return ""
 
+    @classmethod
+    def demand_key(cls, key: str) -> str:
+        """What to say where `key` is missing; nothing where the general words do."""
+        return ""
+
 
 R = TypeVar("R", bound=Record)
 
@@ -163,7 +168,6 @@ _EXPECTED = {
     "greater_than_equal": "a number of at least {ge:g}",
     "less_than": "a number less than {lt:g}",
     "less_than_equal": "a number of at most {le:g}",
-    "union_tag_not_found": "a table with the key {discriminator}",
 }
 
 
@@ -175,7 +179,7 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
         return _Problem(key, str(context["error"]), "")
     if kind == "extra_forbidden":
         if refusal := _refusal(record, loc):
-            return _Problem(key_path(loc[:-1], data, kind), refusal, "")
+            return _Problem(key_path(loc[:-1], data, kind=""), refusal, "")
         known = _known_keys(_alternatives(record, loc[:-1])[0])
         return _Problem(
             key,
@@ -185,8 +189,13 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
     if kind == "missing" and isinstance(loc[-1], int):
         return _Problem(key, "expected a list with more entries", f", found {_show(item['input'])}")
     if kind == "missing":
+        if demand := _demand(record, loc):
+            return _Problem(key_path(loc[:-1], data, kind=""), demand, "")
         return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
     found = item["input"]
+    if kind == "union_tag_not_found":
+        key = key_path((*loc, context["discriminator"].replace("'", "")), data)
+        return _Problem(key, f"expected {_EXPECTED['missing']}", ", found none")
     if kind == "union_tag_invalid":
         tags = context["expected_tags"].replace("'", "").split(", ")
         key = key_path((*loc, context["discriminator"].replace("'", "")), data)
@@ -260,6 +269,12 @@ def _refusal(record: type[BaseModel], loc: Sequence[int | str]) -> str:
     (taken, *more), allowed = _alternatives(record, loc[:-1])
     others = [other for other in allowed if issubclass(other, Record) and str(loc[-1]) in _known_keys([other])]
     return taken.refuse_key(str(loc[-1]), others) if others and not more and issubclass(taken, Record) else ""
+
+
+def _demand(record: type[BaseModel], loc: Sequence[int | str]) -> str:
+    """What a record itself says where its key at `loc` is missing."""
+    (taken, *more), _ = _alternatives(record, loc[:-1])
+    return taken.demand_key(str(loc[-1])) if not more and issubclass(taken, Record) else ""
 
 
 def _models(annotation: object) -> list[type[BaseModel]]:

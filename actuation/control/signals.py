@@ -12,8 +12,8 @@ from ...mbs import _core
 from ...mbs.joints.measure import Marker, Measure
 from ...mbs.model.model import Model
 from ...mbs.model.system import MechanismSystem
-from ...mbs.scene.loop_records import PERMITTIVITY, Sensor
 from ..patches.patches import PatchArray
+from .records import PERMITTIVITY, Sensor
 
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 

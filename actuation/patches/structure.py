@@ -11,8 +11,8 @@ from ...common.arrays import Array
 from ...fe_models.modal_body import Interface, ModalBody
 from ...mbs.model.masses import with_masses
 from ...mbs.model.planar_body import PlanarBody, PlanarPoint
-from ...mbs.scene.actuator_records import PztLayout
 from .patches import patch_edges, section_height
+from .records import PztLayout
 
 GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 

@@ -16,7 +16,7 @@ from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.fields.field_types import split_point
 from ..mbs.model.masses import with_payload
 from ..mbs.model.planar_body import PlanarBody, from_modal_body, from_rigid_body
-from ..mbs.scene.scene import Scene
+from ..scene.scene import Scene
 
 
 @dataclass(frozen=True)

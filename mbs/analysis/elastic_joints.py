@@ -7,8 +7,7 @@ them. What a gear transmits is then known, and where its motor has to be follows
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,35 +21,13 @@ from ..model.model import ZERO, Constraint, Model
 from ..model.planar_body import PlanarBody, from_rigid_body
 from ..model.system import MechanismSystem
 from ..model.transmissions import joint_gears, joint_rotors
-from ..scene.analysis_records import Analysis
 from ..scene.bodies import RigidBody
 from ..solve.initial_state import output_angle
 from ..solve.state import State
-
-if TYPE_CHECKING:
-    from .analyses import Outcome
+from .outcome import GearMotion, Outcome
 
 DEGREE = 5
 UNRESOLVED = 0.001  # of a motor's largest moment: what every second output may change of it
-
-
-@dataclass(frozen=True)
-class GearMotion:
-    """What a gear that gives does in an inverse analysis, one row per output.
-
-    Attributes:
-        gear_moment: (T,) τ_s = k (θ_m − γ) + c (θ̇_m − γ̇), N·m: what the gear does to the second body.
-        angle, rate, acceleration: (T,) of the motor behind its gear, θ_m, rad.
-        moment: (T,) τ_s + J N ψ̈ of the motor, behind its gear.
-        unresolved: part of the largest moment by which it changes when only every second output is known.
-    """
-
-    gear_moment: Array
-    angle: Array
-    rate: Array
-    acceleration: Array
-    moment: Array
-    unresolved: float
 
 
 def with_compliance(model: Model) -> Model:
@@ -192,7 +169,7 @@ def with_rotors(source: Outcome, model: Model) -> Outcome:
     assembly = MechanismSystem(model, [*known_rows, *pins])
     lambda_ = np.zeros((len(q), len(assembly.constraints)))  # nothing pulls at the pins
     lambda_[:, [assembly.constraints.index(row) for row in known_rows]] = source.lambda_
-    return replace(source, assembly=assembly, q=q, v=v, a=a, lambda_=lambda_)
+    return replace(source, assembly=assembly, motion=replace(source.motion, q=q, v=v, a=a, lambda_=lambda_))
 
 
 def rotors_like(model: Model, state: State, source: Outcome) -> State:
@@ -213,15 +190,6 @@ def drive_sizes(source: Outcome, limit: Array) -> list[_core.TimeFunction]:
     assert tau is not None
     cut = np.clip(tau, -limit, limit)
     return spline(source.time, cut, 1 if np.any(cut != tau) else DEGREE)
-
-
-def check_applied(model: Model, analysis: Analysis) -> None:
-    """Raise `InputError` for an actuation that leaves motors behind gears that give without their moments."""
-    if analysis.apply not in ("joints", "joints+pzt"):
-        raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" beside joints'
-            f' with stiffness, found "{analysis.apply}"'
-        )
 
 
 def unresolved_gears(gears: Mapping[str, GearMotion]) -> Iterator[str]:

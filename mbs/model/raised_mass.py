@@ -48,7 +48,7 @@ def integrated(model: Model) -> Model:
     bodies = tuple(with_raised_mass(body) for body in model.bodies)
     if all(one is other for one, other in zip(bodies, model.bodies, strict=True)):
         return model
-    root = {body.name: np.sqrt(mass_factors(body)) for body in model.bodies}
+    root = by_body(model)
     loads = tuple(replace(load, vector=load.vector / root[load.body]) for load in model.modal_loads)
     return replace(model, bodies=bodies, modal_loads=loads)
 
@@ -59,6 +59,11 @@ def raised_in_words(model: Model) -> str:
     if not bodies:
         return ""
     return f"modes of {', '.join(bodies)} above {LIMIT:g} × the highest eigenmode have raised mass in time integration"
+
+
+def by_body(model: Model) -> dict[str, Array]:
+    """√μ (n,) of each body's modal coordinates."""
+    return {body.name: np.sqrt(mass_factors(body)) for body in model.bodies}
 
 
 def coordinate_factors(model: Model) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array
-from ..analysis.analyses import Outcome
+from ..analysis.outcome import Outcome
 from ..model.model import ZERO, Constraint
 from ..model.system import MechanismSystem
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.plane import rotated
 from .. import _core
-from ..analysis.analyses import Outcome
+from ..analysis.outcome import Outcome
 from ..fields.field_types import split_point
 from ..model.geometric_stiffening import second_order_displacement
 from ..model.planar_body import PlanarBody
@@ -88,7 +88,9 @@ def trajectory_force(outcome: Outcome, trajectory: str) -> Array:
 def trajectory_target(outcome: Outcome, trajectory: str) -> Array:
     """Specified values (T, m) in the order of `trajectory_force`; held before 0 and after the end of the analysis."""
     targets = [c.target for c in outcome.assembly.model.trajectories if c.owner == trajectory]
-    return np.column_stack([target.sample(np.clip(outcome.time, 0.0, outcome.analysis.end))[0] for target in targets])
+    return np.column_stack(
+        [target.sample(np.clip(outcome.time, 0.0, outcome.analysis.last_time))[0] for target in targets]
+    )
 
 
 def joint_forces(outcome: Outcome, joint: str) -> JointForces:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...common.plane import rotated
-from ..analysis.analyses import Outcome
+from ..analysis.outcome import Outcome
 from ..model.geometric_stiffening import GeometricStiffening
 
 NOTABLE = 0.01  # relative change of a mode's stiffness from which on the summary warns, and "auto" switches it on

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from ffrobot.actuation.patches.patches import check_reach, patch_array, with_factors
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.actuation.patches.voltages import solve_voltages, voltage_gain
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.model.planar_body import from_modal_body
 from ffrobot.mbs.model.raised_mass import mass_factors
 from ffrobot.mbs.model.truncation import with_fewer_modes
-from ffrobot.mbs.scene.actuator_records import PztLayout
 
 PATH = Path("scene.toml")
 

@@ -7,7 +7,7 @@ from ffrobot.actuation.feasibility import judge_motors
 from ffrobot.actuation.patches.patches import patch_array, with_patch_count
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.actuation.prediction import predicted_shift, unmet_modal_forces
-from ffrobot.run.solution import solve
+from ffrobot.run.solve import solve
 
 LIMIT = 200.0
 SCENE = """
@@ -69,7 +69,7 @@ def arm(link_file, tmp_path_factory):
 
 def test_patches_peak_by_peak(arm):
     solution = arm(limit=3000.0)
-    judged = solution.feasibility["motion"].patches["link"]
+    judged = solution.analyses["motion"].feasibility.patches["link"]
     outcome = solution.outcomes["motion"]
     body = solution.bodies["link"].modal
     # What holds it straight: with a = θ̈ x + g cos θ, the modal forces S̄ g cos θ + h θ̈ against the weight and inertia.
@@ -105,7 +105,9 @@ def test_strain_under_a_static_load_is_that_of_the_beam(arm):
     x = np.linspace(0.025, 0.075, 201)  # the first patch
     M = 7850.0 * 0.025 * 0.015 * 9.81 * (1 - x) ** 2 / 2
     expected = (0.0075 + 0.75e-3) * M.mean() / (2.068427e11 * 0.025 * 0.015**3 / 12)
-    assert solution.feasibility["motion"].patches["link"].strain[0] == pytest.approx(expected, rel=0.05)  # of ten modes
+    assert solution.analyses["motion"].feasibility.patches["link"].strain[0] == pytest.approx(
+        expected, rel=0.05
+    )  # of ten modes
 
 
 @pytest.mark.parametrize("word", ["limit", "layers", "thickness"])
@@ -113,8 +115,8 @@ def test_remedies_do(arm, word):
     """With the limit, layers or thickness named, and nothing else changed, the worst patch just suffices."""
     solution = arm()
     array, outcome = solution.patches["link"], solution.outcomes["motion"]
-    remedies = solution.feasibility["motion"].patches["link"].remedies
-    assert solution.feasibility["motion"].patches["link"].factor.max() > 2.0
+    remedies = solution.analyses["motion"].feasibility.patches["link"].remedies
+    assert solution.analyses["motion"].feasibility.patches["link"].factor.max() > 2.0
 
     def factor(**keys):
         layout = array.layout.model_copy(update=keys)
@@ -145,17 +147,17 @@ def test_number_of_patches_that_would_do(arm):
     assert needs(21) is None  # 21 × 0.05 m on 1 m
     least = min(needs(count) for count in range(10, 21))
     assert least < needs(10)
-    between = arm(limit=0.5 * (least + needs(10))).feasibility["motion"].patches["link"].remedies
+    between = arm(limit=0.5 * (least + needs(10))).analyses["motion"].feasibility.patches["link"].remedies
     assert 10 < between.count <= 20
     assert needs(between.count) <= 0.5 * (least + needs(10)) < needs(between.count - 1)
-    without = arm(limit=0.9 * least).feasibility["motion"].patches["link"].remedies
+    without = arm(limit=0.9 * least).analyses["motion"].feasibility.patches["link"].remedies
     assert (without.count, without.most_count) == (0, 20)
     assert without.most_factor == pytest.approx(needs(20) / (0.9 * least), rel=1e-9)
 
 
 def test_motors_peak_by_peak(arm):
     """τ = J θ̈ + m g L/2 cos θ of a link held straight, θ̇ = 0.2 cos 2t, and their product."""
-    motor = arm().feasibility["motion"].motors["O"]
+    motor = arm().analyses["motion"].feasibility.motors["O"]
     t = np.arange(51) * 0.01
     m = 7850.0 * 0.025 * 0.015
     theta, rate, acceleration = 0.1 * np.sin(2 * t), 0.2 * np.cos(2 * t), -0.4 * np.sin(2 * t)
@@ -181,7 +183,7 @@ def test_motors_without_limits_are_never_short(arm):
 def test_predicted_shift_of_the_tip_is_what_happens(arm):
     """Held by its motor under its weight: patches at their limits against patches without, each solved statically."""
     straight = arm(times=f'shape = "zero"\n{RUN}', trajectory='joint = "O"\nvalue = "0"')
-    voltages = straight.voltages["motion"]["link"]
+    voltages = straight.analyses["motion"].voltages["link"]
     tips = []
     for volts in (voltages.required[0], voltages.within_limit[0]):
         load = '\n[[load]]\npzt = "link"\nvoltage = [' + ", ".join(f'"{v!r}"' for v in volts) + "]\n"
@@ -189,19 +191,21 @@ def test_predicted_shift_of_the_tip_is_what_happens(arm):
         outcome = held.outcomes["motion"]
         tips.append(outcome.q[0, 3:] @ outcome.assembly.model.body("link").points["tip"].translation[1])
     assert abs(tips[0]) < 1e-12  # straight
-    np.testing.assert_allclose(straight.predicted_shift["motion"]["link.tip"][0], [0.0, tips[1]], rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        straight.analyses["motion"].predicted_shift["link.tip"][0], [0.0, tips[1]], rtol=1e-9, atol=1e-15
+    )
 
 
 def test_predicted_shift_of_an_inclined_tip(arm):
     """The shift across the link is the deflection that unmet modal forces leave."""
     solution = arm(trajectory='point = "link.tip"\ny = "0.1*sin(2*t)"')
     outcome = solution.outcomes["motion"]
-    unmet = unmet_modal_forces(outcome, solution.voltages["motion"])
-    np.testing.assert_array_equal(unmet, solution.voltages["motion"]["link"].unmet)
+    unmet = unmet_modal_forces(outcome, solution.analyses["motion"].voltages)
+    np.testing.assert_array_equal(unmet, solution.analyses["motion"].voltages["link"].unmet)
     body = outcome.assembly.model.body("link")
     deflection = -(unmet / body.stiffness) @ body.points["tip"].translation[1]
     theta = outcome.q[:, 2]
     expected = deflection[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
     shift = predicted_shift(outcome, unmet)["link.tip"]
     np.testing.assert_allclose(shift, expected, atol=1e-9 * np.abs(expected).max())
-    np.testing.assert_array_equal(shift, solution.predicted_shift["motion"]["link.tip"])
+    np.testing.assert_array_equal(shift, solution.analyses["motion"].predicted_shift["link.tip"])

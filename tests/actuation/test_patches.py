@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from ffrobot.actuation.patches.patches import check_reach, patch_array
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.modal_body import OutlinedPatches
 from ffrobot.mbs.model.masses import with_payload
 from ffrobot.mbs.model.planar_body import from_modal_body
-from ffrobot.mbs.scene.actuator_records import PztLayout
 
 EI = 2.068427e11 * 0.025 * 0.015**3 / 12
 C = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2  # Shaban 2022, Eq. 14

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 import ffrobot
 from ffrobot.common.arrays import Array
 from ffrobot.run.mode_choice import difference, reported
-from ffrobot.run.solution import Solution, solve
+from ffrobot.run.solution import Solution
+from ffrobot.run.solve import solve
 
 AIM = 2e-3  # of each quantity's peak
 LARGEST = 0.05  # deflection over length
@@ -80,6 +81,11 @@ def solved(arm: dict[str, Any], modes: dict[str, Any], kept: int | None = None) 
     return solve(ffrobot.make_scene(**(arm | {"body": bodies})))
 
 
+def quantities(solution: Solution) -> Any:
+    """Everything of the run whose error counts."""
+    return reported(solution.scene, solution.analyses["s"])
+
+
 def largest_deflection(solution: Solution, found: Any) -> float:
     """Of any link, over its length."""
     lengths = {body.name: body.length for body in solution.model.bodies}
@@ -100,7 +106,7 @@ def main() -> None:
     while len(errors) < asked.arms and time.perf_counter() - began < asked.seconds:
         arm = random_arm(rng)
         reference = solved(arm, {"count": 80, "attachment_modes": False}, kept=asked.reference)
-        truth = reported(reference, "s") if reference.outcomes["s"].status == "completed" else {}
+        truth = quantities(reference) if reference.outcomes["s"].status == "completed" else {}
         if not truth or largest_deflection(reference, truth) > LARGEST:
             passed_over += 1
             continue
@@ -108,12 +114,12 @@ def main() -> None:
             solved(arm, modes)
             for modes in ({"attachment_modes": True}, {"count": asked.plain, "attachment_modes": False})
         )
-        kinds = difference(reported(attached, "s"), truth)
+        kinds = difference(quantities(attached), truth)
         errors.append(max(kinds.values()))
-        plain_errors.append(max(difference(reported(plain, "s"), truth).values()))
+        plain_errors.append(max(difference(quantities(plain), truth).values()))
         starts.append(arm["initial"]["state"])
         each = ", ".join(f"{kind} {error:.1e}" for kind, error in kinds.items())
-        steps = " / ".join(str(one.outcomes["s"].steps) for one in (attached, plain))
+        steps = " / ".join(str(one.outcomes["s"].statistics.steps) for one in (attached, plain))
         arms = f"{len(errors):3d} {len(arm['body'])} links, {starts[-1]:10s}"
         bent = f"bent {100 * largest_deflection(reference, truth):4.2f} %"
         print(f"{arms} {bent}: {each}; plain {plain_errors[-1]:.1e}; steps {steps}", flush=True)

@@ -99,9 +99,7 @@ def test_all_ways_along_one_path(rest_to_rest):
     for label, key in (("rms", "tip_error_rms"), ("at the end", "residual")):
         for way, run in (("PD and patches", "pd_patches"), ("LQR", "lqr")):
             found = [metrics[f"{run}{blow}"][key] / metrics[f"moments{blow}"][key] for blow in ("", "_blow")]
-            np.testing.assert_allclose(
-                1 / np.array(found), factors[f"{label}, {way}"], rtol=allowed)
-            )
+            np.testing.assert_allclose(1 / np.array(found), factors[f"{label}, {way}"], rtol=allowed)
 
 
 def test_closed_loops_are_told_of(loops, ffrobot):

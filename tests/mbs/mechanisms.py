@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 from oracle import Mechanism
 
+from ffrobot.mbs.analysis.forward import Forward
+from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.model.system import MechanismSystem
-from ffrobot.mbs.scene.analysis_records import Analysis
-from ffrobot.mbs.scene.load import make_scene
-from ffrobot.mbs.scene.scene import Scene
+from ffrobot.scene.load import make_scene
+from ffrobot.scene.scene import Scene
 
 PLACEHOLDER = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # the bodies themselves are passed beside the scene
 
@@ -44,11 +45,11 @@ def checked_scene(joints, bodies=("a",)):
 
 
 def pcid(name="inverse", end=1.0, output_step=0.01, **keys):
-    return Analysis(name=name, kind="pcid", end=end, output_step=output_step, **keys)
+    return Pcid(name=name, kind="pcid", end=end, output_step=output_step, **keys)
 
 
 def forward(name="forward", end=1.0, output_step=0.01, **keys):
-    return Analysis(name=name, kind="forward", end=end, output_step=output_step, **keys)
+    return Forward(name=name, kind="forward", end=end, output_step=output_step, **keys)
 
 
 def revolute(name, first, second, **keys):

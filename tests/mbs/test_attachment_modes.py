@@ -8,13 +8,14 @@ import pytest
 import ffrobot
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.link_file import LinkTable
-from ffrobot.mbs.analysis.analyses import run_pcid
-from ffrobot.mbs.analysis.earlier_run import COUNTS, ROWS, EarlierRun
+from ffrobot.mbs.analysis.outcome import EarlierRun
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.masses import with_payload
 from ffrobot.mbs.model.planar_body import from_modal_body
 from ffrobot.mbs.model.raised_mass import LIMIT, mass_factors, with_raised_mass
 from ffrobot.mbs.model.truncation import with_fewer_modes
-from ffrobot.run.solution import prepare, solve
+from ffrobot.run.prepare import prepare
+from ffrobot.run.solve import solve
 
 E, RHO, HEIGHT, WIDTH = 2.068427e11, 7850.0, 0.015, 0.025
 EI, LINE = E * WIDTH * HEIGHT**3 / 12, RHO * HEIGHT * WIDTH
@@ -229,9 +230,7 @@ def test_integration_goes_on_from_where_it_stopped():
     short = analysis.model_copy(update={"max_steps": 200})
     stopped = run_pcid(solution.model, short, True, lambda _: True)
     assert stopped.status == "too many steps"
-    rows = {name: getattr(stopped, name) for name in ROWS if getattr(stopped, name) is not None}
-    counts = {name: getattr(stopped, name) for name in COUNTS}
-    earlier = EarlierRun(stopped.status, rows, counts, stopped.integrator, stopped.checkpoint, stopped.recording)
+    earlier = EarlierRun(stopped.motion, stopped.forces, stopped.statistics, stopped.continuation)
     whole = run_pcid(solution.model, analysis, True, lambda _: True)
     again = run_pcid(solution.model, analysis, True, lambda _: True, earlier)
     assert np.array_equal(again.q, whole.q)
@@ -241,6 +240,6 @@ def test_integration_goes_on_from_where_it_stopped():
 def test_linear_models_are_exact():
     """The robot's frequencies, motors held, do not depend on the number of modes: no mass is raised there."""
     linear = [{"name": "about", "kind": "linear"}]
-    few, many = (solve(two_links(count, True, analysis=linear)).linear["about"] for count in (4, 16))
+    few, many = (solve(two_links(count, True, analysis=linear)).outcomes["about"].details for count in (4, 16))
     lowest = [model.modes[0].frequency[model.modes[0].frequency > 1.0][:4] for model in (few, many)]
     assert lowest[0] == pytest.approx(lowest[1], rel=2e-4)

@@ -9,16 +9,17 @@ from rods import rod
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid, run_static
-from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.analysis.motors_only import run_motors_only
+from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.motors_only import MotorsOnly, run_motors_only
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet, actuation_source
+from ffrobot.mbs.analysis.static import Static, run_static
 from ffrobot.mbs.model.masses import mass_matrix
 from ffrobot.mbs.model.model import ZERO
 from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.quantities.observation import joint_forces
-from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.mbs.scene.bodies import RigidBody
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
@@ -109,7 +110,7 @@ def test_geared_two_link_arm_needs_the_moments_of_spong():
             initial={"angles": {"a": 0.4, "b": 0.0}},
         )
         if kind == "fcid":
-            return run_fcid(model, Analysis(name="i", kind="fcid", shape="zero", end=1.0, output_step=0.01))
+            return run_fcid(model, Fcid(name="i", kind="fcid", shape="zero", end=1.0, output_step=0.01))
         return run_pcid(model, pcid(tolerance=1e-9), False, always)
 
     for kind in ("pcid", "fcid"):
@@ -126,7 +127,7 @@ def test_geared_two_link_arm_needs_the_moments_of_spong():
 def test_motors_alone_carry_rotors_and_friction_along():
     """Inverse dynamics with motors only, applied to the flexible arm, brings its tip along the path."""
     model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION, initial=AT_REST)
-    servo = Analysis(name="servo", kind="motors-only", end=1.0, output_step=0.01)
+    servo = MotorsOnly(name="servo", kind="motors-only", end=1.0, output_step=0.01)
     source = run_motors_only(model, servo, always)
     replay = forward(actuation="servo", apply="joints", tolerance=1e-7)
     outcome = run_forward(model, replay, source, ActuatorSet(), always)
@@ -187,7 +188,7 @@ def test_a_prismatic_joint_moves_the_reflected_mass():
 
 
 def test_equilibrium_knows_neither_rotors_nor_friction():
-    keys = {"analysis": (Analysis(name="static", kind="static"),), "motors": "section"}
+    keys = {"analysis": (Static(name="static", kind="static"),), "motors": "section"}
     with_them = run_static(geared_arm(None, GEARED | FRICTION, GEARED | FRICTION, **keys), keys["analysis"][0])
     without = run_static(geared_arm(None, {}, {}, **keys), keys["analysis"][0])
     np.testing.assert_allclose(with_them.q, without.q, atol=1e-12)

@@ -8,7 +8,8 @@ from links import arm, arm_links, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
 
 from ffrobot.common.errors import SolveError
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.quantities.observation import energies, point_motion
 from ffrobot.mbs.quantities.stiffening import estimated_effect
 

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
-from ffrobot.mbs.analysis.analyses import run_forward
+from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.fields.field_types import Vector2
 from ffrobot.mbs.joints.joints import JOINT_TYPES, Joint
 from ffrobot.mbs.joints.measure import relative_angle, slide

@@ -10,7 +10,7 @@ from mechanisms import always, make_model, oracle_of, pcid, relative, revolute
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.model import ModalLoad
 from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.solve.initial_state import undeformed_state

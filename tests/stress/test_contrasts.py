@@ -98,12 +98,12 @@ def test_too_thin(beams, record):
     """A millimetre of steel a metre long bends under its own weight by more than small deformations allow."""
     outcome = inverse(arm(beams(height=1e-3), initial=STATIC), end=1.0, tolerance=1e-4)
     assert outcome.status == "diverged"
-    assert '"link2" is bent by' in outcome.cause
+    assert '"link2" is bent by' in outcome.statistics.cause
     assert len(outcome.q) == len(outcome.time) > 10  # what there is up to then
     record(
         GROUP,
         "links 1 m long and 0.001 m high",
         "ends at t = {t}",
         'diverged; “"link2" is bent by 103 % of its length …”',
-        t=outcome.time_reached,
+        t=outcome.statistics.time_reached,
     )

@@ -12,7 +12,8 @@ from rods import rod
 from table import at_most
 
 from ffrobot.mbs._core import TimeFunction
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.model import ModalLoad
 from ffrobot.mbs.model.system import MechanismSystem
 
@@ -108,7 +109,7 @@ def test_replayed_actuation(record):
     analysis = forward(end=20.0, output_step=0.1, tolerance=1e-6, actuation="inverse", apply="joints+pzt")
     replay = run_forward(model, analysis, inverse, FULL, always)
     assert replay.status == "diverged"
-    assert "is bent by" in replay.cause
+    assert "is bent by" in replay.statistics.cause
     time, departure = replay.time, np.abs(replay.q - inverse.q[: len(replay.q)])[:, 2]
     early = (time > 1.0) & (departure > 1e-10) & (departure < 1e-2)
     rate = np.polyfit(time[early], np.log(departure[early]), 1)[0]
@@ -122,5 +123,5 @@ def test_replayed_actuation(record):
         second=at_most(1e-10, departure[10]),  # rounding, grown for a second
         rate=rate,
         expected=expected,
-        t=replay.time_reached,
+        t=replay.statistics.time_reached,
     )

@@ -7,18 +7,17 @@ from robots import inverse
 from table import at_most
 from units import SI, SYSTEMS, Units
 
-from ffrobot.mbs.analysis.analyses import run_static
-from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.mbs.analysis.static import Static, run_static
 
 OTHERS = [name for name in SYSTEMS if name != "SI"]
-STATIC = Analysis(name="rest", kind="static")
+STATIC = Static(name="rest", kind="static")
 
 
 def forces(units, state, **keys):
     model = units.arm(initial={"angles": ANGLES, "state": state})
     outcome = inverse(model, end=0.2 * units.time, output_step=0.01 * units.time, **keys)
     assert outcome.status == "completed"
-    return outcome.lambda_ / units.force, outcome.steps
+    return outcome.lambda_ / units.force, outcome.statistics.steps
 
 
 @pytest.mark.parametrize("state", ["undeformed", "static"])

@@ -7,9 +7,9 @@ import pytest
 from table import at_most
 
 from ffrobot.actuation.patches.patches import check_reach, patch_array
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.scene.actuator_records import PztLayout
 
 GROUP = "PZT layouts"
 PATCH = {"body": "link2", "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12}

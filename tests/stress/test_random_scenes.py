@@ -12,7 +12,8 @@ from mechanisms import always, assemble, forward, oracle_of, pcid, random_state,
 from patch_sets import FULL
 from table import at_most
 
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 
 GROUP = "Random scenes"
 SCENES = 40
@@ -132,6 +133,7 @@ def test_they_are_in_the_table(record):
     record(
         GROUP,
         f"{SCENES} random mechanisms of the zoo each: equations of motion, Jacobians, power; 6 arms: PCID → forward",
-        "at most: residuals {residual}, Jacobians against differences {jacobian}, power {power}, round trip {round_trip}",
+        "at most: residuals {residual}, Jacobians against differences {jacobian}, power {power}, round trip"
+        " {round_trip}",
         **{what: at_most(BOUNDS[what], value) for what, value in worst.items()},
     )

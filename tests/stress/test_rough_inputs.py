@@ -9,9 +9,8 @@ from rods import rod
 from table import at_most
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.analysis.fcid import run_fcid
+from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
 from ffrobot.mbs.fields.waypoints import load_waypoints
-from ffrobot.mbs.scene.analysis_records import Analysis
 
 GROUP = "Rough inputs"
 ELBOW = (-0.2, 1.4)
@@ -47,7 +46,7 @@ def test_jumps_are_refused(x, quantity, kind, record):
 
 
 def zero_shape():
-    return Analysis(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01)
+    return Fcid(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01)
 
 
 def test_jump_of_acceleration(record):
@@ -101,8 +100,8 @@ def test_load_that_ends(moment, says, record):
     )
     outcome = free_run(model)
     assert outcome.status == "step underflow"
-    assert says in outcome.cause
-    assert outcome.time_reached <= 0.5
+    assert says in outcome.statistics.cause
+    assert outcome.statistics.time_reached <= 0.5
     assert 10 < len(outcome.q) == len(outcome.time) <= 51
     record(
         GROUP,

@@ -10,7 +10,6 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.plane import perpendicular, rotation
 from ...results.file import Results
-from ...results.linear import read_linear
 from .configurations import body_shape
 from .figure_file import FigureRecord
 from .style import SIZE, legend, shades
@@ -26,7 +25,7 @@ def draw_bode(figure: FigureRecord, results: Results) -> Figure:
     """Magnitude (SI units of output over input) and phase of `figure.transfers` over the frequency, at one time."""
     assert figure.analysis is not None
     k = _nearest(results, figure)
-    model = read_linear(results, figure.analysis)[k]
+    model = results.linear(figure.analysis)[k]
     frequency = results[f"{figure.analysis}/linear/frequency"][k]
     flexible = frequency[frequency > 0.0]
     first, last = (flexible[0], flexible[min(MODES_SHOWN, len(flexible)) - 1]) if len(flexible) else (1.0, 1.0)

@@ -30,7 +30,7 @@ def analyses_table(runs: Sequence[Run]) -> Table:
     rows = []
     for run in runs:
         about, time = run.results.attributes(run.analysis), run.results.time(run.analysis)
-        integrated = about["kind"] != "static"
+        integrated = about["integrator"] != "none"
         counts = tuple(f"{about[key]}" if integrated else "" for key in ("steps", "rejected", "evaluations"))
         violation = run.results[f"{run.analysis}/constraint_violation"].max(initial=0.0)
         rows.append(

@@ -1,20 +1,47 @@
-"""The linear models of a scene's analysis, and what is worth telling of them."""
+"""Linear models about an equilibrium or a motion: the analysis `kind = "linear"`, and what is worth telling of them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
 
-from ...mbs.analysis.analyses import Outcome
+from ...mbs.analysis.operating_points import InstantAnalysis, operating_points
+from ...mbs.analysis.outcome import Details, Outcome
+from ...mbs.fields.field_types import PointReference
+from ...mbs.fields.references import Reference
 from ...mbs.solve.linearisation import Linearisation
+from ..context import ActuatedContext
 from ..patches.patches import PatchArray
 from .linear_model import LinearModel, linear_model
 from .modes import Reach, RobotModes, controllability, observability, robot_modes
 from .zeros import Zeros, zeros
 
 
+class Linear(InstantAnalysis):
+    """The robot as x' = A x + B u, y = C x + D u: `about` the static equilibrium, or an earlier analysis at `times`.
+
+    `points` are those whose motion and disturbance the model knows.
+    """
+
+    kind: Literal["linear"]
+    points: tuple[PointReference, ...] | None = None
+
+    needs_actuators = True
+
+    def references(self) -> Iterator[Reference]:
+        """The points."""
+        for point in self.points or ():
+            yield Reference("points", point, needs_marker=True)
+
+    def run(self, context: ActuatedContext) -> Outcome:
+        """The operating points, with `LinearModels` about them."""
+        outcome = operating_points(context.model, self, context.source(self.source))
+        return replace(outcome, details=analyse(linear_models(outcome, context.patches, self.points)))
+
+
 @dataclass(frozen=True)
-class LinearAnalysis:
+class LinearModels(Details):
     """Linear models at the times of an analysis, with their modes, reach and zeros, one of each per time.
 
     `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
@@ -29,20 +56,22 @@ class LinearAnalysis:
     zeros: Mapping[tuple[str, ...], tuple[Zeros, ...]]
 
 
-def linear_models(outcome: Outcome, patches: Mapping[str, PatchArray]) -> tuple[LinearModel, ...]:
-    """The linear models about the rows of `outcome`."""
+def linear_models(
+    outcome: Outcome, patches: Mapping[str, PatchArray], points: Sequence[str] | None = None
+) -> tuple[LinearModel, ...]:
+    """The linear models about the rows of `outcome`, which know of the `points`, or of those of trajectories."""
     model = outcome.assembly.model
-    linearisation = Linearisation(model, outcome.q[0], outcome.analysis.points or default_points(outcome))
+    linearisation = Linearisation(model, outcome.q[0], tuple(points or default_points(outcome)))
     rows = zip(outcome.time, outcome.q, outcome.v, outcome.a, strict=True)
     return tuple(linear_model(linearisation.at(float(t), q, v, a), patches) for t, q, v, a in rows)
 
 
-def analyse(models: tuple[LinearModel, ...]) -> LinearAnalysis:
+def analyse(models: tuple[LinearModel, ...]) -> LinearModels:
     """Modes, reach and zeros of the models."""
     first = models[0]
     acting = [name for name in first.input_names if not name.startswith("force/")]
     seen = [name for name in first.output_names if not name.startswith("modal/")]
-    return LinearAnalysis(
+    return LinearModels(
         models,
         tuple(robot_modes(model) for model in models),
         tuple(controllability(model, acting) for model in models),

@@ -1,13 +1,15 @@
-"""Patches and actuation points of a scene file, key by key. SI units."""
+"""Patches of a scene file, key by key. SI units."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from ...common.validation import Record
-from ..fields.field_types import Name, NotEmpty, NotNegative, Positive, one_of
+from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, Positive, one_of
+from ...mbs.fields.references import Reference
 
 
 class PztLayout(Record):
@@ -65,23 +67,9 @@ class PztLayout(Record):
         """Number of patches."""
         return len(self.centers) if self.centers is not None else (self.count or 0)
 
-
-Place = float | Name
-"""Where on a link: the distance from its root (m), or the name of one of its points."""
-
-
-class ActuationPoints(Record):
-    """Components of force on one body that carry its generalized driving forces (Shaban 2022, sec. 4).
-
-    `axial` and `transverse` say at which places a component along x or y of the body's frame acts. Without either,
-    as many as the body has coordinates are chosen.
-    """
-
-    body: str
-    axial: tuple[Place, ...] = ()
-    transverse: tuple[Place, ...] = ()
-
-    @property
-    def is_automatic(self) -> bool:
-        """Whether the components are left to the program."""
-        return not (self.axial or self.transverse)
+    def references(self) -> Iterator[Reference]:
+        """The link, and the points of it whose deflections weigh."""
+        yield Reference("body", self.body)
+        yield Reference("body", self.body, "flexible body")
+        for point in self.point_weights or ():
+            yield Reference("point_weights", f"{self.body}.{point}")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
-from ..fields.field_types import NotEmpty
-from ..fields.references import Reference
-from .actuator_records import ActuationPoints, PztLayout
-from .analysis_records import Analysis
-from .mechanism import MechanismKeys, MechanismScene
-from .references import analysis_references, patch_references, point_references
+from ..actuation.patches.records import PztLayout
+from ..actuation.points import ActuationPoints
+from ..mbs.fields.field_types import NotEmpty
+from ..mbs.fields.references import Reference, under
+from ..mbs.scene.mechanism import MechanismKeys, MechanismScene
+from .kinds import Analysis
 
 
 class SceneKeys(MechanismKeys):
@@ -27,11 +27,11 @@ class SceneKeys(MechanismKeys):
         """All that records of the scene refer to, with their full keys."""
         yield from super().references()
         for layout in self.pzt:
-            yield from patch_references(layout)
+            yield from under(f'pzt "{layout.body}"', layout.references())
         for points in self.actuation_points:
-            yield from point_references(points)
+            yield from under(f'actuation_points "{points.body}"', points.references())
         for analysis in self.analysis:
-            yield from analysis_references(analysis)
+            yield from under(f'analysis "{analysis.name}"', analysis.references())
 
 
 class Scene(SceneKeys, MechanismScene):

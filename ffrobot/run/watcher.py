@@ -1,4 +1,4 @@
-"""Ctrl-C while analyses run, or a cluster's end of time: a request to stop that keeps what has been computed."""
+"""Who is told how a solve goes and may stop it: a watcher, Ctrl-C, a cluster's end of time."""
 
 from __future__ import annotations
 
@@ -7,6 +7,17 @@ import threading
 from types import FrameType, TracebackType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Watcher:
+    """Is told how a solve goes; the command line shows it, a library user need not care."""
+
+    def stage(self, title: str) -> None:
+        """Something that may take long begins."""
+
+    def advance(self, t: float, end: float) -> bool:
+        """An analysis has reached time t of `end`; False stops it."""
+        return True
 
 
 class Interruption:

@@ -1,15 +1,16 @@
-"""Sampled control of an analysis of kind "closed-loop", key by key: sensors, controllers, disturbances. SI units."""
+"""Sensors, controllers and placements of a scene file, key by key. SI units."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from ...common.validation import Record, existing_file, quoted
-from ..fields.field_types import Name, NotEmpty, NotNegative, PointReference, Positive, one_of
-from .loads import Load
+from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PointReference, Positive, one_of
+from ...mbs.fields.references import Reference
 
 PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
 
@@ -46,8 +47,28 @@ class Sensor(Record):
             raise ValueError(f'expected the key "capacitance" only beside "pzt", found it beside "{subject}"')
         return self
 
+    def references(self) -> Iterator[Reference]:
+        """What is measured."""
+        if self.point is not None:
+            yield Reference("", self.point, needs_marker=True)
+        yield from (Reference("", body) for body in (self.pzt, self.modal) if body is not None)
+        if self.pzt is not None:
+            yield Reference("pzt", self.pzt, "patches")
+        if self.joint is not None:
+            yield Reference("joint", self.joint, "joint")
+        if self.motor is not None:
+            yield Reference("motor", self.motor, "elastic joint")
 
-class JointPid(Record):
+
+class ControllerRecord(Record):
+    """Base of all controllers."""
+
+    def references(self) -> Iterator[Reference]:
+        """Joints and bodies that a controller names."""
+        yield from ()
+
+
+class JointPid(ControllerRecord):
     """u = P e + D ė + I ∫e of each joint named, e from the reference; N·m/rad, N·m·s/rad, N·m/(rad·s) or their like.
 
     Rates are measured, or `rate = "difference"` of the last two readings.
@@ -65,8 +86,15 @@ class JointPid(Record):
         """Joints with any gain."""
         return tuple(dict.fromkeys((*self.proportional, *self.derivative, *self.integral)))
 
+    def references(self) -> Iterator[Reference]:
+        """The joints, and the side of their gears."""
+        for name in self.joints:
+            yield Reference("", name, "joint")
+            if self.side == "motor":
+                yield Reference("side: motor", name, "elastic joint")
 
-class ComputedTorque(Record):
+
+class ComputedTorque(ControllerRecord):
     """Moments of the mechanism with rigid links for γ̈_ref + 2 ζ ω ė + ω² e, instead of a feed-forward of moments."""
 
     kind: Literal["computed-torque"]
@@ -74,7 +102,7 @@ class ComputedTorque(Record):
     damping_ratio: Positive = 1.0
 
 
-class ModalVelocity(Record):
+class ModalVelocity(ControllerRecord):
     """Patches as dampers of the lowest `modes` of their links: modal forces −2 ζ ω ṗ, ζ the `damping_ratio` added.
 
     p from the voltages of the same patches (least squares over these modes) and ṗ from two samples, or both ideal.
@@ -86,8 +114,14 @@ class ModalVelocity(Record):
     damping_ratio: Positive
     sensor: Literal["pzt", "ideal"] = "pzt"
 
+    def references(self) -> Iterator[Reference]:
+        """The links."""
+        for body in self.bodies:
+            yield Reference("bodies", body)
+            yield Reference("bodies", body, "patches")
 
-class Lqr(Record):
+
+class Lqr(ControllerRecord):
     """u = −K x for the sampled linear model about the reference at `time`, links with their lowest `modes`.
 
     Weights are one over the squares of what is acceptable: angles (rad), rates (rad/s), deflections of the links
@@ -118,7 +152,7 @@ def _python_function(value: object, info: ValidationInfo) -> object:
     return f"{existing_file(Path(path), info)}:{function}"
 
 
-class PythonController(Record):
+class PythonController(ControllerRecord):
     """A function of the user's, "FILE.py:FUNCTION" with the file beside the scene, or itself in scenes made in Python.
 
     See `actuation.control.python_controller`.
@@ -131,41 +165,24 @@ class PythonController(Record):
 Controller = Annotated[JointPid | ComputedTorque | ModalVelocity | Lqr | PythonController, Field(discriminator="kind")]
 
 
-class ClosedLoopKeys(Record):
-    """What an analysis of kind "closed-loop" takes besides; its `actuation` gives reference, feed-forward and start.
+class Placement(Record):
+    """Where on one link the patches of its [[pzt]] should be, `count` of them.
 
-    Samples are at 0, sample_time, …; the command of each acts `delay` later and is held. Moments and voltages keep
-    within the limits of the scene unless `unlimited`. The run starts as the inverse analysis does, or as [initial] of
-    the scene says, on the trajectories. `seed` starts the noise. `tip` is the point whose error is reported.
+    `criterion` "controllability": they reach the `modes` lowest modes of the robot with its motors held; "voltage":
+    the largest voltage, relative to its limit, by which they produce the forces of the `modes` lowest modes of the link
+    over the inverse analysis `about`. `measure` says which reach counts: of the worst mode, on average, or the product.
+    Centers are sought every `spacing`, by trying all sets where that is at most `most_sets`, by evolution otherwise.
     """
 
-    sample_time: Positive | None = None
-    delay: NotNegative = 0.0
-    start: Literal["actuation", "scene"] = "actuation"
-    feed_forward: Literal["none", "joints", "joints+pzt"] = "joints"
-    unlimited: bool = False
-    seed: Annotated[int, Field(ge=0)] = 0
-    tip: PointReference | None = None
-    controller: tuple[Controller, ...] = ()
-    sensor: tuple[Sensor, ...] = ()
-    disturbance: tuple[Load, ...] = ()
+    body: str
+    count: Annotated[int, Field(gt=0)] | None = None
+    criterion: Literal["controllability", "voltage"] = "controllability"
+    measure: Literal["worst", "mean", "product"] = "worst"
+    modes: Annotated[int, Field(gt=0)] | None = None
+    spacing: Positive | None = None
+    most_sets: Annotated[int, Field(gt=0)] = 100_000
 
-    @model_validator(mode="after")
-    def _loop_consistent(self) -> ClosedLoopKeys:
-        kind = getattr(self, "kind", "")
-        found = [key for key in ClosedLoopKeys.model_fields if key in self.model_fields_set]
-        if kind != "closed-loop" and found:
-            raise ValueError(f'expected the key "{found[0]}" only in kind = "closed-loop", found kind = "{kind}"')
-        if kind != "closed-loop":
-            return self
-        for key in ("sample_time", "actuation"):
-            if getattr(self, key, None) is None:
-                raise ValueError(f'expected the key "{key}" in kind = "closed-loop", found none')
-        if any(load.point is None for load in self.disturbance):
-            raise ValueError("expected disturbances at points, found one elsewhere")
-        end = getattr(self, "end", 0.0)
-        if end and self.delay >= end:
-            raise ValueError(f"expected a delay shorter than the run ({end:g} s), found {self.delay:g} s")
-        if end and self.sample_time is not None and self.sample_time > end:
-            raise ValueError(f"expected a sample_time of at most the run ({end:g} s), found {self.sample_time:g} s")
-        return self
+    def references(self) -> Iterator[Reference]:
+        """The link and its patches."""
+        yield Reference("placement.body", self.body)
+        yield Reference("placement.body", self.body, "patches")

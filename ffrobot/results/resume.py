@@ -1,7 +1,8 @@
 """Going on with a run that was stopped, from its results file.
 
-On Ctrl-C and where `max_steps` is used up, the results file keeps what the next step depends on. Analyses of kind
-"pcid" and "forward" go on from there, or are taken over where they are complete; all others are run again.
+On Ctrl-C and where `max_steps` is used up, the results file keeps what the next step depends on. Analyses for
+which that can be done for (`is_resumable`) go on from there, or are taken over where they are complete; all others are
+run again.
 """
 
 from __future__ import annotations
@@ -20,17 +21,21 @@ from ..common.errors import InputError
 from ..common.validation import key_path
 from ..common.version import program_version
 from ..mbs import _core
-from ..mbs.analysis.analyses import Outcome
-from ..mbs.analysis.earlier_run import COUNTS, ROWS, EarlierRun
-from ..mbs.scene.scene import Scene
+from ..mbs.analysis.outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
+from ..mbs.scene.analysis import IntegratedAnalysis
 from ..mbs.solve.integrators import METHODS, Choice
-from ..results.file import Results
-from .solution import Solution, Watcher, prepare, run_analyses, stiffened
+from ..run.prepare import prepare, stiffened
+from ..run.solution import Solution
+from ..run.solve import run_analyses
+from ..run.watcher import Watcher
+from ..scene.scene import Scene
+from .file import Results
 
 GROUP = "resume"  # in the group of an analysis
-KINDS = ("pcid", "forward")
 STOPPED = ("interrupted", "too many steps")
-IN_RESULTS = ("time", "residual")  # of ROWS, what results files hold anyway
+ROWS = ("q", "v", "a", "lambda_", "tau", "F_p")  # what results files do not hold anyway
+COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
+CHECKPOINT = ("state", "stepping", "gathered")
 MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 
@@ -71,7 +76,7 @@ def how_to_go_on(solution: Solution, command: str) -> str:
     if outcome is None:
         return ""
     if _goes_on(solution, outcome):
-        return f"; {command} goes on from t = {outcome.time_reached:.9g} s"
+        return f"; {command} goes on from t = {outcome.statistics.time_reached:.9g} s"
     return f'; {command} runs "{outcome.analysis.name}" again from its start'
 
 
@@ -81,7 +86,7 @@ def _stopped(solution: Solution) -> Outcome | None:
 
 def _goes_on(solution: Solution, outcome: Outcome) -> bool:
     """Whether `outcome` is of use to `resume`; a search for modes has bodies of its own and starts again."""
-    return solution.mode_choice is None and outcome.analysis.kind in KINDS
+    return solution.mode_choice is None and outcome.analysis.is_resumable
 
 
 def _analyses(solution: Solution) -> list[str]:
@@ -90,11 +95,11 @@ def _analyses(solution: Solution) -> list[str]:
 
 def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
     for name in ROWS:
-        if name not in IN_RESULTS and getattr(outcome, name) is not None:
-            group[name] = getattr(outcome, name)
-    checkpoint, recording = outcome.checkpoint, outcome.recording
-    assert checkpoint is not None
-    for name in ("state", "stepping", "gathered"):
+        if (rows := getattr(outcome, name)) is not None:
+            group[name] = rows
+    assert outcome.continuation is not None
+    checkpoint, recording = outcome.continuation.checkpoint, outcome.continuation.recording
+    for name in CHECKPOINT:
         group[f"checkpoint/{name}"] = getattr(checkpoint, name)
     group["checkpoint"].attrs.update({"time": checkpoint.time, "outputs": checkpoint.outputs})
     if recording is not None:
@@ -104,24 +109,32 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
 
 def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
     about, group = file.attributes(name), f"{name}/{GROUP}"
-    analysis = next(analysis for analysis in solution.scene.analysis if analysis.name == name)
-    rows = {row: file[f"{group}/{row}"] for row in ROWS if file.has(f"{group}/{row}")}
-    rows |= {"time": file.time(name), "residual": file[f"{name}/constraint_violation"]}
-    where = file.attributes(f"{group}/checkpoint")
-    state, stepping, gathered = (file[f"{group}/checkpoint/{key}"] for key in ("state", "stepping", "gathered"))
-    recording = None
-    if file.has(f"{group}/recording"):
-        recording = _core.Recording(
-            file[f"{group}/recording/times"], file[f"{group}/recording/states"],
-            METHODS[about["integrator"]], analysis.spectral_radius, analysis.tolerance,
-        )  # fmt: skip
+    rows = {row: file[f"{group}/{row}"] if file.has(f"{group}/{row}") else None for row in ROWS}
+    tau, F_p = rows.pop("tau"), rows.pop("F_p")
+    motion = {key: values for key, values in rows.items() if values is not None}
+    integrator = Choice(about["integrator"], about["integrator_reason"])
+    counts = {count: about[count].item() for count in COUNTS}
     return EarlierRun(
-        about["status"],
-        rows,
-        {count: about[count].item() for count in COUNTS},
-        Choice(about["integrator"], about["integrator_reason"]),
-        _core.Checkpoint(where["time"], state, stepping, gathered, int(where["outputs"])),
-        recording,
+        Motion(time=file.time(name), residual=file[f"{name}/constraint_violation"], **motion),
+        Forces(tau, F_p),
+        Statistics(status=about["status"], integrator=integrator, **counts),
+        _continuation(solution, file, name),
+    )
+
+
+def _continuation(solution: Solution, file: Results, name: str) -> Continuation:
+    about, group = file.attributes(name), f"{name}/{GROUP}"
+    where = file.attributes(f"{group}/checkpoint")
+    state, stepping, gathered = (file[f"{group}/checkpoint/{key}"] for key in CHECKPOINT)
+    checkpoint = _core.Checkpoint(where["time"], state, stepping, gathered, int(where["outputs"]))
+    if not file.has(f"{group}/recording"):
+        return Continuation(checkpoint)
+    analysis = next(analysis for analysis in solution.scene.analysis if analysis.name == name)
+    assert isinstance(analysis, IntegratedAnalysis)
+    times, states = (file[f"{group}/recording/{key}"] for key in ("times", "states"))
+    method = METHODS[about["integrator"]]
+    return Continuation(
+        checkpoint, _core.Recording(times, states, method, analysis.spectral_radius, analysis.tolerance)
     )
 
 
