@@ -61,6 +61,19 @@ def test_the_estimate_is_honest_and_meets_the_tolerance(truth):
     assert choice.highest[0] < choice.highest[1]
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_estimate_is_honest_on_paths_it_was_not_made_with(seed):
+    """Other ways of the tip, drawn by seed: as the paper's arm on its own."""
+    x, y = np.random.default_rng(seed).uniform([-1.0, -0.5], [0.0, 0.5])
+    path = {"x": f"1.5+{x!r}*{S}", "y": f"sqrt(3)/2+{y!r}*{S}"}
+    exact = reported(solve(scene("static", path, tolerance=1e-5)), "inverse")
+    solution = solve(scene("static", path, "auto", tolerance=1e-2))
+    worst = max(difference(reported(solution, "inverse"), exact).values())
+    estimated = max(solution.mode_choice.errors["inverse"].values())
+    assert worst <= 1e-2
+    assert worst / 3 < estimated < 6 * worst  # up to 4 times on the safe side, where the arm above has less than 3
+
+
 def test_all_modes_are_taken_where_fewer_do_not_do():
     solution = solve(scene("undeformed", None, "auto", tolerance=1e-3, end=0.1))
     assert solution.mode_choice.tried[-1] == 20

@@ -84,9 +84,9 @@ PART = 'title = "d"\n[[part]]\nname = "p"\n'
          'part "p": section.diametre: expected one of the keys shape, diameter, found an unknown key'
          ' (did you mean "diameter"?)'),
         (PART + "section = { shape = 'circel' }",
-         'part "p": section.shape: expected one of "circle", "rectangle", found "circel" (did you mean "circle"?)'),
+         'part "p": section.shape: expected "circle" or "rectangle", found "circel" (did you mean "circle"?)'),
         (PART + "section = { diameter = 1.0 }",
-         'part "p": section: expected a table with the key "shape", found {"diameter": 1.0}'),
+         'part "p": section.shape: expected a value, since this key is required, found none'),
         (PART + "widht = 1\n", 'part "p": widht: expected one of the keys name, section, ratio, position, mesh, count,'
          " found an unknown key"),
     ],

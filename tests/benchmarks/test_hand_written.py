@@ -16,6 +16,7 @@ import pytest
 
 from ffrobot.bench.evaluation import evaluation_seconds
 from ffrobot.bench.hand_written import STEPS, TIME, HandWritten, general_state
+from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.pcid import Pcid, run_pcid
 from ffrobot.run.prepare import prepare
 
@@ -54,6 +55,11 @@ def test_both_compute_the_same(two_link, program):
     # the program takes displacements of 1e-12 m at supports for zero; forces amplify that
     np.testing.assert_allclose(tip_force(assembly, lambda_), [force_x, force_y], rtol=1e-8)
     assert alpha == pytest.approx(a[assembly.first[0] + 2], abs=1e-8 * np.abs(a).max())
+
+
+def test_without_the_source_tree_it_says_what_is_missing(two_link, tmp_path):
+    with pytest.raises(InputError, match=r"expected ffrobot's source tree, found no tests/benchmarks/hand_written"):
+        HandWritten(tmp_path, two_link, tmp_path)
 
 
 def test_right_hand_side_ratio(benchmark, two_link, program):

@@ -24,7 +24,11 @@ def links(ffrobot, case_copy_of_module):
 
 @pytest.mark.parametrize(("gravity", "within"), [("full", 0.02), ("native", 0.08)])
 def test_peer_computes_the_same_motion(links, tmp_path, gravity, within):
-    """At coarse steps 1.6 % of the peak with the whole of gravity, 7 % with what EXUDYN takes into account of it."""
+    """At coarse steps 1.6 % of the peak with the whole of gravity, 7 % with what EXUDYN takes into account of it.
+
+    The force is the peer's acceleration of the tip, of second order in steps of 1e-4 s that resolve its highest
+    vibration (39 000 rad/s) by 1.6 points a period: a tenth of the peak is what that leaves.
+    """
     path = tmp_path / "run.csv"
     command = [sys.executable, SCRIPT, *links, "--step", "1e-4", "--gravity", gravity, "-o", path]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=True)

@@ -91,7 +91,7 @@ def test_pcid_of_one_second(benchmark, scene):
     outcome = benchmark(run_pcid, model, model.scene.analysis[0], False, lambda t: True)
     benchmark.extra_info |= {"steps": outcome.statistics.steps, "evaluations": outcome.statistics.evaluations}
     assert outcome.status == "completed"
-    assert outcome.wall_seconds < 5 * outcome.evaluations * evaluation(model)
+    assert outcome.statistics.wall_seconds < 5 * outcome.statistics.evaluations * evaluation(model)
 
 
 @pytest.mark.parametrize(("shape", "evaluations"), [("zero", 40), ("static", 120)])

@@ -115,7 +115,9 @@ def test_nafems_fv52(tmp_path):
         omega2 = eigsh(K, 10, M, sigma=-1e3, return_eigenvectors=False)
         found.append(np.sqrt(np.sort(omega2)[3:]) / (2 * np.pi))
     coarse, fine = found
-    np.testing.assert_allclose(coarse, expected, rtol=0.03)  # a mesh as coarse as the benchmark's
+    # The benchmark's numbers are those of its own mesh and of supports along lines, of which a finer solid takes ever
+    # less notice: there is no exact value to come closer to than this.
+    np.testing.assert_allclose(coarse, expected, rtol=0.03)
     # In-plane mode, which the supports do not touch. The others go on falling with finer meshes: a line holds no solid.
     np.testing.assert_allclose(fine[4], expected[4], rtol=2e-4)
     assert np.all(fine < coarse)

@@ -79,8 +79,14 @@ def test_bending_stress_is_that_of_the_beam(pair, name):
 
 
 def test_shear_stress_on_the_axis_is_that_of_the_beam(pair):
+    """Beams give the mean along the chord; in its middle Timoshenko & Goodier, §124, with a = h/2, b = w/2 have
+
+    1 − ν/(1 + ν) b²/a² [1/3 + 4/π² Σ (−1)ⁿ/(n² cosh nπa/b)] of it: 0.9666 for this section.
+    """
     beam, solid = (body.stress["axis"].stress for body in pair)
-    np.testing.assert_allclose(solid[5], beam[5], rtol=0.1)
+    ratio, n = 0.03 / 0.02, np.arange(1, 20)
+    series = 1 / 3 + 4 / np.pi**2 * np.sum((-1.0) ** n / (n**2 * np.cosh(n * np.pi * ratio)))
+    np.testing.assert_allclose(solid[5] / beam[5], 1 - 0.3 / 1.3 / ratio**2 * series, rtol=5e-3)
 
 
 def test_surface_holds_what_the_points_on_it_have(pair):
@@ -88,8 +94,9 @@ def test_surface_holds_what_the_points_on_it_have(pair):
     assert solid.surface_stress.shape == (len(solid.mesh.points), 6, 3)
     edge = solid.stress["edge"]
     near = np.argsort(np.linalg.norm(solid.mesh.points - edge.position, axis=1))[:4]
-    scale = np.abs(edge.stress).max()
-    np.testing.assert_allclose(solid.surface_stress[near, 0].mean(axis=0), edge.stress[0], atol=0.1 * scale)
+    # Bending: σ_xx is proportional to y, and changes along x over these 5 mm by up to 7 %, in mode 3.
+    expected = solid.mesh.points[near, 1, None] / edge.position[1] * edge.stress[0]
+    np.testing.assert_allclose(solid.surface_stress[near, 0], expected, atol=0.08 * np.abs(edge.stress).max())
 
 
 def test_point_outside_the_solid(body):

@@ -18,7 +18,7 @@ from ffrobot.mbs.joints.moving_joint import MovingJoint
 from ffrobot.mbs.joints.transmission import Rotor
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.model.planar_body import from_rigid_body
-from ffrobot.mbs.scene.scene import Scene
+from ffrobot.scene.scene import Scene
 
 
 class SlotJoint(MovingJoint):
@@ -96,7 +96,7 @@ def test_a_weld_has_no_keys_of_motors(key):
 
 
 def test_a_weld_has_no_coordinate_for_trajectories_and_loads():
-    from ffrobot.mbs.scene.load import make_scene
+    from ffrobot.scene.load import make_scene
 
     rigid = {"mass": 1.0, "inertia": 1.0, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
     with pytest.raises(InputError) as caught:

@@ -164,7 +164,7 @@ def test_equations_of_motion_hold_with_the_motors_moments(carried):
 
 def test_actuation_begins_before_the_path_and_ends_after_it(carried):
     """Pre-actuation is long enough for the slowest zero, and what is left at its start is told."""
-    pre, post = carried.analysis.pre_actuation, carried.analysis.post_actuation
+    pre, post = carried.details.pre_actuation, carried.details.post_actuation
     assert carried.time[0] == -pre < -0.1
     assert carried.time[-1] == pytest.approx(1 + post)
     assert carried.details.inversion.off_rest < 1e-9

@@ -178,10 +178,10 @@ BAD_EXPRESSIONS = [
     ("text", "position", "says"), BAD_EXPRESSIONS, ids=[text[:20] for text, _, _ in BAD_EXPRESSIONS]
 )
 def test_everything_else_is_refused_at_once(text, position, says):
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(ExpressionError, match=says) as caught:
         parse_expression(text)
-    assert time.perf_counter() - start < 0.5
+    assert time.process_time() - start < 0.5
     if position is not None:
         assert caught.value.position == position
     assert len(str(caught.value)) < 400

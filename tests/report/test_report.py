@@ -11,6 +11,7 @@ import pytest
 
 from ffrobot.cli import cli
 from ffrobot.common.errors import InputError, SolveError
+from ffrobot.common.version import program_version
 from ffrobot.pictures.motion import topology
 from ffrobot.pictures.outline import body_outline, points_outline
 from ffrobot.pictures.report import write_report
@@ -108,7 +109,7 @@ def test_page_says_where_it_comes_from(two_link_page, two_link):
         file = Results(two_link.folder / "scene.results.h5").modal_files[name]
         assert file.sha256 in body
         assert file.input_hash in body
-    assert "ffrobot 0.1.0" in body
+    assert f"ffrobot {program_version()}" in body
     assert "y = &#34;sqrt(3)/2*cos(pi*t/4)&#34;" in body  # the scene's text
 
 

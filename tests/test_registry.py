@@ -1,0 +1,107 @@
+"""A new kind of analysis is one file with its record, and one entry in the list of kinds."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import ffrobot.scene.kinds as kinds
+
+TOY = '''
+"""The robot turned about its first motor as it stands, without dynamics."""
+
+from typing import Literal
+
+import numpy as np
+
+from ffrobot.mbs.analysis.outcome import Motion, Outcome
+from ffrobot.mbs.fields.field_types import Positive
+from ffrobot.mbs.fields.references import Reference
+from ffrobot.mbs.model.system import MechanismSystem
+from ffrobot.mbs.scene.analysis import TimedAnalysis
+from ffrobot.mbs.solve.initial_state import undeformed_state
+
+
+class Turntable(TimedAnalysis):
+    """Every body turns about the origin at a constant `rate` (rad/s)."""
+
+    kind: Literal["turntable"]
+    rate: Positive
+    body: str
+
+    is_algebraic = True
+
+    def references(self):
+        yield Reference("body", self.body)
+
+    def run(self, context):
+        system = MechanismSystem(context.model, context.model.joints)
+        start, t = undeformed_state(system).q, self.times
+        q = np.tile(start, (len(t), 1))
+        q[:, 2] += self.rate * t
+        v = np.zeros_like(q)
+        v[:, 2] = self.rate
+        held = len(system.constraints)
+        motion = Motion(t, q, v, np.zeros_like(q), np.zeros((len(t), held)), np.zeros((len(t), 3)))
+        return Outcome(self, system, motion)
+'''
+
+SOLVE = """
+import sys
+import types
+
+import numpy as np
+
+from {name} import kinds_source
+module = types.ModuleType("ffrobot.scene.kinds")
+module.__package__ = "ffrobot.scene"
+sys.modules["ffrobot.scene.kinds"] = module
+exec(kinds_source, module.__dict__)
+
+import ffrobot
+from ffrobot.schema import schema
+
+ROD = {{"mass": 2.0, "inertia": 0.5, "center": [0.5, 0.0], "points": {{"root": [0.0, 0.0], "tip": [1.0, 0.0]}}}}
+KEYS = {{
+    "name": "toy", "gravity": [0.0, 0.0], "body": [{{"name": "rod", "rigid": ROD}}],
+    "joint": [{{"name": "O", "type": "revolute", "between": ["ground", "rod.root"]}}],
+}}
+TURN = {{"name": "turn", "kind": "turntable", "end": 1.0, "output_step": 0.25, "rate": 2.0, "body": "rod"}}
+
+
+def refused(**analysis):
+    try:
+        ffrobot.make_scene(**KEYS, analysis=[TURN | analysis])
+    except ffrobot.InputError as error:
+        return str(error)
+
+
+results = ffrobot.solve(ffrobot.make_scene(**KEYS, analysis=[TURN]))
+np.testing.assert_allclose(results["turn/bodies/rod/angle"], 2.0 * np.linspace(0.0, 1.0, 5))
+np.testing.assert_allclose(results["turn/points/rod.tip/position"][-1], [np.cos(2.0), np.sin(2.0)])
+assert dict(results.attributes("turn"))["kind"] == "turntable"
+assert "integration of turn, algebraic" in results.skipped
+assert 'expected one of the bodies "rod", found "rd"' in refused(body="rd")
+assert 'expected the key "shape" only in kind = "fcid", found kind = "turntable"' in refused(shape="zero")
+assert 'expected the key "rate" in kind = "turntable", found none' in refused(rate=None)
+assert "Turntable" in schema("scene")["$defs"]
+"""
+
+
+def test_a_kind_is_a_file_and_an_entry(tmp_path):
+    """The edit that a developer makes to the list is made here, in a process of its own."""
+    source = Path(kinds.__file__).read_text(encoding="utf-8")
+    entry = "AnyKind = "
+    assert source.count(entry) == 1
+    source = source.replace(entry, f"from turntable import Turntable\n\n{entry}Turntable | ")
+    (tmp_path / "turntable.py").write_text(TOY, encoding="utf-8")
+    (tmp_path / "edited.py").write_text(f"kinds_source = {source!r}\n", encoding="utf-8")
+    program = SOLVE.format(name="edited")
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_every_kind_says_what_it_is():
+    """A record's kind is its own, and it can be run."""
+    names = [kind.kind_name() for kind in kinds.KINDS]
+    assert len(set(names)) == len(names) == 8
+    assert all(callable(kind.run) for kind in kinds.KINDS)
