@@ -130,8 +130,8 @@ def judge_patches(
         field=required / patches.layout.thickness,
         limited_field=np.abs(voltages.within_limit).max(axis=0) / patches.layout.thickness,
         strain=patches.surface_distance * curvature,
-        mode_required=np.abs(F_p).max(axis=0),
-        mode_available=np.abs(patches.Phi_V) @ patches.limit,
+        mode_required=np.abs(F_p[:, : patches.served]).max(axis=0),
+        mode_available=np.abs(patches.Phi_V[: patches.served]) @ patches.limit,
         remedies=_remedies(patches, required, F_p, with_count),
     )
 
@@ -178,7 +178,7 @@ def _count(patches: PatchArray, F_p: Array, with_count: Callable[[int], PatchArr
     most, missing = len(patches.edges), np.inf
     limit = float(patches.limit.min())
     served = patches if patches.of_all_modes is None else patches.of_all_modes[0]
-    for count in range(served.Phi_V.shape[0], MOST_PATCHES):
+    for count in range(served.served, MOST_PATCHES):
         array = with_count(count)
         if array is None:
             break

@@ -88,6 +88,14 @@ class PointSet:
         return PointActuator(self.names, self.equations())
 
 
+def with_factors(points: PointSet, factors: Array) -> PointSet:
+    """The points on a body in coordinates p' = factors · p, factors (n,): see `mbs.model.raised_mass`."""
+    if np.all(factors == 1.0):
+        return points
+    moved = (PlanarPoint(p.position, p.translation / factors, p.rotation / factors) for p in points.points)
+    return replace(points, points=tuple(moved), scale=points.scale * np.concatenate([np.ones(3), factors]))
+
+
 @dataclass(frozen=True)
 class PointForces:
     """Forces at the actuation points of one body over time.

@@ -20,6 +20,7 @@ from ..common.validation import load_toml, validate
 from ..mesh.records import RectangleSection, SectionRecord, TubeSection
 from .beam.section_stress import contains
 from .link_records import BeamLink, Link, Material, OrthotropicMaterial, SolidLink
+from .modal_body.attachment_modes import DEFAULT_COUNT
 from .solid.constitutive import is_stable
 
 
@@ -153,13 +154,15 @@ def _check_beam_interfaces(link: BeamLink, path: Path) -> None:
 
 def _check_modes(link: Link, path: Path) -> None:
     modes, damping = link.modes, link.damping
-    if (modes.count is None) == (modes.indices is None):
-        _reject(path, "modes", "either count or indices", _both_or_neither(modes.count))
+    if modes.count is not None and modes.indices is not None:
+        _reject(path, "modes", "either count or indices", "both")
+    if modes.count is None and modes.indices is None and not modes.attachment_modes:
+        _reject(path, "modes", "either count or indices", "neither")
     if modes.indices and sorted(set(modes.indices)) != list(modes.indices):
         _reject(path, "modes.indices", "ascending numbers, each once", modes.indices)
     if damping.ratio is not None and damping.rayleigh is not None:
         _reject(path, "damping", "either ratio or rayleigh", "both")
-    number = modes.count or len(modes.indices or ())
+    number = modes.count or len(modes.indices or ()) or sum(DEFAULT_COUNT[family] for family in link.families)
     if isinstance(damping.ratio, tuple) and len(damping.ratio) != number:
         _reject(path, "damping.ratio", f"one number, or one for each of the {number} modes", len(damping.ratio))
 

@@ -113,12 +113,14 @@ def _body(file: h5py.File) -> ModalBody:
 
 
 def _optional(file: h5py.File) -> dict[str, Any]:
-    """What only the files of links have that ask for it: modal stresses, patches outlined in the mesh."""
+    """What not all files have: modal stresses, patches outlined in the mesh; marks of attachment modes, in old ones."""
     found: dict[str, Any] = {}
     points = file.get("stress/points", {})
     found["stress"] = {name: StressPoint(**_arrays(points[name], StressPoint)) for name in points}
     if "stress/surface" in file:
         found["surface_stress"] = _array(file, "stress/surface")
+    if "modes/residual" in file:
+        found["residual"] = np.asarray(file["modes/residual"][()], dtype=np.int64)
     if "surface_patches" in file:
         found["surface_patches"] = OutlinedPatches(**_arrays(file["surface_patches"], OutlinedPatches))
     return found
@@ -164,6 +166,7 @@ def _image(body: ModalBody) -> bytes:
         for dataset, unit in _UNITS.items():
             file[dataset].attrs["unit"] = unit
         file["modes"].create_dataset("family", data=list(body.family), dtype=h5py.string_dtype(), track_times=False)
+        _write_arrays(file, {"modes/residual": body.residual})
         _write_arrays(file.create_group("geometric_stiffness"), dict(sorted(body.geometric_stiffness.items())))
         for name, interface in sorted(body.interfaces.items()):
             _write_arrays(file.create_group(f"interfaces/{name}"), vars(interface))

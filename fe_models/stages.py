@@ -79,7 +79,14 @@ def _stresses(body: ModalBody, link: Link) -> dict[str, StressPoint] | None:
     if isinstance(link, BeamLink):
         from .beam.stress import beam_stresses  # loads SciPy
 
-        return beam_stresses(link, body.stations, np.diag(body.stiffness), lumps(link.interface, body.interfaces))
+        return beam_stresses(
+            link,
+            body.stations,
+            np.diag(body.stiffness),
+            lumps(link.interface, body.interfaces),
+            body.residual,
+            body.interfaces,
+        )
     known = {tuple(point.position): point for point in body.stress.values()}
     if not known.keys() >= set(link.stress.points.values()):
         return None

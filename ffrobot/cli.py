@@ -59,9 +59,8 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     body = outcome.body
     reused = f", {outcome.reused} from an earlier run" if outcome.reused else ""
     verb = f"computed in {outcome.seconds:.2f} s{reused}" if outcome.computed else "up to date"
-    click.echo(
-        f"{outcome.path}: {verb}; {body.mode_count} modes, {body.frequency[0]:.6g} … {body.frequency[-1]:.6g} Hz"
-    )
+    highest = body.frequency[body.eigenmode_count - 1]
+    click.echo(f"{outcome.path}: {verb}; {body.modes_in_words}, {body.frequency[0]:.6g} … {highest:.6g} Hz")
 
 
 @cli.command()

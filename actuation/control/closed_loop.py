@@ -18,12 +18,13 @@ from ...mbs.analysis.replay import motor_limits, replay_times
 from ...mbs.fields.field_types import NotNegative, PointReference, Positive
 from ...mbs.fields.references import Reference, under
 from ...mbs.model.model import ZERO, Model, load_measures
+from ...mbs.model.raised_mass import by_body, coordinate_factors, integrated, modal_factors
 from ...mbs.model.system import MechanismSystem
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
 from ...mbs.scene.loads import Load
 from ...mbs.solve.state import State
 from ..context import ActuatedContext
-from ..patches.patches import PatchArray
+from ..patches.patches import PatchArray, with_factors
 from ..patches.voltages import allocation
 from .choice import make_controller, needed_sensors
 from .controllers import Controller, Setup
@@ -158,10 +159,17 @@ def run_closed_loop(
     limit = np.concatenate([motor_limits(model), *(array.limit for array in patches.values())])
     limit = np.full_like(limit, np.inf) if analysis.unlimited else limit
     loop = Loop(setup, read, acting, limit, analysis.seed)
-    voltages = [(assembly.index[body], array.Phi_V) for body, array in patches.items()]
+    start, driven = _start(assembly, analysis, moved, model), assembly
+    if (raised := integrated(built)) is not built:  # the same in other coordinates
+        factors, all_factors = by_body(built), coordinate_factors(built)
+        patches = {body: with_factors(array, factors[body]) for body, array in patches.items()}
+        read = tuple(replace(s, vector=s.vector / factors[s.body]) if s.row is None else s for s in read)
+        start = State(start.q * all_factors, start.v * all_factors)
+        driven = _assembly(model, raised, analysis, source, read)
+        sensor = sensing(driven, read)
+    voltages = [(driven.index[body], array.Phi_V) for body, array in patches.items()]
     control = SampledControl(len(model.motors), voltages, loop.first, sensor, setup.times, analysis.delay, loop)
-    start = _start(assembly, analysis, moved, model)
-    outcome = drive(assembly, analysis, start, progress, times=outputs, control=control)
+    outcome = drive(driven, analysis, start, progress, reported=assembly, times=outputs, control=control)
     return _recorded(outcome, source, setup, loop, acting)
 
 
@@ -267,6 +275,8 @@ def _found(source: Outcome, times: Array) -> tuple[Array, Array | None]:
     if anytime is None:
         return _at(times, source.time, moments), None if F_p is None else _at(times, source.time, F_p)
     tau, F_p = anytime.sample(times.tolist())
+    if source.continuation is not None and source.continuation.assembly is not None and F_p is not None:
+        F_p = F_p * modal_factors(source.assembly.model)
     return _at(times, source.time, moments) if source.gears else tau, F_p
 
 

@@ -127,7 +127,7 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
     bandwidth = 0.0
     for name in record.bodies:
         body, array = setup.model.body(name), setup.patches[name]
-        m = min(record.modes, body.n_modes)
+        m = min(record.modes, body.n_eigenmodes)
         omega = np.sqrt(body.stiffness[:m])
         damping = voltage_gain(array)[:, :m] * (2 * record.damping_ratio * omega)
         G[np.ix_(setup.patch_places(name), modal_columns(record.sensor, setup, name, m))] = damping @ modal_estimate(

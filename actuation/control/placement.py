@@ -191,11 +191,11 @@ def place(
     """
     key = f"{scene_path}: placement"
     count = wanted.count or layout.patch_count
-    modes = wanted.modes or min(count, planar.n_modes)
+    modes = wanted.modes or min(count, planar.n_eigenmodes)
     if layout.coupling == "surface":
         raise InputError(f'{key}: expected patches with coupling = "rotation", found "surface", outlined in the mesh')
-    if modes > planar.n_modes or (F_p is not None and modes > count):
-        most = planar.n_modes if F_p is None else min(count, planar.n_modes)
+    if modes > planar.n_eigenmodes or (F_p is not None and modes > count):
+        most = planar.n_eigenmodes if F_p is None else min(count, planar.n_eigenmodes)
         raise InputError(f"{key}.modes: expected at most {most}, found {modes}")
     candidates = _candidates(scene_path, wanted, layout, body, planar, count)
     reach = held_modes(model, planar, modes) if model is not None else link_modes(planar, modes)

@@ -34,6 +34,7 @@ class PatchArray:
         limit: (k,) largest voltages, V; infinite where the scene gives none.
         W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
         frequency: (n,) of the modes, Hz.
+        served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
         of_all_modes: where the `PlanarBody` has not all modes, but the patches reach all: the same patches
             on all modes, and (n_all, n) the modal forces on these from those on the `PlanarBody`.
     """
@@ -47,6 +48,7 @@ class PatchArray:
     limit: Array
     W_sqrt: Array
     frequency: Array
+    served: int
     of_all_modes: tuple[PatchArray, Array] | None = None
 
     @property
@@ -57,12 +59,12 @@ class PatchArray:
     @property
     def condition_number(self) -> float:
         """Of Φ_V: how unequally the patches reach the modes; infinite where some mode is out of reach."""
-        return float(np.linalg.cond(self.Phi_V))
+        return float(np.linalg.cond(self.Phi_V[: self.served]))
 
     @property
     def unreached_modes(self) -> Indices:
         """Numbers (from 0) of the modes that take part in what no voltages can produce."""
-        left, sizes, _ = np.linalg.svd(self.Phi_V)
+        left, sizes, _ = np.linalg.svd(self.Phi_V[: self.served])
         rank = int(np.count_nonzero(sizes > sizes[0] / SINGULAR))
         return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
 
@@ -111,7 +113,21 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     turn, Phi_V = (np.array([turn.sum(axis=0) for turn in turns]) @ T).T, (per_volt @ T).T
     limit = np.full(len(edges), np.inf if layout.limit is None else layout.limit)
     weights, frequency = _weights(key, layout, planar), np.sqrt(planar.stiffness) / (2 * np.pi)
-    return PatchArray(layout, edges, height, c, turn, Phi_V, limit, weights, frequency)
+    return PatchArray(layout, edges, height, c, turn, Phi_V, limit, weights, frequency, planar.n_eigenmodes)
+
+
+def with_factors(patches: PatchArray, factors: Array) -> PatchArray:
+    """The patches on a body in coordinates p' = factors · p, factors (n,): see `mbs.model.raised_mass`."""
+    if np.all(factors == 1.0):
+        return patches
+    of_all = patches.of_all_modes
+    return replace(
+        patches,
+        turn=patches.turn / factors[:, None],
+        Phi_V=patches.Phi_V / factors[:, None],
+        W_sqrt=patches.W_sqrt * factors,
+        of_all_modes=None if of_all is None else (of_all[0], of_all[1] * factors),
+    )
 
 
 def _on_fewer_modes(whole: PatchArray, planar: PlanarBody) -> PatchArray:
@@ -123,13 +139,14 @@ def _on_fewer_modes(whole: PatchArray, planar: PlanarBody) -> PatchArray:
     reduction = planar.reduction
     assert reduction is not None
     T, lift = reduction.T, reduction.lift
-    reaches_all = whole.Phi_V.shape[1] >= whole.Phi_V.shape[0] and not whole.unreached_modes.size
+    reaches_all = whole.Phi_V.shape[1] >= whole.served and not whole.unreached_modes.size
     return replace(
         whole,
         turn=T.T @ whole.turn,
         Phi_V=T.T @ whole.Phi_V,
         W_sqrt=whole.W_sqrt @ lift,
         frequency=np.sqrt(planar.stiffness) / (2 * np.pi),
+        served=planar.n_eigenmodes,
         of_all_modes=(whole, lift) if reaches_all else None,
     )
 
@@ -174,7 +191,7 @@ def check_reach(scene_path: Path, patches: PatchArray) -> None:
         return
     key = f'{scene_path}: pzt "{patches.body}"'
     advice = 'or be content with the best they can do: allocation = "least-squares"'
-    n, k = patches.Phi_V.shape
+    n, k = patches.served, len(patches.edges)
     if k < n:
         raise InputError(f"{key}: expected as many patches as modes ({n}) or more, found {k}: add patches, {advice}")
     unreached = patches.unreached_modes
@@ -206,7 +223,7 @@ def _check_edges(key: str, edges: Array, length: float) -> None:
 
 def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
     """W_sqrt: of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points."""
-    n = planar.n_modes
+    n = planar.n_eigenmodes
     if layout.mode_weights is not None:
         if len(layout.mode_weights) != n:
             raise InputError(
@@ -214,9 +231,10 @@ def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
                 f" {len(layout.mode_weights)}"
             )
         weights = np.array(layout.mode_weights) / max(layout.mode_weights)
-        return np.diag(np.sqrt(weights.clip(min=LEAST_WEIGHT)))
+        root: Array = np.sqrt(weights.clip(min=LEAST_WEIGHT))
+        return root[:, None] * np.eye(n, planar.n_modes)
     if layout.point_weights is None:
-        return np.eye(n)
+        return np.eye(n, planar.n_modes)
     unknown = layout.point_weights.keys() - planar.points.keys()
     if unknown:
         raise InputError(

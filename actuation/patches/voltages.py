@@ -19,16 +19,18 @@ class Voltages:
         required: (T, k) V, with no limit; of least size or least residual where patches and modes differ in number.
         within_limit: (T, k) V, the best within the limits of the patches.
         unmet: (T, n) modal forces that `within_limit` leaves.
+        served: number of modes, the first ones, that the patches are to serve.
     """
 
     required: Array
     within_limit: Array
     unmet: Array
+    served: int
 
     @property
     def residual(self) -> Array:
-        """(T,) norm of the modal force that `within_limit` leaves unmet."""
-        norms: Array = np.linalg.norm(self.unmet, axis=1)
+        """(T,) norm of the modal force on modes to be served that `within_limit` leaves unmet."""
+        norms: Array = np.linalg.norm(self.unmet[:, : self.served], axis=1)
         return norms
 
     @property
@@ -51,10 +53,10 @@ def voltage_gain(patches: PatchArray) -> Array:
     if patches.of_all_modes is not None:
         on_all, lift = patches.of_all_modes
         return np.asarray(voltage_gain(on_all) @ lift)
-    n, k = patches.Phi_V.shape
-    if k == n and not patches.unreached_modes.size:
-        return np.linalg.inv(patches.Phi_V)
-    W_sqrt = patches.W_sqrt if k < n or patches.unreached_modes.size else np.eye(n)
+    (n, k), served = patches.Phi_V.shape, patches.served
+    if k == served and not patches.unreached_modes.size:
+        return np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n)
+    W_sqrt = patches.W_sqrt if k < served or patches.unreached_modes.size else np.eye(served, n)
     scale = voltage_scale(patches)
     gain: Array = scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt
     return gain
@@ -71,4 +73,4 @@ def solve_voltages(patches: PatchArray, F_p: Array) -> Voltages:
     F_p = np.ascontiguousarray(F_p)
     required = F_p @ voltage_gain(patches).T
     within_limit = allocation(patches, limited=True).solve(F_p)
-    return Voltages(required, within_limit, F_p - within_limit @ patches.Phi_V.T)
+    return Voltages(required, within_limit, F_p - within_limit @ patches.Phi_V.T, patches.served)

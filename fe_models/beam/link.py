@@ -17,9 +17,11 @@ from ...common.version import program_version
 from ...mesh.interval import graded_nodes, interval_mesh, with_points
 from ..link_records import FAMILIES, BeamLink, Family
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
+from ..modal_body.attachment_modes import DEFAULT_COUNT
 from ..modal_body.damping import damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from ..modal_body.signs import canonical_signs
+from .attachment_modes import attachment_modes
 from .beam import R_X, FamilyModel, family_model
 from .eigen import lowest_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
@@ -59,7 +61,12 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         progress(f"{link.name}: assembling {family}")
         models[family] = _loaded(family_model(link, family, mesh, stations.x), link, stations.x)
     progress(f"{link.name}: solving for the modes")
-    modes = select(models, _wanted(link, models, path))
+    modes = select(models, _wanted(link, models, path)) if _is_numbered(link) else select_default(models)
+    count = len(modes)
+    if link.modes.attachment_modes:
+        known = {family: _together(models[family], family, modes) for family in models}
+        places = [int(np.argmin(np.abs(stations.x - place))) for place in named.values()]
+        modes += [Mode(*mode) for mode in attachment_modes(models, known, places, length)]
     fields = station_fields(models, modes, stations.x.size)
     fields = fields * canonical_signs(fields)
     progress(f"{link.name}: integrating the inertia")
@@ -72,6 +79,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
     segment = segments(link, stations.x)
     heights = np.array([section.height for section in link.sections])[segment]
     outlines = section_outlines(link.shapes)[segment]
+    residual = np.repeat([0, 1], [count, omega.size - count])
     kept = Stations(position, translation, rotation, heights, stations.element, outlines)
     return ModalBody(
         name=link.name,
@@ -84,10 +92,11 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         modal_mass=modal_mass(models, modes),
         damping_ratio=damping_ratio(link, omega),
         family=tuple(mode.family for mode in modes),
+        residual=residual,
         geometric_stiffness=with_lumped_loads(geometric_stiffness(link, stations, fields, named), attached),
         interfaces=interfaces,
         stations=kept,
-        stress=beam_stresses(link, kept, omega**2, attached),
+        stress=beam_stresses(link, kept, omega**2, attached, residual, interfaces),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         ffrobot_version=program_version(),
     )
@@ -115,8 +124,30 @@ def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[
     for family, model in models.items():
         omega2, X = lowest_modes(model.K, model.M, model.strain, min(wanted[-1], model.K.shape[0]))
         modes += [Mode(square, family, x) for square, x in zip(omega2, X.T, strict=True)]
-    modes.sort(key=lambda mode: (float(f"{mode.omega2:.9e}"), FAMILIES.index(mode.family)))
+    modes.sort(key=_by_frequency)
     return [modes[number - 1] for number in wanted]
+
+
+def select_default(models: Mapping[Family, FamilyModel]) -> list[Mode]:
+    """As many of each family as a link with attachment modes has by default, ascending."""
+    modes = []
+    for family, model in models.items():
+        count = min(DEFAULT_COUNT[family], model.K.shape[0])
+        modes += select({family: model}, range(1, count + 1))
+    return sorted(modes, key=_by_frequency)
+
+
+def _by_frequency(mode: Mode) -> tuple[float, int]:
+    return float(f"{mode.omega2:.9e}"), FAMILIES.index(mode.family)
+
+
+def _together(model: FamilyModel, family: Family, modes: Sequence[Mode]) -> Array:
+    """(m, n) those of `modes` that belong to a family."""
+    return np.array([mode.x for mode in modes if mode.family == family]).reshape(-1, model.K.shape[0]).T
+
+
+def _is_numbered(link: BeamLink) -> bool:
+    return link.modes.count is not None or link.modes.indices is not None
 
 
 def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], stations: int) -> Array:
@@ -139,7 +170,7 @@ def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> A
 
 
 def _element_boundaries(link: BeamLink) -> Array:
-    """As the link file wants them, and one more at each attached mass: shear and moment jump there."""
+    """As the link file wants them, and one more at each attached mass, or load with a shape of its own: shear jumps."""
     if link.mesh.nodes is not None:
         nodes = np.array(link.mesh.nodes)
     else:
@@ -150,7 +181,8 @@ def _element_boundaries(link: BeamLink) -> Array:
         i = int(np.clip(np.searchsorted(nodes, place), 1, nodes.size - 1))
         nearest = np.min(np.abs(nodes[i - 1 : i + 1] - place))
         # Next to a node that jump does no harm, a sliver of an element does: its stiffness is all rounding.
-        if any(lump_weights(record.mass, record.inertia)) and nearest > SLIVER * (nodes[i] - nodes[i - 1]):
+        loaded = link.modes.attachment_modes or any(lump_weights(record.mass, record.inertia))
+        if loaded and nearest > SLIVER * (nodes[i] - nodes[i - 1]):
             nodes = with_points(nodes, [place])
     return nodes
 
@@ -163,7 +195,8 @@ def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) ->
         key = "count" if link.modes.indices is None else "indices"
         raise InputError(
             f"{path}: modes.{key}: expected at most {available}, the number of modes available in family "
-            f'"{link.modes.family}" on this mesh, found {wanted[-1]}'
+            f'"{link.modes.family if isinstance(link.modes.family, str) else " + ".join(link.families)}" on this mesh,'
+            f" found {wanted[-1]}"
         )
     return wanted
 

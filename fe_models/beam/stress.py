@@ -2,12 +2,13 @@
 
 The part of the beam beyond a section is in equilibrium under its inertia, the lumps and the support on it, and what the
 section carries. In mode k the inertia is ω_k² ρA u per unit of length, so the section forces follow by integration of
-the mode itself and are as accurate as displacements; derivatives of the finite element functions lose two orders.
+the mode itself and are as accurate as displacements; derivatives of the finite element functions lose two orders. In
+attachment modes it is that of eigenmodes, beside the loads at interfaces that they are the residual of.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,8 @@ from scipy.special import roots_legendre
 
 from ...common.arrays import Array, Booleans, Integers
 from ..link_records import BeamLink
-from ..modal_body import Stations, StressPoint
+from ..modal_body import Interface, Stations, StressPoint
+from ..modal_body.attachment_modes import interface_loads
 from ..modal_body.lumped_masses import Lump
 from .section_stress import section_stress
 
@@ -34,6 +36,17 @@ class ModalLoads:
     force: Array
     moment: Array
 
+    def beside(self, others: Sequence[tuple[float, Array]]) -> ModalLoads:
+        """These and others: x, and force and moment there (6, n)."""
+        if not others:
+            return self
+        load = np.array([both for _, both in others])
+        return ModalLoads(
+            np.concatenate([self.x, [x for x, _ in others]]),
+            np.concatenate([self.force, load[:, :3]]),
+            np.concatenate([self.moment, load[:, 3:]]),
+        )
+
     def beyond(self, x: float, side: Booleans) -> tuple[Array, Array]:
         """Force and moment about the axis at x, (3, n) each, of the loads where `side` (q,) is true."""
         force, arm = self.force[side], (self.x[side] - x)[:, None]
@@ -44,7 +57,12 @@ class ModalLoads:
 
 
 def beam_stresses(
-    link: BeamLink, stations: Stations, omega2: Array, attached: Sequence[Lump]
+    link: BeamLink,
+    stations: Stations,
+    omega2: Array,
+    attached: Sequence[Lump],
+    residual: Integers,
+    interfaces: Mapping[str, Interface],
 ) -> dict[str, StressPoint]:
     """Modal stresses and strains at the points that the link file names, which lie in the beam.
 
@@ -56,13 +74,17 @@ def beam_stresses(
         stations: with their elements.
         omega2: (n,) ω² in rad²/s².
         attached: lumps, with what the modes do there.
+        residual: (n,) 1 of residual attachment modes.
+        interfaces: likewise, where loads act in these.
     """
+    inertia, at_interfaces = interface_loads(omega2, residual, interfaces)
+    point_loads = [(interfaces[name].position[0], load) for name, load in at_interfaces.items()]
     E, nu = link.material.youngs_modulus, link.material.poissons_ratio
     points = {}
     for name, position in link.stress.points.items():
         assert nu is not None  # the link file has been checked for it
         x, y, z = position
-        F, M = _section_forces(link, stations, omega2, attached, x)
+        F, M = _section_forces(link, stations, inertia, attached, point_loads, x)
         segment = int(segments(link, np.array(x)))
         stress = section_stress(link.shapes[segment], link.sections[segment], F, M, y, z)
         strain = stress * (2 * (1 + nu) / E)
@@ -72,17 +94,22 @@ def beam_stresses(
 
 
 def _section_forces(
-    link: BeamLink, stations: Stations, omega2: Array, attached: Sequence[Lump], x: float
+    link: BeamLink,
+    stations: Stations,
+    inertia: Array,
+    attached: Sequence[Lump],
+    point_loads: Sequence[tuple[float, Array]],
+    x: float,
 ) -> tuple[Array, Array]:
     """Force (3, n) in N and moment (3, n) in N·m that the part beyond x exerts on the section there, in each mode."""
     length = link.geometry.length
-    loads = _with_support(link, _inertia(link, stations, omega2, attached, x))
+    loads = _with_support(link, _inertia(link, stations, inertia, attached, x).beside(point_loads))
     # A load at the tip counts even for the section there: its stress is the one just before the end.
     return loads.beyond(x, (loads.x > x) | (loads.x == length))
 
 
-def _inertia(link: BeamLink, stations: Stations, omega2: Array, attached: Sequence[Lump], x: float) -> ModalLoads:
-    """ω² times mass times motion: of the beam at Gauss points of its elements, of which one ends at x; of the lumps."""
+def _inertia(link: BeamLink, stations: Stations, W: Array, attached: Sequence[Lump], x: float) -> ModalLoads:
+    """Mass times motion times W (n, n): of the beam at Gauss points of its elements, one ending at x; of the lumps."""
     assert stations.element is not None
     nodes = stations.position[stations.element, 0]
     starts, ends = nodes[:, 0], nodes[:, 3]
@@ -100,16 +127,15 @@ def _inertia(link: BeamLink, stations: Stations, omega2: Array, attached: Sequen
     scale = half * weights
     force = (scale * mass[:, None])[:, :, None, None] * translation
     moment = scale[:, :, None, None] * inertia[:, None, :, None] * rotation
-    n = omega2.size
+    n = len(W)
     at = [lump.at for lump in attached]
     return ModalLoads(
         np.concatenate([s.ravel(), [place.position[0] for place in at]]),
-        omega2
-        * np.concatenate([force.reshape(-1, 3, n), *(lump.mass * lump.at.translation[None] for lump in attached)]),
-        omega2
-        * np.concatenate(
+        np.concatenate([force.reshape(-1, 3, n), *(lump.mass * lump.at.translation[None] for lump in attached)]) @ W,
+        np.concatenate(
             [moment.reshape(-1, 3, n), *((lump.inertia[:, None] * lump.at.rotation)[None] for lump in attached)]
-        ),
+        )
+        @ W,
     )
 
 

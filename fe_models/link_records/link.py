@@ -88,11 +88,16 @@ class Reference(Record):
 
 
 class Modes(Record):
-    """The lowest `count` modes of a family, or those numbered `indices` (1 is the lowest)."""
+    """The lowest `count` eigenmodes of one or several families, or those numbered `indices` (1 is the lowest).
+
+    `attachment_modes` adds the static shapes of loads at interfaces, as far as the eigenmodes do not have them; `count`
+    may then be left out.
+    """
 
     count: Annotated[int, Field(ge=1)] | None = None
     indices: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
-    family: Family | Literal["all"] = "all"
+    family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"
+    attachment_modes: bool = False
 
 
 class Damping(Record):
@@ -122,7 +127,8 @@ class _Link(Record):
     @property
     def families(self) -> tuple[Family, ...]:
         """The mode families asked for."""
-        return FAMILIES if self.modes.family == "all" else (self.modes.family,)
+        wanted = (self.modes.family,) if isinstance(self.modes.family, str) else self.modes.family
+        return tuple(family for family in FAMILIES if family in wanted or "all" in wanted)
 
 
 class BeamLink(_Link):

@@ -143,7 +143,8 @@ class ModalBody:
         stiffness: (n, n) K_ff = diag(ω²).
         modal_mass: (n, n) m_ff = I to 1e-8.
         damping_ratio: (n,) ζ.
-        family: n names.
+        family: n names; of a residual attachment mode, that of the loads behind it.
+        residual: (n,) 0 of eigenmodes, 1 of residual attachment modes, which come after them; all 0 where not given.
         S_bar: (3, n) ∫ρ Φ dV.
         I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
         S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
@@ -184,23 +185,37 @@ class ModalBody:
     stress: Mapping[str, StressPoint] = field(default_factory=dict)
     surface_stress: Array | None = None
     surface_patches: OutlinedPatches | None = None
+    residual: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     input_hash: str = ""
     modes_hash: str = ""
     ffrobot_version: str = ""
 
     def __post_init__(self) -> None:
+        if not np.size(self.residual):
+            object.__setattr__(self, "residual", np.zeros(len(self.family), dtype=np.int64))
         _freeze(self)
         _check(self)
 
     def __repr__(self) -> str:
-        modes = f"{self.mode_count} modes of {self.frequency[0]:.5g} … {self.frequency[-1]:.5g} Hz"
+        modes = f"{self.modes_in_words} of {self.frequency[0]:.5g} … {self.frequency[self.eigenmode_count - 1]:.5g} Hz"
         link = f"{self.kind}, {self.reference_condition}, {self.length:.5g} m, {self.mass:.5g} kg"
         return f"ModalBody({self.name!r}): {link}, {modes}, interfaces {', '.join(self.interfaces)}"
 
     @property
     def mode_count(self) -> int:
-        """Number of modes, n."""
+        """Number of modes, n, attachment modes included."""
         return len(self.family)
+
+    @property
+    def eigenmode_count(self) -> int:
+        """Number of eigenmodes."""
+        return self.mode_count - int(self.residual.sum())
+
+    @property
+    def modes_in_words(self) -> str:
+        """How many modes there are."""
+        static = self.mode_count - self.eigenmode_count
+        return f"{self.eigenmode_count} modes" + (f" and {static} attachment modes" if static else "")
 
     def interpolate(self, x: float) -> Interface:
         """What the modes do at `x` (m from the root) on the axis.
@@ -297,6 +312,8 @@ def _check(body: ModalBody) -> None:
     element = body.stations.element
     if element is not None and not _is_chain(element, k):
         _fail(body, "stations.element: expected four ascending stations for each element, from the first to the last")
+    if np.any((body.residual != 0) & (body.residual != 1)) or np.any(np.diff(body.residual) < 0):
+        _fail(body, "residual: expected 0 of each eigenmode, then 1 of each residual attachment mode")
     if np.any(body.frequency <= 0):
         _fail(body, "frequency: expected positive numbers")
     if np.any(body.damping_ratio < 0):
@@ -359,6 +376,7 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         ("stiffness", body.stiffness, (n, n)),
         ("modal_mass", body.modal_mass, (n, n)),
         ("damping_ratio", body.damping_ratio, (n,)),
+        ("residual", body.residual, (n,)),
         ("S_bar", body.S_bar, (3, n)),
         ("I_bar", body.I_bar, (3, 3, n)),
         ("S_bar_kl", body.S_bar_kl, (3, 3, n, n)),

@@ -80,14 +80,14 @@ def names(motion: SectionMotion) -> list[str]:
     return [FAMILIES[i] if whole >= 0.5 else LOCAL for whole, i in zip(total, first, strict=True)]
 
 
-def aligned(omega2: Array, motion: SectionMotion, wanted: str) -> Array:
+def aligned(omega2: Array, motion: SectionMotion, wanted: Sequence[str] | str) -> Array:
     """(n, n) Q that turns modes of equal frequency into the families, so that the basis is reproducible; orthogonal.
 
     Args:
         omega2: (n,) ascending.
         motion: of the modes.
-        wanted: a family, or "all". For a family, modes of nearly equal frequency are turned too: into Ritz vectors, of
-            which one has all that the cluster has of the family.
+        wanted: families, or "all". For families, modes of nearly equal frequency are turned too: into Ritz vectors, of
+            which one has all that the cluster has of a family.
     """
     Q = np.eye(omega2.size)
     gap = REPEATED if wanted == "all" else NEARLY
@@ -101,8 +101,11 @@ def aligned(omega2: Array, motion: SectionMotion, wanted: str) -> Array:
     return Q
 
 
-def _turn(families: Sequence[Array], wanted: str) -> Array:
+def _turn(families: Sequence[Array], wanted: Sequence[str] | str) -> Array:
     """(m, m): principal axes of the families' energies, each weighted by its number so that none are equal."""
-    weights = [4.0, 3.0, 2.0, 1.0] if wanted == "all" else [float(name == wanted) for name in FAMILIES]
+    weights = [4.0, 3.0, 2.0, 1.0]
+    if wanted != "all":
+        weights = [w * (name in wanted) for w, name in zip(weights, FAMILIES, strict=True)]
+    weights = [w / max(weights) if len(wanted) == 1 else w for w in weights]
     energy = sum(weight * rows.T @ rows for weight, rows in zip(weights, families, strict=True))
     return np.asarray(np.linalg.eigh(energy)[1][:, ::-1])

@@ -24,6 +24,7 @@ from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.damping import damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from ..modal_body.signs import canonical_signs
+from .attachment_modes import attachment_modes
 from .eigen import Mass
 from .elasticity import MaterialMap, SolidModel, material_map, solid_model
 from .families import section_motion
@@ -97,6 +98,10 @@ def solid_modal_body(
         ),
         str(path),
     )
+    count = modes.omega2.size
+    if link.modes.attachment_modes:
+        residual = attachment_modes(link.families, flexibility, mass, modes.X, places.rows, link.geometry.length)
+        modes = modes.followed_by(residual)
     progress(f"{link.name}: integrating the inertia")
     translation, rotation = sections.of(model, model.with_ghosts(modes.X))
     signs = canonical_signs(np.concatenate([translation, rotation], axis=1).transpose(1, 0, 2))
@@ -120,6 +125,7 @@ def solid_modal_body(
         modal_mass=model.total(X.T @ (mass @ X)),
         damping_ratio=damping_ratio(link, omega),
         family=tuple(modes.families),
+        residual=np.repeat([0, 1], [count, omega.size - count]),
         geometric_stiffness=with_lumped_loads(stresses, attached),
         interfaces=interfaces,
         stations=_stations(sections, x, element, translation * signs, rotation * signs),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ..link_records import SolidLink
+from ..modal_body.attachment_modes import DEFAULT_COUNT, ResidualModes
 from .eigen import Mass, lowest_modes
 from .elasticity import SolidModel
 from .families import NEARLY, SectionMotion, aligned, names
@@ -34,6 +36,14 @@ class SolidModes:
     families: list[str]
     X: Array
 
+    def followed_by(self, residual: ResidualModes) -> SolidModes:
+        """The modes, and attachment modes after them."""
+        return SolidModes(
+            np.concatenate([self.omega2, residual.omega2]),
+            [*self.families, *residual.families],
+            np.concatenate([self.X, residual.X], axis=1),
+        )
+
 
 def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Reader, where: str) -> SolidModes:
     """The modes that `link.modes` asks for; collective.
@@ -45,9 +55,9 @@ def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Re
         InputError: more are asked for than the mesh has.
         SolveError: the eigensolver did not converge.
     """
-    family, model = link.modes.family, flexibility.model
+    family, model = "all" if link.modes.family == "all" else link.families, flexibility.model
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
-    needed, available = int(numbers[-1]) + 1, flexibility.rank
+    needed, available = (int(numbers[-1]) + 1 if numbers.size else _default_count(link)), flexibility.rank
     batch = needed + 2 if family == "all" else 2 * needed + 2
     X = np.empty((3 * model.owned, 0))
     while True:
@@ -55,7 +65,8 @@ def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Re
             key = "count" if link.modes.indices is None else "indices"
             raise InputError(
                 f"{where}: modes.{key}: expected at most the number of modes available in family "
-                f'"{family}" on this mesh, which has {available} of all families, found {needed}'
+                f'"{" + ".join(link.families) if family != "all" else family}" on this mesh, which has {available} of'
+                f" all families, found {needed}"
             )
         X = lowest_modes(flexibility, mass, min(batch, available - X.shape[1]), X)
         omega2, X = _ritz(model, X)
@@ -63,12 +74,29 @@ def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Re
         Q = aligned(omega2, motion, family)
         kinds = names(motion.turned(Q))
         settled = available if X.shape[1] == available else _settled(omega2)
-        hits = [k for k, kind in enumerate(kinds[:settled]) if family in ("all", kind)]
+        hits = [k for k, kind in enumerate(kinds[:settled]) if family == "all" or kind in family]
+        if not numbers.size:
+            hits = _lowest_of_each(hits, kinds)
         if len(hits) >= needed:
-            chosen = np.array(hits)[numbers]
+            chosen = np.array(hits)[numbers] if numbers.size else np.array(hits)
             return _chosen(omega2, X, Q[:, chosen], [kinds[k] for k in chosen])
         share = max(len(hits), 1) / X.shape[1]
         batch = int(np.ceil((needed - len(hits)) / share)) + 2
+
+
+def _default_count(link: SolidLink) -> int:
+    return sum(DEFAULT_COUNT[family] for family in link.families)
+
+
+def _lowest_of_each(hits: Sequence[int], kinds: Sequence[str]) -> list[int]:
+    """Of the modes `hits`, as many of each family as a link has by default."""
+    taken: Counter[str] = Counter()
+    chosen = []
+    for k in hits:
+        taken[kinds[k]] += 1
+        if kinds[k] in DEFAULT_COUNT and taken[kinds[k]] <= DEFAULT_COUNT[kinds[k]]:  # type: ignore[index]
+            chosen.append(k)
+    return chosen
 
 
 def _settled(omega2: Array) -> int:

@@ -54,8 +54,9 @@ def _modal_body(body: ModalBody) -> str:
     modes = Table("mode", "family", "frequency (Hz)", "ω (rad/s)", "damping ratio")
     for k, family in enumerate(body.family):
         frequency = body.frequency[k]
+        kind = f"{family}, attachment" if body.residual[k] else family
         modes.add_row(
-            f"{k + 1}", family, f"{frequency:.6f}", f"{6.283185307179586 * frequency:.5f}", f"{body.damping_ratio[k]:g}"
+            f"{k + 1}", kind, f"{frequency:.6f}", f"{6.283185307179586 * frequency:.5f}", f"{body.damping_ratio[k]:g}"
         )
     return "\n".join(lines) + "\n" + _rendered(modes)
 

@@ -15,6 +15,7 @@ from ..actuation.feasibility import Feasibility
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.model.raised_mass import raised_in_words
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.stiffening import NOTABLE
 from ..run.solution import ModeChoice, Solution
@@ -72,6 +73,8 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
             yield "motors only", f"{name}: {_inversion(outcome, outcome.details)}"
     if solution.mode_choice is not None:
         yield "modes", _modes(solution, solution.mode_choice)
+    if (raised := raised_in_words(solution.model)) and any(one.analysis.is_integrated for one in outcomes.values()):
+        yield "modes", raised
     loops = {name: outcome.details for name, outcome in outcomes.items() if isinstance(outcome.details, LoopRecord)}
     warnings = [(name, line) for name, loop in loops.items() for line in loop.warnings]
     warnings += [(name, line) for name, outcome in outcomes.items() for line in unresolved_gears(outcome.gears)]

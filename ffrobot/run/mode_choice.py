@@ -187,7 +187,7 @@ def truncation_levels(scene: Scene, bodies: Mapping[str, PlanarBody]) -> list[di
     if not auto:
         return [fixed]
     found = []
-    squares = np.sort(np.concatenate([body.stiffness for body in auto.values()]))
+    squares = np.sort(np.concatenate([body.stiffness[: body.n_eigenmodes] for body in auto.values()]))
     each = 1
     while each * len(auto) < len(squares):
         cut = squares[each * len(auto) - 1]

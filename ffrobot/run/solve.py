@@ -8,10 +8,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from ..actuation.context import ActuatedContext
+from ..actuation.patches.patches import with_factors as patches_with
 from ..actuation.patches.voltages import allocation, solve_voltages
+from ..actuation.points import with_factors as points_with
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import ActuatorSet
+from ..mbs.model.raised_mass import mass_factors
 from ..mbs.quantities.stiffening import NOTABLE, estimated_effect
 from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
@@ -130,7 +135,7 @@ def _context(
     return ActuatedContext(
         model=solution.model,
         outcomes={name: result.outcome for name, result in results.items()},
-        make_actuators=lambda: _actuator_set(solution),
+        make_actuators=lambda raised: _actuator_set(solution, raised=raised),
         progress=progress,
         is_replayed=any(other.takes_actuation and other.source == analysis.name for other in later),
         earlier=solution.earlier.get(analysis.name),
@@ -139,12 +144,15 @@ def _context(
     )
 
 
-def _actuator_set(solution: Solution) -> ActuatorSet:
+def _actuator_set(solution: Solution, *, raised: bool) -> ActuatorSet:
     """The actuators of the scene, fresh for one run."""
+    factors = {body.name: np.sqrt(mass_factors(body)) if raised else np.ones(1) for body in solution.model.bodies}
+    patches = {name: patches_with(array, factors[name]) for name, array in solution.patches.items()}
+    points = {name: points_with(one, factors[name]) for name, one in solution.points.items()}
     return ActuatorSet(
-        {name: allocation(array, limited=False) for name, array in solution.patches.items()},
-        {name: allocation(array, limited=True) for name, array in solution.patches.items()},
-        {name: points.actuator() for name, points in solution.points.items()},
+        {name: allocation(array, limited=False) for name, array in patches.items()},
+        {name: allocation(array, limited=True) for name, array in patches.items()},
+        {name: one.actuator() for name, one in points.items()},
     )
 
 

@@ -18,7 +18,7 @@ class Context:
     Attributes:
         model: the robot.
         outcomes: of the analyses before, by name.
-        make_actuators: the actuators of the scene, fresh for one run.
+        make_actuators: the actuators of the scene, fresh for one run, which has raised masses or not (`raised_mass`).
         progress: see `drive.Progress`.
         is_replayed: whether a later analysis takes its actuation.
         earlier: an earlier run of the same analysis, to go on with.
@@ -26,7 +26,7 @@ class Context:
 
     model: Model
     outcomes: Mapping[str, Outcome]
-    make_actuators: Callable[[], ActuatorSet]
+    make_actuators: Callable[[bool], ActuatorSet]
     progress: Progress
     is_replayed: bool = False
     earlier: EarlierRun | None = None

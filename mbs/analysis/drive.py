@@ -62,6 +62,7 @@ def drive(
     start: State,
     progress: Progress,
     *,
+    reported: MechanismSystem | None = None,
     times: Array | None = None,
     steering: _core.ExternalLoads | None = None,
     control: SampledControl | None = None,
@@ -71,6 +72,9 @@ def drive(
 ) -> Outcome:
     """The outcome of an integration with outputs at `times`, those of the analysis where not given.
 
+    It is in the coordinates of `reported`, the same mechanism with masses as they are, where those of `assembly` are
+    raised.
+
     Under `steering` from outside, or sampled `control`. It goes on with an `earlier` run of the same analysis. An
     integration that ends early is kept with its cause. Raises `SolveError` for a start without inertia.
     """
@@ -79,8 +83,11 @@ def drive(
         motors = len(assembly.motor_measures) if resolver is not None else None
         check_earlier(earlier, assembly, times, motors, recorded=recording is not None)
     if earlier is not None and earlier.statistics.status == "completed":
-        motion, forces, run_before = earlier.motion, earlier.forces, earlier.statistics
-        return Outcome(analysis, assembly, motion, forces, run_before, continuation=earlier.continuation)
+        integrated = None if reported is None else assembly
+        return Outcome(
+            analysis, reported or assembly, earlier.motion, earlier.forces, earlier.statistics,
+            continuation=replace(earlier.continuation, assembly=integrated),
+        )  # fmt: skip
     if len(times) > 1 and (cause := lost_inertia(assembly, start.q)):
         raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
@@ -115,6 +122,7 @@ def drive(
         statistics=statistics,
         continuation=continuation if control is None else None,
     )
+    outcome = outcome if reported is None else outcome.in_coordinates_of(reported)
     return outcome if earlier is None else _joined(earlier, outcome)
 
 

@@ -13,6 +13,7 @@ from ...common.validation import either, quoted
 from .. import _core
 from ..joints.measure import Marker, Measure
 from ..model.model import ZERO, Model
+from ..model.raised_mass import coordinate_factors, integrated
 from ..model.system import MechanismSystem
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
 from ..solve.state import State
@@ -69,7 +70,8 @@ class Forward(ActuatedAnalysis):
     def run(self, context: Context) -> Outcome:
         """Motion alone: nothing is specified."""
         source = context.source(self.actuation)
-        return run_forward(context.model, self, source, context.make_actuators(), context.progress, context.earlier)
+        actuators = context.make_actuators(has_raised_masses(source))
+        return run_forward(context.model, self, source, actuators, context.progress, context.earlier)
 
 
 def run_forward(
@@ -85,23 +87,35 @@ def run_forward(
     Motors turn elastic gears with the moments at the outputs of `source` and splines between these.
     It goes on with an `earlier` run of the same analysis.
     """
-    model = with_compliance(model)
+    exact = with_compliance(model)
+    model = integrated(exact) if has_raised_masses(source) else exact
     if source is None:
         assembly = MechanismSystem(model, model.joints, model.loads)
-        return drive(assembly, analysis, initial_state(assembly), progress, earlier=earlier)
+        reported = None if model is exact else MechanismSystem(exact, exact.joints, exact.loads)
+        return drive(assembly, analysis, initial_state(assembly), progress, reported=reported, earlier=earlier)
     loads = model.loads if source.details.loads is None else source.details.loads
     rows, actuators = applied_actuators(model, analysis, source, actuator_set)
-    sizes, moved = [ZERO] * len(rows), with_rotors(source, model)
+    sizes, moved = [ZERO] * len(rows), with_rotors(source, exact)
     if model.gears:
         _check_applied(model, analysis)
         limits = motor_limits(model)
         sizes = drive_sizes(source, limits if analysis.limits else np.full_like(limits, np.inf))
         actuators = actuators[1:]  # without the motors
-    assembly = MechanismSystem(model, model.joints, [*zip(rows, sizes, strict=True), *loads])
+    drives = [*zip(rows, sizes, strict=True), *loads]
+    assembly = MechanismSystem(model, model.joints, drives)
+    reported = None if model is exact else MechanismSystem(exact, exact.joints, drives)
     steering = _core.Actuation(actuation_source(source), actuators) if actuators else None
-    start = State(moved.q[0].copy(), moved.v[0].copy())  # bodies and their order are the same
+    factors = 1.0 if model is exact else coordinate_factors(exact)
+    start = State(moved.q[0] * factors, moved.v[0] * factors)  # bodies and their order are the same
     times = replay_times(source, analysis)
-    return drive(assembly, analysis, start, progress, times=times, steering=steering, earlier=earlier)
+    return drive(
+        assembly, analysis, start, progress, reported=reported, times=times, steering=steering, earlier=earlier
+    )
+
+
+def has_raised_masses(source: Outcome | None) -> bool:
+    """Whether a run under the actuation of `source` raises masses: not where that prescribes the shape."""
+    return source is None or source.details.shape_force is None
 
 
 def _check_applied(model: Model, analysis: Forward) -> None:

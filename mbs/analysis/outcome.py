@@ -13,6 +13,7 @@ from ...common.errors import SolveError
 from .. import _core
 from .._core import TimeFunction
 from ..joints.measure import Measure
+from ..model.raised_mass import coordinate_factors, modal_factors
 from ..model.system import MechanismSystem
 from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
@@ -97,10 +98,14 @@ BODY_PEAKS = (
 
 @dataclass(frozen=True)
 class Continuation:
-    """Where an integration can be gone on with, and its steps where a later analysis replays them."""
+    """Where an integration can be gone on with, and its steps where a later analysis replays them.
+
+    Both are in the coordinates of `assembly`, what was integrated, where that is not the outcome's: see `raised_mass`.
+    """
 
     checkpoint: _core.Checkpoint
     recording: _core.Recording | None = None
+    assembly: MechanismSystem | None = None
 
 
 @dataclass(frozen=True)
@@ -151,11 +156,15 @@ class Details:
     shape_force: Array | None = None
 
     def actuation_source(self, outcome: Outcome) -> _core.ActuationSource | None:
-        """What was found at any time of the run, not at its outputs alone; None where that is not known."""
+        """What was found at any time of the run, not at its outputs alone; None where that is not known.
+
+        Modal forces are in the coordinates of what was integrated.
+        """
         if outcome.continuation is None or outcome.continuation.recording is None:
             return None
-        assembly, recording = outcome.assembly, outcome.continuation.recording
-        return _core.RecordedActuation(assembly.system, recording, assembly.is_trajectory, outcome.resolver())
+        assembly = outcome.continuation.assembly or outcome.assembly
+        recording, resolver = outcome.continuation.recording, outcome.resolver(assembly)
+        return _core.RecordedActuation(assembly.system, recording, assembly.is_trajectory, resolver)
 
 
 @dataclass(frozen=True)
@@ -237,11 +246,28 @@ class Outcome:
         columns = [self.gears[joint].moment if joint in self.gears else self.tau[:, k] for k, joint in motors]
         return np.column_stack(columns)
 
-    def resolver(self) -> _core.ActuatorForces | None:
-        """What turned trajectory forces into motor and modal forces; None where motors do not fit the mechanism."""
+    def resolver(self, assembly: MechanismSystem | None = None) -> _core.ActuatorForces | None:
+        """What turned trajectory forces into motor and modal forces; None where motors do not fit the mechanism.
+
+        `assembly`: the outcome's unless given.
+        """
         if self.tau is None:
             return None
-        return _core.ActuatorForces(self.assembly.system, self.assembly.is_trajectory, self.assembly.motor_measures)
+        assembly = assembly or self.assembly
+        return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
+
+    def in_coordinates_of(self, reported: MechanismSystem) -> Outcome:
+        """A motion with raised masses as one of `reported`, the same mechanism without."""
+        if all(a is b for a, b in zip(self.assembly.model.bodies, reported.model.bodies, strict=True)):
+            return self
+        factors, motion, F_p = coordinate_factors(reported.model), self.motion, self.F_p
+        return replace(
+            self,
+            assembly=reported,
+            motion=replace(motion, q=motion.q / factors, v=motion.v / factors, a=motion.a / factors),
+            forces=replace(self.forces, F_p=None if F_p is None else F_p * modal_factors(reported.model)),
+            continuation=self.continuation and replace(self.continuation, assembly=self.assembly),
+        )
 
     @property
     def failed(self) -> bool:

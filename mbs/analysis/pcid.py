@@ -7,6 +7,7 @@ from typing import Literal
 
 from .. import _core
 from ..model.model import Model
+from ..model.raised_mass import integrated
 from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis, Need
 from ..solve.initial_state import undeformed_state
@@ -48,11 +49,23 @@ def run_pcid(
 
     Raises `InputError` where the trajectories cannot be followed.
     """
-    assembly = MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+    raised = integrated(model)
+    assembly = _system(raised)
     start = initial_state(assembly)
     check_smooth(assembly, analysis.end)
     check_reach(assembly, undeformed_state(assembly), analysis.times)
     recording = _core.Recording() if keep_recording else None
     return drive(
-        assembly, analysis, start, progress, resolver=resolver_of(assembly), recording=recording, earlier=earlier
+        assembly,
+        analysis,
+        start,
+        progress,
+        reported=None if raised is model else _system(model),
+        resolver=resolver_of(assembly),
+        recording=recording,
+        earlier=earlier,
     )
+
+
+def _system(model: Model) -> MechanismSystem:
+    return MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))

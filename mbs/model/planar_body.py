@@ -54,11 +54,17 @@ class PlanarBody:
     length: float | None
     stiffening: GeometricStiffening | None = None  # left out of the equations where None
     reduction: Reduction | None = None  # where it has fewer modes than move in the plane
+    attachment_modes: int = 0  # how many of the n, after all others, are static shapes of loads at interfaces
 
     @property
     def n_modes(self) -> int:
         """Number n of modal coordinates in the equations."""
         return len(self.stiffness)
+
+    @property
+    def n_eigenmodes(self) -> int:
+        """How many of them count as modes of the link: for patches, for `modes = k`."""
+        return self.n_modes - self.attachment_modes
 
 
 @dataclass(frozen=True)
@@ -113,6 +119,7 @@ def from_modal_body(name: str, body: ModalBody) -> PlanarBody:
         modal_transform=np.eye(len(omega))[:, in_plane],
         length=body.length,
         stiffening=geometric_stiffening.from_modal_body(body, in_plane),
+        attachment_modes=int(body.residual[in_plane].sum()),
     )
     return diagonalised(planar, body.stiffness[block], np.eye(len(in_plane)))
 

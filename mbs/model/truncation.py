@@ -24,7 +24,9 @@ def with_fewer_modes(body: PlanarBody, lowest: int, loaded: Sequence[str]) -> Pl
 
     A unit load (modal forces Bᵀ) bends the discarded modes d by Ω_d⁻² B_dᵀ. These shapes, made orthonormal in mass and
     uncoupled, are further modes: the flexibility B K⁻¹ Bᵀ stays exact. The body comes back where nothing is saved.
+    Attachment modes of the file are no modes to be kept: what the loads need of them is in the static shapes.
     """
+    lowest = min(lowest, body.n_eigenmodes)
     if lowest >= body.n_modes:
         return body
     B_T = interface_loads(body, loaded)
@@ -35,16 +37,18 @@ def with_fewer_modes(body: PlanarBody, lowest: int, loaded: Sequence[str]) -> Pl
     T[lowest:, lowest:] = static
     lift = T + (B_T - T @ (T.T @ B_T)) @ np.linalg.pinv(T.T @ B_T)
     reduced = transformed(body, T, np.concatenate([body.stiffness[:lowest], squares]))
-    return replace(reduced, reduction=Reduction(body, lowest, T, lift))
+    static_shapes = len(squares) if body.attachment_modes else 0
+    return replace(reduced, reduction=Reduction(body, lowest, T, lift), attachment_modes=static_shapes)
 
 
 def modes_kept(body: PlanarBody) -> str:
     """How many of the modes that move in the plane a body has, in words."""
     if body.reduction is None:
-        return f"all {body.n_modes} modes"
+        attachment = f" and {body.attachment_modes} attachment modes" if body.attachment_modes else ""
+        return f"all {body.n_eigenmodes} modes{attachment}"
     lowest, static = body.reduction.lowest, body.n_modes - body.reduction.lowest
     shapes = f" and {static} static shapes for the others" if static else ""
-    return f"{lowest} of {body.reduction.whole.n_modes} modes{shapes}"
+    return f"{lowest} of {body.reduction.whole.n_eigenmodes} modes{shapes}"
 
 
 def loaded_points(scene: MechanismKeys, body: str) -> list[str]:

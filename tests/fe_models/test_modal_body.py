@@ -123,6 +123,7 @@ def test_without_modes(body):
         modal_mass=nothing,
         damping_ratio=np.zeros(0),
         family=(),
+        residual=np.zeros(0, dtype=int),
         S_bar=np.zeros((3, 0)),
         I_bar=np.zeros((3, 3, 0)),
         S_bar_kl=np.zeros((3, 3, 0, 0)),

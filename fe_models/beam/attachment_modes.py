@@ -1,0 +1,45 @@
+"""Residual attachment modes of a beam, family by family."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from scipy.sparse.linalg import splu
+
+from ...common.arrays import Array
+from ..link_records import Family
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
+from .beam import R_X, FamilyModel
+
+
+def attachment_modes(
+    models: Mapping[Family, FamilyModel], known: Mapping[Family, Array], places: Iterable[int], length: float
+) -> list[tuple[float, Family, Array]]:
+    """ω², family and degrees of freedom x (m,) of that family's model, xᵀMx = 1, of each attachment mode by frequency.
+
+    Args:
+        models: by family.
+        known: of each family (m, n), its eigenmodes in the file.
+        places: the stations of the interfaces.
+        length: of the link in m, by which moments are divided to be compared with forces.
+    """
+    found = list[tuple[float, Family, Array]]()
+    for family, model in models.items():
+        modes = _of_family(family, model, known[family], list(places), length)
+        found += [(float(square), family, x) for square, x in zip(modes.omega2, modes.X.T, strict=True)]
+    families = list(models)
+    return sorted(found, key=lambda mode: (float(f"{mode[0]:.9e}"), families.index(mode[1])))
+
+
+def _of_family(family: Family, model: FamilyModel, X: Array, places: list[int], length: float) -> ResidualModes:
+    rows = [row for row in COMPONENTS[family] if row in model.fields]
+    loads = [model.fields[row][place].toarray()[0] / (1.0 if row < R_X else length) for place in places for row in rows]
+    B = np.array(loads).T
+    static = splu(model.K.tocsc()).solve(B)
+
+    def energy(U: Array) -> Array:
+        strain = model.strain @ U
+        return np.asarray(strain.T @ strain)
+
+    return residual_modes({family: (static, B)}, X, Inertia(lambda U: model.M @ U, energy, np.asarray))

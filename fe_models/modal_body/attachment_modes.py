@@ -1,0 +1,174 @@
+"""Residual attachment modes: what static shapes of interface loads have that the eigenmodes of a link have not.
+
+Under a unit load b at an interface a link bends by K⁻¹b, of which the n eigenmodes X kept (XᵀMX = I) have their part.
+The rest, the residual flexibility,
+
+    R = (I − X Xᵀ M) K⁻¹ B,
+
+is made orthonormal in M and uncoupled in K, and serves as further modes: the flexibility at interfaces is that of the
+whole finite element model, however few eigenmodes there are (MacNeal, Comput. Struct. 1, 1971, 581–601; Rubin, AIAA J.
+13, 1975, 995–1006; Craig and Chang, NASA CR-2885, 1977). NumPy only: beams and solids say what M and strain energy are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array, Integers
+from ..link_records import FAMILIES, Family
+from .body import Interface
+
+# Of the energy (its square root) of the static shape of a load, what a combination of residuals must have to be kept.
+TOLERANCE = 1e-3
+# Of the largest energy of a load: less is rounding, of a load that the supports carry.
+IMMOBILE = 1e-10
+# Times the highest eigenmode's frequency: stiffer shapes (of loads a hair's breadth apart) only spoil linear models.
+STIFFEST = 1e4
+# Coupling of families by stiffness, relative to their own: less is rounding.
+COUPLED = 1e-10
+# Eigenmodes of each family where the link file leaves their number out: attachment modes have the statics.
+DEFAULT_COUNT: Mapping[Family, int] = {
+    "in-plane-bending": 6,
+    "out-of-plane-bending": 6,
+    "axial": 1,
+    "torsion": 1,
+}
+# Components of a load at an interface that move a family: forces 0 … 2 along x, y, z, moments 3 … 5 about them.
+COMPONENTS: Mapping[Family, tuple[int, ...]] = {
+    "in-plane-bending": (1, 5),
+    "out-of-plane-bending": (2, 4),
+    "axial": (0,),
+    "torsion": (3,),
+}
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """M and strain energy of a finite element model with m degrees of freedom, of which a process may own a part.
+
+    Attributes:
+        mass: M U of U (m, k).
+        energy: (k, k) UᵀKU, free of the rounding errors of an assembled K.
+        total: sum of an array over all processes.
+    """
+
+    mass: Callable[[Array], Array]
+    energy: Callable[[Array], Array]
+    total: Callable[[Array], Array]
+
+    def without(self, X: Array, U: Array) -> Array:
+        """U less its part in X (m, n), XᵀMX = I; twice, for orthogonality to rounding."""
+        for _ in range(2):
+            U = U - X @ self.total(X.T @ self.mass(U))
+        return U
+
+
+@dataclass(frozen=True)
+class ResidualModes:
+    """Attachment modes by frequency: ω² (r,) in rad²/s², the family of their loads, X (m, r) with XᵀMX = I."""
+
+    omega2: Array
+    families: tuple[Family, ...]
+    X: Array
+
+    def up_to(self, omega2: float) -> ResidualModes:
+        """Those with at most that ω²."""
+        count = int(np.searchsorted(self.omega2, omega2, side="right"))
+        return ResidualModes(self.omega2[:count], self.families[:count], self.X[:, :count])
+
+
+def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, inertia: Inertia) -> ResidualModes:
+    """Attachment modes from static shapes, by family of their loads.
+
+    Args:
+        static: for each family K⁻¹B (m, loads) and the loads B (m, loads), moments divided by a length.
+        X: (m, n) eigenmodes, XᵀMX = I.
+        inertia: of the model.
+    """
+    known, families = X, list[Family]()
+    largest = max((float(_energies(*pair, inertia).max(initial=0.0)) for pair in static.values()), default=0.0)
+    for family in FAMILIES:
+        if family in static:
+            shapes, loads = static[family]
+            own = _energies(shapes, loads, inertia)
+            moved = own > IMMOBILE * largest
+            found = _independent(shapes[:, moved] / np.sqrt(own[moved]), known, inertia)
+            families += [family] * found.shape[1]
+            known = np.concatenate([known, found], axis=1)
+    highest = np.diag(inertia.energy(X)).max() if X.shape[1] else np.inf
+    return _uncoupled(known[:, X.shape[1] :], families, inertia).up_to(STIFFEST**2 * highest)
+
+
+def _energies(shapes: Array, loads: Array, inertia: Inertia) -> Array:
+    """(loads,) bᵀK⁻¹b."""
+    return inertia.total(np.einsum("il,il->l", shapes, loads))
+
+
+def _independent(shapes: Array, known: Array, inertia: Inertia) -> Array:
+    """(m, r) orthonormal in M to each other and to `known`: combinations of `shapes` that have energy of their own."""
+    shapes = inertia.without(known, shapes)
+    energy, turn = np.linalg.eigh(inertia.energy(shapes))
+    kept = energy > TOLERANCE**2
+    shapes = shapes @ (turn[:, kept] / np.sqrt(energy[kept]))
+    for _ in range(2):
+        shapes = inertia.without(known, shapes)
+        gram = inertia.total(shapes.T @ inertia.mass(shapes))
+        squares, turn = np.linalg.eigh(0.5 * (gram + gram.T))
+        shapes = shapes @ (turn / np.sqrt(squares))[:, ::-1]
+    return shapes
+
+
+def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> ResidualModes:
+    """Principal axes of the strain energy: in each family by itself, unless the link couples families."""
+    K = inertia.energy(X)
+    of = np.array([FAMILIES.index(family) for family in families])
+    apart = of[:, None] != of
+    size = np.sqrt(np.diag(K))
+    if np.any(np.abs(K)[apart] > (COUPLED * np.outer(size, size))[apart]):
+        squares, turn = np.linalg.eigh(K)
+        shares = np.array([np.sum(turn[of == k] ** 2, axis=0) for k in range(len(FAMILIES))])
+        of = shares.argmax(axis=0)
+    else:
+        squares, turn = np.zeros(of.size), np.zeros(K.shape)
+        for k in set(of.tolist()):
+            own = np.flatnonzero(of == k)
+            squares[own], turn[np.ix_(own, own)] = np.linalg.eigh(K[np.ix_(own, own)])
+    # Equal frequencies of different families are ordered by these, not by rounding.
+    order = sorted(range(of.size), key=lambda k: (float(f"{squares[k]:.6e}"), int(of[k])))
+    return ResidualModes(squares[order], tuple(FAMILIES[of[k]] for k in order), X @ turn[:, order])
+
+
+def interface_loads(
+    omega2: Array, residual: Integers, interfaces: Mapping[str, Interface]
+) -> tuple[Array, dict[str, Array]]:
+    """The loads that bend a link into each of its n modes, as far as they are loads at interfaces.
+
+    K x = ω² M x of an eigenmode x. Of a residual mode r = R c it is Bc − M X XᵀBc: loads c at the interfaces, and the
+    opposite of the inertia that the eigenmodes have of them; c follows from the work rᵀBc = rᵀKr.
+
+    Args:
+        omega2: (n,) in rad²/s².
+        residual: (n,) 1 of residual attachment modes.
+        interfaces: what the modes do there.
+
+    Returns:
+        W (n, n): the inertia in column k is M times the modes times W[:, k]; and by interface (6, n), force in N and
+        moment in N·m per unit of modal coordinate.
+    """
+    static = residual.astype(bool)
+    W = np.diag(np.where(static, 0.0, omega2))
+    if not static.any():
+        return W, {}
+    rows = np.concatenate([np.concatenate([at.translation, at.rotation]) for at in interfaces.values()])
+    flexibility = np.square(rows) @ (1.0 / omega2)
+    scale = np.zeros(len(rows))
+    # Loads that do no work on any mode are carried by the supports.
+    scale[flexibility > 0.0] = 1.0 / np.sqrt(flexibility[flexibility > 0.0])
+    work = (rows[:, static] * scale[:, None]).T
+    c = np.zeros(rows.shape)
+    c[:, static] = scale[:, None] * np.linalg.pinv(work, rcond=TOLERANCE**2) * omega2[static]
+    W[np.ix_(~static, static)] = -rows[:, ~static].T @ c[:, static]
+    return W, dict(zip(interfaces, c.reshape(len(interfaces), 6, -1), strict=True))

@@ -1,0 +1,49 @@
+"""Residual attachment modes of a solid: unit loads at its interfaces, spread as the mean motion there says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...common.arrays import Array
+from ..link_records import Family
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
+from .eigen import Mass
+from .strain_energy import internal_forces, strain_energy
+from .supports import Flexibility
+
+
+def attachment_modes(
+    families: Sequence[Family],
+    flexibility: Flexibility,
+    mass: Mass,
+    X: Array,
+    interfaces: Mapping[str, Array],
+    length: float,
+) -> ResidualModes:
+    """Those of the loads that belong to `families`; collective.
+
+    Args:
+        families: wanted ones.
+        flexibility: of the held body.
+        mass: with what is attached.
+        X: (3 owned, n) eigenmodes.
+        interfaces: B (6, 3 owned), mean motion of each; its transpose spreads a force.
+        length: of the link in m, by which moments are divided to be compared with forces.
+    """
+    model = flexibility.model
+    scale = np.array([1.0, 1.0, 1.0, 1.0 / length, 1.0 / length, 1.0 / length])
+    rows = [(family, row) for family in families for _ in interfaces for row in COMPONENTS[family]]
+    B = np.array(
+        [scale[row] * at[row] for family in families for at in interfaces.values() for row in COMPONENTS[family]]
+    ).T
+    shapes = flexibility @ B
+    # As for prestress: without the rounding errors of an assembled K.
+    shapes += flexibility @ (B - internal_forces(model, model.with_ghosts(shapes)))
+    columns = {family: [k for k, (of, _) in enumerate(rows) if of == family] for family in families}
+    static = {family: (shapes[:, own], B[:, own]) for family, own in columns.items()}
+    inertia = Inertia(
+        lambda U: mass @ U, lambda U: strain_energy(model, np.ascontiguousarray(model.with_ghosts(U))), model.total
+    )
+    return residual_modes(static, X, inertia)

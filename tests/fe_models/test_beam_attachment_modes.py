@@ -1,0 +1,195 @@
+"""Residual attachment modes: closed forms of the flexibility at interfaces, identities, and what files say of them."""
+
+import h5py
+import numpy as np
+import pytest
+
+from ffrobot.common.errors import InputError
+from ffrobot.fe_models.link import make_link
+from ffrobot.fe_models.modal_body_file import read_modal_body
+
+E, I_Z, L = 2.068427e11, 0.025 * 0.015**3 / 12, 1.0
+ATTACHED = {'family = "in-plane-bending"': 'family = "in-plane-bending"\nattachment_modes = true'}
+INTERFACES = "".join(f'[[interface]]\nname = "i{k}"\nposition = {0.45 + 0.005 * k}\n' for k in range(5))
+
+
+@pytest.fixture
+def modal_body(link_file):
+    def make(replace=None, **options):
+        return make_link(link_file(replace={**ATTACHED, **(replace or {})}, **options)).body
+
+    return make
+
+
+def flexibility(body, name):
+    """(6, 6) displacement and rotation of an interface under unit force and moment there."""
+    at = body.interfaces[name]
+    rows = np.concatenate([at.translation, at.rotation])
+    return rows / np.diag(body.stiffness) @ rows.T
+
+
+def check_identities(body):
+    """Of the file, which `ModalBody` has checked to 1e-8, to rounding; signs as of eigenmodes."""
+    n = body.mode_count
+    assert np.abs(body.modal_mass - np.eye(n)).max() < 1e-12
+    total = np.einsum("kkij->ij", body.S_bar_kl)
+    assert np.abs(total - np.eye(n)).max() < 1e-10
+    assert np.array_equal(body.stiffness, np.diag(np.diag(body.stiffness)))
+    static = body.residual == 1
+    assert np.all(np.diff(body.frequency[static]) >= 0)
+    assert all(matrix.shape == (n, n) for matrix in body.geometric_stiffness.values())
+
+
+@pytest.mark.parametrize("count", [1, 4, 10])
+def test_cantilever_tip_is_exact_with_any_number_of_modes(modal_body, count):
+    body = modal_body(condition="cantilever", count=count)
+    found = flexibility(body, "tip")
+    assert found[1, 1] == pytest.approx(L**3 / (3 * E * I_Z), rel=1e-9)
+    assert found[5, 5] == pytest.approx(L / (E * I_Z), rel=1e-9)
+    assert found[1, 5] == pytest.approx(L**2 / (2 * E * I_Z), rel=1e-9)
+    assert (body.eigenmode_count, body.mode_count) == (count, count + 2)
+    check_identities(body)
+
+
+@pytest.mark.parametrize("count", [1, 4, 10])
+def test_end_moments_of_a_simply_supported_beam_are_exact(modal_body, count):
+    body = modal_body(count=count)
+    for name, other in (("root", "tip"), ("tip", "root")):
+        assert flexibility(body, name)[5, 5] == pytest.approx(L / (3 * E * I_Z), rel=1e-9)
+        turn = body.interfaces[name].rotation[2] / np.diag(body.stiffness) @ body.interfaces[other].rotation[2]
+        assert turn == pytest.approx(-L / (6 * E * I_Z), rel=1e-9)
+    assert body.mode_count == count + 2  # the forces at the supports do no work
+    check_identities(body)
+
+
+def test_eigenmodes_alone_are_wrong_there(link_file):
+    """What attachment modes are for: ten modes lack 6 % of the rotation under an end moment."""
+    body = make_link(link_file()).body
+    assert not body.residual.any()
+    assert flexibility(body, "tip")[5, 5] / (L / (3 * E * I_Z)) == pytest.approx(0.94, abs=0.01)
+
+
+def test_eigenmodes_stay_as_they_are(link_file, modal_body):
+    plain, body = make_link(link_file(name="plain")).body, modal_body()
+    n = plain.mode_count
+    assert np.array_equal(body.frequency[:n], plain.frequency)
+    assert np.array_equal(body.stations.translation[..., :n], plain.stations.translation)
+    assert np.array_equal(body.S_bar[:, :n], plain.S_bar)
+    assert body.family == ("in-plane-bending",) * (n + 2)
+    assert body.residual.tolist() == [0] * n + [1] * 2
+
+
+def test_all_eigenmodes_of_the_mesh_leave_nothing_over(modal_body):
+    assert modal_body(count=40).mode_count == 40
+
+
+def test_near_interfaces(modal_body):
+    """Seven interfaces, five of them at 5 mm: as many shapes as say something, and the flexibility of each is there."""
+    body = modal_body(more=INTERFACES)
+    for k in range(5):
+        a = 0.45 + 0.005 * k
+        found = flexibility(body, f"i{k}")
+        assert found[1, 1] == pytest.approx(a**2 * (L - a) ** 2 / (3 * E * I_Z * L), rel=1e-5)
+        # Nodes are at every interface: the moment may jump there.
+        assert found[5, 5] == pytest.approx((a**3 + (L - a) ** 3) / (3 * E * I_Z * L**2), rel=1e-5)
+    assert 4 <= body.mode_count - body.eigenmode_count <= 12
+    check_identities(body)
+
+
+def test_interface_twice_at_one_place(modal_body):
+    more = '[[interface]]\nname = "one"\nposition = 0.5\n[[interface]]\nname = "two"\nposition = 0.5\n'
+    body = modal_body(more=more)
+    assert body.mode_count == modal_body(more='[[interface]]\nname = "one"\nposition = 0.5\n').mode_count
+    assert np.array_equal(body.interfaces["one"].translation, body.interfaces["two"].translation)
+
+
+def test_all_families(modal_body):
+    """All six loads at the tip of a cantilever, each by its own closed form."""
+    body = modal_body({'"in-plane-bending"\nattachment': '"all"\nattachment'}, condition="cantilever", count=8)
+    found = np.diag(flexibility(body, "tip"))
+    I_y, area, G = 0.015 * 0.025**3 / 12, 0.015 * 0.025, E / 2.6
+    assert found[0] == pytest.approx(L / (E * area), rel=1e-9)
+    assert found[2] == pytest.approx(L**3 / (3 * E * I_y), rel=1e-9)
+    assert found[4] == pytest.approx(L / (E * I_y), rel=1e-9)
+    J = 0.025 * 0.015**3 * (1 / 3 - 0.21 * 0.6 * (1 - 0.6**4 / 12))  # Roark, within 0.5 %
+    assert found[3] == pytest.approx(L / (G * J), rel=5e-3)
+    added = np.array(body.family)[body.residual == 1].tolist()
+    assert sorted(added) == ["axial", *["in-plane-bending"] * 2, *["out-of-plane-bending"] * 2, "torsion"]
+    check_identities(body)
+
+
+def test_list_of_families_and_default_count(modal_body):
+    listed = {'"in-plane-bending"\nattachment': '["axial", "in-plane-bending"]\nattachment', "count = 10": ""}
+    body = modal_body(listed, condition="cantilever")
+    eigenmodes = np.array(body.family)[body.residual == 0].tolist()
+    assert (eigenmodes.count("in-plane-bending"), eigenmodes.count("axial"), len(eigenmodes)) == (6, 1, 7)
+    assert flexibility(body, "tip")[0, 0] == pytest.approx(L / (E * 0.015 * 0.025), rel=1e-9)
+    check_identities(body)
+
+
+def test_count_must_be_given_without_attachment_modes(link_file):
+    with pytest.raises(InputError, match="modes: expected either count or indices, found neither"):
+        make_link(link_file(replace={"count = 10": "attachment_modes = false"}))
+
+
+def test_timoshenko_with_masses(modal_body):
+    more = '[model]\ntheory = "timoshenko"\n[[interface]]\nname = "tip"\nmass = 2.0\ninertia = [0.0, 0.0, 0.01]\n'
+    body = modal_body(condition="cantilever", count=3, more=more)
+    shear = L / (5 / 6 * E / 2.6 * 0.015 * 0.025)
+    assert flexibility(body, "tip")[1, 1] == pytest.approx(L**3 / (3 * E * I_Z) + shear, rel=2e-3)
+    check_identities(body)
+
+
+@pytest.mark.parametrize("count", [4, 10])
+def test_stress_of_end_loads(modal_body, count):
+    """M y / I of a moment and of a force at the tip, next to it too, where eigenmodes have nothing."""
+    more = "[stress.points]\nnear = [0.2, 0.0075, 0.0]\nend = [0.995, 0.0075, 0.0]\n"
+    body = modal_body(condition="cantilever", count=count, more=more)
+    for point, x in (("near", 0.2), ("end", 0.995)):
+        for row, moment in (("rotation", 10.0), ("translation", 10.0 * (L - x))):
+            load = getattr(body.interfaces["tip"], row)[2 if row == "rotation" else 1]
+            stress = body.stress[point].stress @ (10.0 * load / np.diag(body.stiffness))
+            assert stress[0] == pytest.approx(-moment * 0.0075 / I_Z, rel=1e-9)
+
+
+def test_damping(modal_body):
+    given = modal_body(more="[damping]\nratio = [0.01, 0.02, 0.03]\n", count=3)
+    assert given.damping_ratio.tolist() == [0.01, 0.02, 0.03, 0.03, 0.03]
+    rayleigh = modal_body(more="[damping]\nrayleigh = [1.0, 1e-5]\n", count=3)
+    omega = 2 * np.pi * rayleigh.frequency
+    assert rayleigh.damping_ratio == pytest.approx(0.5 / omega + 0.5e-5 * omega)
+
+
+def test_same_modes_with_other_damping_and_stress(link_file):
+    """Stage 1 is not run again, and says the same as if it were."""
+    points = "[stress.points]\nend = [0.9, 0.0075, 0.0]\n"
+    path = link_file(replace=ATTACHED)
+    make_link(path)
+    path.write_text(path.read_text() + points)
+    again = make_link(path)
+    assert again.reused == "modes"
+    anew = make_link(path, force=True)
+    assert np.allclose(again.body.stress["end"].stress, anew.body.stress["end"].stress, rtol=1e-12)
+
+
+def test_switching_is_another_link(link_file):
+    path = link_file(replace=ATTACHED)
+    assert make_link(path).body.mode_count == 12
+    path.write_text(path.read_text().replace("attachment_modes = true", "attachment_modes = false"))
+    assert make_link(path).body.mode_count == 10
+
+
+def test_file_keeps_the_marks_and_old_files_have_none(link_file):
+    outcome = make_link(link_file(replace=ATTACHED))
+    assert read_modal_body(outcome.path).residual.tolist() == [0] * 10 + [1] * 2
+    with h5py.File(outcome.path, "r+") as file:
+        del file["modes/residual"]
+    assert not read_modal_body(outcome.path).residual.any()
+
+
+def test_marks_must_stand_behind(modal_body):
+    from dataclasses import replace
+
+    body = modal_body()
+    with pytest.raises(InputError, match="residual: expected 0 of each eigenmode, then 1"):
+        replace(body, residual=body.residual[::-1])

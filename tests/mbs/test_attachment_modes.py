@@ -1,0 +1,245 @@
+"""Attachment modes in mechanisms: exact statics with few modes, few as good as many, masses raised without harm."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ffrobot
+from ffrobot.fe_models.link import cached_modal_body
+from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.mbs.analysis.outcome import EarlierRun
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.model.masses import with_payload
+from ffrobot.mbs.model.planar_body import from_modal_body
+from ffrobot.mbs.model.raised_mass import LIMIT, mass_factors, with_raised_mass
+from ffrobot.mbs.model.truncation import with_fewer_modes
+from ffrobot.run.prepare import prepare
+from ffrobot.run.solve import solve
+
+E, RHO, HEIGHT, WIDTH = 2.068427e11, 7850.0, 0.015, 0.025
+EI, LINE = E * WIDTH * HEIGHT**3 / 12, RHO * HEIGHT * WIDTH
+QUINTIC = "(10*t**3-15*t**4+6*t**5)"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cache(tmp_path_factory):
+    """One cache of stage 1 for all tests here, and not the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+def link(condition, count, attachment, ratio=0.005):
+    return {
+        "name": condition,
+        "material": {"youngs_modulus": E, "density": RHO},
+        "geometry": {
+            "kind": "beam",
+            "length": 1.0,
+            "section": {"shape": "rectangle", "height": HEIGHT, "width": WIDTH},
+        },
+        "mesh": {"elements": 40},
+        "reference": {"condition": condition},
+        "modes": {"count": count, "family": "in-plane-bending", "attachment_modes": attachment},
+        "damping": {"ratio": ratio},
+    }
+
+
+def two_links(count, attachment, kept=None, **keys):
+    """The arm of two steel links, the first simply supported, the second a cantilever, with a payload of 2 kg."""
+    bodies = [
+        {"name": name, "link": link(condition, count, attachment, keys.get("ratio", 0.005))}
+        | ({"modes": kept} if kept else {})
+        for name, condition in (("a", "simply-supported"), ("b", "cantilever"))
+    ]
+    keys.pop("ratio", None)
+    scene = {
+        "name": "arm",
+        "gravity": [0.0, -9.81],
+        "body": bodies,
+        "joint": [
+            {"name": "O", "type": "revolute", "between": ["ground", "a.root"]},
+            {"name": "A", "type": "revolute", "between": ["a.tip", "b.root"]},
+        ],
+        "payload": [{"point": "b.tip", "mass": 2.0}],
+        "trajectory": [
+            {"name": "first", "joint": "O", "value": f"0.2+0.8*{QUINTIC}"},
+            {"name": "second", "joint": "A", "value": f"-0.5+0.7*{QUINTIC}"},
+        ],
+        "initial": {"state": "static", "angles": {"a": 0.2, "b": -0.3}},
+        "analysis": [{"name": "swing", "kind": "pcid", "end": 1.0, "output_step": 0.005, "tolerance": 1e-6}],
+    }
+    return ffrobot.make_scene(**(scene | keys))
+
+
+def errors(found, expected, name="swing"):
+    """Of the tip in m, of the moments relative to their peaks."""
+    tip = f"{name}/points/b.tip/position"
+    moments = [f"{name}/joints/{joint}/moment" for joint in "OA"]
+    return (
+        np.abs(found[tip] - expected[tip]).max(),
+        *(np.abs(found[m] - expected[m]).max() / np.abs(expected[m]).max() for m in moments),
+    )
+
+
+@pytest.fixture(scope="module")
+def all_modes():
+    """All 80 eigenmodes of the meshes; twelve kept, with the statics of the others, in the equations."""
+    return ffrobot.solve(two_links(80, False, kept=12))
+
+
+@pytest.mark.parametrize("count", [2, 4, 10])
+def test_swing_with_payload(all_modes, count):
+    """Findings of the second round: 3.6 mm and 6 % with ten modes and no attachment modes."""
+    tip, *moments = errors(ffrobot.solve(two_links(count, True)), all_modes)
+    assert tip < 2e-5
+    assert max(moments) < 2e-3
+    if count > 2:
+        assert tip < 1e-6
+        assert max(moments) < 1e-5
+
+
+def test_ten_modes_alone_are_far_off(all_modes):
+    """What the test above compares with."""
+    tip, *moments = errors(ffrobot.solve(two_links(10, False)), all_modes)
+    assert tip > 2e-3
+    assert max(moments) > 2e-2
+
+
+def test_fewer_modes_of_a_file_with_attachment_modes(all_modes):
+    """`modes = 4` of ten: static shapes for all that is left out, attachment modes among it."""
+    found = ffrobot.solve(two_links(10, True, kept=4))
+    assert found.attributes("swing/bodies/a")["modes_kept"] == "4 of 10 modes and 2 static shapes for the others"
+    tip, *moments = errors(found, all_modes)
+    assert tip < 1e-6
+    assert max(moments) < 1e-5
+
+
+def test_sag_of_two_links():
+    """Two horizontal links under their weight and payload, of which the motors hold the sections at the joints.
+
+    The section angles are held: each link sags as a cantilever, and what the first turns at its tip is taken back by
+    the second motor.
+    """
+    held = [{"name": "first", "joint": "O", "value": "0.0"}, {"name": "second", "joint": "A", "value": "0.0"}]
+    analysis = [{"name": "swing", "kind": "static"}]
+    found = ffrobot.solve(two_links(4, True, trajectory=held, analysis=analysis, initial={"angles": {"a": 0, "b": 0}}))
+    g, payload = 9.81, 2.0
+    weight = LINE * g
+    force, moment = weight + payload * g, weight / 2 + payload * g  # of the second link on the tip of the first
+    middle = weight / (8 * EI) + force / (3 * EI) + moment / (2 * EI)
+    turn = weight / (6 * EI) + force / (2 * EI) + moment / EI
+    expected = middle + turn + weight / (8 * EI) + payload * g / (3 * EI)
+    sag = -found["swing/points/b.tip/position"][0, 1]
+    # Positions turn rigidly with the first link's slope: linear theory against sines and cosines of a few degrees.
+    assert sag == pytest.approx(expected, rel=5e-3)
+    linear = -(found["swing/points/a.tip/deflection"][0, 1])
+    assert linear == pytest.approx(0.0, abs=1e-12)  # simply supported: the frame goes through the tip
+    stiff = ffrobot.solve(
+        two_links(
+            4, True, trajectory=held, analysis=analysis, gravity=[0.0, -9.81e-4], initial={"angles": {"a": 0, "b": 0}}
+        )
+    )
+    assert -stiff["swing/points/b.tip/position"][0, 1] == pytest.approx(1e-4 * expected, rel=1e-6)
+
+
+def planar(count=4, attachment=True, condition="cantilever"):
+    table = LinkTable(link(condition, count, attachment), path=Path("link.toml"))
+    return from_modal_body("b", cached_modal_body(table).body)
+
+
+@pytest.mark.parametrize("payload", [0.0, 1.0])
+def test_raised_mass_keeps_statics_and_identities(payload):
+    body = with_payload(planar(), "tip", payload, 0.0) if payload else planar()
+    raised, mu = with_raised_mass(body), mass_factors(body)
+    assert np.all(mu[: body.n_eigenmodes] == 1.0)
+    assert np.any(mu > 1.0)
+    limit = LIMIT**2 * np.sort(body.stiffness)[body.n_eigenmodes - 1]
+    assert np.all(raised.stiffness <= limit * (1 + 1e-12))
+    for one, other in zip(body.points.values(), raised.points.values(), strict=True):
+        flexibility = [p.translation / b.stiffness @ p.translation.T for p, b in ((one, body), (other, raised))]
+        assert np.allclose(*flexibility, rtol=1e-12, atol=1e-20)
+    assert np.allclose(body.S_bar / body.stiffness @ body.S_bar.T, raised.S_bar / raised.stiffness @ raised.S_bar.T)
+    if not payload:  # in the plane all of m_ff = I is in S_bar_11 + S_bar_22
+        assert np.allclose(np.diag(raised.m_xy), 1.0, atol=1e-12)
+    p = np.linspace(1.0, 2.0, body.n_modes)
+    assert raised.h @ (np.sqrt(mu) * p) == pytest.approx(body.h @ p)
+
+
+def test_bodies_without_attachment_modes_stay_the_same_objects():
+    body = planar(attachment=False)
+    assert with_raised_mass(body) is body
+    assert with_fewer_modes(body, 2, ["root", "tip"]).attachment_modes == 0
+
+
+def test_results_are_in_the_modes_of_the_file():
+    """Statics know no mass: a run starts with the p of the equilibrium, attachment modes included."""
+    rest = {"name": "rest", "kind": "static"}
+    swing = {"name": "swing", "kind": "pcid", "end": 0.01, "output_step": 0.005}
+    found = ffrobot.solve(two_links(4, True, analysis=[rest, swing]))
+    p = found["swing/bodies/b/modal"][0]
+    assert p.shape == (6,)
+    assert np.all(p[4:] != 0.0)
+    assert p == pytest.approx(found["rest/bodies/b/modal"][0], rel=1e-6)
+
+
+@pytest.mark.parametrize("source", ["pcid", "fcid"])
+def test_inverse_forward(source):
+    """What an inverse analysis found leads back to its motion: by the force on the point, or, with a prescribed shape,
+    by motors and patches, which serve all eigenmodes and leave the attachment modes with a remainder.
+    """
+    inverse = {"name": "swing", "kind": source, "end": 0.5, "output_step": 0.01, "tolerance": 1e-8}
+    inverse |= {"shape": "static"} if source == "fcid" else {}
+    forward = inverse | {"name": "again", "kind": "forward", "actuation": "swing", "apply": "trajectory"}
+    forward.pop("shape", None)
+    if source == "fcid":
+        forward["apply"] = "joints+pzt"
+    pzt = [
+        {
+            "body": body,
+            "count": 10,
+            "length": 0.05,
+            "width": WIDTH,
+            "thickness": 0.75e-3,
+            "modulus": 63e9,
+            "d31": 110e-12,
+        }
+        for body in "ab"
+    ]
+    found = ffrobot.solve(two_links(10, True, analysis=[inverse, forward], pzt=pzt))
+    for what in ("points/b.tip/position", "bodies/a/modal", "bodies/b/modal"):
+        atol = 1e-8 if source == "pcid" else 5e-6
+        assert np.allclose(found[f"again/{what}"], found[f"swing/{what}"], rtol=0, atol=atol)
+
+
+def test_free_swing_keeps_its_energy():
+    """Undamped, no motors: energy as reported leaves out that of the mass that was raised, 1e-7 of the peak."""
+    free = {"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.005, "tolerance": 1e-9}
+    found = ffrobot.solve(
+        two_links(4, True, ratio=0.0, trajectory=[], analysis=[free], initial={"state": "undeformed"})
+    )
+    energy = sum(found[f"fall/energy/{kind}"] for kind in ("kinetic", "strain", "gravitational"))
+    assert np.ptp(energy) < 1e-6 * found["fall/energy/kinetic"].max()
+
+
+def test_integration_goes_on_from_where_it_stopped():
+    """An earlier run is kept in the coordinates of results; its checkpoint in those of the integration."""
+    solution = prepare(two_links(4, True))
+    (analysis,) = solution.scene.analysis
+    short = analysis.model_copy(update={"max_steps": 200})
+    stopped = run_pcid(solution.model, short, True, lambda _: True)
+    assert stopped.status == "too many steps"
+    earlier = EarlierRun(stopped.motion, stopped.forces, stopped.statistics, stopped.continuation)
+    whole = run_pcid(solution.model, analysis, True, lambda _: True)
+    again = run_pcid(solution.model, analysis, True, lambda _: True, earlier)
+    assert np.array_equal(again.q, whole.q)
+    assert np.array_equal(again.F_p, whole.F_p)
+
+
+def test_linear_models_are_exact():
+    """The robot's frequencies, motors held, do not depend on the number of modes: no mass is raised there."""
+    linear = [{"name": "about", "kind": "linear"}]
+    few, many = (solve(two_links(count, True, analysis=linear)).outcomes["about"].details for count in (4, 16))
+    lowest = [model.modes[0].frequency[model.modes[0].frequency > 1.0][:4] for model in (few, many)]
+    assert lowest[0] == pytest.approx(lowest[1], rel=2e-4)
