@@ -83,18 +83,7 @@ def drive(
         continuation = Continuation(_core.Checkpoint(), recording)
     else:
         integrator, continuation = earlier.statistics.integrator, earlier.continuation
-    method, tolerance, most = METHODS[integrator.name], analysis.tolerance, analysis.max_steps
-    if control is None:
-        run = _core.run(
-            assembly.system, assembly.groups, assembly.moments, steering, times.tolist(), start.q, start.v, tolerance,
-            most, method, analysis.spectral_radius, resolver, progress, continuation.recording, continuation.checkpoint,
-        )  # fmt: skip
-    else:
-        run = _core.run_sampled(
-            assembly.system, assembly.groups, assembly.moments, times.tolist(), start.q, start.v, tolerance,
-            most, method, analysis.spectral_radius, control.motors, control.voltages, control.first, control.sensing,
-            control.times.tolist(), control.delay, control.controller, progress,
-        )  # fmt: skip
+    run = _integrated(assembly, analysis, start, times, integrator, steering, control, resolver, continuation, progress)
     seconds = time.perf_counter() - began
     statistics = statistics_of(assembly, run, integrator, seconds)
     if statistics.status == "step underflow" and not statistics.cause:
@@ -108,6 +97,31 @@ def drive(
         continuation=continuation if control is None else None,
     )
     return outcome if earlier is None else _joined(earlier, outcome)
+
+
+def _integrated(
+    assembly: MechanismSystem,
+    analysis: IntegratedAnalysis,
+    start: State,
+    times: Array,
+    integrator: Choice,
+    steering: _core.ExternalLoads | None,
+    control: SampledControl | None,
+    resolver: _core.ActuatorForces | None,
+    continuation: Continuation,
+    progress: Progress,
+) -> _core.Run:
+    method, tolerance, most = METHODS[integrator.name], analysis.tolerance, analysis.max_steps
+    if control is None:
+        return _core.run(
+            assembly.system, assembly.groups, assembly.moments, steering, times.tolist(), start.q, start.v, tolerance,
+            most, method, analysis.spectral_radius, resolver, progress, continuation.recording, continuation.checkpoint,
+        )  # fmt: skip
+    return _core.run_sampled(
+        assembly.system, assembly.groups, assembly.moments, times.tolist(), start.q, start.v, tolerance,
+        most, method, analysis.spectral_radius, control.motors, control.voltages, control.first, control.sensing,
+        control.times.tolist(), control.delay, control.controller, progress,
+    )  # fmt: skip
 
 
 def motion_of(assembly: MechanismSystem, run: _core.Run | _core.FcidOutputs, times: Array) -> Motion:
