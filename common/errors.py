@@ -22,3 +22,11 @@ class SolveError(FfrobotError):
 
     __module__ = "ffrobot"
     exit_code = 1
+
+
+class StoppedError(SolveError):
+    """A signal has ended a run, which has kept what it had computed."""
+
+    def __init__(self, message: str, number: int) -> None:
+        super().__init__(message)
+        self.exit_code = 128 + number  # as shells tell it

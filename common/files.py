@@ -6,28 +6,37 @@ import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 from uuid import uuid4
 
 from .errors import InputError, SolveError
+from .outputs import DAMAGED, check_not_an_input, check_same_kind, kind_of_file
 
-HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+PIECE = 1 << 22  # bytes
 
 
-def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool = False) -> None:
+def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool = False, ours: bool = False) -> None:
     """Write `content` to a temporary name in the same folder, then rename it to `path`.
 
     HDF5 files are handed over as images made in memory: a full disk then is an ordinary failed write, which HDF5
-    itself does not survive. Raises `SolveError` naming the file, `what` it is, and the reason.
+    itself does not survive. Raises `SolveError` naming the file, `what` it is, and the reason; `InputError` where an
+    input of the command (see `outputs.protected`) would be lost, or a file of another kind, unless the name is `ours`
+    alone, as in the cache.
     """
+    check_not_an_input(path)
+    if not ours:
+        check_same_kind(path, content)
     target = path.resolve()  # a symbolic link stays one
-    temporary = target.with_name(f".{target.name}.{uuid4().hex}.tmp")
+    temporary = target.with_name(f".{target.name[:100]}.{uuid4().hex}.tmp")
     try:
         if make_folder:
             target.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("xb") as stream:
-            stream.write(content)
+        with _without_name(temporary) as stream:
+            for start in range(0, len(content), PIECE):  # Ctrl-C is answered between two
+                stream.write(content[start : start + PIECE])
             stream.flush()
             os.fsync(stream.fileno())
+            _name(stream, temporary)
         temporary.replace(target)
     except OSError as error:
         raise SolveError(f"{path}: cannot write the {what}: {error.strerror or error}") from None
@@ -36,17 +45,37 @@ def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool
             temporary.unlink(missing_ok=True)
 
 
-def check_output(path: Path, file_format: str, *, force: bool = False) -> None:
-    """Refuse, before any work is done, an output that could not be written or would cost a file of another kind.
+def _without_name(temporary: Path) -> BinaryIO:
+    """A file in the folder of `temporary` that is gone with this process, however that ends; named where need be."""
+    if hasattr(os, "O_TMPFILE") and os.path.isdir("/proc/self/fd"):
+        with suppress(OSError):  # not on this file system
+            return os.fdopen(os.open(temporary.parent, os.O_TMPFILE | os.O_RDWR, 0o666), "wb")
+    return temporary.open("xb")
 
-    An existing file is replaced only where it is empty, an HDF5 file whose attribute `format` is `file_format`, or one
-    too damaged to tell; or any file if `force`. Raises `InputError`.
+
+def _name(stream: BinaryIO, temporary: Path) -> None:
+    """Give a complete file without a name that of `temporary`."""
+    if temporary.exists():
+        return
+    folder = os.open(temporary.parent, os.O_RDONLY)
+    try:
+        os.link(f"/proc/self/fd/{stream.fileno()}", temporary.name, src_dir_fd=folder, dst_dir_fd=folder)
+    finally:
+        os.close(folder)
+
+
+def check_output(path: Path, file_format: str) -> None:
+    """Refuse, before any work is done, an output that could not be written or would cost another file.
+
+    An existing file is replaced only where it is no input, and is empty, an HDF5 file whose attribute `format` is
+    `file_format`, or one too damaged to tell. Raises `InputError`.
     """
+    check_not_an_input(path)
     if path.is_dir():
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
-    if path.exists() and not (path.is_file() and (force or _is_of_format(path, file_format))):  # no device, ever
+    if path.exists() and not (path.is_file() and _is_of_format(path, file_format)):  # no device, ever
         raise InputError(
             f'{path}: output: expected a new name or an earlier file of format "{file_format}", found a file of another'
             " kind"
@@ -60,19 +89,10 @@ def check_output(path: Path, file_format: str, *, force: bool = False) -> None:
 
 def check_folder(folder: Path) -> None:
     """Refuse an output folder whose place a file has; one that is absent is made later. Raises `InputError`."""
+    check_not_an_input(folder)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: output: expected a folder, found a file")
 
 
 def _is_of_format(path: Path, file_format: str) -> bool:
-    with suppress(OSError), path.open("rb") as stream:
-        signature = stream.read(len(HDF5_SIGNATURE))
-        if signature != HDF5_SIGNATURE:
-            return signature == b""
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            return bool(file.attrs.get("format") == file_format)
-    except OSError:
-        return True
+    return kind_of_file(path) in ("empty", "unreadable", f"HDF5 {file_format}", DAMAGED)

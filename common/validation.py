@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, Val
 from pydantic_core import ErrorDetails
 
 from .errors import InputError
+from .function_content import digest_of_function
 
 
 class Record(BaseModel):
@@ -106,7 +107,8 @@ def plain(value: Any, functions: dict[str, object] | None = None) -> Any:  # noq
     if isinstance(value, list | tuple):
         return [plain(item, functions) for item in value]
     if functions is not None and (callable(value) or hasattr(value, "address")):
-        name = f"<{getattr(value, '__qualname__', type(value).__name__)}, function no. {len(functions) + 1}>"
+        called = getattr(value, "__qualname__", type(value).__name__)
+        name = f"<{called}, function no. {len(functions) + 1}, content {digest_of_function(value)}>"
         functions[name] = value
         return name
     return str(value) if isinstance(value, PathLike) else value

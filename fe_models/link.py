@@ -54,7 +54,7 @@ def make_link(
     Args:
         source: the link file, or its content.
         output: where to write; if None, LINK.h5 beside the link file, or the user's cache where there is no file.
-        force: compute and overwrite in any case.
+        force: compute in any case.
         progress: is told what is being done, one line a step.
 
     Under mpirun all processes call; only the first writes, and computes the links that are beams.
@@ -70,7 +70,7 @@ def make_link(
     if not force and on_first(lambda: _up_to_date(path, digest) is not None):
         return LinkOutcome(path, read_modal_body(path), False, time.perf_counter() - start)
     if path.parent != _cache_folder():
-        on_first(lambda: check_output(path, FORMAT, force=force))
+        on_first(lambda: check_output(path, FORMAT))
     earlier = [] if force else [path, *beside]
     return _compute(link, link_path(source), path, digest, start, progress, earlier, force=force)
 

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import Array
+from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
 from ..common.files import write_atomically
+from ..common.hdf5 import open_checked, read
 from .modal_body import Interface, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
 if TYPE_CHECKING:
@@ -41,12 +43,12 @@ _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": 
 
 
 def write_modal_body(path: Path, body: ModalBody, *, make_folder: bool = False) -> None:
-    """Write `body` to `path`, replacing what is there only once the new file is complete.
+    """Write `body` to `path`, replacing what is there only once the new file is complete; `make_folder` in the cache.
 
     Raises:
         SolveError: the file cannot be written; names file and reason.
     """
-    write_atomically(path, _image(body), "modal body file", make_folder=make_folder)
+    write_atomically(path, sealed(_image(body)), "modal body file", make_folder=make_folder, ours=make_folder)
 
 
 def read_modal_body(path: Path) -> ModalBody:
@@ -59,23 +61,25 @@ def read_modal_body(path: Path) -> ModalBody:
     if not path.is_file():
         raise InputError(f"{path}: modal body file not found")
     try:
-        with h5py.File(path, "r") as file:
+        with open_checked(path) as file:
             _check_format(path, file.attrs)
             return _body(file)
     except InputError as error:
         raise InputError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from None
     except KeyError as error:
         raise InputError(f"{path}: damaged modal body file: {error.args[0]}") from None
-    except (OSError, RuntimeError, ValueError, TypeError) as error:
+    except MemoryError:
+        raise InputError(f"{path}: damaged modal body file: larger than memory") from None
+    except (OSError, RuntimeError, ValueError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not a modal body file, or a damaged one: {error}") from None
 
 
 def is_modal_body_file(path: Path) -> bool:
     """Whether the file says so; False for what cannot be read."""
     try:
-        with h5py.File(path, "r") as file:
+        with open_checked(path) as file:
             return bool(file.attrs.get("format") == FORMAT)
-    except OSError:
+    except (OSError, InputError):
         return False
 
 
@@ -99,7 +103,7 @@ def _body(file: h5py.File) -> ModalBody:
     return ModalBody(
         **values,
         modes_hash=_text(file.attrs.get("modes_hash", "")),
-        family=tuple(_text(name) for name in file["modes/family"][()]),
+        family=tuple(_text(name) for name in read(file["modes/family"])),
         geometric_stiffness=_geometric_stiffness(file),
         interfaces={name: Interface(**_arrays(interfaces[name], Interface)) for name in interfaces},
         stations=Stations(**_arrays(stations, Stations)),
@@ -123,7 +127,7 @@ def _optional(file: h5py.File) -> dict[str, Any]:
 def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any]:
     """The datasets of `group` that are fields of `record`; those without default must be there."""
     required = {item.name: item.default is MISSING for item in fields(record)}
-    return {name: group[name][()] for name, needed in required.items() if needed or name in group}
+    return {name: read(group[name]) for name, needed in required.items() if needed or name in group}
 
 
 def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
@@ -131,7 +135,7 @@ def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
 
     def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if isinstance(item, h5py.Dataset):
-            found[name] = np.asarray(item[()], dtype=np.float64)
+            found[name] = np.asarray(read(item), dtype=np.float64)
 
     if "geometric_stiffness" in file:
         file["geometric_stiffness"].visititems(collect)
@@ -139,7 +143,7 @@ def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
 
 
 def _array(group: h5py.Group, name: str) -> Array:
-    return np.asarray(group[name][()], dtype=np.float64)
+    return np.asarray(read(group[name]), dtype=np.float64)
 
 
 def _text(value: object) -> str:
@@ -151,6 +155,7 @@ def _image(body: ModalBody) -> bytes:
     with h5py.File("modal body", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
+        file.attrs[MARK] = METHOD
         for name in _ATTRIBUTES:
             file.attrs[name] = getattr(body, name)
         if body.modes_hash:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
     from .results.file import Results
+    from .run.solution import Solution
     from .run.watcher import Watcher
     from .scene.scene import Scene
 
@@ -18,47 +19,65 @@ AnyPath = str | PathLike[str]
 
 
 def solve(
-    scene: Scene | AnyPath, output: AnyPath | None = None, watcher: Watcher | None = None, *, resume: bool = False
+    scene: Scene | AnyPath,
+    output: AnyPath | None = None,
+    watcher: Watcher | None = None,
+    *,
+    resume: bool = False,
+    allow_python: Sequence[AnyPath] = (),
 ) -> Results:
     """Run the analyses of a scene, or of a scene file, and return the results: `ffrobot solve`.
 
     They are written to `output` where one is given, and kept in memory otherwise. `watcher` is told how it goes.
+    Python files that a scene file names run from below its folder, and from `allow_python` (files and folders).
     `resume` goes on with a run that was stopped, from `output`; functions of Python have to be the same then.
     Raises `InputError` for anything wrong with the scene, `SolveError` where an analysis does not reach its end; what
     was computed until then is in `output` all the same.
     """
     from .common.errors import InputError
     from .common.files import check_output
+    from .common.outputs import protected
     from .results.file import FORMAT, Results
     from .results.resume import how_to_go_on
     from .results.resume import resume as run_on
     from .results.write import results_image, write_results
+    from .run.inputs import files_of_scene, files_of_tables
     from .run.solve import solve as run
     from .scene.scene import Scene
 
-    if output is not None:
-        check_output(Path(output), FORMAT)
+    path = None if output is None else Path(output)
+    inputs = files_of_scene(Path(scene)) if not isinstance(scene, Scene) else files_of_tables(scene.path, scene.text)
+    if path is not None:
+        with protected(inputs):
+            check_output(path, FORMAT)
     elif resume:
         raise InputError("solve: resume: expected the output of the run that was stopped, found none")
-    scene = scene if isinstance(scene, Scene) else Path(scene)
-    solution = run_on(scene, Path(output), watcher) if output is not None and resume else run(scene, watcher)
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene, allow_python=allow_python)
+
+    def keep(solution: Solution) -> None:
+        if path is not None:
+            with protected(inputs):
+                write_results(solution, path)
+
+    solution = run_on(scene, path, watcher, keep) if path is not None and resume else run(scene, watcher, keep)
     if solution is None:
-        assert output is not None
-        return Results(output)
-    if output is not None:
-        write_results(solution, Path(output))
+        assert path is not None
+        return Results(path)
     for outcome in solution.outcomes.values():
-        outcome.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if output is not None else "")
-    if output is not None:
-        return Results(output)
+        outcome.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if path is not None else "")
+    if path is not None:
+        return Results(path)
     return Results.from_image(results_image(solution), solution.scene.path)
 
 
-def load_scene(path: AnyPath) -> Scene:
-    """Read and validate a scene file. Raises `InputError` with a line for each wrong key."""
+def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
+    """Read and validate a scene file, `allow_python` as in `solve`. Raises `InputError`, a line for each wrong key."""
+    from .common.python_files import python_allowed
     from .scene.load import load_scene
 
-    return load_scene(Path(path))
+    with python_allowed(Path(place) for place in allow_python):
+        return load_scene(Path(path))
 
 
 def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
@@ -86,16 +105,21 @@ def plot_results(results: AnyPath, folder: AnyPath, formats: Sequence[str] = ("p
 
     `formats` are "png", "pdf", "svg".
     """
+    from .common.hdf5 import reading
     from .pictures.figures.plot import plot_results
 
-    return plot_results(Path(results), Path(folder), formats)
+    with reading(Path(results)):
+        return plot_results(Path(results), Path(folder), formats)
 
 
 def write_report(results: Sequence[AnyPath], path: AnyPath) -> None:
     """Write one HTML page about results files: `ffrobot report`."""
+    from .common.hdf5 import reading
     from .pictures.report import write_report
 
-    write_report([Path(file) for file in results], Path(path))
+    paths = [Path(file) for file in results]
+    with reading(*paths):
+        write_report(paths, Path(path))
 
 
 def view_file(
@@ -113,6 +137,8 @@ def view_file(
     `frames` outputs at most of one `analysis`, or of all; the picture at `time` (s) with deflections `scale` times as
     large. `pictures`: whether to draw them; None: where PyVista can. Returns the files written.
     """
+    from .common.hdf5 import reading
     from .pictures.view.view import FRAMES, Options, view_file
 
-    return view_file(Path(file), Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths
+    with reading(Path(file)):
+        return view_file(Path(file), Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths

@@ -6,16 +6,20 @@ import signal
 import sys
 import time
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .bench.command import bench
 from .common.errors import FfrobotError
 from .common.parallel import end_all, is_first, on_first
-from .present.logs import LOGGER, logging_options
+from .present.logs import LOGGER, logging_options, python_option
+
+if TYPE_CHECKING:
+    from .run.solution import Solution
 
 FILE = click.Path(path_type=Path)
 
@@ -45,7 +49,9 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     """
     from .fe_models.link import make_link
     from .present.progress import Display
+    from .run.inputs import files_of_link
 
+    _protect(files_of_link(link_file))
     with Display() as display:
         outcome = make_link(link_file, output, force, display.stage)
     if not is_first():
@@ -68,6 +74,7 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     help="Where to write [SCENE.results.h5 beside the input].",
 )
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped, from its results file.")
+@python_option
 @logging_options
 def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
     """Run the analyses of a scene (stage 2).
@@ -77,38 +84,55 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
 
     Ctrl-C keeps what was computed; --resume goes on from there, and from the start where there are no results yet.
     """
+    from .common.errors import SolveError, StoppedError
     from .common.files import check_output
     from .present.progress import Display
     from .present.summary import print_summary, summary_console
     from .results.file import FORMAT
-    from .results.resume import how_to_go_on
+    from .results.resume import how_to_go_on, left_out
     from .results.resume import resume as resume_scene
     from .results.write import write_results
+    from .run.inputs import files_of_scene
     from .run.solve import solve as solve_scene
 
     path = output or scene_file.with_suffix(".results.h5")
+    _protect(files_of_scene(scene_file))
     check_output(path, FORMAT)
+    writing = 0.0
+
+    def keep(solution: Solution) -> None:
+        nonlocal writing
+        began = time.perf_counter()
+        write_results(solution, path)
+        writing = time.perf_counter() - began
+
     with Display() as display:
-        solution = resume_scene(scene_file, path, display) if resume else solve_scene(scene_file, display)
+        solution = resume_scene(scene_file, path, display, keep) if resume else solve_scene(scene_file, display, keep)
     if solution is None:
         click.echo(f"{path}: complete, nothing to go on with")
         return
-    began = time.perf_counter()
-    write_results(solution, path)
-    seconds = {**solution.seconds, "writing": time.perf_counter() - began}
-    print_summary(solution, path, seconds, summary_console())
+    print_summary(solution, path, {**solution.seconds, "writing": writing}, summary_console())
     where = f" -o {output}" if output else ""
-    for outcome in solution.outcomes.values():
-        outcome.check_completed(how_to_go_on(solution, f"ffrobot solve {scene_file}{where} --resume"))
+    go_on = how_to_go_on(solution, f"ffrobot solve {scene_file}{where} --resume")
+    try:
+        for outcome in solution.outcomes.values():
+            outcome.check_completed(go_on)
+    except SolveError as error:
+        raise StoppedError(str(error), display.signal) if display.signal else error from None
+    if display.signal:
+        done = "before all analyses" if left_out(solution) else "when all was computed and written"
+        raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
 
 
 @cli.command()
 @click.argument("file", metavar="FILE.h5", type=FILE)
 def info(file: Path) -> None:
     """Say what a modal body file or a results file holds."""
+    from .common.hdf5 import reading
     from .present.info import describe
 
-    click.echo(describe(file))
+    with reading(file):
+        click.echo(describe(file))
 
 
 @cli.command()
@@ -116,10 +140,12 @@ def info(file: Path) -> None:
 @click.option("--analysis", metavar="NAME", help="Of this analysis only.")
 def feasibility(results_file: Path, analysis: str | None) -> None:
     """Say whether motors and patches can do what the analyses of a results file ask of them, and what would do."""
+    from .common.hdf5 import reading
     from .present.feasibility import print_feasibility
     from .present.summary import summary_console
 
-    print_feasibility(results_file, analysis, summary_console())
+    with reading(results_file):
+        print_feasibility(results_file, analysis, summary_console())
 
 
 @cli.command()
@@ -131,9 +157,12 @@ def plot(file: Path, output: Path | None, formats: str) -> None:
 
     Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn.
     """
+    from .common.hdf5 import reading
     from .pictures.figures.plot import plot_file
 
-    for path in plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(",")):
+    with reading(file):
+        paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","))
+    for path in paths:
         click.echo(path)
 
 
@@ -150,9 +179,11 @@ def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN4
 
     Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies.
     """
+    from .common.hdf5 import reading
     from .pictures.view import Options, view_file
 
-    viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
+    with reading(file):
+        viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
     for path in viewed.paths:
         click.echo(path)
     for note in viewed.notes:
@@ -167,10 +198,12 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 
     Several results files come side by side, for comparison. The page needs no network and no other file.
     """
+    from .common.hdf5 import reading
     from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
-    write_report(results_files, path)
+    with reading(*results_files):
+        write_report(results_files, path)
     click.echo(path)
 
 
@@ -180,10 +213,11 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 @click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Where to write [RESULTS.npz].")
 def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
     """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
+    from .common.hdf5 import reading
     from .results.file import Results
 
     path = output or results_file.with_suffix(".npz")
-    with Results(results_file) as results:
+    with reading(results_file), Results(results_file) as results:
         name = results.export_linear(analysis, path)
     click.echo(f"{path}: linear model of {name}")
 
@@ -198,6 +232,7 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
 @click.option("--retry", is_flag=True, help="Run again what failed before.")
 @click.option("--keep/--no-keep", default=True, show_default=True, help="Whether results files of the runs stay.")
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder of the sweep [SCENE.sweep beside the input].")
+@python_option
 @logging_options
 def sweep(
     scene_file: Path,
@@ -223,12 +258,16 @@ def sweep(
     """  # noqa: D301 (click wants the backspace itself)
     from .present.progress import Display
     from .present.summary import summary_console
-    from .sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep
+    from .run.inputs import files_of_scene
+    from .sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
 
     folder = output or scene_file.with_suffix(".sweep")
+    _protect(files_of_scene(scene_file))
     plan = on_first(lambda: plan_sweep(scene_file, vary, folder, sample, seed, collect))
     if retry and is_first():
         forget_failures(plan)
+    if is_first() and (changes := stale_rows(plan)):
+        click.echo(f"ffrobot: {changes}", err=True)
     with Display() as display:
         rows = run_sweep(plan, processes, display)
     if not is_first():
@@ -257,17 +296,28 @@ def schema(kind: str) -> None:
 cli.add_command(bench)
 
 
+def _protect(paths: Iterable[Path]) -> None:
+    """Write to none of these files as long as the command runs."""
+    from .common.outputs import protected
+
+    click.get_current_context().with_resource(protected(paths))
+
+
 def main() -> None:
-    """Run the command line: exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C."""
-    stopped = False
+    """Run the command line.
+
+    Exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C, 143 after SIGTERM.
+    """
+    stopped = 0
 
     def stop(number: int, frame: FrameType | None) -> None:
         nonlocal stopped
-        stopped = True
+        stopped = number
         signal.default_int_handler(number, frame)
 
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
-    signal.signal(signal.SIGINT, stop)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
     try:
         cli(standalone_mode=False)
     except click.ClickException as error:
@@ -276,7 +326,7 @@ def main() -> None:
     except Exception as error:
         if stopped:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
             click.echo("ffrobot: stopped", err=True)
-            sys.exit(130)
+            sys.exit(128 + stopped)
         if not isinstance(error, FfrobotError):
             LOGGER.error("failed", exc_info=True)
             traceback.print_exc()
@@ -286,3 +336,6 @@ def main() -> None:
             LOGGER.error("%s", error)
             click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)
+    finally:  # nothing is left to keep: at the interpreter's end an interrupt would be a traceback
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)

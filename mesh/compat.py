@@ -15,8 +15,8 @@ import petsc4py
 import scipy.sparse as sp
 
 from ..common.arrays import Array, Integers
-from ..common.errors import SolveError
 from .cells import CellName
+from .form_cache import form_folder
 
 # Before dolfinx does it: PETSc's own signal handlers would answer a closed pipe or a kill with a page on debuggers.
 petsc4py.init(["ffrobot", "-no_signal_handler"])
@@ -54,10 +54,11 @@ def function_space(mesh: Mesh, family: ElementName, degree: int, *, discontinuou
     options: dict[str, Any] = {"discontinuous": discontinuous}
     if family == "P":
         options["lagrange_variant"] = basix.LagrangeVariant.gll_warped
-    with _compiling():
+    with _compiling(mesh.comm) as jit:
         if _OLD:
-            return fem.FunctionSpace(mesh, basix_ufl.create_element(_FAMILIES[family], _INTERVAL, degree, **options))
-        return fem.functionspace(mesh, basix_ufl.element(_FAMILIES[family], _INTERVAL, degree, **options))
+            element = basix_ufl.create_element(_FAMILIES[family], _INTERVAL, degree, **options)
+            return fem.FunctionSpace(mesh, element, **jit)
+        return fem.functionspace(mesh, basix_ufl.element(_FAMILIES[family], _INTERVAL, degree, **options), **jit)
 
 
 def create_interval_mesh(points: Array, cells: Integers) -> Mesh:
@@ -71,8 +72,7 @@ def create_interval_mesh(points: Array, cells: Integers) -> Mesh:
         domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell("interval", geometric_dimension=1), 1))
     else:
         domain = ufl.Mesh(basix_ufl.element("Lagrange", "interval", 1, shape=(1,)))
-    with _compiling():
-        return create_mesh(MPI.COMM_SELF, np.asarray(cells, dtype=np.int64), points.reshape(-1, 1), domain)
+    return create_mesh(MPI.COMM_SELF, np.asarray(cells, dtype=np.int64), points.reshape(-1, 1), domain)
 
 
 def cell_vertices(mesh: Mesh) -> Array:
@@ -98,12 +98,10 @@ def create_solid_mesh(comm: MPI.Comm, cell: CellName, degree: int, cells: Intege
     nodes = np.ascontiguousarray(cells[:, order], dtype=np.int64)
     if _OLD:
         scalar = ufl.FiniteElement("Lagrange", ufl.Cell(cell, geometric_dimension=3), degree, variant="equispaced")
-        with _compiling():
-            return create_mesh(comm, nodes, points, ufl.Mesh(ufl.VectorElement(scalar)), GhostMode.none)
+        return create_mesh(comm, nodes, points, ufl.Mesh(ufl.VectorElement(scalar)), GhostMode.none)
     element = basix_ufl.element("Lagrange", cell, degree, basix.LagrangeVariant.equispaced, shape=(3,))
     partitioner = create_cell_partitioner(GhostMode.none)
-    with _compiling():
-        return create_mesh(comm, nodes, points, ufl.Mesh(element), partitioner)
+    return create_mesh(comm, nodes, points, ufl.Mesh(element), partitioner)
 
 
 def geometry_nodes(mesh: Mesh) -> Integers:
@@ -137,8 +135,7 @@ def cell_dofs(space: FunctionSpace) -> Integers:
 
 def assemble_matrix(form: ufl.Form) -> sp.csr_matrix:
     """Assemble a bilinear form, without boundary conditions, to (test, trial) dofs."""
-    with _compiling():
-        compiled = fem.form(form)
+    compiled = compiled_form(form)
     matrix = fem.assemble_matrix(compiled)
     if _OLD:
         matrix.finalize()
@@ -151,8 +148,8 @@ def assemble_matrix(form: ufl.Form) -> sp.csr_matrix:
 
 def compiled_form(form: ufl.Form) -> fem.Form:
     """`form` ready to be assembled."""
-    with _compiling():
-        return fem.form(form)
+    with _compiling(form.ufl_domain().ufl_cargo().comm) as jit:
+        return fem.form(form, **jit)
 
 
 def lagrange_element(space: FunctionSpace) -> basix.finite_element.FiniteElement:
@@ -168,21 +165,13 @@ def node_map(space: FunctionSpace) -> Integers:
 
 
 @contextmanager
-def _compiling() -> Iterator[None]:
-    """FFCx compiles what it does not find in its cache (`fenics` in the XDG cache folder): mute its and gcc's log.
-
-    Raises:
-        SolveError: another run holds the cache's lock, or once died with it.
-    """
+def _compiling(comm: MPI.Comm) -> Iterator[dict[str, Any]]:
+    """Arguments that have dolfinx compile, and find what is compiled, by way of `form_cache`; logs are muted."""
     before = logging.root.manager.disable
     logging.disable(logging.WARNING)
     try:
-        yield
-    except TimeoutError:
-        raise SolveError(
-            "compiling the finite element forms: another run seems to be compiling the same form, or was interrupted "
-            "while it did; wait for it, or delete the folder `fenics` in your cache folder (~/.cache/fenics)"
-        ) from None
+        with form_folder(comm, dolfinx.__version__) as folder:
+            yield {"jit_params" if _OLD else "jit_options": {"cache_dir": str(folder)}}
     finally:
         logging.disable(before)
 
@@ -202,10 +191,10 @@ def _space(mesh: Mesh, degree: int, shape: tuple[int, ...]) -> FunctionSpace:
     if degree:
         options["lagrange_variant"] = basix.LagrangeVariant.gll_warped
     cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
-    with _compiling():
+    with _compiling(mesh.comm) as jit:
         if _OLD:
             element = basix_ufl.create_element(_FAMILIES["P"], cell, degree, **options)
             wrap = {0: lambda e: e, 1: basix_ufl.VectorElement, 2: basix_ufl.TensorElement}[len(shape)]
-            return fem.FunctionSpace(mesh, wrap(element, *([shape] if len(shape) == 2 else shape)))
+            return fem.FunctionSpace(mesh, wrap(element, *([shape] if len(shape) == 2 else shape)), **jit)
         element = basix_ufl.element(_FAMILIES["P"], cell, degree, shape=shape or None, **options)
-        return fem.functionspace(mesh, element)
+        return fem.functionspace(mesh, element, **jit)

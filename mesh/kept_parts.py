@@ -89,4 +89,4 @@ def keep_part(path: Path, part: PartMesh) -> None:
     image = BytesIO()
     np.savez(image, **arrays)
     with suppress(SolveError):
-        write_atomically(path, image.getvalue(), "mesh", make_folder=True)
+        write_atomically(path, image.getvalue(), "mesh", make_folder=True, ours=True)

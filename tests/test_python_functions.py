@@ -55,7 +55,7 @@ def test_load_needs_the_value_alone():
 
 
 def test_text_of_the_scene_names_the_function():
-    assert 'value = "<sine, function no. 1>"' in swing(sine).text
+    assert 'value = "<sine, function no. 1, content ' in swing(sine).text
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
+from ...common.python_files import check_python_file
 from ...common.validation import Record, existing_file, quoted
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PointReference, Positive, one_of
 from ...mbs.fields.references import Reference
@@ -149,7 +150,9 @@ def _python_function(value: object, info: ValidationInfo) -> object:
     path, colon, function = value.rpartition(":") if isinstance(value, str) else ("", "", "")
     if not colon or not path or not function.isidentifier():
         raise ValueError(f'expected "FILE.py:FUNCTION", found "{value}"')
-    return f"{existing_file(Path(path), info)}:{function}"
+    file = existing_file(Path(path), info)
+    check_python_file(file, (info.context or {}).get("folder", Path()))
+    return f"{file}:{function}"
 
 
 class PythonController(ControllerRecord):

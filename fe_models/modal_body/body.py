@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # m_ff = I and the identities between invariants must hold to this.
 IDENTITY_TOLERANCE = 1e-8
+POSITIVE_TOLERANCE = 1e-6  # of matrices that rounding, or a mesh, may leave indefinite
+INTERFACE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,6 +302,34 @@ def _check(body: ModalBody) -> None:
     if np.any(body.damping_ratio < 0):
         _fail(body, "damping_ratio: expected numbers not below 0")
     _check_identities(body, np.eye(n))
+    _check_inertia(body)
+    _check_interfaces(body)
+
+
+def _check_inertia(body: ModalBody) -> None:
+    """Kinetic energy is positive in every motion: about the center of mass, and with what the modes carry along."""
+    about_center = body.second_moment - np.outer(body.first_moment, body.first_moment) / body.mass
+    relative = body.modal_mass - body.S_bar.T @ body.S_bar / body.mass
+    matrices = {"second_moment, about the center of mass": about_center, "modal_mass, less S_bar": relative}
+    for name, matrix in matrices.items():
+        lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
+        if lowest < -POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0):
+            _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
+
+
+def _check_interfaces(body: ModalBody) -> None:
+    """Interfaces of a beam are points of its axis: they move as its stations do."""
+    if body.kind != "beam" or body.stations.element is None:
+        return
+    for name, interface in body.interfaces.items():
+        axis = body.interpolate(float(interface.position[0]))
+        for key, of_all in (("translation", body.stations.translation), ("rotation", body.stations.rotation)):
+            error = np.max(np.abs(getattr(interface, key) - getattr(axis, key)), initial=0.0)
+            if error > INTERFACE_TOLERANCE * np.max(np.abs(of_all), initial=0.0):
+                _fail(
+                    body,
+                    f"interfaces/{name}/{key}: expected what stations say there, found a difference of {error:.2g}",
+                )
 
 
 def _check_identities(body: ModalBody, unit: Array) -> None:

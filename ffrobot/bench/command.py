@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ..present.logs import logging_options
+from ..present.logs import logging_options, python_option
 from . import OF_A_SCENE, PARTS, PEER
 
 FILE = click.Path(path_type=Path)
@@ -51,6 +51,7 @@ def _numbers(context: click.Context, parameter: click.Parameter, value: str | No
 @click.option("--peer", type=click.Choice(["exudyn"]), help="Measure this program too, as part peer.")
 @click.option("--peer-python", metavar="PYTHON", type=FILE, help="Interpreter that has the peer [this one].")
 @click.option("--source", metavar="DIR", type=FILE, default=Path(), help="ffrobot's source tree [.].")
+@python_option
 @logging_options
 def bench(
     scene_file: Path | None,
@@ -72,8 +73,10 @@ def bench(
     source tree: the same for the two cases of the paper, how time grows with modes, links and outputs, and ratios to
     the two-link case written by hand. Tables as CSV and JSON, figures as PNG and PDF.
     """
+    from ..common.outputs import protected
     from ..present.progress import Display
     from ..present.summary import summary_console
+    from ..run.inputs import files_of_scene
     from .campaign import Campaign, Settings
     from .precision import INTEGRATORS, TOLERANCES
 
@@ -81,6 +84,9 @@ def bench(
         raise click.UsageError(f"of a scene, only the parts {' and '.join(OF_A_SCENE)} can be measured")
     if scene_file is None and analysis is not None:
         raise click.UsageError("--analysis goes with a scene")
+    if scene_file is not None:
+        context = click.get_current_context()
+        context.with_resource(protected(files_of_scene(scene_file)))
     settings = Settings(integrators or INTEGRATORS, tolerances or TOLERANCES, repeat, budget)
     folder = output or (scene_file.with_suffix(".bench") if scene_file else Path("bench"))
     with Display() as display:

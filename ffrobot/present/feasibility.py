@@ -11,6 +11,7 @@ from rich.console import Console, Group
 from rich.table import Table
 
 from ..common.errors import InputError
+from ..common.hdf5 import open_checked
 from ..common.validation import quoted
 
 
@@ -19,7 +20,7 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
     from ..results.file import FORMAT
 
     try:
-        with h5py.File(path, "r") as file:
+        with open_checked(path) as file:
             if file.attrs.get("format") != FORMAT:
                 raise InputError(f"{path}: expected a results file, found format {file.attrs.get('format')!r}")
             judged = [name for name, group in file.items() if "feasibility" in group]

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from ..common.arrays import Array
 from ..common.errors import InputError
+from ..common.hdf5 import open_checked
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
@@ -25,7 +26,7 @@ from .control import LOOP_COLUMNS, loop_row
 def describe(path: Path) -> str:
     """Text for `ffrobot info`. Raises `InputError` for a file that is neither a modal body nor results."""
     try:
-        with h5py.File(path, "r") as file:
+        with open_checked(path) as file:
             kind = file.attrs.get("format")
             if kind == RESULTS_FORMAT:
                 return _results(file)

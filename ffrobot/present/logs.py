@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import platform
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +19,26 @@ F = TypeVar("F", bound=Callable[..., object])
 
 LOGGER = logging.getLogger("ffrobot")
 LOGGER.addHandler(logging.NullHandler())
+
+
+def python_option(command: F) -> F:
+    """Give a command that solves scenes the option `--allow-python`."""
+    option = click.option(
+        "--allow-python",
+        metavar="PATH",
+        multiple=True,
+        type=click.Path(path_type=Path, exists=True),
+        expose_value=False,
+        callback=_allow_python,
+        help="Run Python files that the scene names from here too [its own folder]; repeatable.",
+    )
+    return option(command)
+
+
+def _allow_python(context: click.Context, parameter: click.Parameter, paths: tuple[Path, ...]) -> None:
+    from ..common.python_files import allow_python
+
+    allow_python(paths)
 
 
 def logging_options(command: F) -> F:
@@ -40,6 +61,8 @@ def _verbose(context: click.Context, parameter: click.Parameter, verbose: bool) 
 def _log_file(context: click.Context, parameter: click.Parameter, path: Path | None) -> None:
     if path is None:
         return
+    if not _is_log(path):
+        raise click.BadParameter(f"expected a new file or a log, found {path}, a file of another kind")
     try:
         _add(logging.FileHandler(path, encoding="utf-8"), "%(asctime)s %(levelname)s %(message)s")
     except OSError as error:
@@ -48,6 +71,21 @@ def _log_file(context: click.Context, parameter: click.Parameter, path: Path | N
 
     LOGGER.info("ffrobot %s, Python %s, %s", program_version(), platform.python_version(), platform.platform())
     LOGGER.info("%s", " ".join(sys.argv))
+
+
+def _is_log(path: Path) -> bool:
+    """Whether lines may be added to `path`: a new file, an empty one, an earlier log, a device."""
+    try:
+        if path.is_symlink() and not path.exists():
+            path.resolve(strict=True)
+        if not path.is_file():
+            return True
+        with path.open("rb") as stream:
+            return re.match(rb"$|\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} [A-Z]+ ", stream.read(80)) is not None
+    except FileNotFoundError:
+        return True
+    except (OSError, RuntimeError):  # links in a circle, for one
+        return False
 
 
 def _add(handler: logging.Handler, layout: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -23,6 +24,7 @@ class Display(Watcher):
     def __init__(self) -> None:
         self._progress: Progress | None = None
         self._task: TaskID | None = None
+        self.signal = 0  # that has asked for an end
 
     def __enter__(self) -> Display:
         if sys.stderr.isatty() and is_first():
@@ -46,6 +48,12 @@ class Display(Watcher):
         if self._task is not None:
             self._progress.remove_task(self._task)
         self._task = self._progress.add_task(title, total=None)
+
+    def stopping(self, number: int) -> None:
+        """Say so at once: evaluating and writing what was computed may take a while."""
+        self.signal = number
+        # not by way of Python's streams, which the signal may have found in the middle of something
+        os.write(sys.stderr.fileno(), b"ffrobot: stopping, and keeping what was computed (again: not keeping it)\n")
 
     def advance(self, t: float, end: float) -> bool:
         """Move the bar."""

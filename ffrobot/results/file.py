@@ -14,10 +14,10 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import h5py
-import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError
+from ..common.hdf5 import blaming, numbers, open_checked
 from ..common.validation import did_you_mean, quoted
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_modal_body
@@ -60,15 +60,16 @@ class Results:
     def _open(self, path: Path, content: PathLike[str] | str | h5py.h5f.FileID) -> None:
         self.path = path
         try:
-            self._file = h5py.File(content, "r")
+            self._file = h5py.File(content, "r") if isinstance(content, h5py.h5f.FileID) else open_checked(path)
         except OSError as error:
             reason = "no such file" if not self.path.exists() else f"not a readable HDF5 file ({error})"
             raise InputError(f"{path}: expected a results file, found {reason}") from None
         if "scene" not in self._file.attrs:
             self._file.close()
             raise InputError(f"{path}: expected a results file, found an HDF5 file without a scene")
-        self.scene_text: str = self._file.attrs["scene"]
-        self.scene: dict[str, Any] = tomllib.loads(self.scene_text)
+        with blaming(path):
+            self.scene_text: str = self._file.attrs["scene"]
+            self.scene: dict[str, Any] = tomllib.loads(self.scene_text)
 
     def __enter__(self) -> Results:
         return self
@@ -191,7 +192,7 @@ class Results:
         item = self._file.get(dataset)
         if not isinstance(item, h5py.Dataset):
             raise InputError(f'{self.path}: expected the dataset "{dataset}", found none{self._near(dataset)}')
-        return np.asarray(item, dtype=float)
+        return numbers(item, f"{self.path}: {dataset}")
 
     def data(self, name: str) -> Array:
         """A dataset as (T, columns), or one of its columns, `name[k]`, as (T, 1). Raises `InputError` if absent."""
@@ -218,7 +219,7 @@ class Results:
         def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
             if not isinstance(item, h5py.Dataset) or item.shape[:1] != (outputs,) or name.startswith("resume/"):
                 return
-            values = np.asarray(item, dtype=float).reshape(outputs, -1)
+            values = numbers(item, f"{self.path}: {name}").reshape(outputs, -1)
             labels = [name] if item.ndim == 1 else [f"{name}[{k}]" for k in range(values.shape[1])]
             found.update(zip(labels, values.T, strict=True))
 

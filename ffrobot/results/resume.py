@@ -7,7 +7,6 @@ run again.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -17,16 +16,19 @@ from typing import Any
 
 import h5py
 
+from ..common.arrays import Array
 from ..common.errors import InputError
+from ..common.hdf5 import blaming
 from ..common.validation import key_path
 from ..common.version import program_version
 from ..mbs import _core
-from ..mbs.analysis.outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
+from ..mbs.analysis.outcome import BODY_PEAKS, STEPS, Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from ..mbs.scene.analysis import IntegratedAnalysis
 from ..mbs.solve.integrators import METHODS, Choice
+from ..run.inputs import digest_of_file, named_files
 from ..run.prepare import prepare, stiffened
 from ..run.solution import Solution
-from ..run.solve import run_analyses
+from ..run.solve import Keep, run_analyses
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
 from .file import Results
@@ -35,11 +37,12 @@ GROUP = "resume"  # in the group of an analysis
 STOPPED = ("interrupted", "too many steps")
 ROWS = ("q", "v", "a", "lambda_", "tau", "F_p")  # what results files do not hold anyway
 COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
-CHECKPOINT = ("state", "stepping", "gathered")
 MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 
-def resume(scene: Scene | Path, results: Path, watcher: Watcher | None = None) -> Solution | None:
+def resume(
+    scene: Scene | Path, results: Path, watcher: Watcher | None = None, keep: Keep | None = None
+) -> Solution | None:
     """`solve`, going on from the results file `results`; None where that is complete. From the start if absent.
 
     Raises `InputError` where the file is not that of the same scene, modal bodies and waypoints; else as `solve`.
@@ -47,8 +50,8 @@ def resume(scene: Scene | Path, results: Path, watcher: Watcher | None = None) -
     watcher = watcher or Watcher()
     solution = prepare(scene, watcher)
     if not results.exists():
-        return run_analyses(solution, watcher)
-    with Results(results) as file:
+        return run_analyses(solution, watcher, keep)
+    with blaming(results), Results(results) as file:
         _check_same_input(solution, file)
         status = [file.attributes(name)["status"] if file.has(name) else "" for name in _analyses(solution)]
         if all(found == "completed" for found in status):
@@ -57,13 +60,13 @@ def resume(scene: Scene | Path, results: Path, watcher: Watcher | None = None) -
             solution = stiffened(solution)
         kept = [name for name in file.analyses if file.has(f"{name}/{GROUP}")]
         solution = replace(solution, earlier={name: _earlier_run(solution, file, name) for name in kept})
-    return run_analyses(solution, watcher)
+    return run_analyses(solution, watcher, keep)
 
 
 def write_state(file: h5py.File, solution: Solution) -> None:
     """Add to a results file, where the run was stopped, what `resume` needs."""
-    file.attrs["waypoint_files"] = json.dumps(_waypoint_files(solution.scene))
-    if not _stopped(solution):
+    file.attrs["input_files"] = json.dumps(_input_files(solution.scene))
+    if not _stopped(solution) and not left_out(solution):
         return
     for name, outcome in solution.outcomes.items():
         if _goes_on(solution, outcome):
@@ -74,10 +77,17 @@ def how_to_go_on(solution: Solution, command: str) -> str:
     """What a message about a run that was stopped adds; empty where it cannot be gone on with."""
     outcome = _stopped(solution)
     if outcome is None:
-        return ""
+        return "".join(f'; {command} goes on with "{name}"' for name in left_out(solution)[:1])
     if _goes_on(solution, outcome):
         return f"; {command} goes on from t = {outcome.statistics.time_reached:.9g} s"
     return f'; {command} runs "{outcome.analysis.name}" again from its start'
+
+
+def left_out(solution: Solution) -> list[str]:
+    """Analyses that were not begun when the run was stopped, or ended by an error."""
+    if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
+        return []
+    return [name for name in _analyses(solution) if name not in solution.outcomes]
 
 
 def _stopped(solution: Solution) -> Outcome | None:
@@ -86,7 +96,8 @@ def _stopped(solution: Solution) -> Outcome | None:
 
 def _goes_on(solution: Solution, outcome: Outcome) -> bool:
     """Whether `outcome` is of use to `resume`; a search for modes has bodies of its own and starts again."""
-    return solution.mode_choice is None and outcome.analysis.is_resumable
+    searched = any(body.modes == "auto" for body in solution.scene.body)
+    return not searched and outcome.analysis.is_resumable
 
 
 def _analyses(solution: Solution) -> list[str]:
@@ -99,9 +110,11 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
             group[name] = rows
     assert outcome.continuation is not None
     checkpoint, recording = outcome.continuation.checkpoint, outcome.continuation.recording
-    for name in CHECKPOINT:
-        group[f"checkpoint/{name}"] = getattr(checkpoint, name)
-    group["checkpoint"].attrs.update({"time": checkpoint.time, "outputs": checkpoint.outputs})
+    group["checkpoint/state"] = checkpoint.state
+    for name in (*BODY_PEAKS, "groups"):
+        group[f"checkpoint/peaks/{name}"] = getattr(checkpoint.peaks, name)
+    about = {"time": checkpoint.time, "outputs": checkpoint.outputs}
+    group["checkpoint"].attrs.update(about | {name: getattr(checkpoint.steps, name) for name in STEPS})
     if recording is not None:
         group["recording/times"] = recording.times
         group["recording/states"] = recording.states
@@ -110,6 +123,8 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
 def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
     about, group = file.attributes(name), f"{name}/{GROUP}"
     rows = {row: file[f"{group}/{row}"] if file.has(f"{group}/{row}") else None for row in ROWS}
+    if missing := [row for row in ROWS[:4] if rows[row] is None]:
+        raise InputError(f"{file.path}: {group}/{missing[0]}: expected a dataset, found none")
     tau, F_p = rows.pop("tau"), rows.pop("F_p")
     motion = {key: values for key, values in rows.items() if values is not None}
     integrator = Choice(about["integrator"], about["integrator_reason"])
@@ -119,23 +134,47 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
         Forces(tau, F_p),
         Statistics(status=about["status"], integrator=integrator, **counts),
         _continuation(solution, file, name),
+        f"{file.path}: {group}",
     )
 
 
 def _continuation(solution: Solution, file: Results, name: str) -> Continuation:
     about, group = file.attributes(name), f"{name}/{GROUP}"
-    where = file.attributes(f"{group}/checkpoint")
-    state, stepping, gathered = (file[f"{group}/checkpoint/{key}"] for key in CHECKPOINT)
-    checkpoint = _core.Checkpoint(where["time"], state, stepping, gathered, int(where["outputs"]))
+    checkpoint, expected = _checkpoint(file, f"{group}/checkpoint"), len(file.time(name))
+    if checkpoint.outputs != expected or about["status"] not in (*STOPPED, "completed"):
+        raise InputError(
+            f"{file.path}: {group}: expected as many outputs as times, {expected}, found {checkpoint.outputs}"
+        )
     if not file.has(f"{group}/recording"):
         return Continuation(checkpoint)
     analysis = next(analysis for analysis in solution.scene.analysis if analysis.name == name)
     assert isinstance(analysis, IntegratedAnalysis)
-    times, states = (file[f"{group}/recording/{key}"] for key in ("times", "states"))
+    times, states = (_vector(file, f"{group}/recording/{key}") for key in ("times", "states"))
     method = METHODS[about["integrator"]]
     return Continuation(
         checkpoint, _core.Recording(times, states, method, analysis.spectral_radius, analysis.tolerance)
     )
+
+
+def _checkpoint(file: Results, group: str) -> _core.Checkpoint:
+    about = file.attributes(group)
+    try:
+        return _core.Checkpoint(
+            time=float(about["time"]),
+            state=_vector(file, f"{group}/state"),
+            steps=_core.StepHistory(**{name: about[name].item() for name in STEPS}),
+            peaks=_core.Peaks(**{name: _vector(file, f"{group}/peaks/{name}") for name in (*BODY_PEAKS, "groups")}),
+            outputs=int(about["outputs"]),
+        )
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise InputError(f"{file.path}: {group}: expected where the run has stopped, found {error}") from None
+
+
+def _vector(file: Results, name: str) -> Array:
+    values = file[name]
+    if values.ndim != 1:
+        raise InputError(f"{file.path}: {name}: expected a row of numbers, found an array of shape {values.shape}")
+    return values
 
 
 def _check_same_input(solution: Solution, file: Results) -> None:
@@ -159,10 +198,10 @@ def _changes(solution: Solution, file: Results) -> Iterator[str]:
     for name, body in solution.bodies.items():
         if body.path is not None and body.file_hash != file.modal_files[name].sha256:
             yield f'the modal body of "{name}"'
-    waypoints = json.loads(file.attributes("/").get("waypoint_files", "{}"))
-    for name, digest in _waypoint_files(solution.scene).items():
-        if waypoints.get(name) != digest:
-            yield f"the waypoints {name}"
+    files = json.loads(file.attributes("/").get("input_files", "{}"))
+    for name, digest in _input_files(solution.scene).items():
+        if files.get(name) != digest:
+            yield name
 
 
 def _without_limits(scene: Mapping[str, Any]) -> dict[str, Any]:
@@ -184,7 +223,10 @@ def _first_difference(then: object, now: object, loc: tuple[int | str, ...] = ()
     return next((place for place in found if place is not None), loc)
 
 
-def _waypoint_files(scene: Scene) -> dict[str, str]:
-    """SHA-256 of the waypoint files of a scene, by their name there."""
-    names = [entry.get("waypoints") for entry in tomllib.loads(scene.text).get("trajectory", [])]
-    return {n: hashlib.sha256((scene.path.parent / n).read_bytes()).hexdigest() for n in names if n is not None}
+def _input_files(scene: Scene) -> dict[str, str]:
+    """SHA-256 of the files that a scene names besides links and modal bodies, by what messages call them."""
+    tables, folder = tomllib.loads(scene.text), scene.path.parent
+    waypoints = {entry["waypoints"] for entry in tables.get("trajectory", []) if "waypoints" in entry}
+    calls = {folder / name: f"the waypoints {name}" for name in waypoints}
+    besides = {key: value for key, value in tables.items() if key != "body"}
+    return {calls.get(file, f"the file {file.name}"): digest_of_file(file) for file in named_files(besides, folder)}

@@ -12,6 +12,7 @@ import h5py
 from ..actuation.control.closed_loop import LoopRecord
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.placement import Placed
+from ..common.checksum import MARK, METHOD, sealed
 from ..common.files import write_atomically
 from ..common.version import program_version
 from ..mbs.analysis.motors_only import InvertedPath
@@ -38,7 +39,7 @@ DETAILS: dict[type[Details], Callable[[h5py.Group, Outcome, Any], None]] = {
 
 def write_results(solution: Solution, path: Path) -> None:
     """Write every analysis of a solution to `path`. Raises `SolveError` where that fails; no half file is left."""
-    write_atomically(path, results_image(solution), "results file")
+    write_atomically(path, sealed(results_image(solution)), "results file")
 
 
 def results_image(solution: Solution) -> bytes:
@@ -46,6 +47,7 @@ def results_image(solution: Solution) -> bytes:
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
+        file.attrs[MARK] = METHOD
         file.attrs["ffrobot_version"] = program_version()
         file.attrs["name"] = solution.scene.name
         file.attrs["scene"] = solution.scene.text

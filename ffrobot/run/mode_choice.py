@@ -110,7 +110,9 @@ class ModeSearch:
         """Take in a solve with the bodies asked for, which is the `last` one in any case where that is said."""
         self._tried.append(sum(body.n_modes for body in self._levels[self._level].values()))
         results = solution.analyses
-        self._completed = all(result.outcome.status == "completed" for result in results.values())
+        self._completed = len(results) == len(solution.scene.analysis) and all(
+            result.outcome.status == "completed" for result in results.values()
+        )
         if self._completed:
             self._estimate.add({name: reported(solution.scene, result) for name, result in results.items()})
         enough = self._completed and self._estimate.meets(self._tolerances)

@@ -79,6 +79,7 @@ class Solution:
         mode_choice: where `modes = "auto"`.
         stiffened: whether geometric stiffening is in the equations.
         earlier: runs of analyses to go on with, from a results file: see `results.resume`.
+        failure: what ended the run, where that was an error after analyses that are worth keeping.
     """
 
     scene: Scene
@@ -93,6 +94,7 @@ class Solution:
     mode_choice: ModeChoice | None = None
     stiffened: bool = False
     earlier: Mapping[str, EarlierRun] = field(default_factory=dict)
+    failure: Exception | None = None
 
     @property
     def outcomes(self) -> Mapping[str, Outcome]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,27 +24,47 @@ from .watcher import Interruption, Watcher
 logger = logging.getLogger(__name__)
 
 
-def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
+Keep = Callable[[Solution], None]
+
+
+def solve(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None = None) -> Solution:
     """Run every analysis of a scene or a scene file; stage 1 runs first for links that are not up to date.
 
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
-    So does Ctrl-C during an analysis.
+    So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised, and before Ctrl-C
+    interrupts again.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
     watcher = watcher or Watcher()
-    return run_analyses(prepare(scene, watcher), watcher)
+    return run_analyses(prepare(scene, watcher), watcher, keep)
 
 
-def run_analyses(solution: Solution, watcher: Watcher) -> Solution:
+def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """What `solve` does with everything prepared; analyses go on from where `solution.earlier` has them."""
-    with Interruption() as interruption:
+    with Interruption(watcher.stopping) as interruption:
         if any(body.modes == "auto" for body in solution.scene.body):
             solution = _with_enough_modes(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
-    return replace(solution, analyses={name: evaluated(solution, x) for name, x in solution.analyses.items()})
+        solution = _evaluated(solution)
+        if keep is not None and solution.analyses:
+            keep(solution)
+    if solution.failure is not None:
+        raise solution.failure
+    return solution
+
+
+def _evaluated(solution: Solution) -> Solution:
+    """The solution with all that follows from its outcomes; without it where finding it fails."""
+    results, failure = dict(solution.analyses), solution.failure
+    for name, result in results.items():
+        try:
+            results[name] = evaluated(solution, result)
+        except Exception as error:
+            failure = failure or error
+    return replace(solution, analyses=results, failure=failure)
 
 
 def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
@@ -52,28 +72,34 @@ def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Inter
     search = ModeSearch(solution)
     while (bodies := search.next_bodies()) is not None:
         solution = _completed(with_bodies(solution, bodies), watcher, interruption)
+        if solution.failure is not None:
+            return solution
         search.add(solution, last=interruption.requested)
     return replace(solution, mode_choice=search.choice())
 
 
 def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
     """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
-    results = _run_all(solution, watcher, interruption)
-    if results is None:
-        solution = stiffened(solution)
-        results = _run_all(solution, watcher, interruption)
-    assert results is not None
-    return replace(solution, analyses=results)
+    found = _run_all(solution, watcher, interruption) or _run_all(stiffened(solution), watcher, interruption)
+    assert found is not None
+    return found
 
 
-def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> dict[str, AnalysisResult] | None:
+def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution | None:
     """The analyses up to the first that fails; None where `geometric_stiffening = "auto"` asks for them all again."""
     stiffening = {name: body.planar.stiffening for name, body in solution.bodies.items()}
     results: dict[str, AnalysisResult] = {}
     for analysis in solution.scene.analysis:
+        if interruption.requested and results:
+            break
         began = time.perf_counter()
         watcher.stage(f'analysis "{analysis.name}"')
-        outcome = analysis.run(_context(solution, analysis, results, watcher, interruption))
+        try:
+            outcome = analysis.run(_context(solution, analysis, results, watcher, interruption))
+        except Exception as error:  # raised once the analyses before it are kept
+            if not results:
+                raise
+            return replace(solution, analyses=results, failure=error)
         effect = estimated_effect(outcome, stiffening)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
         if automatic and effect > NOTABLE and outcome.status != "interrupted":
@@ -86,7 +112,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         _log(outcome)
         if outcome.failed:
             break
-    return results
+    return replace(solution, analyses=results)
 
 
 def _context(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Callable
 from types import FrameType, TracebackType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -19,16 +20,22 @@ class Watcher:
         """An analysis has reached time t of `end`; False stops it."""
         return True
 
+    def stopping(self, number: int) -> None:
+        """Signal `number` asks for an end: what has been computed is kept, unless another signal follows."""
+
 
 class Interruption:
     """Within its context the first Ctrl-C (or SIGTERM) only sets `requested`; the next one interrupts as usual.
+
+    `tell` is called at once with the number of the signal.
 
     Python would raise `KeyboardInterrupt` anywhere, in the calls from the core too, and the outputs so far were lost.
     Signals reach the main thread only: in any other the context does nothing.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, tell: Callable[[int], None]) -> None:
         self.requested = False
+        self._tell = tell
         self._is_main = threading.current_thread() is threading.main_thread()
 
     def __enter__(self) -> Interruption:
@@ -43,6 +50,7 @@ class Interruption:
     def _request(self, number: int, frame: FrameType | None) -> None:
         self.requested = True
         self._restore()
+        self._tell(number)
 
     def _restore(self) -> None:
         for number, handler in self._previous.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .sweep import Sweep, drop_results, forget_failures, plan_sweep, run_sweep
+from .sweep import Sweep, drop_results, forget_failures, plan_sweep, run_sweep, stale_rows
 from .table import print_table
 
-__all__ = ["Sweep", "drop_results", "forget_failures", "plan_sweep", "print_table", "run_sweep"]
+__all__ = ["Sweep", "drop_results", "forget_failures", "plan_sweep", "print_table", "run_sweep", "stale_rows"]

@@ -3,26 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from ..common.errors import InputError
+from ..common.files import write_atomically
 from ..common.validation import did_you_mean, load_toml, quoted
+from ..run.inputs import FILE_KEYS, digest_of_file, fingerprints, named_files
 from .variation import Value
 
 Table = dict[str, Any]
 Node = dict[str, Any] | list[Any]
 
-LINKS = "links"
-FILE_KEYS = {"link", "modal", "waypoints", "file", "python"}
+LINKS, SCENE = "links", "scene.toml"
 
 
-def write_run(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder: Path) -> Path:
-    """Write the scene at `scene_path` with `changes`, and the link files they concern, into `folder`.
+@dataclass(frozen=True)
+class RunFiles:
+    """The scene of one run and the link files that its changes concern, not written yet.
 
-    Returns the new scene file. Raises `InputError` for a key that leads nowhere.
+    Attributes:
+        scene: its tables; of changed links the names in the run's folder.
+        links: the tables of changed links, by name there.
+        inputs: fingerprints of everything that the run is made from, under the names of the user's files.
+    """
+
+    scene: Table
+    links: dict[Path, Table]
+    inputs: dict[str, str]
+
+    def write(self, folder: Path) -> Path:
+        """Write them into `folder`; returns the scene file."""
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, tables in (*self.links.items(), (folder / SCENE, self.scene)):
+            write_atomically(path, tomli_w.dumps(tables).encode(), "scene of the run", ours=True)
+        return folder / SCENE
+
+
+def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder: Path) -> RunFiles:
+    """The scene at `scene_path` with `changes`, and the link files they concern, for the folder `folder`.
+
+    Raises `InputError` for a key that leads nowhere.
     """
     scene = load_toml(scene_path, "scene file")
     _resolve(scene, scene_path.absolute().parent)
@@ -32,14 +56,15 @@ def write_run(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
             _set(_link_of(scene_path, scene, key, links), key[2:], value, key)
         else:
             _set(scene, key, value, key)
-    folder.mkdir(parents=True, exist_ok=True)
+    inputs = fingerprints(scene, scene_path.absolute())
+    copies = {}
     for body, link in links.items():
-        path = folder / f"{body}.toml"
-        path.write_text(tomli_w.dumps(link), encoding="utf-8")
-        _body(scene, body)["link"] = str(path.absolute())
-    path = folder / "scene.toml"
-    path.write_text(tomli_w.dumps(scene), encoding="utf-8")
-    return path
+        path = (folder / f"{body}.toml").absolute()
+        origin = Path(_body(scene, body)["link"])
+        inputs |= {str(path): digest_of_file(path) for path in named_files(link, origin.parent)}
+        copies[path] = link
+        _body(scene, body)["link"] = str(path)
+    return RunFiles(scene, copies, inputs)
 
 
 def _link_of(scene_path: Path, scene: Table, key: tuple[str, ...], links: dict[str, Table]) -> Table:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
+import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
 from typing import Any
 
 import numpy as np
@@ -18,8 +20,12 @@ from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.parallel import environment_without_mpi
 from ..results.file import Results
+from .files import SCENE
 
-ROW, SCENE, RESULTS = "row.json", "scene.toml", "results.h5"
+ROW, RESULTS = "row.json", "results.h5"
+
+STOPPED = [code for number in (signal.SIGINT, signal.SIGTERM) for code in (-number, 128 + number)]
+"""Exit codes of a run that was asked to end: nothing of the run itself."""
 
 REDUCTIONS: Mapping[str, Callable[[Array], Any]] = {
     "max": lambda values: np.abs(values).max(),
@@ -35,46 +41,71 @@ STANDARD = ("joints/{}/moment", "pzt/{}/required_voltage", "pzt/{}/voltage", "po
 
 @dataclass(frozen=True)
 class Run:
-    """One combination of values: where its files are and what is collected of its results."""
+    """One combination of values: where its files are, what is collected of its results, and what it is made from."""
 
     number: int
     values: tuple[Any, ...]
     folder: Path
     collect: tuple[str, ...] = ()
+    inputs: dict[str, str] = field(default_factory=dict)
+    allow_python: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
 class Row:
-    """What a run left: `status` is "completed", "wrong input", "failed" or "crashed", with the program's message."""
+    """What a run left: `status` is "completed", "wrong input", "failed" or "crashed", with the program's message.
+
+    `inputs` are the fingerprints of what it was made from: see `run.inputs`.
+    """
 
     number: int
     values: tuple[Any, ...]
     status: str
     message: str = ""
     quantities: dict[str, float] = field(default_factory=dict)
+    inputs: dict[str, str] = field(default_factory=dict)
 
 
-def perform(run: Run) -> Row:
-    """Solve the scene in the run's folder; the row is kept there, so that the sweep can be taken up again."""
+_children: set[Popen[str]] = set()
+
+
+def stop_runs() -> None:
+    """Ask the processes of runs that go on to end."""
+    for child in list(_children):
+        child.terminate()
+
+
+def perform(run: Run) -> Row | None:
+    """Solve the scene in the run's folder; None where a signal has asked it to stop."""
     results = run.folder / RESULTS
     command = [sys.executable, "-m", "ffrobot", "solve", str(run.folder / SCENE), "-o", str(results)]
+    command += [f"--allow-python={path}" for path in run.allow_python]
     threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(command, env=environment_without_mpi() | threads, capture_output=True, text=True)
-    status = {0: "completed", 1: "failed", 2: "wrong input"}.get(done.returncode, "crashed")
-    message = "" if done.returncode == 0 else _last_message(done.stderr, run.folder)
+    results.unlink(missing_ok=True)  # of other input, maybe
+    environment = environment_without_mpi() | threads
+    with Popen(command, env=environment, stdout=DEVNULL, stderr=PIPE, text=True) as child:
+        _children.add(child)
+        _, told = child.communicate()
+        _children.discard(child)
+    if child.returncode in STOPPED:
+        return None
+    status = {0: "completed", 1: "failed", 2: "wrong input"}.get(child.returncode, "crashed")
+    message = "" if child.returncode == 0 else _last_message(told, run.folder)
     quantities = _quantities(results, run.collect) if results.exists() else {}
-    row = Row(run.number, run.values, status, message, quantities)
-    write_atomically(run.folder / ROW, json.dumps(asdict(row)).encode(), "row of the sweep")
-    return row
+    return Row(run.number, run.values, status, message, quantities, run.inputs)
+
+
+def keep_row(folder: Path, row: Row) -> None:
+    """Keep a row in the run's folder, so that the sweep can be taken up again."""
+    write_atomically(folder / ROW, json.dumps(asdict(row)).encode(), "row of the sweep", ours=True)
 
 
 def finished_row(folder: Path) -> Row | None:
-    """The row that an earlier run left in `folder`, if it came to its end."""
-    path = folder / ROW
-    if not path.exists():
-        return None
-    data = json.loads(path.read_text(encoding="utf-8"))
-    return Row(**(data | {"values": tuple(data["values"])}))
+    """The row that an earlier run left in `folder`, if it came to its end and can be read."""
+    with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
+        data = json.loads((folder / ROW).read_text(encoding="utf-8"))
+        return Row(**(data | {"values": tuple(data["values"])}))
+    return None
 
 
 def _last_message(text: str, folder: Path) -> str:

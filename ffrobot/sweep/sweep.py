@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..common.errors import InputError
-from ..common.files import write_atomically
+from ..common.errors import InputError, StoppedError
+from ..common.files import check_folder, write_atomically
 from ..common.parallel import is_first, processes
+from ..common.python_files import allowed_python, python_allowed
+from ..run.inputs import PROGRAM, changed
 from ..run.watcher import Watcher
-from .files import write_run
-from .runs import RESULTS, ROW, Row, Run, collected, finished_row, perform
+from .files import RunFiles, run_files
+from .runs import RESULTS, ROW, Row, Run, collected, finished_row, keep_row, perform, stop_runs
 from .table import write_table
 from .variation import Value, Variation, grid, latin_hypercube, parse_variation
 
@@ -34,6 +37,7 @@ class Sweep:
     points: tuple[tuple[Value, ...], ...]
     folder: Path
     collect: tuple[str, ...] = ()
+    allow_python: tuple[Path, ...] = ()
 
     @property
     def keys(self) -> list[str]:
@@ -53,22 +57,33 @@ class Sweep:
     @property
     def runs(self) -> list[Run]:
         """In the order of the table."""
-        return [Run(k, values, self.folder / "runs" / f"{k:04d}", self.collect) for k, values in enumerate(self.points)]
+        folders = (self.folder / "runs" / f"{k:04d}" for k in range(len(self.points)))
+        return [
+            Run(k, values, folder, self.collect, {}, self.allow_python)
+            for k, (values, folder) in enumerate(zip(self.points, folders, strict=True))
+        ]
 
 
 def plan_sweep(
-    scene: Path, vary: Sequence[str], folder: Path, sample: int | None, seed: int, collect: Sequence[str]
+    scene: Path,
+    vary: Sequence[str],
+    folder: Path,
+    sample: int | None,
+    seed: int,
+    collect: Sequence[str],
 ) -> Sweep:
     """Every combination of the values, or `sample` points of a Latin hypercube.
 
     Raises `InputError` for a wrong `--vary` or `--collect`, a scene or link file that its first point makes wrong, and
     a folder that holds another sweep.
     """
+    check_folder(folder)
     variations = tuple(parse_variation(text) for text in vary)
     for request in collect:
         collected(request)
     points = tuple(grid(variations) if sample is None else latin_hypercube(variations, sample, seed))
-    sweep = Sweep(scene, variations, points, folder, tuple(collect))
+    allowed = (scene.absolute().parent, *allowed_python())  # runs have folders of their own
+    sweep = Sweep(scene, variations, points, folder, tuple(collect), allowed)
     _check_first(sweep)
     _claim_folder(sweep)
     return sweep
@@ -83,21 +98,57 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher) -> list[Row]:
     if not is_first():
         with _performed([], side_by_side):
             return []
-    rows = {run.number: row for run in sweep.runs if (row := finished_row(run.folder)) is not None}
-    waiting = [run for run in sweep.runs if run.number not in rows]
-    for run in waiting:
-        _write_files(sweep, run)
+    rows, waiting = _rows_and_runs(sweep)
+    if rows or sweep.table.exists():
+        write_table(sweep.table, sweep.keys, [rows[k] for k in sorted(rows)])
     watcher.stage(f"{len(waiting)} runs" + (f", {len(rows)} done before" if rows else ""))
-    with _performed(waiting, side_by_side) as finished:
+    with _performed(list(waiting.values()), side_by_side) as finished:
         for row in finished:
+            if row is None:
+                raise StoppedError(f"{sweep.folder}: stopped; the same command takes it up again", signal.SIGINT)
+            run = waiting[row.number]
+            if what := changed(row.inputs, _files(sweep, run).inputs):
+                raise InputError(
+                    f"{sweep.folder}: {' and '.join(what)} changed while the sweep ran, and the runs under way with it;"
+                    " the same command takes it up again, and computes what is out of date"
+                )
+            keep_row(run.folder, row)
             rows[row.number] = row
             watcher.advance(len(rows), len(sweep.points))
             write_table(sweep.table, sweep.keys, [rows[k] for k in sorted(rows)])
     return [rows[k] for k in sorted(rows)]
 
 
+def stale_rows(sweep: Sweep) -> str:
+    """Drop rows of other input than there is now; one line on what has changed, empty where nothing has."""
+    stale: dict[str, None] = {}
+    count = 0
+    for run in sweep.runs:
+        row = finished_row(run.folder)
+        if row is None or not (what := changed(row.inputs, _files(sweep, run).inputs)):
+            continue
+        stale |= dict.fromkeys(what if row.inputs else [PROGRAM])
+        count += 1
+        (run.folder / ROW).unlink()
+    names = " and ".join(stale)
+    return f"{names} {'have' if len(stale) > 1 else 'has'} changed since: {count} rows computed again" if stale else ""
+
+
+def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, Run]]:
+    """By number: the rows of finished runs of the same input, and the runs that are left, their files written."""
+    rows, waiting = {}, {}
+    for run in sweep.runs:
+        files, row = _files(sweep, run), finished_row(run.folder)
+        if row is not None and row.inputs == files.inputs:
+            rows[run.number] = row
+        else:
+            files.write(run.folder)
+            waiting[run.number] = replace(run, inputs=files.inputs)
+    return rows, waiting
+
+
 @contextmanager
-def _performed(runs: Sequence[Run], side_by_side: int) -> Iterator[Iterable[Row]]:
+def _performed(runs: Sequence[Run], side_by_side: int) -> Iterator[Iterable[Row | None]]:
     """Rows of the runs as they finish; the body of the `with` ends when the last one is there."""
     if processes() > 1:
         from mpi4py.futures import MPICommExecutor
@@ -110,12 +161,13 @@ def _performed(runs: Sequence[Run], side_by_side: int) -> Iterator[Iterable[Row]
         try:
             yield (future.result() for future in as_completed(futures))
         finally:
-            threads.shutdown(cancel_futures=True)
+            threads.shutdown(wait=False, cancel_futures=True)
+            stop_runs()
 
 
-def _write_files(sweep: Sweep, run: Run) -> Path:
+def _files(sweep: Sweep, run: Run) -> RunFiles:
     changes = {v.key: value for v, value in zip(sweep.variations, run.values, strict=True)}
-    return write_run(sweep.scene, changes, run.folder)
+    return run_files(sweep.scene, changes, run.folder)
 
 
 def _check_first(sweep: Sweep) -> None:
@@ -128,7 +180,8 @@ def _check_first(sweep: Sweep) -> None:
     with TemporaryDirectory() as folder:
         run = Run(0, sweep.points[0], Path(folder))
         try:
-            scene = load_scene(_write_files(sweep, run))
+            with python_allowed(sweep.allow_python):
+                scene = load_scene(_files(sweep, run).write(run.folder))
             for body in scene.body:
                 if body.link is not None:
                     read_link(body.link)
@@ -151,11 +204,11 @@ def _claim_folder(sweep: Sweep) -> None:
         }
     )
     path = sweep.folder / PLAN
-    if path.exists() and path.read_text(encoding="utf-8") != plan:
+    if path.exists() and path.read_text(encoding="utf-8", errors="replace") != plan:
         raise InputError(f"{sweep.folder}: output: expected a new folder or one of this very sweep, found another's")
     if not path.exists() and sweep.folder.exists() and any(sweep.folder.iterdir()):
         raise InputError(f"{sweep.folder}: output: expected a new folder, found one that holds other files")
-    write_atomically(path, plan.encode(), "plan of the sweep", make_folder=True)
+    write_atomically(path, plan.encode(), "plan of the sweep", make_folder=True, ours=True)
 
 
 def forget_failures(sweep: Sweep) -> int:

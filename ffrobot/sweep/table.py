@@ -26,7 +26,7 @@ def write_table(path: Path, keys: Sequence[str], rows: Sequence[Row]) -> None:
     for row in rows:
         found = [row.quantities.get(name, "") for name in quantities]
         writer.writerow([row.number, *row.values, row.status, *found, row.message])
-    write_atomically(path, text.getvalue().encode(), "table of the sweep")
+    write_atomically(path, text.getvalue().encode(), "table of the sweep", ours=True)
 
 
 def print_table(

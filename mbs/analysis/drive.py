@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +16,10 @@ from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause, lost_inertia
 from ..solve.initial_state import undeformed_state
-from ..solve.integrators import METHODS, Choice, beyond_order, choose_integrator
+from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
+from .earlier_check import check_earlier
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 
 Progress = Callable[[float], bool]
@@ -73,8 +75,12 @@ def drive(
     integration that ends early is kept with its cause. Raises `SolveError` for a start without inertia.
     """
     times = analysis.times if times is None else times
+    if earlier is not None:
+        motors = len(assembly.motor_measures) if resolver is not None else None
+        check_earlier(earlier, assembly, times, motors, recorded=recording is not None)
     if earlier is not None and earlier.statistics.status == "completed":
-        return Outcome(analysis, assembly, **vars(earlier))
+        motion, forces, run_before = earlier.motion, earlier.forces, earlier.statistics
+        return Outcome(analysis, assembly, motion, forces, run_before, continuation=earlier.continuation)
     if len(times) > 1 and (cause := lost_inertia(assembly, start.q)):
         raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
@@ -111,16 +117,18 @@ def _integrated(
     continuation: Continuation,
     progress: Progress,
 ) -> _core.Run:
-    method, tolerance, most = METHODS[integrator.name], analysis.tolerance, analysis.max_steps
+    common: dict[str, Any] = {
+        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments, "times": times.tolist(),
+        "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
+    }  # fmt: skip
     if control is None:
         return _core.run(
-            assembly.system, assembly.groups, assembly.moments, steering, times.tolist(), start.q, start.v, tolerance,
-            most, method, analysis.spectral_radius, resolver, progress, continuation.recording, continuation.checkpoint,
+            **common, external_loads=steering, actuator_forces=resolver, recording=continuation.recording,
+            checkpoint=continuation.checkpoint,
         )  # fmt: skip
     return _core.run_sampled(
-        assembly.system, assembly.groups, assembly.moments, times.tolist(), start.q, start.v, tolerance,
-        most, method, analysis.spectral_radius, control.motors, control.voltages, control.first, control.sensing,
-        control.times.tolist(), control.delay, control.controller, progress,
+        **common, motors=control.motors, patches=control.voltages, first_command=control.first,
+        sensing=control.sensing, samples=control.times.tolist(), delay=control.delay, controller=control.controller,
     )  # fmt: skip
 
 
@@ -134,7 +142,7 @@ def statistics_of(assembly: MechanismSystem, run: _core.Run, integrator: Choice,
     """How a run of the core went, and why it ended where it failed."""
     status, cause = STATUS[run.status], ""
     if status not in ("completed", "interrupted"):
-        cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2)))
+        cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, [assembly.system.n_q])))
     return Statistics(status, integrator, run.steps, run.rejected, run.evaluations, seconds, run.time_reached, cause)
 
 

@@ -85,6 +85,16 @@ class Statistics:
         return replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
 
 
+STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error", "in_transient")
+"""Of the core's `StepHistory`, all."""
+
+BODY_PEAKS = (
+    "velocity", "angular_velocity", "modal_velocity", "modal", "acceleration", "angular_acceleration",
+    "modal_acceleration",
+)  # fmt: skip
+"""Of the core's `Peaks`, what there is of each body."""
+
+
 @dataclass(frozen=True)
 class Continuation:
     """Where an integration can be gone on with, and its steps where a later analysis replays them."""
@@ -95,12 +105,16 @@ class Continuation:
 
 @dataclass(frozen=True)
 class EarlierRun:
-    """What an earlier run of an analysis has computed, complete or not: it is taken over, or gone on with."""
+    """What an earlier run of an analysis has computed, complete or not: it is taken over, or gone on with.
+
+    `where` is what messages call the place that it was read from.
+    """
 
     motion: Motion
     forces: Forces
     statistics: Statistics
     continuation: Continuation
+    where: str
 
 
 @dataclass(frozen=True)

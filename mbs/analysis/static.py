@@ -43,10 +43,13 @@ def run_static(model: Model, analysis: Analysis) -> Outcome:
     held = [replace(c, target=_core.TimeFunction.constant(c.target(0.0)[0])) for c in model.trajectories]
     assembly = MechanismSystem(model, [*model.joints, *held], model.loads, list(model.motors.values()))
     state = static_equilibrium(assembly, undeformed_state(assembly))
-    at_rest, resolver, began = np.zeros_like(state.q), resolver_of(assembly), time.perf_counter()
+    at_rest, resolver, began = np.zeros_like(state.v), resolver_of(assembly), time.perf_counter()
+    controls = _core.IntegrationControls(
+        tolerance=analysis.tolerance, max_steps=1, method=METHODS["dop853"], spectral_radius=0.0
+    )
     run = _core.run(  # no step is made: accelerations and multipliers of one state
-        assembly.system, assembly.groups, assembly.moments, None, [0.0], state.q, at_rest, analysis.tolerance, 1,
-        METHODS["dop853"], 0.0, resolver, lambda _: True, None, None,
+        system=assembly.system, groups=assembly.groups, moments=assembly.moments, times=[0.0], q=state.q, v=at_rest,
+        controls=controls, carry_on=lambda _: True, actuator_forces=resolver,
     )  # fmt: skip
     return Outcome(
         analysis=analysis,

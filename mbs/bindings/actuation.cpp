@@ -1,8 +1,7 @@
 #include "core/actuation/actuators.h"
 #include "core/actuation/allocation.h"
-#include "core/analysis/fcid.h"
-#include "core/analysis/replay.h"
-#include "core/body/points.h"
+#include "core/actuation/points.h"
+#include "core/actuation/source.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
@@ -19,26 +18,22 @@ using namespace ffrobot;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 namespace {
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 // Voltages (T, k) for modal forces (T, n), one after the other
-RowMajor allocate(Allocation &allocation, const RowMajor &F_p) {
-  RowMajor V(F_p.rows(), allocation.Phi().cols());
+RowMajorMatrix allocate(Allocation &allocation, const RowMajorMatrix &F_p) {
+  RowMajorMatrix V(F_p.rows(), allocation.Phi().cols());
   for (Index i = 0; i < F_p.rows(); ++i)
     V.row(i) = allocation.solve(F_p.row(i).transpose()).transpose();
   return V;
 }
 
 // What a source gives at `times`: tau (T, motors) and F_p (T, modes of all bodies)
-std::tuple<RowMajor, RowMajor> sample(ActuationSource &source, const std::vector<double> &times) {
+std::tuple<RowMajorMatrix, RowMajorMatrix> sample(ActuationSource &source, const std::vector<double> &times) {
   const auto T = static_cast<Index>(times.size());
-  Index modes = 0;
-  for (const auto &body : source.system().bodies)
-    modes += body.modes();
-  RowMajor tau, F_p(T, modes);
+  RowMajorMatrix tau, F_p(T, source.system().n_modes());
   for (Index i = 0; i < T; ++i) {
     source.evaluate(times[static_cast<std::size_t>(i)]);
     if (i == 0)
@@ -53,56 +48,17 @@ std::tuple<RowMajor, RowMajor> sample(ActuationSource &source, const std::vector
   return {tau, F_p};
 }
 
-} // namespace
-
-void bind_actuation(nb::module_ &m) {
+void bind_sources(nb::module_ &m) {
   nb::class_<ActuatorForces>(m, "ActuatorForces", "Trajectory forces as motor forces and modal forces.")
       .def(nb::init<const System &, std::vector<bool>, std::vector<Measure>>(), "system"_a, "trajectory"_a, "motors"_a,
            nb::keep_alive<1, 2>());
 
-  nb::class_<Allocation>(m, "Allocation", "Voltages within limits by bounded weighted least squares.")
-      .def(nb::init<MatrixXd, const MatrixXd &, MatrixXd, VectorXd, VectorXd>(), "Phi"_a, "W_sqrt"_a, "gain"_a,
-           "limit"_a, "scale"_a)
-      .def("solve", &allocate, "F_p"_a, "Voltages (T, k) for modal forces (T, n); each solve starts at the one before.")
-      .def_prop_ro("iterations", &Allocation::iterations);
-
-  nb::class_<FcidOutputs>(m, "FcidOutputs", "Fully constrained inverse dynamics, one row per time reached.")
-      .def_ro("completed", &FcidOutputs::completed)
-      .def_ro("reached", &FcidOutputs::reached)
-      .def_ro("q", &FcidOutputs::q)
-      .def_ro("v", &FcidOutputs::v)
-      .def_ro("a", &FcidOutputs::a)
-      .def_ro("multipliers", &FcidOutputs::lambda)
-      .def_ro("shape_force", &FcidOutputs::shape_force)
-      .def_ro("tau", &FcidOutputs::tau)
-      .def_ro("F_p", &FcidOutputs::F_p)
-      .def_ro("residual", &FcidOutputs::residual);
-  m.def("fully_constrained", &fully_constrained, "system"_a, "times"_a, "shape"_a, "guess"_a, "resolver"_a.none(),
-        "Motion and forces for prescribed trajectories and modal coordinates p(t), shape[body][mode].");
-  m.def("static_shape", &static_shape, "system"_a, "times"_a, "guess"_a, "resolver"_a.none(),
-        "Shapes (T, modes of all bodies) that need no modal forces at rest; fewer rows where one is not found.");
-
+  nb::class_<ExternalLoads>(m, "ExternalLoads", "Loads from outside a system's own.");
   nb::class_<ActuationSource>(m, "ActuationSource", "What an inverse analysis found, at any time of it.")
       .def("sample", &sample, "times"_a, "tau (T, motors) and F_p (T, modes of all bodies).");
-  nb::class_<RecordedActuation, ActuationSource>(m, "RecordedActuation", "From the dense output of a recorded run.")
-      .def(nb::init<const System &, const Recording &, std::vector<bool>, std::optional<ActuatorForces>>(), "system"_a,
-           "recording"_a, "is_trajectory"_a, "resolver"_a.none(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
-  nb::class_<FullyConstrainedActuation, ActuationSource>(m, "FullyConstrainedActuation", "Solved anew at every time.")
-      .def(nb::init<const System &, std::vector<ModalShape>, VectorXd, std::vector<bool>,
-                    std::optional<ActuatorForces>>(),
-           "system"_a, "shape"_a, "guess"_a, "is_trajectory"_a, "resolver"_a.none(), nb::keep_alive<1, 2>());
+}
 
-  nb::class_<ActuationPoints>(m, "ActuationPoints", "Generalized forces of a body as forces at points of it.")
-      .def(nb::init<Eigen::Matrix2Xd, Eigen::Matrix2Xd, MatrixXd, VectorXd>(), "direction"_a, "position"_a, "Phi"_a,
-           "scale"_a)
-      .def("L_a", &ActuationPoints::L_a, "p"_a, nb::rv_policy::copy)
-      .def(
-          "solve",
-          [](ActuationPoints &points, double theta, const VectorXd &p, const VectorXd &Q_a) {
-            return points.solve(theta, p, Q_a);
-          },
-          "theta"_a, "p"_a, "Q_a"_a);
-
+void bind_actuators(nb::module_ &m) {
   nb::class_<Actuator>(m, "Actuator", "Acts on a forward run as an inverse analysis tells it to.");
   nb::class_<TrajectoryForces, Actuator>(m, "TrajectoryForces", "Forces that held the trajectories, on their points.")
       .def(nb::init<std::size_t>(), "first_drive"_a);
@@ -115,4 +71,28 @@ void bind_actuation(nb::module_ &m) {
   nb::class_<Actuation, ExternalLoads>(m, "Actuation", "An inverse analysis and the actuators that carry it out.")
       .def(nb::init<std::shared_ptr<ActuationSource>, std::vector<std::shared_ptr<Actuator>>>(), "source"_a,
            "actuators"_a);
+}
+
+} // namespace
+
+void bind_actuation(nb::module_ &m) {
+  bind_sources(m);
+  nb::class_<Allocation>(m, "Allocation", "Voltages within limits by bounded weighted least squares.")
+      .def(nb::init<MatrixXd, const MatrixXd &, MatrixXd, VectorXd, VectorXd>(), "Phi"_a, "W_sqrt"_a, "gain"_a,
+           "limit"_a, "scale"_a)
+      .def("solve", &allocate, "F_p"_a, "Voltages (T, k) for modal forces (T, n); each solve starts at the one before.")
+      .def_prop_ro("iterations", &Allocation::iterations);
+
+  nb::class_<ActuationPoints>(m, "ActuationPoints", "Generalized forces of a body as forces at points of it.")
+      .def(nb::init<Eigen::Matrix2Xd, Eigen::Matrix2Xd, MatrixXd, VectorXd>(), "direction"_a, "position"_a, "Phi"_a,
+           "scale"_a)
+      .def("L_a", &ActuationPoints::L_a, "p"_a, nb::rv_policy::copy)
+      .def(
+          "solve",
+          [](ActuationPoints &points, double theta, const VectorXd &p, const VectorXd &Q_a) {
+            return points.solve(theta, p, Q_a);
+          },
+          "theta"_a, "p"_a, "Q_a"_a);
+
+  bind_actuators(m);
 }

@@ -4,13 +4,15 @@
 #include <nanobind/nanobind.h>
 #include <string>
 
-// One function per concern of the core; module.cpp calls them. Default arguments live in Python, never here.
+// One function per folder of the core, in a file of that name; module.cpp calls them. Default arguments live in Python,
+// never here: only what may be absent is None.
 void bind_time_function(nanobind::module_ &m);
+void bind_constraint(nanobind::module_ &m);
 void bind_system(nanobind::module_ &m);
-void bind_run(nanobind::module_ &m);
+void bind_integrate(nanobind::module_ &m);
 void bind_actuation(nanobind::module_ &m);
-void bind_servo(nanobind::module_ &m);
-void bind_tangent(nanobind::module_ &m);
+void bind_analysis(nanobind::module_ &m);
+void bind_for_tests(nanobind::module_ &m); // of no use to the program
 
 // Raises ValueError with both sizes where they differ.
 inline void check_size(const char *name, Eigen::Index got, Eigen::Index expected) {

@@ -3,14 +3,16 @@
 #include "bindings/bindings.h"
 
 NB_MODULE(_core, m) {
-  // pydantic and typing cache the types of their fields until after the interpreter's end: not a leak of ours.
+  // pydantic and typing keep the types of their fields until after the interpreter has ended, which nanobind would
+  // report as a leak.
   nanobind::set_leak_warnings(false);
   m.doc() = "Compiled core of ffrobot: planar floating-frame dynamics.";
   m.attr("build") = FFROBOT_BUILD; // compiler and flags
   bind_time_function(m);
+  bind_constraint(m);
   bind_system(m);
-  bind_run(m);
+  bind_integrate(m);
   bind_actuation(m);
-  bind_tangent(m);
-  bind_servo(m);
+  bind_analysis(m);
+  bind_for_tests(m);
 }

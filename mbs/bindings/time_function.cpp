@@ -55,9 +55,7 @@ Samples sample(const TimeFunction &function, Vector times) {
   return Samples(data, {3, count}, owner);
 }
 
-} // namespace
-
-void bind_time_function(nb::module_ &m) {
+void bind_operations(nb::module_ &m) {
   nb::enum_<Op>(m, "Op", "Instructions of an expression in postfix order.")
       .value("constant", Op::constant)
       .value("time", Op::time)
@@ -83,7 +81,12 @@ void bind_time_function(nb::module_ &m) {
       .value("logical_or", Op::logical_or)
       .value("logical_not", Op::logical_not)
       .value("select", Op::select);
+}
 
+} // namespace
+
+void bind_time_function(nb::module_ &m) {
+  bind_operations(m);
   nb::class_<TimeFunction>(m, "TimeFunction",
                            "A function of time with exact first and second derivatives; NaN where it has none.")
       .def_static(

@@ -37,7 +37,8 @@ class Measure:
     """value = motion of `b` relative to `a`, in m or rad, less `offset`; `label` names it in messages.
 
     By `kind`: the difference of x or y in global axes, of the angles, the way of b along `direction`, which is fixed to
-    the section at a ("slide"), or direction₀ α_b − direction₁ α_a with the angles α ("gear").
+    the section at a ("slide"), or n_b α_b − n_a α_a with the angles α and the
+    gear ratios (n_b, n_a) ("gear").
     """
 
     label: str
@@ -45,6 +46,7 @@ class Measure:
     a: Marker
     b: Marker
     direction: tuple[float, float] = (0.0, 0.0)
+    gear_ratios: tuple[float, float] = (0.0, 0.0)
     offset: float = 0.0
 
     @property

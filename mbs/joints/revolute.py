@@ -56,12 +56,13 @@ class RevoluteJoint(MovingJoint):
         """
         coordinate, N = self.coordinate(motors), self.gear_ratio
         label, gear = f"rotor of {self.label}", _core.MeasureKind.gear
-        return Rotor(Measure(label, gear, coordinate.a, coordinate.b, (N, N - 1)), self.rotor_inertia)
+        return Rotor(Measure(label, gear, coordinate.a, coordinate.b, gear_ratios=(N, N - 1)), self.rotor_inertia)
 
     def elastic_gear(self, motors: MotorSide) -> ElasticGear | None:
         """The gear with its spring, where `stiffness` is given."""
         if self.stiffness is None:
             return None
         coordinate, N, rotor = self.coordinate(motors), self.gear_ratio, f"{self.name}/rotor"
-        motor = Measure(f"motor of {self.label}", _core.MeasureKind.gear, coordinate.a, Marker(rotor), (1.0, 1 / N))
+        label, gear = f"motor of {self.label}", _core.MeasureKind.gear
+        motor = Measure(label, gear, coordinate.a, Marker(rotor), gear_ratios=(1.0, 1 / N))
         return ElasticGear(self.name, rotor, N, self.rotor_inertia, self.stiffness, self.damping, motor, coordinate)

@@ -138,7 +138,8 @@ class MechanismSystem:
 
     def _core_measure(self, measure: Measure) -> _core.Measure:
         a, b = self._marker(measure.a), self._marker(measure.b)
-        return _core.Measure(measure.kind, a, b, np.array(measure.direction), measure.offset)
+        direction, ratios = np.array(measure.direction), np.array(measure.gear_ratios)
+        return _core.Measure(measure.kind, a, b, direction, ratios, measure.offset)
 
     def _marker(self, marker: Marker) -> _core.Marker:
         if marker.body is None:

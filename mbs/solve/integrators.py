@@ -92,6 +92,14 @@ def choose_integrator(
     return Choice("radau" if cost * implicit < explicit else "dop853", reason)
 
 
+def integration_controls(analysis: IntegratedAnalysis, choice: Choice) -> _core.IntegrationControls:
+    """What the core integrates an analysis with."""
+    return _core.IntegrationControls(
+        tolerance=analysis.tolerance, max_steps=analysis.max_steps, method=METHODS[choice.name],
+        spectral_radius=analysis.spectral_radius,
+    )  # fmt: skip
+
+
 def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:
     """A sentence where steps have become too short with a method of order 2; empty with any other."""
     if choice.name != "generalized-alpha":

@@ -94,7 +94,7 @@ class Linearisation:
         Raises `SolveError` in a configuration in which the independent coordinates do not determine the others.
         """
         system = self.assembly.system
-        linear = _core.reduce(system, self.independent, t, q, v, a, 1)
+        linear = _core.reduce(system, self.independent, t, q, v, a)
         if not linear.reciprocal_condition > DEPENDENT**2 or not np.all(np.isfinite(linear.K)):
             rows = ", ".join(self.names[: len(self.independent)])
             raise SolveError(

@@ -19,10 +19,15 @@ def solve_positions(assembly: MechanismSystem, t: float, q: Array) -> Array | No
 
     None where that does not converge.
     """
-    q, r = q.copy(), assembly.frame_coordinates
-    rest, scales, measure_scales = np.zeros_like(q), assembly.scales, assembly.measure_scales
+    system, r, scales, measure_scales = (
+        assembly.system,
+        assembly.frame_coordinates,
+        assembly.scales,
+        assembly.measure_scales,
+    )
+    rest = np.zeros(system.n_v)
     for _ in range(MOST_ITERATIONS):
-        C, _, _ = assembly.system.constraints(t, q, rest)
+        C, _, _ = system.constraints(t, q, rest)
         size = 1.0 + np.abs(q / scales).max(initial=0.0)
         left = np.abs(C / measure_scales).max(initial=0.0)
         if left <= TOLERANCE * size:
@@ -31,7 +36,9 @@ def solve_positions(assembly: MechanismSystem, t: float, q: Array) -> Array | No
             return None
         step = _least_step(assembly, t, q, C)
         largest = np.abs(step / scales[r]).max()
-        q[r] -= step * min(1.0, LARGEST_TURN * size / largest) if largest else step
+        change = np.zeros(system.n_v)
+        change[r] = -step * min(1.0, LARGEST_TURN * size / largest) if largest else -step
+        q = system.integrate(q, change)
     return q if left <= 1e3 * TOLERANCE * size else None
 
 

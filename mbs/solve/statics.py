@@ -22,30 +22,31 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
 
     Raises `SolveError` where the robot has no equilibrium near the start.
     """
-    system, n = assembly.system, assembly.system.coordinates
+    system, n = assembly.system, assembly.system.n_v
     rest, sizes = np.zeros(n), assembly.scales
 
-    def residual(x: Array) -> tuple[Array, float]:
-        C, _, C_q = system.constraints(0.0, x[:n], rest)
-        Q, constraint_forces = system.force_at_rest(0.0, x[:n]), C_q.T @ x[n:]
+    def residual(q: Array, multipliers: Array) -> tuple[Array, float]:
+        C, _, C_q = system.constraints(0.0, q, rest)
+        Q, constraint_forces = system.force_at_rest(0.0, q), C_q.T @ multipliers
         size = max(float(np.abs(Q).max()), float(np.abs(constraint_forces).max(initial=0.0)))
         return np.concatenate([Q - constraint_forces, C]), size
 
-    _, _, C_q = system.constraints(0.0, start.q, rest)
-    multipliers = np.linalg.lstsq(C_q.T, system.force_at_rest(0.0, start.q), rcond=None)[0]
-    x, largest = np.concatenate([start.q, multipliers]), np.inf
+    q, largest = start.q, np.inf
+    _, _, C_q = system.constraints(0.0, q, rest)
+    multipliers = np.linalg.lstsq(C_q.T, system.force_at_rest(0.0, q), rcond=None)[0]
     for _ in range(MOST_ITERATIONS):
-        r, size = residual(x)
+        r, size = residual(q, multipliers)
         closed = np.abs(r[n:] / assembly.measure_scales).max(initial=0.0) <= TOLERANCE
         if closed and (np.abs(r[:n]).max() <= TOLERANCE * size or largest <= ROUNDING):
-            return with_rates(assembly, x[:n], start.v)
+            return with_rates(assembly, q, start.v)
         try:
-            step = np.linalg.solve(_jacobian(assembly, x), r)
+            step = np.linalg.solve(_jacobian(assembly, q, multipliers), r)
         except np.linalg.LinAlgError:
             break
         largest = float(np.abs(step[:n] / sizes).max())
-        x = x - step * min(1.0, LARGEST_STEP / largest if largest else 1.0)
-        if not np.all(np.isfinite(x)):
+        change = -step * min(1.0, LARGEST_STEP / largest if largest else 1.0)
+        q, multipliers = system.integrate(q, change[:n]), multipliers + change[n:]
+        if not np.all(np.isfinite(change)):
             break
     raise SolveError(
         f"{assembly.model.scene.path}: no static equilibrium was found near the initial angles: a robot without"
@@ -53,8 +54,8 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
     )
 
 
-def _jacobian(assembly: MechanismSystem, x: Array) -> Array:
+def _jacobian(assembly: MechanismSystem, q: Array, multipliers: Array) -> Array:
     """Exact derivative of Q − C_qᵀλ and C with respect to (q, λ), at rest."""
-    n, rest = assembly.system.coordinates, np.zeros(assembly.system.coordinates)
-    _, _, K, C_q = _core.tangent(assembly.system, 0.0, x[:n], rest, rest, x[n:], [])
+    rest = np.zeros(assembly.system.n_v)
+    _, _, K, C_q = _core.tangent(assembly.system, 0.0, q, rest, rest, multipliers, [])
     return np.block([[-K, -C_q.T], [C_q, np.zeros((len(C_q), len(C_q)))]])

@@ -63,7 +63,7 @@ def modal_excitation(
     system, q, v = assembly.system, state.q, state.v
     a, lambda_ = system.evaluate(0.0, q, v, steering)
     dt = 1e-3 / modes.frequency.max(initial=1.0)
-    jerk = (system.evaluate(dt, q + dt * v, v + dt * a, steering)[0] - a) / dt
+    jerk = (system.evaluate(dt, system.integrate(q, dt * v), v + dt * a, steering)[0] - a) / dt
     omega, project = modes.frequency, (modes.shape * _stiffness(assembly)[:, None]).T / modes.frequency[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
     if not len(lambda_):

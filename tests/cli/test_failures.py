@@ -72,7 +72,7 @@ def test_full_disk(two_link_copy, ffrobot, small_disk, command):
         (".", "found a folder"),
         ("/proc/r.h5", "expected a writable folder"),  # not even for root
         ("/dev/null", "found a file of another kind"),  # a rename would replace the device
-        ("link1.toml", "found a file of another kind"),
+        ("link1.toml", "another file than the input"),
     ],
 )
 def test_output_that_cannot_be_written(two_link_copy, refused, output, named):
@@ -112,7 +112,7 @@ def test_ctrl_c_keeps_what_was_computed(two_link_copy, ffrobot, number):
     shown += _read_until(terminal, b"--resume")
     summary, _ = process.communicate(timeout=30)
     assert time.monotonic() - began < 5.0
-    assert process.returncode == 1
+    assert process.returncode == 128 + number
     assert b"Traceback" not in shown
     assert b"(interrupted): stopped on request" in shown
     assert b"ffrobot solve scene.toml --resume" in shown
@@ -170,3 +170,87 @@ def test_reader_that_goes_away_is_no_error(ffrobot, two_link):
     )  # fmt: skip
     os.close(write)
     assert process.stderr == ""
+
+
+LARGE = {"end = 1.0": "end = 0.2", "output_step = 0.001": "output_step = 2e-6"}
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_ctrl_c_while_results_are_written(two_link_copy, ffrobot, times):
+    """Once keeps what was computed, twice leaves nothing half-written."""
+    folder = two_link_copy({"scene.toml": LARGE})
+    log = folder / "log"
+    process = subprocess.Popen(
+        [ffrobot.path, "solve", "scene.toml", "--log-file", log], cwd=folder, env=ffrobot.environment,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while not log.exists() or 'analysis "inverse": completed' not in log.read_text(encoding="utf-8"):
+        assert process.poll() is None
+        time.sleep(0.01)
+    for _ in range(times):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.3)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == 130, message
+    assert "stopping, and keeping what was computed" in message
+    assert "Traceback" not in message
+    names = {path.name for path in folder.iterdir()}
+    assert not any(".tmp" in name for name in names)
+    if times == 1:
+        with h5py.File(folder / "scene.results.h5") as file:
+            assert file["inverse"].attrs["status"] == "completed"
+    elif "scene.results.h5" in names:  # the second came too late
+        h5py.File(folder / "scene.results.h5").close()
+
+
+def test_an_error_later_keeps_the_analyses_before(two_link_copy, ffrobot):
+    folder = two_link_copy({"scene.toml": SHORT})
+    scene = folder / "scene.toml"
+    text = scene.read_text(encoding="utf-8")
+    text += """
+[[analysis]]
+name = "loop"
+kind = "closed-loop"
+actuation = "inverse"
+sample_time = 0.001
+controller = [{ kind = "python", python = "own.py:controller" }]
+sensor = [{ joint = "O" }]
+"""
+    scene.write_text(text, encoding="utf-8")
+    (folder / "own.py").write_text("def controller(setup):\n    return lambda k, y: 1 / 0\n", encoding="utf-8")
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    assert done.returncode == 1
+    assert "ZeroDivisionError" in done.stderr
+    with h5py.File(folder / "scene.results.h5") as file:
+        assert file["inverse"].attrs["status"] == "completed"
+        assert "loop" not in file
+
+
+def test_python_files_run_from_below_the_scene_only(two_link_copy, ffrobot, refused, tmp_path):
+    """By their true place: symbolic links and `..` lead nowhere else."""
+    folder, elsewhere = two_link_copy({"scene.toml": SHORT}), tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    ran = elsewhere / "ran"
+    (elsewhere / "own.py").write_text(
+        f"open({str(ran)!r}, 'w')\ndef controller(setup):\n    return lambda k, y: 0 * setup.feed_forward[0]\n"
+    )
+    (folder / "link.py").symlink_to(elsewhere / "own.py")
+    scene = folder / "scene.toml"
+    text = scene.read_text(encoding="utf-8")
+    for name in (str(elsewhere / "own.py"), "../elsewhere/own.py", "link.py"):
+        loop = f"""
+[[analysis]]
+name = "loop"
+kind = "closed-loop"
+actuation = "inverse"
+sample_time = 0.001
+controller = [{{ kind = "python", python = "{name}:controller" }}]
+"""
+        scene.write_text(text + loop, encoding="utf-8")
+        message = refused(folder, "solve", "scene.toml")
+        assert "expected a Python file below the scene's folder" in message
+        assert f"--allow-python {elsewhere}" in message
+        assert not ran.exists()
+    done = ffrobot("solve", "scene.toml", "--allow-python", elsewhere, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert ran.exists()

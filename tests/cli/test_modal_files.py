@@ -7,6 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
+from ffrobot.common.checksum import seal
+
 SHORT = {"end = 1.0": "end = 0.01"}
 GIVEN = {'link = "link1.toml"': 'modal = "link1.h5"'}
 
@@ -81,16 +83,19 @@ def _garbage(path):
 def _nan(path):
     with h5py.File(path, "r+") as file:
         file["invariants/S_bar"][0, 0] = np.nan
+    seal(path)
 
 
 def _newer(path):
     with h5py.File(path, "r+") as file:
         file.attrs["format_version"] = 99
+    seal(path)
 
 
 def _asymmetric(path):
     with h5py.File(path, "r+") as file:
         file["modes/stiffness"][0, 1] = 1e6
+    seal(path)
 
 
 @pytest.mark.parametrize(

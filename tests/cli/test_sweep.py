@@ -1,7 +1,9 @@
 """`ffrobot sweep`: grids and samples over any key, failures as rows, taken up again, several processes."""
 
 import csv
+import signal
 import subprocess
+import time
 import tomllib
 from math import prod
 
@@ -148,3 +150,59 @@ def test_wrong_reduction_and_folder(refused, ffrobot, short_scene):
     assert "max|rms|first|last" in message
     assert ffrobot("sweep", "scene.toml", "--vary", MASSES, cwd=folder).returncode == 0
     assert "another's" in refused(folder, "sweep", "scene.toml", "--vary", HEIGHTS)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("scene.toml", "", ""),
+        ("rod.toml", "youngs_modulus = ", "youngs_modulus = 1"),
+        ("path.csv", "0.01,0.28", "0.01,0.27"),
+    ],
+)
+def test_rows_of_other_input_are_computed_again(ffrobot, short_scene, name, old, new):
+    """All of them, or only those that are stale: what has changed is said."""
+    folder = short_scene.parent
+    (folder / "path.csv").write_text("t,x\n0,0.35\n0.005,0.31\n0.01,0.28\n", encoding="utf-8")
+    scene = tomllib.loads(short_scene.read_text(encoding="utf-8"))
+    scene["trajectory"] = [{"name": "slider", "point": "slider.pin", "waypoints": "path.csv"}]
+    scene["gravity"] = [0.0, -9.81]
+    short_scene.write_text(tomli_w.dumps(scene), encoding="utf-8")
+    command = ["sweep", short_scene, "--vary", MASSES]
+    assert ffrobot(*command).returncode == 0
+    before = table(short_scene)
+    again = ffrobot(*command)
+    assert "changed" not in again.stderr
+    assert table(short_scene) == before
+    content = (folder / name).read_text(encoding="utf-8")
+    if name == "scene.toml":
+        scene["gravity"] = [0.0, -1.62]
+        content = tomli_w.dumps(scene)
+    else:
+        assert old in content
+        content = content.replace(old, new)
+    (folder / name).write_text(content, encoding="utf-8")
+    done = ffrobot(*command)
+    assert f"ffrobot: {name} has changed since: 2 rows computed again" in done.stderr
+    assert all(row["status"] == "completed" for row in table(short_scene))
+    changed = [key for key in before[0] if before[0][key] != table(short_scene)[0][key] and "wall" not in key]
+    assert changed
+
+
+def test_stopped_runs_leave_no_row(ffrobot, short_scene):
+    """The sweep itself is asked to end: its runs end with it, and are no failures."""
+    text = short_scene.read_text(encoding="utf-8").replace("end = 0.01", "end = 1000.0")
+    short_scene.write_text(text.replace("output_step = 0.001", "output_step = 1.0"), encoding="utf-8")
+    process = subprocess.Popen(
+        [ffrobot.path, "sweep", short_scene, "--vary", MASSES], env=ffrobot.environment, stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    runs = short_scene.with_suffix(".sweep") / "runs"
+    while not (runs / "0001" / "scene.toml").exists():
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+    time.sleep(2.0)
+    process.send_signal(signal.SIGTERM)
+    _, message = process.communicate(timeout=30)
+    assert process.returncode == 143, message
+    assert list(runs.glob("*/row.json")) == []

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import OutlinedPatches, StressPoint
@@ -117,7 +118,7 @@ def test_missing_file(tmp_path):
 @pytest.mark.parametrize("kept", [0, 7, 100, 5000, -1])
 def test_truncated_file(outcome, kept):
     outcome.path.write_bytes(outcome.path.read_bytes()[:kept])
-    with pytest.raises(InputError, match=r"link1\.h5: not a modal body file, or a damaged one"):
+    with pytest.raises(InputError, match=r"link1\.h5: (not a modal body file, or a )?damaged"):
         read_modal_body(outcome.path)
 
 
@@ -136,6 +137,7 @@ def test_foreign_files(tmp_path):
 def test_newer_version(outcome):
     with h5py.File(outcome.path, "a") as file:
         file.attrs["format_version"] = 99
+    seal(outcome.path)
     with pytest.raises(InputError, match=r"newer ffrobot.*format_version: expected at most 1, found 99"):
         read_modal_body(outcome.path)
 
@@ -148,6 +150,7 @@ def test_nan_is_refused(outcome, name):
         values = file[name][()]
         values.flat[0] = np.nan
         file[name][...] = values
+    seal(outcome.path)
     with pytest.raises(InputError, match=rf"link1\.h5: .*{name.split('/')[-1]}: expected finite numbers"):
         read_modal_body(outcome.path)
 
@@ -158,6 +161,7 @@ def test_nan_is_refused(outcome, name):
 def test_missing_dataset(outcome, name):
     with h5py.File(outcome.path, "a") as file:
         del file[name]
+    seal(outcome.path)
     with pytest.raises(InputError, match=r"link1\.h5: "):
         read_modal_body(outcome.path)
 
@@ -167,6 +171,7 @@ def test_wrong_dataset(outcome, value):
     with h5py.File(outcome.path, "a") as file:
         del file["modes/stiffness"]
         file["modes/stiffness"] = value
+    seal(outcome.path)
     with pytest.raises(InputError, match=r"link1\.h5: "):
         read_modal_body(outcome.path)
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from oracle import Mechanism
 
+from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.model.model import build_model
@@ -69,6 +70,17 @@ def random_state(rng, size, modal=0.1):
 def always(_):
     """The progress of runs that nobody watches."""
     return True
+
+
+def core_run(assembly, q, v, times, tolerance=1e-6, max_steps=0, **keys):
+    """A run of the core itself from (q, v), with DOP853."""
+    controls = _core.IntegrationControls(
+        tolerance=tolerance, max_steps=max_steps, method=_core.MethodKind.dop853, spectral_radius=0.8
+    )
+    return _core.run(
+        system=assembly.system, groups=assembly.groups, moments=assembly.moments, times=times, q=q, v=v,
+        controls=controls, carry_on=always, **keys,
+    )  # fmt: skip
 
 
 def relative(got, expected, scale=None):

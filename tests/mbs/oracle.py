@@ -181,7 +181,7 @@ class Mechanism:
             value = b.position[k] - a.position[k] - row.offset
             return RowState(value, b.velocity[k] - a.velocity[k], b.L[k] - a.L[k], b.convective[k] - a.convective[k])
         if row.kind.name == "gear":
-            n_b, n_a = row.direction
+            n_b, n_a = row.gear_ratios
             value, rate, gradient, bias = (
                 n_b * at_b - n_a * at_a
                 for at_a, at_b in (

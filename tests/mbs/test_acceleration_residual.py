@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 import zoo
-from mechanisms import always, assemble
+from mechanisms import assemble, core_run
 
-from ffrobot.mbs import _core
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 SLIDES = ("mixed", "mixed backwards", "slider-crank")
@@ -22,10 +21,7 @@ def moving(name):
 def test_constraints_of_a_moving_mechanism_with_slides_hold_on_all_levels(name):
     """A slide's velocity terms must not be counted in the row after it, as they once were."""
     assembly, q, v = moving(name)
-    run = _core.run(
-        assembly.system, assembly.groups, assembly.moments, None, [0.0, 1e-6], q, v, 1e-6, 1,
-        _core.MethodKind.dop853, 0.8, None, always, None, None,
-    )  # fmt: skip
+    run = core_run(assembly, q, v, [0.0, 1e-6], max_steps=1)
     assert run.residual[0].max() < 1e-13
     C, C_dot, _ = assembly.system.constraints(0.0, run.q[0], run.v[0])
     assert max(np.abs(C).max(), np.abs(C_dot).max()) < 1e-13

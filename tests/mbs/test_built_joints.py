@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, arm, arm_links
-from mechanisms import always, checked_scene, forward, make_model, pcid, relative, revolute
+from mechanisms import always, checked_scene, core_run, forward, make_model, pcid, relative, revolute
 from rods import rod
 
 from ffrobot.common.errors import InputError
@@ -168,9 +168,9 @@ def test_inverse_moments_carry_out_the_motion_with_rotors_and_friction():
         _core.Patches(i, _core.Allocation(np.eye(2), np.eye(2), np.eye(2), np.full(2, np.inf), np.ones(2)))
         for i in range(2)
     ]
-    run = _core.run(
-        assembly.system, assembly.groups, assembly.moments, _core.Actuation(actuation_source(source), actuators),
-        source.time.tolist(), source.q[0], source.v[0], 1e-8, 0, _core.MethodKind.dop853, 0.8, None, always, None, None,
+    run = core_run(
+        assembly, source.q[0], source.v[0], source.time.tolist(), tolerance=1e-8,
+        external_loads=_core.Actuation(actuation_source(source), actuators),
     )  # fmt: skip
     assert relative(run.q, source.q) < 1e-5
 

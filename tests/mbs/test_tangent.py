@@ -156,7 +156,7 @@ def test_reduction_is_the_derivative_of_the_equations_in_independent_coordinates
     s, force = reduced_force(assembly, oracle_of(assembly), near, T)
     s_dot, s_ddot = rng.standard_normal((2, len(s)))
     expected, (q, v, a) = force(s, s_dot, s_ddot)
-    linear = _core.reduce(assembly.system, assembly.motor_measures, T, q, v, a, 1)
+    linear = _core.reduce(assembly.system, assembly.motor_measures, T, q, v, a)
     assert relative(linear.force, expected) < 1e-10
     assert_derivative(linear.M, lambda x: force(s, s_dot, x)[0], s_ddot)
     assert_derivative(linear.D, lambda x: force(s, x, s_ddot)[0], s_dot)
@@ -167,4 +167,4 @@ def test_reduction_refuses_rows_that_do_not_fit():
     assembly = assemble(zoo.build("chain of 2"))
     q = np.zeros(assembly.system.coordinates)
     with pytest.raises(ValueError, match="expected 6 constraints and independent rows, got 8"):
-        _core.reduce(assembly.system, assembly.motor_measures, T, q, q, q, 1)
+        _core.reduce(assembly.system, assembly.motor_measures, T, q, q, q)

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ffrobot.common.checksum import seal
+
 INVERSE_BLUE = (0x00, 0x72, 0xB2)
 
 
@@ -145,6 +147,7 @@ def test_names_are_shown_as_they_are(browser, page, two_link, tmp_path):
     path = shutil.copy(two_link.folder / "scene.results.h5", tmp_path)
     with h5py.File(path, "r+") as file:
         file.attrs["name"] = "<b>A & B</b>"
+    seal(path)
     browser.open(page(path, two_link.folder / "scene.results.h5"))
     assert browser.value("document.querySelector('h1').textContent").startswith("<b>A & B</b>")
     legend = "[...document.querySelectorAll('#mechanism .legendtext')].map((item) => item.textContent)"

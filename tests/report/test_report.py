@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ffrobot.cli import cli
+from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import program_version
 from ffrobot.pictures.motion import topology
@@ -122,6 +123,7 @@ def test_page_without_modal_bodies_draws_links_through_their_points(two_link, tm
     copy_of(two_link, path)
     with h5py.File(path, "r+") as file:
         file.attrs["modal_bodies"] = file.attrs["modal_bodies"].replace('.h5"', '.gone.h5"')
+    seal(path)
     write_report([path], tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text(encoding="utf-8")
     assert "link1 is drawn through its points only" in text
@@ -137,6 +139,7 @@ def test_results_that_stopped_early_have_a_page(two_link, tmp_path):
             del file["forward"][name]
             file["forward"][name] = values
         file["forward"].attrs["status"] = "interrupted"
+    seal(path)
     write_report([path], tmp_path / "r.html")
     assert "<td>interrupted</td><td>0.299</td><td>300</td>" in (tmp_path / "r.html").read_text(encoding="utf-8")
 
@@ -154,6 +157,7 @@ def test_texts_of_a_scene_are_no_markup(two_link, tmp_path):
         file.attrs["scene"] = file.attrs["scene"] + f"# {evil}"
         file.move("joints_only", "x<")
         file.attrs["scene"] = file.attrs["scene"].replace('"joints_only"', '"x<"')
+    seal(path)
     write_report([path, path], tmp_path / "r.html")
     assert "<script>alert" not in (tmp_path / "r.html").read_text(encoding="utf-8")
 
@@ -194,6 +198,7 @@ def test_modal_body_beside_results_that_were_moved(two_link, tmp_path):
         shutil.copy(file.path, tmp_path / file.path.name)
     with h5py.File(path, "r+") as stored:
         stored.attrs["modal_bodies"] = stored.attrs["modal_bodies"].replace(str(file.path.parent), "/nowhere")
+    seal(path)
     with Results(path) as results:
         assert results.modal_body("link1").name == "link1"
         with pytest.raises(InputError, match='"link2" was solved with, found none'):

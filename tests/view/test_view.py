@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from ffrobot.cli import cli
+from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.quantities.stress import von_mises
 from ffrobot.pictures.view import Options, view_file
@@ -162,6 +163,7 @@ def test_body_without_its_file_is_drawn_through_its_points(read, two_link, tmp_p
     path = shutil.copy(two_link.folder / "scene.results.h5", tmp_path)
     with h5py.File(path, "r+") as file:
         file.attrs["modal_bodies"] = file.attrs["modal_bodies"].replace('.h5"', '.gone.h5"')
+    seal(path)
     viewed = view_file(path, tmp_path / "view", Options(analysis="inverse", frames=2, pictures=False))
     assert [note.split(":")[0] for note in viewed.notes] == [
         f"link{k} is drawn through its points only" for k in (1, 2)

@@ -10,6 +10,7 @@ from typing import Any
 
 from ...common.errors import InputError, SolveError
 from ...common.files import write_atomically
+from ...common.outputs import check_not_an_input
 from ...common.version import program_version
 from ...results.file import Results
 from .histories import history_charts
@@ -28,6 +29,7 @@ def write_report(results_paths: Sequence[Path], path: Path) -> None:
     Raises `InputError` where a file is no results file or `path` would cost a file of another kind, `SolveError` where
     the page cannot be written or Plotly is not installed.
     """
+    check_not_an_input(path)
     if path.is_dir():
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if path.suffix.lower() not in (".html", ".htm"):

@@ -9,7 +9,7 @@ using Eigen::Index;
 void TrajectoryForces::act(const ActuationSource &source, Workspace &forward) {
   const auto &lambda = source.workspace().lambda;
   std::size_t drive = first_drive_;
-  for (Index r = 0; r < static_cast<Index>(source.system().held); ++r)
+  for (Index r = 0; r < static_cast<Index>(source.system().n_bilateral()); ++r)
     if (source.is_trajectory(static_cast<std::size_t>(r)))
       forward.external_drive[drive++] = -lambda[r];
 }
@@ -42,7 +42,7 @@ void PointForces::act(const ActuationSource &source, Workspace &forward) {
   }
 }
 
-void Actuation::steer(double t, Workspace &forward) {
+void Actuation::apply(double t, Workspace &forward) {
   source_->evaluate(t);
   for (const auto &actuator : actuators_)
     actuator->act(*source_, forward);

@@ -2,8 +2,9 @@
 #pragma once
 
 #include "core/actuation/allocation.h"
-#include "core/analysis/replay.h"
-#include "core/body/points.h"
+#include "core/actuation/points.h"
+#include "core/actuation/source.h"
+#include "core/system/motion.h"
 
 #include <memory>
 #include <optional>
@@ -69,7 +70,7 @@ public:
   Actuation(std::shared_ptr<ActuationSource> source, std::vector<std::shared_ptr<Actuator>> actuators)
       : source_(std::move(source)), actuators_(std::move(actuators)) {}
 
-  void steer(double t, Workspace &forward) override;
+  void apply(double t, Workspace &forward) override;
 
 private:
   std::shared_ptr<ActuationSource> source_;

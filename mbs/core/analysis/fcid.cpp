@@ -12,8 +12,8 @@ using Eigen::VectorXd;
 
 FullyConstrained::FullyConstrained(const System &system, VectorXd guess)
     : system_(system), workspace_(system), q_(std::move(guess)), gradients_(static_cast<Index>(system.bodies.size())) {
-  v_ = a_ = f_ = VectorXd::Zero(system.coordinates);
-  value_ = rate_ = acceleration_ = VectorXd::Zero(static_cast<Index>(system.constraints.size()));
+  v_ = a_ = f_ = step_ = VectorXd::Zero(system.n_v());
+  value_ = rate_ = acceleration_ = VectorXd::Zero(static_cast<Index>(system.rows.size()));
   for (const auto &body : system.bodies)
     shape_force_.emplace_back(VectorXd::Zero(body.modes()));
 }
@@ -57,20 +57,22 @@ void FullyConstrained::set_target(double t, std::size_t constraint, const Jet &t
 }
 
 void FullyConstrained::update_jacobian() {
-  for (std::size_t r = 0; r < system_.constraints.size(); ++r) {
-    const Measure &row = system_.constraints[r].row;
+  for (std::size_t r = 0; r < system_.rows.size(); ++r) {
+    const Measure &row = system_.rows[r];
     evaluate(row, workspace_.bodies, workspace_.rows[r]);
-    if (r < system_.held)
+    if (r < system_.n_bilateral())
       gradients_.set_column(static_cast<Index>(r), row, workspace_.rows[r], workspace_.bodies);
   }
   gradients_.factorise();
 }
 
-// (R, theta) part of x += sign C_q,r^-1 rhs
-void FullyConstrained::move_frames(VectorXd &x, const VectorXd &rhs, double sign) {
-  const VectorXd step = gradients_.solve_transposed(rhs.head(static_cast<Index>(system_.held)));
+// C_q,r^-1 rhs on the frames' coordinates (R, theta), zero on p
+const VectorXd &FullyConstrained::frame_step(const VectorXd &rhs) {
+  const VectorXd step = gradients_.solve_transposed(rhs.head(static_cast<Index>(system_.n_bilateral())));
+  step_.setZero();
   for (std::size_t b = 0; b < system_.bodies.size(); ++b)
-    x.segment<3>(system_.first_coordinate[b]) += sign * step.segment<3>(static_cast<Index>(3 * b));
+    step_.segment<3>(system_.first_coordinate[b]) = step.segment<3>(static_cast<Index>(3 * b));
+  return step_;
 }
 
 bool FullyConstrained::find_position(double t) {
@@ -86,21 +88,23 @@ bool FullyConstrained::find_position(double t) {
     if (!std::isfinite(left))
       return false;
     previous = left;
-    move_frames(q_, value_, -1);
+    system_.space.integrate(q_.data(), -1, frame_step(value_).data(), q_.data());
   }
   return false;
 }
 
 // f_r += d mu with the moments mu = J d^T q_ddot of the rotors, which become their multipliers
 void FullyConstrained::add_rotors(VectorXd &f_r) {
-  if (system_.held == system_.constraints.size())
+  if (system_.rotors.empty())
     return;
   constraint_accelerations(system_, q_.data(), a_.data(), workspace_, acceleration_.data());
-  for (std::size_t r = system_.held; r < system_.constraints.size(); ++r) {
+  for (std::size_t k = 0; k < system_.rotors.size(); ++k) {
+    const Rotor &rotor = system_.rotors[k];
+    const std::size_t r = system_.n_bilateral() + k;
     const auto i = static_cast<Index>(r);
-    const double mu = workspace_.lambda[i] = acceleration_[i] / system_.constraints[r].compliance;
+    const double mu = workspace_.lambda[i] = acceleration_[i] / rotor.compliance;
     VectorXd d = VectorXd::Zero(f_r.size());
-    add_frame_gradient(system_.constraints[r].row, workspace_.rows[r], workspace_.bodies, d);
+    add_frame_gradient(rotor.row, workspace_.rows[r], workspace_.bodies, d);
     f_r += mu * d;
   }
 }
@@ -113,20 +117,22 @@ bool FullyConstrained::solve(double t) {
 }
 
 bool FullyConstrained::move(double t) {
-  for (std::size_t b = 0; started_ && b < system_.bodies.size(); ++b) {
-    const Index i = system_.first_coordinate[b];
-    q_.segment<3>(i) += (t - time_) * v_.segment<3>(i);
+  if (started_) { // on with the velocity of the frames; p is given
+    step_.setZero();
+    for (const Index i : system_.first_coordinate)
+      step_.segment<3>(i) = v_.segment<3>(i);
+    system_.space.integrate(q_.data(), t - time_, step_.data(), q_.data());
   }
   started_ = true;
   time_ = t;
   if (!find_position(t))
     return false;
-  move_frames(v_, rate_, -1); // C_q v + C_t is linear in v: exact in one step
+  v_ -= frame_step(rate_); // C_q v + C_t is linear in v: exact in one step
   constraint_residuals(system_, t, q_.data(), v_.data(), workspace_, value_.data(), rate_.data());
-  for (std::size_t r = 0; r < system_.constraints.size(); ++r) // biases of slides go with v
-    evaluate(system_.constraints[r].row, workspace_.bodies, workspace_.rows[r]);
+  for (std::size_t r = 0; r < system_.rows.size(); ++r) // biases of slides go with v
+    evaluate(system_.rows[r], workspace_.bodies, workspace_.rows[r]);
   constraint_accelerations(system_, q_.data(), a_.data(), workspace_, acceleration_.data());
-  move_frames(a_, acceleration_, -1);
+  a_ -= frame_step(acceleration_);
   return a_.allFinite();
 }
 
@@ -139,9 +145,8 @@ void FullyConstrained::balance(double t) {
   workspace_.lambda.head(f_r.size()) = -gradients_.solve(f_r);
   for (auto &wrench : workspace_.wrench)
     wrench.setZero();
-  for (std::size_t r = 0; r < system_.constraints.size(); ++r)
-    add_wrench(system_.constraints[r].row, workspace_.rows[r], workspace_.lambda[static_cast<Index>(r)],
-               workspace_.wrench);
+  for (std::size_t r = 0; r < system_.rows.size(); ++r)
+    add_wrench(system_.rows[r], workspace_.rows[r], workspace_.lambda[static_cast<Index>(r)], workspace_.wrench);
   for (std::size_t b = 0; b < system_.bodies.size(); ++b) {
     shape_force_[b] = f_.segment(system_.first_coordinate[b] + 3, system_.bodies[b].modes());
     add_modal_force(system_.bodies[b], workspace_.bodies[b], workspace_.wrench[b], shape_force_[b]);
@@ -149,8 +154,6 @@ void FullyConstrained::balance(double t) {
 }
 
 namespace {
-
-Index total_modes(const System &system) { return system.coordinates - static_cast<Index>(3 * system.bodies.size()); }
 
 VectorXd joined(const std::vector<VectorXd> &parts, Index size) {
   VectorXd whole(size);
@@ -166,24 +169,25 @@ VectorXd modal_stiffness(const System &system) {
   std::vector<VectorXd> stiffness;
   for (const auto &body : system.bodies)
     stiffness.push_back(body.stiffness);
-  return joined(stiffness, total_modes(system));
+  return joined(stiffness, system.n_modes());
 }
 
 } // namespace
 
 FcidOutputs collect(const FullyConstrained &motion, const std::vector<double> &times,
-                    const std::function<bool(double)> &solve, ActuatorForces *resolver) {
+                    const std::function<bool(double)> &solve, ActuatorForces *actuator_forces) {
   const System &system = motion.system();
-  const auto T = static_cast<Index>(times.size()), m = static_cast<Index>(system.constraints.size());
-  const Index n = total_modes(system);
+  const auto T = static_cast<Index>(times.size()), m = static_cast<Index>(system.rows.size());
+  const Index n = system.n_modes();
   FcidOutputs out;
-  for (auto *x : {&out.q, &out.v, &out.a})
-    x->resize(T, system.coordinates);
+  out.q.resize(T, system.n_q());
+  for (auto *x : {&out.v, &out.a})
+    x->resize(T, system.n_v());
   out.lambda.resize(T, m);
   out.shape_force.resize(T, n);
   out.residual.resize(T, 3);
-  if (resolver) {
-    out.tau.resize(T, resolver->tau().size());
+  if (actuator_forces) {
+    out.tau.resize(T, actuator_forces->tau().size());
     out.F_p.resize(T, n);
   }
   for (Index i = 0; i < T; ++i) {
@@ -202,30 +206,31 @@ FcidOutputs collect(const FullyConstrained &motion, const std::vector<double> &t
     out.residual(i, 1) =
         motion.velocity_residual().lpNorm<Eigen::Infinity>() / (1 + motion.v().lpNorm<Eigen::Infinity>());
     out.residual(i, 2) = acceleration_residual(system, motion.q().data(), motion.a().data(), motion.workspace());
-    if (!resolver)
+    if (!actuator_forces)
       continue;
-    resolver->resolve(motion.workspace());
-    out.tau.row(i) = resolver->tau().transpose();
-    out.F_p.row(i) = joined(resolver->modal_force(), n).transpose() + out.shape_force.row(i);
+    actuator_forces->resolve(motion.workspace());
+    out.tau.row(i) = actuator_forces->tau().transpose();
+    out.F_p.row(i) = joined(actuator_forces->modal_force(), n).transpose() + out.shape_force.row(i);
   }
   return out;
 }
 
 FcidOutputs fully_constrained(const System &system, const std::vector<double> &times,
-                              const std::vector<ModalShape> &shape, const VectorXd &guess, ActuatorForces *resolver) {
+                              const std::vector<ModalShape> &shape, const VectorXd &guess,
+                              ActuatorForces *actuator_forces) {
   FullyConstrained motion(system, guess);
   const auto solve = [&](double t) {
     motion.set_shape(t, shape);
     return motion.solve(t);
   };
-  return collect(motion, times, solve, resolver);
+  return collect(motion, times, solve, actuator_forces);
 }
 
 MatrixXd static_shape(const System &system, const std::vector<double> &times, const VectorXd &guess,
-                      ActuatorForces *resolver) {
+                      ActuatorForces *actuator_forces) {
   constexpr int most_iterations = 100;
   constexpr double tolerance = 1e-14; // of the shape's size
-  const Index n = total_modes(system);
+  const Index n = system.n_modes();
   const VectorXd K = modal_stiffness(system);
   MatrixXd shapes(static_cast<Index>(times.size()), n);
   const auto shape = [&](std::size_t i) { return shapes.row(static_cast<Index>(i)).transpose(); };
@@ -243,9 +248,9 @@ MatrixXd static_shape(const System &system, const std::vector<double> &times, co
       if (!motion.solve(times[i]))
         break;
       VectorXd F_p = joined(motion.shape_force(), n);
-      if (resolver) {
-        resolver->resolve(motion.workspace());
-        F_p += joined(resolver->modal_force(), n);
+      if (actuator_forces) {
+        actuator_forces->resolve(motion.workspace());
+        F_p += joined(actuator_forces->modal_force(), n);
       }
       const VectorXd step = F_p.cwiseQuotient(K);
       p -= step;

@@ -1,7 +1,7 @@
 // Fully constrained inverse dynamics: the modal coordinates are prescribed too, so that everything is algebraic.
 #pragma once
 
-#include "core/actuation/actuation.h"
+#include "core/actuation/actuator_forces.h"
 #include "core/system/frame_system.h"
 #include "core/system/system.h"
 
@@ -53,13 +53,13 @@ public:
 
 private:
   bool find_position(double t);
-  void move_frames(Eigen::VectorXd &x, const Eigen::VectorXd &rhs, double sign);
+  const Eigen::VectorXd &frame_step(const Eigen::VectorXd &rhs);
   void update_jacobian();
   void add_rotors(Eigen::VectorXd &f_r);
 
   const System &system_;
   Workspace workspace_;
-  Eigen::VectorXd q_, v_, a_, f_, value_, rate_, acceleration_;
+  Eigen::VectorXd q_, v_, a_, f_, step_, value_, rate_, acceleration_;
   FrameSystem gradients_; // C_q,r^T
   double time_ = 0;
   bool started_ = false;
@@ -74,20 +74,20 @@ struct FcidOutputs {
       residual;
 };
 
-// What is reported of `motion` at `times`; solve(t) makes it that of time t. resolver may be null; F_p then stays
-// empty.
+// What is reported of `motion` at `times`; solve(t) makes it that of time t. actuator_forces may be null; F_p then
+// stays empty.
 FcidOutputs collect(const FullyConstrained &motion, const std::vector<double> &times,
-                    const std::function<bool(double)> &solve, ActuatorForces *resolver);
+                    const std::function<bool(double)> &solve, ActuatorForces *actuator_forces);
 
-// resolver may be null, as above.
+// actuator_forces may be null, as above.
 FcidOutputs fully_constrained(const System &system, const std::vector<double> &times,
                               const std::vector<ModalShape> &shape, const Eigen::VectorXd &guess,
-                              ActuatorForces *resolver);
+                              ActuatorForces *actuator_forces);
 
 // The shape in which the links, at rest relative to their frames, need no modal forces beside those of motors and
-// joints (of the trajectory forces without a resolver): they sag under gravity and inertia as they would by themselves.
-// Rows p of all bodies, one per time; fewer where the iteration p <- p - K^-1 F_p(p) does not converge.
+// joints (of the trajectory forces without a actuator_forces): they sag under gravity and inertia as they would by
+// themselves. Rows p of all bodies, one per time; fewer where the iteration p <- p - K^-1 F_p(p) does not converge.
 Eigen::MatrixXd static_shape(const System &system, const std::vector<double> &times, const Eigen::VectorXd &guess,
-                             ActuatorForces *resolver);
+                             ActuatorForces *actuator_forces);
 
 } // namespace ffrobot

@@ -6,32 +6,19 @@ namespace ffrobot {
 
 using Eigen::Index;
 
-ActuationSource::ActuationSource(const System &system, std::vector<bool> is_trajectory,
-                                 std::optional<ActuatorForces> resolver)
-    : is_trajectory_(std::move(is_trajectory)), resolver_(std::move(resolver)) {
-  for (const auto &body : system.bodies)
-    modal_zero_.emplace_back(Eigen::VectorXd::Zero(body.modes()));
-  modal_force_ = modal_zero_;
-}
-
-void ActuationSource::resolve() {
-  if (!resolver_)
-    return;
-  resolver_->resolve(workspace());
-  tau_ = resolver_->tau();
-  for (std::size_t b = 0; b < modal_force_.size(); ++b)
-    modal_force_[b] = resolver_->modal_force()[b] + shape_force()[b];
-}
-
 RecordedMotion::RecordedMotion(const System &system, const Recording &recording)
-    : motion_(system, {}, {}, nullptr), recording_(recording) {
-  motion_.plan(recording.times.back() - recording.times.front());
+    : motion_(system), recording_(recording), z_(motion_.size()) {
+  motion_.norm().plan(recording.times.back() - recording.times.front());
   constexpr int remembered = 4;
   for (int i = 0; i < remembered; ++i)
     cache_.push_back({static_cast<std::size_t>(-1), make_method(recording.method, motion_)});
 }
 
-void RecordedMotion::state(double t, double *y) {
+const double *RecordedMotion::recorded(std::size_t i) const {
+  return recording_.states.data() + static_cast<std::size_t>(motion_.local().state_size()) * i;
+}
+
+void RecordedMotion::find_interval(double t) {
   const auto &times = recording_.times;
   const std::size_t last = times.size() - 2;
   hint_ = std::min(hint_, last);
@@ -39,41 +26,49 @@ void RecordedMotion::state(double t, double *y) {
     ++hint_;
   while (hint_ > 0 && t < times[hint_])
     --hint_;
+}
+
+void RecordedMotion::make_again(Method &method) {
+  const double t0 = recording_.times[hint_], h = recording_.times[hint_ + 1] - t0;
+  motion_.local().from_state(recorded(hint_), z_.data());
+  motion_.slope(t0, z_.data(), method.first_slope());
+  motion_.accepted(t0, z_.data(), method.first_slope()); // peaks, which iterations measure themselves by
+  method.step(t0, z_.data(), h, 1e-3 * recording_.tolerance);
+  motion_.local().from_state(recorded(hint_ + 1), method.end());
+  motion_.slope(t0 + h, method.end(), method.last_slope());
+  method.prepare_dense(t0, z_.data(), h);
+}
+
+const double *RecordedMotion::state(double t) {
+  find_interval(t);
+  motion_.local().set_centre(recorded(hint_));
   auto found = std::find_if(cache_.begin(), cache_.end(), [&](const Interval &i) { return i.index == hint_; });
   if (found == cache_.end()) {
     found = cache_.begin() + static_cast<std::ptrdiff_t>(next_);
     next_ = (next_ + 1) % cache_.size();
     found->index = hint_;
-    const Index n = motion_.size();
-    const double *start = recording_.states.data() + static_cast<std::size_t>(n) * hint_;
-    const double t0 = times[hint_], h = times[hint_ + 1] - t0;
-    Method &method = *found->method;
-    motion_.slope(t0, start, method.first_slope());
-    motion_.accepted(t0, start, method.first_slope()); // peaks, which iterations measure themselves by
-    method.step(t0, start, h, 1e-3 * recording_.tolerance);
-    std::copy_n(start + n, n, method.end());
-    motion_.slope(t0 + h, start + n, method.last_slope());
-    method.prepare_dense(t0, start, h);
+    make_again(*found->method);
   }
-  found->method->interpolate(t, y);
+  found->method->interpolate(t, z_.data());
+  return motion_.local().state(z_.data());
 }
 
 RecordedActuation::RecordedActuation(const System &system, const Recording &recording, std::vector<bool> is_trajectory,
-                                     std::optional<ActuatorForces> resolver)
-    : ActuationSource(system, std::move(is_trajectory), std::move(resolver)), system_(system),
-      motion_(system, recording), workspace_(system), y_(2 * system.coordinates), a_(system.coordinates) {}
+                                     std::optional<ActuatorForces> actuator_forces)
+    : ActuationSource(system, std::move(is_trajectory), std::move(actuator_forces)), system_(system),
+      motion_(system, recording), workspace_(system), a_(system.n_v()) {}
 
 void RecordedActuation::find(double t) {
-  motion_.state(t, y_.data());
-  accelerations(system_, t, y_.data(), y_.data() + system_.coordinates, workspace_, a_.data());
-  q_ = y_.head(system_.coordinates);
+  const double *y = motion_.state(t);
+  accelerations(system_, t, y, y + system_.n_q(), workspace_, a_.data());
+  q_ = Eigen::Map<const Eigen::VectorXd>(y, system_.n_q());
   resolve();
 }
 
 FullyConstrainedActuation::FullyConstrainedActuation(const System &system, std::vector<ModalShape> shape,
                                                      Eigen::VectorXd guess, std::vector<bool> is_trajectory,
-                                                     std::optional<ActuatorForces> resolver)
-    : ActuationSource(system, std::move(is_trajectory), std::move(resolver)), system_(system),
+                                                     std::optional<ActuatorForces> actuator_forces)
+    : ActuationSource(system, std::move(is_trajectory), std::move(actuator_forces)), system_(system),
       motion_(system, std::move(guess)), shape_(std::move(shape)) {}
 
 void FullyConstrainedActuation::find(double t) {

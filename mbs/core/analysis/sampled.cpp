@@ -46,7 +46,7 @@ void HeldCommands::set(const VectorXd &u) {
   }
 }
 
-void HeldCommands::steer(double, Workspace &workspace) {
+void HeldCommands::apply(double, Workspace &workspace) {
   std::copy(drive_.begin(), drive_.end(), workspace.external_drive.begin());
   workspace.has_external_modal = !patches_.empty();
   for (std::size_t i = 0; i < patches_.size(); ++i)
@@ -90,7 +90,7 @@ Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, con
                 const std::function<bool(double)> &carry_on) {
   const System &system = motion.system();
   OutputEvaluator evaluate(system, times.size(), &commands, nullptr);
-  VectorXd y(2 * q.size()), a = VectorXd::Zero(q.size());
+  VectorXd y(q.size() + v.size()), a = VectorXd::Zero(v.size());
   y << q, v;
   std::vector<VectorXd> taken(sampling.times.size());
   const std::vector<Event> events = schedule(sampling, times.back());
@@ -103,9 +103,9 @@ Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, con
       commands.set(taken[event.sample]);
       return;
     }
-    const double *rates = state + system.coordinates;
+    const double *rates = state + system.n_q();
     if (sensing.needs_accelerations()) {
-      commands.steer(t, motion.workspace());
+      commands.apply(t, motion.workspace());
       accelerations(system, t, state, rates, motion.workspace(), a.data());
     }
     taken[event.sample] = sampling.controller(event.sample, t, sensing.read(state, rates, a.data()));

@@ -48,7 +48,7 @@ public:
 
   // u: motors, then the patches of one body after the other.
   void set(const Eigen::VectorXd &u);
-  void steer(double t, Workspace &workspace) override;
+  void apply(double t, Workspace &workspace) override;
 
 private:
   std::vector<double> drive_;
@@ -63,7 +63,7 @@ struct Sampling {
   std::function<Eigen::VectorXd(std::size_t, double, const Eigen::VectorXd &)> controller;
 };
 
-// As run(); `commands`, which `motion` is steered by, hold what they were set to until the first command acts.
+// As run(); `commands` are the external loads of `motion`, and hold what they were set to until the first command acts.
 Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q,
                 const Eigen::VectorXd &v, const IntegrationControls &controls, HeldCommands &commands, Sensing &sensing,
                 const Sampling &sampling, const std::function<bool(double)> &carry_on);

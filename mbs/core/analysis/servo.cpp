@@ -13,7 +13,7 @@ ServoConstraint::ServoConstraint(const System &path, std::vector<Measure> motors
     : path_system_(path), driven_system_(driven), motors_(std::move(motors)),
       motor_constraint_(std::move(motor_constraint)), factor_(factor), offset_(std::move(offset)),
       guess_(std::move(guess)), path_(path, guess_), driven_(driven, guess_) {
-  residual_ = p_ = p_dot_ = p_ddot_ = VectorXd::Zero(path.coordinates - static_cast<Index>(3 * path.bodies.size()));
+  residual_ = p_ = p_dot_ = p_ddot_ = VectorXd::Zero(path.n_modes());
 }
 
 void ServoConstraint::restart() { path_.start_at(guess_); }
@@ -114,15 +114,15 @@ InternalDynamics servo_derivatives(ServoConstraint &servo, const std::vector<dou
 }
 
 FcidOutputs servo_outputs(ServoConstraint &servo, const std::vector<double> &times,
-                          const std::vector<ModalShape> &shape, ActuatorForces &resolver) {
+                          const std::vector<ModalShape> &shape, ActuatorForces &actuator_forces) {
   servo.restart();
-  return collect(servo.motion(), times, [&](double t) { return servo.solve(t, shape); }, &resolver);
+  return collect(servo.motion(), times, [&](double t) { return servo.solve(t, shape); }, &actuator_forces);
 }
 
 ServoActuation::ServoActuation(const System &driven, ServoConstraint servo, std::vector<ModalShape> shape,
-                               std::vector<bool> is_motor, ActuatorForces resolver)
-    : ActuationSource(driven, std::move(is_motor), std::move(resolver)), system_(driven), servo_(std::move(servo)),
-      shape_(std::move(shape)) {}
+                               std::vector<bool> is_motor, ActuatorForces actuator_forces)
+    : ActuationSource(driven, std::move(is_motor), std::move(actuator_forces)), system_(driven),
+      servo_(std::move(servo)), shape_(std::move(shape)) {}
 
 void ServoActuation::find(double t) {
   servo_.solve(t, shape_); // was found at all output times before; a failure in between shows as a refused step

@@ -63,13 +63,13 @@ InternalDynamics servo_derivatives(ServoConstraint &servo, const std::vector<dou
 
 // Motion and forces for p(t), one row per time that was reached; shape_force is the residual.
 FcidOutputs servo_outputs(ServoConstraint &servo, const std::vector<double> &times,
-                          const std::vector<ModalShape> &shape, ActuatorForces &resolver);
+                          const std::vector<ModalShape> &shape, ActuatorForces &actuator_forces);
 
 // The motors' forces for p(t), solved anew at every time.
 class ServoActuation final : public ActuationSource {
 public:
   ServoActuation(const System &driven, ServoConstraint servo, std::vector<ModalShape> shape, std::vector<bool> is_motor,
-                 ActuatorForces resolver);
+                 ActuatorForces actuator_forces);
 
   const System &system() const override { return system_; }
   const Workspace &workspace() const override { return servo_.motion().workspace(); }

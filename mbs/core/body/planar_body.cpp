@@ -1,7 +1,7 @@
 #include "core/body/planar_body.h"
 
 #include "core/body/lanes.h"
-#include "core/constraint/moving_rows.h"
+#include "core/body/moving_rows.h"
 
 #include <algorithm>
 #include <cmath>

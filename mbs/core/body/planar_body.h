@@ -1,12 +1,11 @@
 // A planar flexible body in the floating frame of reference: coordinates (R, theta, p).
 //
-// What a body contributes to the system is independent of the space it moves in: the free accelerations of its ports
-// (directions in which constraints hold its markers), and their mobility (the acceleration of one per unit force on
-// another). Constraints, elimination and integrators use nothing else, so that a spatial body can stand beside this
-// one.
+// Constraints and their elimination need of it the free accelerations of its ports (directions in which constraints
+// hold its markers), and their mobility (the acceleration of one per unit force on another). Units: SI; modes are
+// mass-orthonormal, so that p is in m sqrt(kg).
 #pragma once
 
-#include "core/constraint/packed_rows.h"
+#include "core/body/packed_rows.h"
 
 #include <Eigen/Core>
 #include <vector>
@@ -27,16 +26,16 @@ struct SecondOrder {
 //   W = [S_bar_x; S_bar_y; h; Phi_x, Phi_y, Phi_rotation of marker 1; of marker 2; ...]     (3 + 3 markers) x n
 // and its Gram matrix G = W W^T, both constant in the body frame (row h moves with p where S_tilde is not zero).
 struct PlanarBody {
-  double mass = 0;
-  double inertia = 0;                            // J2_11 + J2_22, about the origin of the frame
-  Eigen::Vector2d first_moment;                  // s0
-  Eigen::VectorXd stiffness;                     // (n) diagonal of K_ff
-  Eigen::MatrixXd damping;                       // (n, 1) diagonal of D_ff, or (n, n)
+  double mass = 0;                               // kg
+  double inertia = 0;                            // kg m^2, J2_11 + J2_22, about the origin of the frame
+  Eigen::Vector2d first_moment;                  // kg m, s0
+  Eigen::VectorXd stiffness;                     // (n) 1/s^2, diagonal of K_ff
+  Eigen::MatrixXd damping;                       // 1/s, (n, 1) diagonal of D_ff, or (n, n)
   Eigen::MatrixXd W;                             // (3 + 3 markers, n)
   Eigen::VectorXd j;                             // (n) I_bar_11 + I_bar_22; empty where it vanishes
   Eigen::MatrixXd S_tilde;                       // (n, n) S_bar_12 - S_bar_21, skew; empty where it vanishes
   Eigen::MatrixXd m_xy;                          // (n, n) S_bar_11 + S_bar_22; empty where it is the identity
-  std::vector<Eigen::Vector2d> marker_positions; // undeformed, body frame
+  std::vector<Eigen::Vector2d> marker_positions; // m, undeformed, body frame
   std::vector<int> marker_rows; // that constraints use: 0, 2 (translation) or 3 (rotation too); set by System::finish
   // Geometric stiffening. With W(p) = W - (K p)^T in place of W, and m_thetatheta less p^T K_omega p, every term that
   // follows from the kinetic energy and virtual work stays consistent. Both empty where it is left out.
@@ -48,7 +47,7 @@ struct PlanarBody {
   Eigen::Index coordinates() const { return 3 + modes(); }
 };
 
-// Motion of one marker in the global frame.
+// Motion of one marker in the global frame: m, m/s, rad, rad/s.
 struct MarkerMotion {
   Eigen::Vector2d arm; // from the frame's origin, deformed
   Eigen::Vector2d position;
@@ -66,7 +65,7 @@ struct PlanarBodyState {
   std::vector<MarkerMotion> markers;
 
   // applied loads, set between kinematics and free_motion
-  Eigen::Matrix3Xd wrench;    // (force x, force y, moment) at each marker, global
+  Eigen::Matrix3Xd wrench;    // (force x, force y, moment) at each marker, global: N, N m
   Eigen::VectorXd modal_load; // (n) generalized forces on p
   bool has_wrench = false, has_modal_load = false;
 
@@ -129,7 +128,7 @@ void required_force(const PlanarBody &body, const double *q, const double *v, co
 // p^T (S_bar_11 + S_bar_22) x, both (n)
 double weighted(const PlanarBody &body, const double *p, const double *x);
 
-// Kinetic, strain and gravitational energy.
+// Kinetic, strain and gravitational energy (J) and the power of damping (W).
 struct Energy {
   double kinetic = 0, strain = 0, gravitational = 0, dissipated_power = 0;
 };

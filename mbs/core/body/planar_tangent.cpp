@@ -1,5 +1,5 @@
 // Derivatives of planar_inverse.cpp: of the force that one body needs for a motion, and of its markers' accelerations.
-#include "core/system/tangent.h"
+#include "core/body/planar_tangent.h"
 
 namespace ffrobot {
 

@@ -1,7 +1,5 @@
 #include "core/constraint/port_couplings.h"
 
-#include "core/system/system.h"
-
 #include <algorithm>
 
 namespace ffrobot {
@@ -30,10 +28,10 @@ double coefficient(const PortTerm &term, const MeasureMotion &motion) {
 
 } // namespace
 
-PortCouplings::PortCouplings(const std::vector<PlanarBodyState> &bodies, const std::vector<Constraint> &constraints,
+PortCouplings::PortCouplings(const std::vector<PlanarBodyState> &bodies, const std::vector<Measure> &measures,
                              const EnvelopeMatrix<double> &schur) {
-  for (std::size_t r = 0; r < constraints.size(); ++r) {
-    const Measure &row = constraints[r].row;
+  for (std::size_t r = 0; r < measures.size(); ++r) {
+    const Measure &row = measures[r];
     const std::size_t first = terms_.size();
     add_terms(row, r, true, bodies, terms_);
     add_terms(row, r, false, bodies, terms_);

@@ -1,15 +1,13 @@
-// Constraint rows written over the ports of bodies: C_ddot = sum of coefficient * port acceleration + bias - target.
-// Rows of every kind come down to these terms, and C M^-1 C^T to a sum over pairs of terms that meet on a body.
+// Rows (constraints, rotors) written over the ports of bodies: C_ddot = sum of coefficient * port acceleration + bias -
+// target. Rows of every kind come down to these terms, and C M^-1 C^T to a sum over pairs of terms that meet on a body.
 #pragma once
 
 #include "core/constraint/envelope.h"
-#include "core/constraint/rows.h"
+#include "core/constraint/measure.h"
 
 #include <vector>
 
 namespace ffrobot {
-
-struct Constraint;
 
 struct PortTerm {
   std::size_t row, body;
@@ -28,7 +26,7 @@ struct PortCoupling {
 class PortCouplings {
 public:
   // marker_rows of the bodies are set; envelope as for EnvelopeMatrix.
-  PortCouplings(const std::vector<PlanarBodyState> &bodies, const std::vector<Constraint> &constraints,
+  PortCouplings(const std::vector<PlanarBodyState> &bodies, const std::vector<Measure> &measures,
                 const EnvelopeMatrix<double> &schur);
 
   // Coefficients of rows whose directions move, from rows[i]; those of all others stay as they are.

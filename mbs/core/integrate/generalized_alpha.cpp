@@ -16,12 +16,12 @@ constexpr double rounding = 1e-14;
 } // namespace
 
 GeneralizedAlpha::GeneralizedAlpha(ImplicitSystem &system, double spectral_radius)
-    : system_(system), project_(system), n_(system.size() / 2),
-      alpha_m_((2 * spectral_radius - 1) / (spectral_radius + 1)), alpha_f_(spectral_radius / (spectral_radius + 1)),
-      beta_(0.25 * std::pow(1 + alpha_f_ - alpha_m_, 2)), gamma_(0.5 + alpha_f_ - alpha_m_),
-      leading_((1 - alpha_m_) / (1 - alpha_f_)), v_dot_(n_), next_v_dot_(n_), previous_v_dot_(n_), drift_(n_), a_(n_),
-      next_a_(n_), position_correction_(n_), end_(2 * n_), start_(2 * n_), first_slope_(2 * n_), last_slope_(2 * n_),
-      change_(2 * n_), excess_(n_), force_(n_), x_(n_), value_(system.constraints()), rate_(value_), c_(value_) {}
+    : system_(system), project_(system), n_(system.n_v()), alpha_m_((2 * spectral_radius - 1) / (spectral_radius + 1)),
+      alpha_f_(spectral_radius / (spectral_radius + 1)), beta_(0.25 * std::pow(1 + alpha_f_ - alpha_m_, 2)),
+      gamma_(0.5 + alpha_f_ - alpha_m_), leading_((1 - alpha_m_) / (1 - alpha_f_)), v_dot_(n_), next_v_dot_(n_),
+      previous_v_dot_(n_), drift_(n_), a_(n_), next_a_(n_), position_correction_(n_), end_(2 * n_), start_(2 * n_),
+      first_slope_(2 * n_), last_slope_(2 * n_), change_(2 * n_), excess_(n_), force_(n_), x_(n_),
+      value_(system.constraints()), rate_(value_), c_(value_) {}
 
 // Consistent initial accelerations, C_tt included, are the first slope. The method's own lie alpha_m - alpha_f steps
 // ahead: their rate is taken from a difference.

@@ -40,7 +40,7 @@ private:
 
   ImplicitSystem &system_;
   ImplicitProjection project_;
-  Eigen::Index n_; // coordinates
+  Eigen::Index n_; // n_v
   double alpha_m_, alpha_f_, beta_, gamma_, leading_;
   double damping_factor_ = 0, stiffness_factor_ = 0;
   // v_dot: accelerations at the start, end and before; a: the method's own, behind them by alpha_m - alpha_f steps

@@ -16,7 +16,11 @@ public:
   bool operator()(double t, double *y);
 
 private:
-  bool settle(double t, const double *y, double *x, const Eigen::VectorXd &residual);
+  using VectorMap = Eigen::Map<Eigen::VectorXd>;
+
+  // Newton steps on x, the positions or velocities in y, until `residual` vanishes; move(step) takes a step off them.
+  template <class Move>
+  bool settle(double t, const double *y, const VectorMap &x, const Eigen::VectorXd &residual, const Move &move);
 
   ImplicitSystem &system_;
   Eigen::VectorXd none_, value_, rate_, correction_;

@@ -3,25 +3,31 @@
 #include "core/integrate/step_control.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <memory>
 
 namespace ffrobot {
 
 namespace {
 
 constexpr unsigned long steps_between_questions = 1000;
+constexpr std::chrono::milliseconds time_between_questions{200}; // where steps take long
 
 // A step size that collapses never quite reaches rounding where noise feeds its estimates. A run that would take this
-// many times the steps it is allowed, at the pace of its last thousand, is not worth going on with.
+// many times the steps it is allowed, at the pace of its last thousand, is given up.
 constexpr double hopeless = 100;
 
-// What is an error once, not at every step, may take from a reserve, all of which is as much as the tolerance. A load
-// that jumps leaves an error in proportion to the step across it, more than that step's share of the tolerance however
-// short it is: steps that have become so much shorter than those before may take from the reserve. Vibrations below the
-// tolerance that a step damps away are gone after it: methods that do so begin with the longest step there is, and may.
+// The reserve is a second tolerance, as large as the first, for errors that happen once and not at every step. There
+// are two kinds. A load that jumps leaves an error in proportion to the step across it, more than that step's share of
+// the tolerance however short it is: steps that are that much shorter than the usual ones may take from the reserve.
+// Vibrations below the tolerance that a step damps away are gone after it: a method that damps begins with the longest
+// step there is, and may take from the reserve until these are gone.
 constexpr double much_shorter = 1e-3, part_of_reserve = 0.25;
 
-// Size of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
+constexpr double rounding = 2e-14; // what error estimates see of it: shorter steps would not help
+
+// Length of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
 double next_step(double h, double left, bool lands) {
   if (h >= left)
     return left;
@@ -30,153 +36,253 @@ double next_step(double h, double left, bool lands) {
   return h > 0.5 * left ? 0.5 * left : h;
 }
 
+// A step to be tried. `target` is where steps have to end next, if `lands`, or the end of the run.
+struct Attempt {
+  double target, step, end;
+};
+
+// How large its error may be: as parts of the tolerance, and in the unit of errors.
+struct Allowance {
+  double regular_part, part;
+  double regular_error, error;
+};
+
+class Integration {
+public:
+  Integration(ImplicitSystem &system, const std::vector<double> &times, const Eigen::VectorXd &y,
+              const IntegrationControls &controls, const StateFunctionOfTime &output,
+              const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks)
+      : system_(system), times_(times), controls_(controls), output_(output), carry_on_(carry_on),
+        recording_(recording), breaks_(breaks), method_(make_method(controls.method, system)),
+        control_(method_->error_order()), t_(times.front()), t_asked_(t_), end_(times.back()),
+        duration_(times.back() - times.front()), z_(system.size()), error_(system.size()), z_output_(system.size()) {
+    system_.local().set_centre(y.data());
+    system_.local().from_state(y.data(), z_.data());
+    steps_.in_transient = method_->damps();
+    steps_.next_step = method_->damps() ? end_ - t_ : std::min(system.initial_step(), end_ - t_);
+  }
+
+  void begin() {
+    pass_breaks();
+    system_.slope(t_, z_.data(), method_->first_slope());
+    system_.accepted(t_, z_.data(), method_->first_slope());
+    record();
+    output_(report_.outputs++, t_, state(z_.data()));
+  }
+
+  void go_on(const IntegrationCheckpoint &checkpoint) {
+    pass_breaks(); // those at the start
+    system_.local().set_centre(checkpoint.state.data());
+    system_.local().from_state(checkpoint.state.data(), z_.data());
+    t_ = t_asked_ = checkpoint.time;
+    steps_ = checkpoint.steps;
+    control_.go_on(steps_.previous_step, steps_.previous_error);
+    system_.slope(t_, z_.data(), method_->first_slope());
+    report_.outputs = checkpoint.outputs;
+  }
+
+  IntegrationReport run() {
+    while (report_.outputs < times_.size() && may_go_on()) {
+      steps_.next_step = std::min(steps_.next_step, duration_);
+      const Attempt attempt = next_attempt();
+      const Allowance allowance = allowance_of(attempt.step);
+      const double size = try_step(attempt, allowance);
+      if (!(size <= 1)) {
+        ++report_.rejected;
+        steps_.next_step = control_.after_rejected(attempt.step, size);
+        continue;
+      }
+      accept(attempt, allowance, size);
+    }
+    report_.time = t_;
+    report_.evaluations = system_.evaluations();
+    return report_;
+  }
+
+  Eigen::VectorXd final_state() const {
+    return Eigen::Map<const Eigen::VectorXd>(state(z_.data()), system_.local().state_size());
+  }
+
+  IntegrationCheckpoint checkpoint() const {
+    StepHistory steps = steps_;
+    steps.previous_step = control_.previous_step();
+    steps.previous_error = control_.previous_error();
+    return {t_, final_state(), steps, report_.outputs};
+  }
+
+private:
+  const double *state(const double *z) const { return system_.local().state(z); }
+
+  // False where the run ends here, with its status set.
+  bool may_go_on() {
+    const auto end_as = [&](IntegrationStatus status) {
+      report_.status = status;
+      return false;
+    };
+    if (report_.status != IntegrationStatus::completed)
+      return false;
+    const auto taken = report_.steps + report_.rejected;
+    if (controls_.max_steps && taken >= controls_.max_steps)
+      return end_as(IntegrationStatus::too_many_steps);
+    const double left = end_ - t_;
+    bool collapsed = steps_.next_step < 1e-13 * std::max(std::abs(t_), left);
+    const bool counted = taken % steps_between_questions == 0;
+    if (const auto now = std::chrono::steady_clock::now(); counted || now - asked_ > time_between_questions) {
+      asked_ = now;
+      if (!carry_on_(t_))
+        return end_as(IntegrationStatus::interrupted);
+    }
+    if (counted) {
+      const double most = hopeless * static_cast<double>(controls_.max_steps) / steps_between_questions;
+      collapsed = collapsed || (taken > 0 && controls_.max_steps && left > most * (t_ - t_asked_));
+      t_asked_ = t_;
+    }
+    return collapsed ? end_as(IntegrationStatus::step_underflow) : true;
+  }
+
+  Attempt next_attempt() const {
+    bool lands = method_->lands_on_outputs();
+    double target = lands ? times_[report_.outputs] : end_;
+    if (breaks_ && next_break_ < breaks_->times.size() && breaks_->times[next_break_] <= target) {
+      target = breaks_->times[next_break_];
+      lands = true;
+    }
+    const double step = next_step(steps_.next_step, target - t_, lands);
+    return {target, step, step == target - t_ ? target : t_ + step};
+  }
+
+  Allowance allowance_of(double step) const {
+    const double regular = method_->error_share(step / duration_);
+    const bool once = steps_.in_transient || step < much_shorter * steps_.usual_step;
+    const double part = once ? std::max(regular, part_of_reserve * steps_.reserve) : regular;
+    const auto error = [&](double of_tolerance) { return std::max(controls_.tolerance * of_tolerance, rounding); };
+    return {regular, part, error(regular), error(part)};
+  }
+
+  // Size of the step's error relative to the largest one allowed; NaN where it could not be made.
+  double try_step(const Attempt &attempt, const Allowance &allowance) {
+    const double tolerance = steps_.in_transient ? allowance.regular_error : allowance.error;
+    if (!method_->step(t_, z_.data(), attempt.step, tolerance) || !method_->correct(attempt.end))
+      return NAN;
+    system_.slope(attempt.end, method_->end(), method_->last_slope());
+    const double damping = method_->estimate(attempt.step, error_);
+    return system_.error_size(attempt.end, method_->end(), error_.data()) * damping / allowance.error;
+  }
+
+  void accept(const Attempt &attempt, const Allowance &allowance, double size) {
+    ++report_.steps;
+    size = take_from_reserve(attempt.step, allowance, size);
+    deliver_outputs(attempt);
+    move_to_end(attempt);
+    if (!system_.is_sensible(z_.data())) {
+      report_.status = IntegrationStatus::diverged;
+      return;
+    }
+    // A step that was shortened to land on an output tells what the step asked for would have cost. One that was
+    // shortened much, to end at a break, tells nothing: the next step stays as long as the control had asked for.
+    const double asked = std::clamp(steps_.next_step, attempt.step, 2 * attempt.step);
+    if (!(t_ == attempt.target && breaks_ && 2 * attempt.step < steps_.next_step))
+      steps_.next_step = control_.after_accepted(asked, size * std::pow(asked / attempt.step, method_->error_order()));
+    if (pass_breaks()) {
+      system_.slope(t_, z_.data(), method_->first_slope());
+      method_->restart();
+    }
+  }
+
+  // The size of the error for the control of the next step, which should do without the reserve.
+  double take_from_reserve(double step, const Allowance &allowance, double size) {
+    steps_.usual_step = std::max(step, 0.8 * steps_.usual_step);
+    if (allowance.part > allowance.regular_part &&
+        (!steps_.in_transient || size * allowance.error > allowance.regular_error))
+      steps_.reserve -= size * allowance.part;
+    if (steps_.in_transient) {
+      size *= allowance.error / allowance.regular_error;
+      steps_.in_transient = size > 1;
+    }
+    return size;
+  }
+
+  void deliver_outputs(const Attempt &attempt) {
+    bool dense = false;
+    for (; report_.outputs < times_.size() && times_[report_.outputs] <= attempt.end; ++report_.outputs) {
+      const double t = times_[report_.outputs];
+      if (t == attempt.end) {
+        output_(report_.outputs, t, state(method_->end()));
+        continue;
+      }
+      if (!dense)
+        method_->prepare_dense(t_, z_.data(), attempt.step);
+      dense = true;
+      method_->interpolate(t, z_output_.data());
+      output_(report_.outputs, t, state(z_output_.data()));
+    }
+  }
+
+  void move_to_end(const Attempt &attempt) {
+    t_ = attempt.end;
+    method_->accept(attempt.step);
+    z_ = Eigen::Map<const Eigen::VectorXd>(method_->end(), system_.size());
+    std::copy_n(method_->last_slope(), system_.size(), method_->first_slope());
+    if (system_.local().recentre(z_.data(), method_->first_slope()))
+      method_->recentred();
+    system_.accepted(t_, z_.data(), method_->first_slope());
+    record();
+  }
+
+  // True where loads have jumped at t.
+  bool pass_breaks() {
+    const std::size_t before = next_break_;
+    while (breaks_ && next_break_ < breaks_->times.size() && breaks_->times[next_break_] <= t_) {
+      breaks_->at(next_break_, t_, state(z_.data()));
+      ++next_break_;
+    }
+    return next_break_ > before;
+  }
+
+  void record() {
+    if (!recording_)
+      return;
+    const double *y = state(z_.data());
+    recording_->times.push_back(t_);
+    recording_->states.insert(recording_->states.end(), y, y + system_.local().state_size());
+  }
+
+  ImplicitSystem &system_;
+  const std::vector<double> &times_;
+  const IntegrationControls &controls_;
+  const StateFunctionOfTime &output_;
+  const std::function<bool(double)> &carry_on_;
+  Recording *recording_;
+  const Breaks *breaks_;
+  std::unique_ptr<Method> method_;
+  StepControl control_;
+  StepHistory steps_;
+  IntegrationReport report_;
+  double t_, t_asked_, end_, duration_;
+  std::chrono::steady_clock::time_point asked_ = std::chrono::steady_clock::now();
+  std::size_t next_break_ = 0;
+  Eigen::VectorXd z_, error_, z_output_; // local coordinates (ode.h)
+};
+
 } // namespace
 
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
-                            const IntegrationControls &controls,
-                            const std::function<void(std::size_t, double, const double *)> &output,
+                            const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
-                            Checkpoint *checkpoint) {
-  const auto made = make_method(controls.method, system);
-  Method &method = *made;
-  Eigen::VectorXd error(system.size()), y_output(system.size());
-  const double end = times.back(), duration = end - times.front();
-  IntegrationReport report;
-  double t = times.front(), t_asked = t;
-  double usual_step = 0, reserve = 1; // the largest of late; in terms of the tolerance
-  bool in_transient = method.damps(); // vibrations of the start
-  double h = method.damps() ? end - t : std::min(system.initial_step(), end - t);
-  const auto record = [&] {
-    if (recording) {
-      recording->times.push_back(t);
-      recording->states.insert(recording->states.end(), y.data(), y.data() + y.size());
-    }
-  };
-  std::size_t next_break = 0;
-  const auto pass_breaks = [&] {
-    const std::size_t before = next_break;
-    while (breaks && next_break < breaks->times.size() && breaks->times[next_break] <= t) {
-      breaks->at(next_break, t, y.data());
-      ++next_break;
-    }
-    return next_break > before;
-  };
-  pass_breaks();
-  StepControl control(method.error_order());
-  if (checkpoint && checkpoint->state.size()) {
-    y = checkpoint->state;
-    t = t_asked = checkpoint->time;
-    h = checkpoint->stepping[0];
-    usual_step = checkpoint->stepping[1];
-    reserve = checkpoint->stepping[2];
-    control.go_on(checkpoint->stepping[3], checkpoint->stepping[4]);
-    in_transient = checkpoint->stepping[5] != 0;
-    system.restore(checkpoint->gathered);
-    system.slope(t, y.data(), method.first_slope());
-    report.outputs = checkpoint->outputs;
-  } else {
-    system.slope(t, y.data(), method.first_slope());
-    system.accepted(t, y.data(), method.first_slope());
-    record();
-    output(report.outputs++, t, y.data());
-  }
+                            IntegrationCheckpoint *checkpoint) {
+  Integration integration(system, times, y, controls, output, carry_on, recording, breaks);
+  if (checkpoint && checkpoint->has_begun())
+    integration.go_on(*checkpoint);
+  else
+    integration.begin();
   if (recording) {
     recording->method = controls.method;
     recording->tolerance = controls.tolerance;
   }
-  while (report.outputs < times.size()) {
-    if (controls.max_steps && report.steps + report.rejected >= controls.max_steps) {
-      report.status = IntegrationStatus::too_many_steps;
-      break;
-    }
-    const double left = end - t;
-    bool collapsed = h < 1e-13 * std::max(std::abs(t), left);
-    if (const auto taken = report.steps + report.rejected; taken % steps_between_questions == 0) {
-      if (!carry_on(t)) {
-        report.status = IntegrationStatus::interrupted;
-        break;
-      }
-      const double most = hopeless * static_cast<double>(controls.max_steps) / steps_between_questions;
-      collapsed = collapsed || (taken > 0 && controls.max_steps && left > most * (t - t_asked));
-      t_asked = t;
-    }
-    if (collapsed) {
-      report.status = IntegrationStatus::step_underflow;
-      break;
-    }
-    h = std::min(h, duration);
-    double target = method.lands_on_outputs() ? times[report.outputs] : end;
-    bool lands = method.lands_on_outputs();
-    if (breaks && next_break < breaks->times.size() && breaks->times[next_break] <= target) {
-      target = breaks->times[next_break];
-      lands = true;
-    }
-    const double step = next_step(h, target - t, lands);
-    const double t_end = step == target - t ? target : t + step;
-    constexpr double rounding = 2e-14; // what estimates see of it: shorter steps would not help
-    const double regular = method.error_share(step / duration);
-    const bool once = in_transient || step < much_shorter * usual_step;
-    const double part = once ? std::max(regular, part_of_reserve * reserve) : regular;
-    const double share = std::max(controls.tolerance * part, rounding);
-    const double regular_share = std::max(controls.tolerance * regular, rounding);
-    double size = NAN;
-    if (method.step(t, y.data(), step, in_transient ? regular_share : share) && method.correct(t_end)) {
-      system.slope(t_end, method.end(), method.last_slope());
-      const double damping = method.estimate(step, error);
-      size = system.error_size(t_end, method.end(), error.data()) * damping / share;
-    }
-    if (!(size <= 1)) {
-      ++report.rejected;
-      h = control.after_rejected(step, size);
-      continue;
-    }
-    ++report.steps;
-    usual_step = std::max(step, 0.8 * usual_step);
-    if (part > regular && (!in_transient || size * share > regular_share))
-      reserve -= size * part;
-    if (in_transient) {
-      size *= share / regular_share; // the steps after this one should do without the reserve
-      in_transient = size > 1;
-    }
-    bool dense = false;
-    for (; report.outputs < times.size() && times[report.outputs] <= t_end; ++report.outputs) {
-      if (times[report.outputs] == t_end) {
-        output(report.outputs, t_end, method.end());
-        continue;
-      }
-      if (!dense)
-        method.prepare_dense(t, y.data(), step);
-      dense = true;
-      method.interpolate(times[report.outputs], y_output.data());
-      output(report.outputs, times[report.outputs], y_output.data());
-    }
-    t = t_end;
-    method.accept(step);
-    y = Eigen::Map<const Eigen::VectorXd>(method.end(), system.size());
-    std::copy_n(method.last_slope(), system.size(), method.first_slope());
-    system.accepted(t, y.data(), method.first_slope());
-    record();
-    if (!system.is_sensible(y.data())) {
-      report.status = IntegrationStatus::diverged;
-      break;
-    }
-    // Steps that were shortened to land on an output tell what the step asked for would have cost.
-    // A much shorter one, on the way to a break, tells nothing: what was found before it stands.
-    const double asked = std::clamp(h, step, 2 * step);
-    if (!(t == target && breaks && 2 * step < h))
-      h = control.after_accepted(asked, size * std::pow(asked / step, method.error_order()));
-    if (pass_breaks()) {
-      system.slope(t, y.data(), method.first_slope());
-      method.restart();
-    }
-  }
-  if (checkpoint) {
-    Eigen::VectorXd stepping(6);
-    stepping << h, usual_step, reserve, control.previous_step(), control.previous_error(), in_transient;
-    *checkpoint = {t, y, stepping, system.save(), report.outputs};
-  }
-  report.time = t;
-  report.evaluations = system.evaluations();
+  const IntegrationReport report = integration.run();
+  y = integration.final_state();
+  if (checkpoint)
+    *checkpoint = integration.checkpoint();
   return report;
 }
 

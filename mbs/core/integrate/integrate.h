@@ -12,20 +12,30 @@ namespace ffrobot {
 
 // The accepted steps of a run: with them its dense output can be made again at any time (see replay.h).
 struct Recording {
-  std::vector<double> times;
-  std::vector<double> states; // one after the other
+  std::vector<double> times;  // s
+  std::vector<double> states; // (q, v) of each, one after the other
   MethodChoice method;
   double tolerance = 0;
 };
 
-// Where a run has stopped, and all that its next step depends on. Explicit methods go on as if nothing had been; what
-// implicit ones extrapolate from earlier steps is lost.
-struct Checkpoint {
-  double time = 0;
-  Eigen::VectorXd state;    // empty: the run has not begun
-  Eigen::VectorXd stepping; // step size, of late the largest, reserve, previous step, its error, in_transient
-  Eigen::VectorXd gathered; // of the system
-  std::size_t outputs = 0;  // delivered
+// What the size of the next step follows from.
+struct StepHistory {
+  double next_step = 0;                         // s
+  double usual_step = 0;                        // s, the largest of the last ones
+  double reserve = 1;                           // what is left of it, in terms of the tolerance
+  double previous_step = 0, previous_error = 1; // s, and relative to the largest error allowed; of StepControl
+  bool in_transient = false;                    // vibrations of the start are still being damped away
+};
+
+// Where an integration has stopped, and all that its next step depends on. Explicit methods go on as if nothing had
+// been; what implicit ones extrapolate from earlier steps is lost.
+struct IntegrationCheckpoint {
+  double time = 0;       // s
+  Eigen::VectorXd state; // (q, v); empty: the integration has not begun
+  StepHistory steps;
+  std::size_t outputs = 0; // delivered
+
+  bool has_begun() const { return state.size() > 0; }
 };
 
 enum class IntegrationStatus {
@@ -38,7 +48,7 @@ enum class IntegrationStatus {
 
 struct IntegrationReport {
   IntegrationStatus status = IntegrationStatus::completed;
-  double time = 0; // reached
+  double time = 0; // s, reached
   unsigned long steps = 0, rejected = 0, evaluations = 0;
   std::size_t outputs = 0; // delivered
 };
@@ -49,21 +59,23 @@ struct IntegrationControls {
   MethodChoice method;
 };
 
+using StateFunctionOfTime = std::function<void(std::size_t, double, const double *)>; // of number, time and (q, v)
+
 // Times, ascending, at which loads jump: steps end there, and `at` is told index, time and state before the next
 // begins.
 struct Breaks {
   std::vector<double> times;
-  std::function<void(std::size_t, double, const double *)> at;
+  StateFunctionOfTime at;
 };
 
-// Integrates y from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
-// carry_on(t) is asked about every thousand steps. y ends at the last accepted step. `breaks` may be null.
-// A `checkpoint` of an earlier call with the same `times` has the run go on from there: neither outputs nor the
-// `recording`, which has to be the same, begin again, and max_steps counts anew. It ends as that of this call.
+// Integrates y = (q, v) from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
+// carry_on(t) is asked every thousand steps, and about five times a second. y ends at the last accepted step.
+// `recording`, `breaks` and `checkpoint` may be null. Of a `checkpoint` that has begun in an earlier call with the same
+// `times` the integration goes on: neither outputs nor the `recording`, which has to be the same, begin again, and
+// max_steps counts anew. It ends as that of this call.
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
-                            const IntegrationControls &controls,
-                            const std::function<void(std::size_t, double, const double *)> &output,
+                            const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording,
-                            const Breaks *breaks = nullptr, Checkpoint *checkpoint = nullptr);
+                            const Breaks *breaks = nullptr, IntegrationCheckpoint *checkpoint = nullptr);
 
 } // namespace ffrobot

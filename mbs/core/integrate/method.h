@@ -14,7 +14,8 @@ class Method {
 public:
   virtual ~Method() = default;
 
-  // One step from (t, y) with the slope there in first_slope(); the result, before any correction, is in end().
+  // One step from (t, y) with the slope there in first_slope(); the result, before any correction, is in end(). States
+  // here are local coordinates (ode.h), whose centre is where the step starts.
   // `tolerance` bounds what iterations may leave. False where the equations of the step could not be solved.
   virtual bool step(double t, const double *y, double h, double tolerance) = 0;
 
@@ -40,6 +41,9 @@ public:
 
   // Loads jump here, and the first slope with them: what earlier steps tell of slopes is of no use for the next.
   virtual void restart() {}
+
+  // The next step has local coordinates about another centre.
+  virtual void recentred() {}
 
   // Whether steps have to end at output times, or there is an interpolation as good as the steps.
   virtual bool lands_on_outputs() const = 0;

@@ -20,6 +20,7 @@ public:
   bool damps() const override { return true; }
   void accept(double h) override;
   void restart() override { previous_step_ = 0; }
+  void recentred() override { restart(); } // slopes of earlier steps are rates of other coordinates
 
   bool lands_on_outputs() const override { return true; } // between steps it is of order 3 only
   void prepare_dense(double t, const double *y, double h) override;
@@ -41,7 +42,7 @@ private:
 
   ImplicitSystem &system_;
   ImplicitProjection project_;
-  Eigen::Index n_;                           // coordinates: half the size of y
+  Eigen::Index n_;                           // n_v: half the size of y
   Eigen::MatrixXd Z_, W_, F_, change_;       // (2n, 3): stages less y, the same in eigenvectors, slopes, Newton's step
   Eigen::MatrixXd collocation_;              // (2n, 3) coefficients of the last accepted step's polynomial
   Eigen::MatrixXd slopes_, previous_slopes_; // (2n, 3) of that polynomial at its stages, and of the one before

@@ -3,7 +3,7 @@
 // links of a chain.
 #pragma once
 
-#include "core/constraint/rows.h"
+#include "core/constraint/measure.h"
 
 #include <Eigen/LU>
 #include <Eigen/SparseLU>

@@ -20,8 +20,8 @@ template <class Vector> void rotate(double c, double s, Vector &v) {
 
 template <class Scalar>
 IterationMatrix<Scalar>::IterationMatrix(const System &system)
-    : system_(system), rows_(system.constraints.size()), schur_(system.envelope),
-      nu_(Vector::Zero(static_cast<Index>(system.constraints.size()))) {
+    : system_(system), rows_(system.rows.size()), schur_(system.envelope),
+      nu_(Vector::Zero(static_cast<Index>(system.rows.size()))) {
   for (const auto &body : system.bodies) {
     Body &b = bodies_.emplace_back();
     b.W = body.W;
@@ -113,9 +113,10 @@ void IterationMatrix<Scalar>::factorise(const Workspace &w, const Eigen::VectorX
     const Vector3 image = E * cs;
     *schur_.entry(c.r, c.s) += cr[0] * image[0] + cr[1] * image[1] + cr[2] * image[2];
   }
-  for (std::size_t r = system_.held; r < rows_.size(); ++r) {
-    const auto i = static_cast<Index>(r);
-    *schur_.entry(i, i) += system_.constraints[r].compliance;
+  auto i = static_cast<Index>(system_.n_bilateral());
+  for (const Rotor &rotor : system_.rotors) {
+    *schur_.entry(i, i) += rotor.compliance;
+    ++i;
   }
   schur_.factorise();
 }
@@ -132,7 +133,7 @@ template <class Scalar> void IterationMatrix<Scalar>::free_response(const Scalar
 }
 
 template <class Scalar> Scalar IterationMatrix<Scalar>::along_row(std::size_t i) const {
-  const Measure &row = system_.constraints[i].row;
+  const Measure &row = system_.rows[i];
   Scalar sum(0);
   for (const auto &[m, h] : {std::pair(&row.b, &rows_[i].coefficient_b), std::pair(&row.a, &rows_[i].coefficient_a)})
     if (m->body >= 0) {
@@ -154,7 +155,7 @@ template <class Scalar> void IterationMatrix<Scalar>::constrain(const Scalar *x,
     }
   }
   for (std::size_t i = 0; i < rows_.size(); ++i)
-    c[i] = i < system_.held ? along_row(i) : Scalar(0);
+    c[i] = i < system_.n_bilateral() ? along_row(i) : Scalar(0);
 }
 
 template <class Scalar> void IterationMatrix<Scalar>::solve(const Scalar *r, const Scalar *c, Scalar *x) {
@@ -164,7 +165,7 @@ template <class Scalar> void IterationMatrix<Scalar>::solve(const Scalar *r, con
     nu_[static_cast<Index>(i)] = along_row(i) - (c ? c[i] : Scalar(0));
   schur_.solve(nu_.data());
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    const Measure &row = system_.constraints[i].row;
+    const Measure &row = system_.rows[i];
     for (const auto &[m, h] : {std::pair(&row.b, &rows_[i].coefficient_b), std::pair(&row.a, &rows_[i].coefficient_a)})
       if (m->body >= 0)
         bodies_[static_cast<std::size_t>(m->body)].wrench.col(m->marker) -= nu_[static_cast<Index>(i)] * *h;

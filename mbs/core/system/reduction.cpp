@@ -10,12 +10,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 Reduction::Reduction(const System &system, std::vector<Measure> independent)
-    : system_(system), independent_(std::move(independent)), tangent_(system.coordinates),
-      rows_(static_cast<Index>(3 * system.bodies.size()), system.coordinates) {
+    : system_(system), independent_(std::move(independent)), tangent_(system.n_v()),
+      rows_(static_cast<Index>(3 * system.bodies.size()), system.n_v()) {
   for (std::size_t b = 0; b < system.bodies.size(); ++b)
     for (Index i = 0; i < system.bodies[b].coordinates(); ++i)
       (i < 3 ? frames_ : modes_).push_back(system.first_coordinate[b] + i);
-  const std::size_t found = system.held + independent_.size();
+  const std::size_t found = system.n_bilateral() + independent_.size();
   if (found != frames_.size())
     throw std::invalid_argument("expected " + std::to_string(frames_.size()) +
                                 " constraints and independent rows, got " + std::to_string(found));
@@ -23,10 +23,10 @@ Reduction::Reduction(const System &system, std::vector<Measure> independent)
   G_frames_.resize(n, n);
   G_modes_.resize(n, static_cast<Index>(modes_.size()));
   right_.resize(n, f);
-  H = H_dot = H_ddot = MatrixXd::Zero(system.coordinates, f);
+  H = H_dot = H_ddot = MatrixXd::Zero(system.n_v(), f);
   for (std::size_t i = 0; i < modes_.size(); ++i)
     H(modes_[i], static_cast<Index>(independent_.size() + i)) = 1;
-  lambda.resize(static_cast<Index>(system.held));
+  lambda.resize(static_cast<Index>(system.n_bilateral()));
   force.resize(f);
 }
 
@@ -60,8 +60,8 @@ void Reduction::reduce(double t, const double *q, const double *v, const double 
   tangent(system_, t, q, v, a, w, tangent_);
   const Index m = lambda.size();
   Index row = 0;
-  for (std::size_t r = 0; r < system_.held; ++r)
-    row_tangent(system_, system_.constraints[r].row, q, v, a, w, row++, rows_);
+  for (std::size_t r = 0; r < system_.n_bilateral(); ++r)
+    row_tangent(system_, system_.rows[r], q, v, a, w, row++, rows_);
   for (const auto &independent : independent_)
     row_tangent(system_, independent, q, v, a, w, row++, rows_);
   transform();
@@ -77,8 +77,8 @@ void Reduction::reduce(double t, const double *q, const double *v, const double 
   force << along.tail(row - m), of_modes - G_modes_.transpose() * along;
   for (Index r = 0; r < row; ++r) {
     const auto i = static_cast<std::size_t>(r);
-    add_row_curvature(system_, r < m ? system_.constraints[i].row : independent_[i - static_cast<std::size_t>(m)],
-                      -along[r], w, tangent_.K);
+    add_row_curvature(system_, r < m ? system_.rows[i] : independent_[i - static_cast<std::size_t>(m)], -along[r], w,
+                      tangent_.K);
   }
   const MatrixXd HT = H.transpose(), M_H_dot = tangent_.M * H_dot;
   M.noalias() = HT * (tangent_.M * H);

@@ -10,7 +10,7 @@ using Eigen::Index;
 
 void System::finish() {
   first_coordinate.clear();
-  coordinates = 0;
+  Index coordinates = 0;
   length = 0;
   for (const auto &body : bodies) {
     first_coordinate.push_back(coordinates);
@@ -19,25 +19,43 @@ void System::finish() {
     for (const auto &position : body.marker_positions)
       length = std::max(length, position.norm());
   }
+  space = ConfigurationSpace(coordinates);
+  rows.clear();
+  for (const Constraint &constraint : constraints)
+    rows.push_back(constraint.row);
+  for (const Rotor &rotor : rotors)
+    rows.push_back(rotor.row);
+  find_used_markers();
+  find_couplings();
+}
+
+Index System::n_modes() const {
+  Index modes = 0;
+  for (const auto &body : bodies)
+    modes += body.modes();
+  return modes;
+}
+
+void System::find_used_markers() {
   for (auto &body : bodies)
     body.marker_rows.assign(static_cast<std::size_t>(body.markers()), 0);
-  held = 0;
-  for (const auto &[row, target, compliance] : constraints) {
-    held += compliance == 0;
+  for (const Measure &row : rows)
     for (const auto *m : {&row.a, &row.b})
       if (m->body >= 0) {
         int &used = bodies[static_cast<std::size_t>(m->body)].marker_rows[static_cast<std::size_t>(m->marker)];
         used = std::max(used, row.kind == MeasureKind::x || row.kind == MeasureKind::y ? 2 : 3);
       }
-  }
+}
+
+void System::find_couplings() {
   couplings.clear();
   envelope.clear();
-  const auto count = static_cast<int>(constraints.size());
+  const auto count = static_cast<int>(rows.size());
   for (int r = 0; r < count; ++r) {
-    const Measure &row = constraints[static_cast<std::size_t>(r)].row;
+    const Measure &row = rows[static_cast<std::size_t>(r)];
     Index first = r;
     for (int s = 0; s <= r; ++s) {
-      const Measure &other = constraints[static_cast<std::size_t>(s)].row;
+      const Measure &other = rows[static_cast<std::size_t>(s)];
       for (const bool r_is_b : {false, true})
         for (const bool s_is_b : {false, true}) {
           const MarkerReference &m = r_is_b ? row.b : row.a, &o = s_is_b ? other.b : other.a;
@@ -54,17 +72,16 @@ void System::finish() {
 }
 
 Workspace::Workspace(const System &system)
-    : bodies(system.bodies.begin(), system.bodies.end()), rows(system.constraints.size()),
-      drive_rows(system.drives.size()), targets(system.constraints.size()), external_drive(system.drives.size(), 0.0),
-      schur(system.envelope), ports(bodies, system.constraints, schur),
-      lambda(Eigen::VectorXd::Zero(static_cast<Index>(system.constraints.size()))),
-      correction(Eigen::VectorXd::Zero(system.coordinates)), value(lambda), rate(lambda) {
+    : bodies(system.bodies.begin(), system.bodies.end()), rows(system.rows.size()), drive_rows(system.drives.size()),
+      targets(system.rows.size()), external_drive(system.drives.size(), 0.0), schur(system.envelope),
+      ports(bodies, system.rows, schur), lambda(Eigen::VectorXd::Zero(static_cast<Index>(system.rows.size()))),
+      correction(Eigen::VectorXd::Zero(system.n_v())), value(lambda), rate(lambda) {
   for (const auto &body : system.bodies) {
     wrench.emplace_back(Eigen::Matrix3Xd::Zero(3, body.markers()));
     external_modal.emplace_back(Eigen::VectorXd::Zero(body.modes()));
   }
   for (std::size_t r = 0; r < rows.size(); ++r)
-    evaluate(system.constraints[r].row, bodies, rows[r]);
+    evaluate(system.rows[r], bodies, rows[r]);
 }
 
 void update_kinematics(const System &system, const double *q, const double *v, Workspace &w) {
@@ -80,7 +97,7 @@ namespace {
 void update_targets(const System &system, double t, Workspace &w) {
   if (t == w.target_time)
     return;
-  for (std::size_t r = 0; r < system.constraints.size(); ++r)
+  for (std::size_t r = 0; r < system.n_bilateral(); ++r)
     w.targets[r] = system.constraints[r].target(t);
   w.target_time = t;
 }
@@ -94,7 +111,7 @@ void apply_drives(const System &system, double t, Workspace &w) {
     for (std::size_t d = 0; d < system.drives.size(); ++d) {
       const Drive &drive = system.drives[d];
       evaluate(drive.row, w.bodies, w.drive_rows[d]);
-      double force = drive.size(t).value + w.external_drive[d];
+      double force = drive.magnitude(t).value + w.external_drive[d];
       if (drive.friction.acts())
         force -= drive.friction.resistance(w.drive_rows[d].rate);
       add_wrench(drive.row, w.drive_rows[d], force, w.wrench);
@@ -118,7 +135,7 @@ void apply_drives(const System &system, double t, Workspace &w) {
       w.bodies[b].has_modal_load = true;
     }
     for (const ModalDrive &drive : system.modal_drives)
-      w.bodies[static_cast<std::size_t>(drive.body)].modal_load += drive.size(t).value * drive.vector;
+      w.bodies[static_cast<std::size_t>(drive.body)].modal_load += drive.magnitude(t).value * drive.vector;
   }
 }
 
@@ -131,9 +148,10 @@ void solve_multipliers(Workspace &w) {
 void assemble_schur(const System &system, Workspace &w) {
   w.schur.set_zero();
   w.ports.assemble(w.bodies, w.schur);
-  for (std::size_t r = system.held; r < system.constraints.size(); ++r) {
-    const auto i = static_cast<Index>(r);
-    *w.schur.entry(i, i) += system.constraints[r].compliance;
+  auto i = static_cast<Index>(system.n_bilateral());
+  for (const Rotor &rotor : system.rotors) {
+    *w.schur.entry(i, i) += rotor.compliance;
+    ++i;
   }
   w.schur.factorise();
 }
@@ -147,7 +165,7 @@ void eliminate(const System &system, double t, const double *q, const double *v,
     free_motion(system.bodies[b], q + i, v + i, system.gravity, w.bodies[b]);
   }
   for (const std::size_t r : w.ports.moving_rows())
-    evaluate(system.constraints[r].row, w.bodies, w.rows[r]);
+    evaluate(system.rows[r], w.bodies, w.rows[r]);
   w.ports.update(w.rows);
   update_targets(system, t, w);
   assemble_schur(system, w);
@@ -173,20 +191,20 @@ void constraint_residuals(const System &system, double t, const double *q, const
   update_kinematics(system, q, v, w);
   update_targets(system, t, w);
   MeasureMotion motion;
-  for (std::size_t r = 0; r < system.held; ++r) {
-    evaluate(system.constraints[r].row, w.bodies, motion);
+  for (std::size_t r = 0; r < system.n_bilateral(); ++r) {
+    evaluate(system.rows[r], w.bodies, motion);
     value[r] = motion.value - w.targets[r].value;
     rate[r] = motion.rate - w.targets[r].rate;
   }
-  std::fill(value + system.held, value + system.constraints.size(), 0.0);
-  std::fill(rate + system.held, rate + system.constraints.size(), 0.0);
+  std::fill(value + system.n_bilateral(), value + system.rows.size(), 0.0);
+  std::fill(rate + system.n_bilateral(), rate + system.rows.size(), 0.0);
 }
 
 double acceleration_residual(const System &system, const double *q, const double *a, const Workspace &w) {
   double worst = 0;
   MeasureMotion motion;
-  for (std::size_t r = 0; r < system.held; ++r) {
-    const Measure &row = system.constraints[r].row;
+  for (std::size_t r = 0; r < system.n_bilateral(); ++r) {
+    const Measure &row = system.rows[r];
     evaluate(row, w.bodies, motion);
     double residual = motion.bias - w.targets[r].acceleration, scale = 1 + std::abs(w.targets[r].acceleration);
     for (const auto &[m, c] : {std::pair(&row.b, &motion.coefficient_b), std::pair(&row.a, &motion.coefficient_a)}) {
@@ -239,24 +257,23 @@ double row_acceleration(const System &system, const Measure &row, const MeasureM
 }
 
 void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c) {
-  for (std::size_t r = 0; r < system.constraints.size(); ++r)
-    c[r] = row_acceleration(system, system.constraints[r].row, w.rows[r], q, a, w) - w.targets[r].acceleration;
+  for (std::size_t r = 0; r < system.rows.size(); ++r)
+    c[r] = row_acceleration(system, system.rows[r], w.rows[r], q, a, w) - w.targets[r].acceleration;
 }
 
 double project(const System &system, double t, double *q, double *v, Workspace &w) {
   // Not tighter: rounding of positions, moved into modes with frequencies up to 1e5 rad/s, is noise in their forces.
   constexpr double tolerance = 1e-12;
   constexpr int refresh_after = 3, most_iterations = 12;
-  if (system.constraints.empty())
+  if (system.rows.empty())
     return 0;
-  Eigen::Map<Eigen::VectorXd> q_(q, system.coordinates), v_(v, system.coordinates);
+  const Eigen::Map<Eigen::VectorXd> q_(q, system.n_q()), v_(v, system.n_v());
   Eigen::VectorXd &value = w.value, &rate = w.rate;
-  const auto correct = [&](const Eigen::VectorXd &residual, Eigen::Map<Eigen::VectorXd> &x) {
+  const auto find_correction = [&](const Eigen::VectorXd &residual) {
     w.lambda = residual;
     solve_multipliers(w);
     for (std::size_t b = 0; b < system.bodies.size(); ++b)
       apply_inverse_mass(system.bodies[b], w.bodies[b], w.correction.data() + system.first_coordinate[b]);
-    x += w.correction;
   };
   double left = 0, previous = 1e300;
   for (int i = 0; i < most_iterations; ++i) {
@@ -269,21 +286,23 @@ double project(const System &system, double t, double *q, double *v, Workspace &
     previous = left;
     if (i >= refresh_after)
       eliminate(system, t, q, v, w);
-    correct(rate, v_);
-    if (position > tolerance * scale_q)
-      correct(value, q_);
+    find_correction(rate);
+    Eigen::Map<Eigen::VectorXd>(v, system.n_v()) += w.correction;
+    if (position > tolerance * scale_q) {
+      find_correction(value);
+      system.space.integrate(q, 1, w.correction.data(), q);
+    }
   }
   return left;
 }
 
 Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w) {
-  const auto m = static_cast<Index>(system.held);
-  Eigen::MatrixXd C_q = Eigen::MatrixXd::Zero(system.coordinates, m); // transposed: gradients are columns
-  for (std::size_t r = 0; r < system.held; ++r) {
+  const auto m = static_cast<Index>(system.n_bilateral());
+  Eigen::MatrixXd C_q = Eigen::MatrixXd::Zero(system.n_v(), m); // transposed: gradients are columns
+  for (std::size_t r = 0; r < system.n_bilateral(); ++r) {
     MeasureMotion motion;
-    evaluate(system.constraints[r].row, w.bodies, motion);
-    jacobian(system.constraints[r].row, motion, system.bodies, w.bodies, system.first_coordinate,
-             C_q.col(static_cast<Index>(r)));
+    evaluate(system.rows[r], w.bodies, motion);
+    jacobian(system.rows[r], motion, system.bodies, w.bodies, system.first_coordinate, C_q.col(static_cast<Index>(r)));
   }
   return C_q.transpose();
 }
@@ -292,9 +311,9 @@ JointEnergy joint_energy(const System &system, const double *q, const double *v,
   update_kinematics(system, q, v, w);
   JointEnergy result;
   MeasureMotion motion;
-  for (std::size_t r = system.held; r < system.constraints.size(); ++r) {
-    evaluate(system.constraints[r].row, w.bodies, motion);
-    result.kinetic += motion.rate * motion.rate / (2 * system.constraints[r].compliance);
+  for (const Rotor &rotor : system.rotors) {
+    evaluate(rotor.row, w.bodies, motion);
+    result.kinetic += motion.rate * motion.rate / (2 * rotor.compliance);
   }
   for (const Drive &drive : system.drives)
     if (drive.friction.acts()) {

@@ -4,114 +4,85 @@
 #pragma once
 
 #include "core/body/planar_body.h"
+#include "core/constraint/constraint.h"
 #include "core/constraint/envelope.h"
 #include "core/constraint/port_couplings.h"
-#include "core/constraint/rows.h"
-#include "core/time_function/state_force.h"
-#include "core/time_function/time_function.h"
+#include "core/constraint/state_force.h"
+#include "core/space/configuration_space.h"
 
-#include <cmath>
 #include <limits>
 #include <vector>
 
 namespace ffrobot {
 
-// C = row - target(t) = 0, or, with a compliance 1/J, the kinetic energy 1/2 J row_dot^2 of a rotor.
-//
-// M q_ddot + J d d^T q_ddot with the gradient d of the row is the multiplier mu = J d^T q_ddot of one more row, with
-// -1/J on the diagonal: d^T q_ddot - mu/J = 0 beside M q_ddot + d mu = Q. C M^-1 C^T gets 1/J there and stays positive
-// definite. Nothing holds such a row: as a constraint its value and rate are 0.
-struct Constraint {
-  Measure row;
-  TimeFunction target;
-  double compliance = 0;
-};
-
-// -(c v + tau_c tanh(v / v_s)) along a row whose rate is v: viscous and Coulomb friction, the latter smooth about rest.
-struct Friction {
-  double viscous = 0, coulomb = 0, speed = 1;
-
-  double resistance(double rate) const { return viscous * rate + coulomb * std::tanh(rate / speed); }
-  double slope(double rate) const { // of the resistance
-    const double steady = std::cosh(rate / speed);
-    return viscous + coulomb / (speed * steady * steady);
-  }
-  bool acts() const { return viscous != 0 || coulomb != 0; }
-};
-
-// Generalized force `size(t)` along a row: joint moments, point forces, with the same directions as constraints.
-struct Drive {
-  Measure row;
-  TimeFunction size;
-  Friction friction = {};
-};
-
-// Spring and damper of a gear: the moment k delta + c delta_dot, delta = motor - joint, pulls the motor back and the
-// joint along. Both rows are angles, which do not move with the bodies.
-struct Spring {
-  Measure motor, joint;
-  double stiffness = 0, damping = 0;
-
-  double moment(const MeasureMotion &of_motor, const MeasureMotion &of_joint) const {
-    return stiffness * (of_motor.value - of_joint.value) + damping * (of_motor.rate - of_joint.rate);
-  }
-};
-
-// Modal forces `vector * size(t)` on one body: PZT patches.
+// Modal forces `vector * magnitude(t)` on one body: PZT patches.
 struct ModalDrive {
   int body;
   Eigen::VectorXd vector;
-  TimeFunction size;
+  TimeFunction magnitude;
 };
 
 struct System {
-  Eigen::Vector2d gravity = Eigen::Vector2d::Zero();
+  Eigen::Vector2d gravity = Eigen::Vector2d::Zero(); // m/s^2, global axes
   std::vector<PlanarBody> bodies;
-  std::vector<Constraint> constraints; // ordered for a small envelope by whoever builds the system, rotors last
+  std::vector<Constraint> constraints; // the caller orders them for a small envelope of C M^-1 C^T
+  std::vector<Rotor> rotors;
   std::vector<Drive> drives;
   std::vector<Spring> springs;
   std::vector<ModalDrive> modal_drives;
   std::vector<StateForce> state_forces;
 
   // Derived from the above by finish()
-  std::vector<Eigen::Index> first_coordinate; // of each body in q
-  Eigen::Index coordinates = 0;
-  double length = 0;                  // of the bodies, in whatever unit: what positions are compared with
-  std::size_t held = 0;               // constraints that are no rotors
-  std::vector<Eigen::Index> envelope; // first column of each row of C M^-1 C^T
-  struct Coupling {                   // constraint rows r >= s meet on a body at markers k and l
+  ConfigurationSpace space;                   // of q, with its lengths n_q and n_v
+  std::vector<Eigen::Index> first_coordinate; // of each body, whose coordinates are numbers, in q and in v
+  double length = 0;                          // m, of the bodies: what positions are compared with
+  std::vector<Measure> rows;                  // of all constraints, then of all rotors: those of multipliers
+  std::vector<Eigen::Index> envelope;         // first column of each row of C M^-1 C^T
+  struct Coupling {                           // constraint rows r >= s meet on a body at markers k and l
     int r, s, body, k, l;
     bool r_is_b, s_is_b;
   };
   std::vector<Coupling> couplings;
 
+  Eigen::Index n_q() const { return space.n_q(); }
+  Eigen::Index n_v() const { return space.n_v(); }
+  Eigen::Index n_modes() const;                                  // of all bodies
+  std::size_t n_bilateral() const { return constraints.size(); } // the first of the rows
+
   void finish();
+
+private:
+  void find_used_markers();
+  void find_couplings();
 };
 
 struct Workspace {
   explicit Workspace(const System &system);
 
   std::vector<PlanarBodyState> bodies;
-  // Of the constraints, at the last evaluation; values and rates only where coefficients move.
+  // Of the system's rows at the last evaluation; values and rates only where coefficients move.
   std::vector<MeasureMotion> rows;
   std::vector<MeasureMotion> drive_rows;
-  std::vector<Jet> targets; // of the constraints at target_time
+  std::vector<Jet> targets; // of the system's rows at target_time; zero for rotors
   double target_time = std::numeric_limits<double>::quiet_NaN();
-  std::vector<double> external_drive;          // added to the drives' own sizes; set by whoever steers the system
+  std::vector<double> external_drive;          // of ExternalLoads, added to the magnitudes of the drives
   std::vector<Eigen::VectorXd> external_modal; // likewise, modal forces of each body
   bool has_external_modal = false;
   EnvelopeMatrix<double> schur; // C M^-1 C^T, factorised
   PortCouplings ports;
-  Eigen::VectorXd lambda;
+  Eigen::VectorXd lambda;                  // of the system's rows: N along a length, N m about an angle
   std::vector<Eigen::Matrix3Xd> wrench;    // scratch: on the markers of each body
   Eigen::VectorXd correction, value, rate; // of projections
   unsigned long evaluations = 0;
 };
 
-// Accelerations a (coordinates) and multipliers workspace.lambda at time t.
+// Below: q (n_q), v, a and generalized forces (n_v), values of rows (constraints, then rotors).
+
+// Accelerations a and multipliers workspace.lambda at time t.
 void accelerations(const System &system, double t, const double *q, const double *v, Workspace &w, double *a);
 
-// Values C and rates C_dot of all constraints; refreshes the kinematics but neither mass matrix nor coefficients.
+// Values C and rates C_dot of all rows, zero for rotors; refreshes the kinematics but neither mass matrix nor
+// coefficients.
 void constraint_residuals(const System &system, double t, const double *q, const double *v, Workspace &w, double *value,
                           double *rate);
 
@@ -123,10 +94,10 @@ double acceleration_residual(const System &system, const double *q, const double
 // is good enough and a fresh one otherwise. Returns the largest residual left, relative to 1 m, 1 rad, 1 m/s.
 double project(const System &system, double t, double *q, double *v, Workspace &w);
 
-// Generalized forces of gravity, elasticity and drives on all coordinates, at rest.
+// Generalized forces Q (n_v) of gravity, elasticity and drives, at rest.
 void static_force(const System &system, double t, const double *q, Workspace &w, double *Q);
 
-// f = M a - Q (coordinates): what constraints and actuators must supply for the accelerations a, drives taken off.
+// f = M a - Q (n_v): what constraints and actuators must supply for the accelerations a, drives taken off.
 void required_force(const System &system, double t, const double *q, const double *v, const double *a, Workspace &w,
                     double *f);
 
@@ -137,14 +108,14 @@ void update_kinematics(const System &system, const double *q, const double *v, W
 double row_acceleration(const System &system, const Measure &row, const MeasureMotion &motion, const double *q,
                         const double *a, const Workspace &w);
 
-// Accelerations C_ddot (constraints, rotors too) for accelerations a of the coordinates. Uses kinematics, rows and
+// Accelerations C_ddot of all rows for accelerations a. Uses kinematics, rows and
 // targets in w.
 void constraint_accelerations(const System &system, const double *q, const double *a, const Workspace &w, double *c);
 
-// C_q (held constraints x coordinates), dense, at the coordinates of the last evaluation.
+// C_q (constraints, n_v), dense, at the coordinates of the last evaluation.
 Eigen::MatrixXd constraint_jacobian(const System &system, const Workspace &w);
 
-// Energies of rotors and springs and the power that friction and dampers take, at the state (q, v).
+// Energies (J) of rotors and springs and the power (W) that friction and dampers take, at the state (q, v).
 struct JointEnergy {
   double kinetic = 0, strain = 0, dissipated_power = 0;
 };

@@ -1,5 +1,7 @@
 #include "core/system/tangent.h"
 
+#include "core/body/planar_tangent.h"
+
 #include <algorithm>
 
 namespace ffrobot {
@@ -58,7 +60,7 @@ void add_slide_curvature(const System &system, const Measure &row, double multip
   if (row.a.body < 0)
     return;
   const SlideAxes axes(row, row.a.motion(w.bodies), row.b.motion(w.bodies));
-  VectorXd x = VectorXd::Zero(system.coordinates), alpha = x;
+  VectorXd x = VectorXd::Zero(system.n_v()), alpha = x;
   MeasureMotion of_x, of_alpha;
   of_x.coefficient_b << axes.n_alpha, 0;
   of_x.coefficient_a << -axes.n_alpha, -0.5 * axes.n.dot(axes.d);
@@ -120,7 +122,7 @@ namespace {
 void add_springs(const System &system, const Workspace &w, Tangent &result) {
   MeasureMotion motion;
   for (const Spring &spring : system.springs) {
-    VectorXd motor = VectorXd::Zero(system.coordinates), joint = motor;
+    VectorXd motor = VectorXd::Zero(system.n_v()), joint = motor;
     evaluate(spring.motor, w.bodies, motion);
     jacobian(spring.motor, motion, system.bodies, w.bodies, system.first_coordinate, motor);
     evaluate(spring.joint, w.bodies, motion);
@@ -134,16 +136,15 @@ void add_springs(const System &system, const Workspace &w, Tangent &result) {
 // Rotors, whose moments are J row_ddot along their rows, and friction, which goes with row_dot.
 void add_built_joints(const System &system, const double *q, const double *v, const double *a, Workspace &w,
                       Tangent &result) {
-  RowTangents row(1, system.coordinates);
+  RowTangents row(1, system.n_v());
   MeasureMotion motion;
-  VectorXd gradient(system.coordinates);
+  VectorXd gradient(system.n_v());
   const auto look_at = [&](const Measure &r) {
     evaluate(r, w.bodies, motion);
     row_tangent(system, r, q, v, a, w, 0, row);
     gradient = row.by_acceleration.row(0).transpose();
   };
-  for (std::size_t r = system.held; r < system.constraints.size(); ++r) {
-    const auto &[rotor, target, compliance] = system.constraints[r];
+  for (const auto &[rotor, compliance] : system.rotors) {
     look_at(rotor);
     const double moment = row_acceleration(system, rotor, motion, q, a, w) / compliance;
     result.force += moment * gradient;
@@ -174,7 +175,7 @@ void add_state_force(const System &system, const StateForce &force, double t, co
   const Vector3d rate(m.velocity.x(), m.velocity.y(), m.angular_velocity);
   const Vector3d steps = small * Vector3d(system.length, system.length, 1), now = force(t, position, rate);
   Eigen::Matrix3d by_position, by_rate;
-  RowTangents rows(3, system.coordinates);
+  RowTangents rows(3, system.n_v());
   const MeasureKind kinds[] = {MeasureKind::x, MeasureKind::y, MeasureKind::angle};
   for (Index i = 0; i < 3; ++i) {
     const Vector3d step = steps[i] * Vector3d::Unit(i);
@@ -203,9 +204,9 @@ void tangent(const System &system, double t, const double *q, const double *v, c
   }
   for (std::size_t d = 0; d < system.drives.size(); ++d) {
     const Drive &drive = system.drives[d];
-    add_row_curvature(system, drive.row, -(drive.size(t).value + w.external_drive[d]), w, result.K);
+    add_row_curvature(system, drive.row, -(drive.magnitude(t).value + w.external_drive[d]), w, result.K);
   }
-  if (system.held < system.constraints.size() ||
+  if (!system.rotors.empty() ||
       std::any_of(system.drives.begin(), system.drives.end(), [](const Drive &d) { return d.friction.acts(); }))
     add_built_joints(system, q, v, a, w, result);
   for (const StateForce &force : system.state_forces)

@@ -12,18 +12,17 @@
 namespace ffrobot {
 
 struct Tangent {
-  explicit Tangent(Eigen::Index coordinates)
-      : M(Eigen::MatrixXd::Zero(coordinates, coordinates)), D(M), K(M), force(coordinates) {}
+  explicit Tangent(Eigen::Index n_v) : M(Eigen::MatrixXd::Zero(n_v, n_v)), D(M), K(M), force(n_v) {}
 
-  Eigen::MatrixXd M, D, K; // (coordinates, coordinates)
-  Eigen::VectorXd force;   // M a - Q (coordinates), drives taken off
+  Eigen::MatrixXd M, D, K; // (n_v, n_v)
+  Eigen::VectorXd force;   // M a - Q (n_v), drives taken off
 };
 
-// Derivatives of the accelerations of rows (rows, coordinates): row_ddot = by_acceleration a + ...; the first is the
+// Derivatives of the accelerations of rows (rows, n_v): row_ddot = by_acceleration a + ...; the first is the
 // Jacobian of the rows' values too, and by_velocity is twice the derivative of row_dot with respect to q.
 struct RowTangents {
-  RowTangents(Eigen::Index rows, Eigen::Index coordinates)
-      : by_acceleration(rows, coordinates), by_velocity(rows, coordinates), by_position(rows, coordinates) {}
+  RowTangents(Eigen::Index rows, Eigen::Index n_v)
+      : by_acceleration(rows, n_v), by_velocity(rows, n_v), by_position(rows, n_v) {}
 
   Eigen::MatrixXd by_acceleration, by_velocity, by_position;
 };
@@ -40,21 +39,5 @@ void add_row_curvature(const System &system, const Measure &row, double multipli
 // Measure i of `result`. After tangent, or anything else that sets the kinematics of (q, v).
 void row_tangent(const System &system, const Measure &row, const double *q, const double *v, const double *a,
                  const Workspace &w, Eigen::Index i, RowTangents &result);
-
-// M, D, K of one body (its block of the system's), without applied loads. After kinematics.
-void tangent(const PlanarBody &body, const PlanarBodyState &state, const double *q, const double *v, const double *a,
-             const Eigen::Vector2d &gravity, Eigen::Ref<Eigen::MatrixXd> M, Eigen::Ref<Eigen::MatrixXd> D,
-             Eigen::Ref<Eigen::MatrixXd> K);
-
-// K += d2(wrench . (x, y, angle) of marker k)/dq2 of one body, the wrench in global axes and fixed.
-void add_marker_curvature(const PlanarBody &body, const PlanarBodyState &state, Eigen::Index k,
-                          const Eigen::Vector3d &wrench, Eigen::Ref<Eigen::MatrixXd> K);
-
-// Derivatives (3, coordinates of the body) of the acceleration (x, y, angular) of a marker, as RowTangents.
-struct MarkerTangent {
-  Eigen::Matrix3Xd by_acceleration, by_velocity, by_position;
-};
-void marker_tangent(const PlanarBody &body, const PlanarBodyState &state, Eigen::Index k, const double *v,
-                    const double *a, MarkerTangent &result);
 
 } // namespace ffrobot

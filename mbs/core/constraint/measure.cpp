@@ -1,4 +1,4 @@
-#include "core/constraint/rows.h"
+#include "core/constraint/measure.h"
 
 namespace ffrobot {
 
@@ -37,7 +37,7 @@ void evaluate(const Measure &row, const std::vector<PlanarBodyState> &bodies, Me
     return;
   }
   case MeasureKind::gear: {
-    const double n_b = row.direction.x(), n_a = row.direction.y();
+    const double n_b = row.gear_ratios[0], n_a = row.gear_ratios[1];
     motion.value = n_b * b.angle - n_a * a.angle - row.offset;
     motion.rate = n_b * b.angular_velocity - n_a * a.angular_velocity;
     motion.coefficient_b = n_b * Vector3d::UnitZ();

@@ -27,8 +27,8 @@ enum class MeasureKind {
   y,     // (r_b - r_a)_y, global
   angle, // alpha_b - alpha_a (x, y and angle in the order of a marker's rows)
   slide, // n . (r_b - r_a), n fixed to the section of a
-  gear,  // n_b alpha_b - n_a alpha_a, the angle between shafts behind gears: (N, N - 1) is that of a rotor on a that
-         // turns N times as fast as b does on a
+  gear,  // n_b alpha_b - n_a alpha_a, the angle between shafts behind gears: n_b = N, n_a = N - 1 is that of a rotor
+         // on a that turns N times as fast as b does on a
 };
 
 // Whether the directions of such rows, and with them their coefficients below, move with the bodies.
@@ -40,12 +40,13 @@ constexpr int component_of(MeasureKind kind) { return kind == MeasureKind::gear 
 struct Measure {
   MeasureKind kind;
   MarkerReference a, b;
-  Eigen::Vector2d direction = Eigen::Vector2d::Zero(); // of a slide, in the axes of a; of a gear (n_b, n_a)
-  double offset = 0;                                   // the row's value at its zero
+  Eigen::Vector2d direction = Eigen::Vector2d::Zero();   // n of a slide, in the axes of a
+  Eigen::Vector2d gear_ratios = Eigen::Vector2d::Zero(); // (n_b, n_a) of a gear
+  double offset = 0;                                     // m or rad: the row's value at its zero
 };
 
-// value, its rate, and acceleration = coefficient_b . (acceleration of b) + coefficient_a . (… of a) + bias, with
-// marker accelerations (x, y, angular). The transposed coefficients spread a force along the row over the markers.
+// value (m or rad), its rate, and acceleration = coefficient_b . (acceleration of b) + coefficient_a . (… of a) + bias,
+// with marker accelerations (x, y, angular). The transposed coefficients spread a force along the row over the markers.
 struct MeasureMotion {
   double value = 0, rate = 0, bias = 0;
   Eigen::Vector3d coefficient_a = Eigen::Vector3d::Zero(), coefficient_b = Eigen::Vector3d::Zero();

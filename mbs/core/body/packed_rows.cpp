@@ -1,4 +1,4 @@
-#include "core/constraint/packed_rows.h"
+#include "core/body/packed_rows.h"
 
 #include "core/body/planar_body.h"
 

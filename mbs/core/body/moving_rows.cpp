@@ -1,4 +1,4 @@
-#include "core/constraint/moving_rows.h"
+#include "core/body/moving_rows.h"
 
 namespace ffrobot {
 

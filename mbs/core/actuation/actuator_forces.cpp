@@ -1,4 +1,4 @@
-#include "core/actuation/actuation.h"
+#include "core/actuation/actuator_forces.h"
 
 namespace ffrobot {
 
@@ -38,7 +38,7 @@ void ActuatorForces::resolve(const Workspace &w) {
     wrench.setZero();
   Index column = 0;
   for (std::size_t r = 0; r < trajectory_.size(); ++r) {
-    const Measure &row = system_.constraints[r].row;
+    const Measure &row = system_.rows[r];
     if (trajectory_[r])
       add_wrench(row, w.rows[r], -w.lambda[static_cast<Index>(r)], wrench_);
     else
@@ -56,7 +56,7 @@ void ActuatorForces::resolve(const Workspace &w) {
   column = 0;
   for (std::size_t r = 0; r < trajectory_.size(); ++r)
     if (!trajectory_[r])
-      add_wrench(system_.constraints[r].row, w.rows[r], -solution_[column++], wrench_);
+      add_wrench(system_.rows[r], w.rows[r], -solution_[column++], wrench_);
   for (std::size_t i = 0; i < motors_.size(); ++i) {
     tau_[static_cast<Index>(i)] = solution_[column];
     add_wrench(motors_[i], motor_rows_[i], -solution_[column++], wrench_);

@@ -1,4 +1,4 @@
-#include "core/body/points.h"
+#include "core/actuation/points.h"
 
 #include <cmath>
 
@@ -11,12 +11,12 @@ using Eigen::VectorXd;
 
 void driving_force(const System &system, const Workspace &w, const std::function<bool(std::size_t)> &is_trajectory,
                    const VectorXd &shape_force, std::size_t body, VectorXd &Q_a) {
-  VectorXd gradient(system.coordinates);
+  VectorXd gradient(system.n_v());
   const Index first = system.first_coordinate[body], n = system.bodies[body].modes();
   Q_a = VectorXd::Zero(3 + n);
   Q_a.tail(n) = shape_force;
-  for (std::size_t r = 0; r < system.held; ++r) {
-    const Measure &row = system.constraints[r].row;
+  for (std::size_t r = 0; r < system.n_bilateral(); ++r) {
+    const Measure &row = system.rows[r];
     if (!is_trajectory(r) || (row.a.body != static_cast<int>(body) && row.b.body != static_cast<int>(body)))
       continue;
     gradient.setZero();

@@ -7,6 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings/bindings.h"
+#include "bindings/system/system.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -18,9 +19,9 @@ using Eigen::VectorXd;
 namespace {
 
 void check_motion(const System &system, const VectorXd &q, const VectorXd &v, const VectorXd &a) {
-  check_size("q", q.size(), system.coordinates);
-  check_size("v", v.size(), system.coordinates);
-  check_size("a", a.size(), system.coordinates);
+  check_size("q", q.size(), system.n_q());
+  check_size("v", v.size(), system.n_v());
+  check_size("a", a.size(), system.n_v());
 }
 
 // (M, D, K, C_q) at one state
@@ -29,25 +30,17 @@ std::tuple<MatrixXd, MatrixXd, MatrixXd, MatrixXd> system_tangent(const System &
                                                                   const VectorXd &multipliers,
                                                                   const std::vector<double> &external_drive) {
   check_motion(system, q, v, a);
-  check_size("multipliers", multipliers.size(), static_cast<Index>(system.held));
+  check_size("multipliers", multipliers.size(), static_cast<Index>(system.n_bilateral()));
   Workspace w(system);
   if (!external_drive.empty()) {
     check_size("external_drive", static_cast<Index>(external_drive.size()), static_cast<Index>(system.drives.size()));
     w.external_drive = external_drive;
   }
-  Tangent result(system.coordinates);
+  Tangent result(system.n_v());
   tangent(system, t, q.data(), v.data(), a.data(), w, result);
-  for (std::size_t r = 0; r < system.held; ++r)
-    add_row_curvature(system, system.constraints[r].row, multipliers[static_cast<Index>(r)], w, result.K);
+  for (std::size_t r = 0; r < system.n_bilateral(); ++r)
+    add_row_curvature(system, system.rows[r], multipliers[static_cast<Index>(r)], w, result.K);
   return {result.M, result.D, result.K, constraint_jacobian(system, w)};
-}
-
-VectorXd force_for_motion(const System &system, double t, const VectorXd &q, const VectorXd &v, const VectorXd &a) {
-  check_motion(system, q, v, a);
-  Workspace w(system);
-  VectorXd f(system.coordinates);
-  required_force(system, t, q.data(), v.data(), a.data(), w, f.data());
-  return f;
 }
 
 // (by_acceleration, by_velocity, by_position) of rows
@@ -55,21 +48,20 @@ std::tuple<MatrixXd, MatrixXd, MatrixXd> row_tangents(const System &system, cons
                                                       const VectorXd &q, const VectorXd &v, const VectorXd &a) {
   check_motion(system, q, v, a);
   Workspace w(system);
-  VectorXd ignored(system.coordinates);
+  VectorXd ignored(system.n_v());
   required_force(system, 0.0, q.data(), v.data(), a.data(), w, ignored.data());
-  RowTangents result(static_cast<Index>(rows.size()), system.coordinates);
+  RowTangents result(static_cast<Index>(rows.size()), system.n_v());
   for (std::size_t i = 0; i < rows.size(); ++i)
     row_tangent(system, rows[i], q.data(), v.data(), a.data(), w, static_cast<Index>(i), result);
   return {result.by_acceleration, result.by_velocity, result.by_position};
 }
 
 Reduction reduce(const System &system, const std::vector<Measure> &independent, double t, const VectorXd &q,
-                 const VectorXd &v, const VectorXd &a, int repetitions) {
+                 const VectorXd &v, const VectorXd &a) {
   check_motion(system, q, v, a);
   Workspace w(system);
   Reduction reduction(system, independent);
-  for (int i = 0; i < repetitions; ++i)
-    reduction.reduce(t, q.data(), v.data(), a.data(), w);
+  reduction.reduce(t, q.data(), v.data(), a.data(), w);
   return reduction;
 }
 
@@ -78,7 +70,6 @@ Reduction reduce(const System &system, const std::vector<Measure> &independent, 
 void bind_tangent(nb::module_ &m) {
   m.def("tangent", &system_tangent, "system"_a, "t"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a, "external_drive"_a,
         "M, D = -dQ/dv, K = d(M a + C_q^T lambda - Q)/dq and C_q; external_drive empty, or one force for each drive.");
-  m.def("required_force", &force_for_motion, "system"_a, "t"_a, "q"_a, "v"_a, "a"_a, "M a - Q (coordinates,).");
   m.def("row_tangents", &row_tangents, "system"_a, "rows"_a, "q"_a, "v"_a, "a"_a,
         "Derivatives (rows, coordinates) of the rows' accelerations with respect to a, v and q.");
   nb::class_<Reduction>(m, "Reduction", "The linear equations of a motion in independent coordinates.")
@@ -87,11 +78,9 @@ void bind_tangent(nb::module_ &m) {
       .def_ro("K", &Reduction::K)
       .def_ro("H", &Reduction::H)
       .def_ro("H_dot", &Reduction::H_dot)
-      .def_ro("H_ddot", &Reduction::H_ddot)
       .def_ro("multipliers", &Reduction::lambda)
       .def_ro("force", &Reduction::force)
       .def_ro("reciprocal_condition", &Reduction::reciprocal_condition);
-  m.def("reduce", &reduce, "system"_a, "independent"_a, "t"_a, "q"_a, "v"_a, "a"_a, "repetitions"_a,
-        nb::keep_alive<0, 1>(),
-        "Linear equations in s = (values of the independent rows, p), made `repetitions` times.");
+  m.def("reduce", &reduce, "system"_a, "independent"_a, "t"_a, "q"_a, "v"_a, "a"_a, nb::keep_alive<0, 1>(),
+        "Linear equations in s = (values of the independent rows, p).");
 }

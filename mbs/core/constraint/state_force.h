@@ -1,13 +1,14 @@
 // A force of the user's on a marker, which may depend on how the marker moves.
 #pragma once
 
-#include "core/constraint/rows.h"
+#include "core/constraint/measure.h"
 
 #include <functional>
 
 namespace ffrobot {
 
-// Writes force and moment (x, y, moment) at time t for position and rates (x, y, angle), all in global axes.
+// Writes force and moment (x, y, moment; N, N m) at time t (s) for position and rates (x, y, angle), all in global
+// axes.
 struct StateFunction {
   using Compiled = void (*)(double, const double *, const double *, double *);
 

@@ -1,0 +1,105 @@
+"""Reading HDF5 files that may be damaged, or made to lead elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from . import checksum
+from .errors import FfrobotError, InputError
+from .outputs import protected
+
+MOST_COMPRESSED = 1100  # gzip makes 1032 bytes of one at best
+
+
+def open_checked(path: Path) -> h5py.File:
+    """The HDF5 file at `path`, its checksum and its links checked.
+
+    Raises:
+        InputError: the checksum does not fit or is missing, or a link leads out of the file.
+        OSError: there is no such file, or it is not HDF5.
+    """
+    state = checksum.state(path)
+    if state == "damaged":
+        raise checksum.refuse(path)
+    file = h5py.File(path, "r")
+    try:
+        if state == "none" and checksum.MARK in file.attrs:
+            raise checksum.refuse(path)
+        check_links(file, path)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def check_links(file: h5py.File, path: Path) -> None:
+    """Raise `InputError` where a member of the file is not in the file itself."""
+
+    def leads_away(name: bytes, info: h5py.h5l.LinkInfo) -> bytes | None:
+        return None if info.type == h5py.h5l.TYPE_HARD else name
+
+    found = file.id.links.visit(leads_away, info=True)
+    if found is not None:
+        where = found.decode(errors="replace")
+        raise InputError(f"{path}: expected members in the file itself, found a link at {where}")
+
+
+def read(dataset: h5py.Dataset) -> Any:  # noqa: ANN401 (as h5py)
+    """All of a dataset.
+
+    Raises `InputError` where its data are elsewhere (virtual and external datasets), or fewer than its shape says.
+    """
+    name = f"{dataset.file.filename}: dataset {dataset.name}"
+    if dataset.is_virtual or dataset.external:
+        raise InputError(f"{name}: expected data in the file itself, found a virtual or external dataset")
+    stored, declared = dataset.id.get_storage_size(), math.prod(dataset.shape or ()) * dataset.dtype.itemsize
+    if declared > stored * (MOST_COMPRESSED if dataset.id.get_create_plist().get_nfilters() else 1):
+        raise InputError(f"{name}: expected {declared:.4g} bytes, as its shape {dataset.shape} says, found {stored}")
+    return dataset[()]
+
+
+def numbers(item: object, name: str) -> NDArray[np.float64]:
+    """A dataset of numbers. Raises `InputError` where `item`, which messages call `name`, is none."""
+    if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiub":
+        raise InputError(f"{name}: expected a dataset of numbers, found {type(item).__name__.lower()}")
+    return np.asarray(read(item), dtype=np.float64)
+
+
+@contextmanager
+def blaming(*paths: Path) -> Iterator[None]:
+    """Turn what reading these files raises into `InputError`, where one is not known to be as ffrobot wrote it.
+
+    With all of them sound an error is the program's own, and is left as it is.
+    """
+    try:
+        yield
+    except FfrobotError:
+        raise
+    except Exception as error:
+        doubtful = [path for path in paths if _is_doubtful(path)]
+        if not doubtful:
+            raise
+        about = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise InputError(f"{doubtful[0]}: damaged file, or one that ffrobot did not write: {about}") from error
+
+
+@contextmanager
+def reading(*paths: Path) -> Iterator[None]:
+    """For a command that reads these files: none of them is lost to an output, errors are put down to damage."""
+    with protected(paths), blaming(*paths):
+        yield
+
+
+def _is_doubtful(path: Path) -> bool:
+    try:
+        return checksum.state(path) != "sound"
+    except OSError:
+        return True

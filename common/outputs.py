@@ -1,0 +1,106 @@
+"""What an output may replace: neither an input of the command nor a file of another kind."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from io import BytesIO
+from pathlib import Path
+
+from . import checksum
+from .errors import InputError
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_KINDS = {HDF5_SIGNATURE: "HDF5", b"\x89PNG": "PNG", b"%PDF": "PDF", b"PK\x03\x04": "zip", b"MATLAB": "MATLAB"}
+DAMAGED = "HDF5 damaged"
+_START = 4096  # bytes that tell the kind of a file
+
+_inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
+
+
+@contextmanager
+def protected(paths: Iterable[Path]) -> Iterator[None]:
+    """Within its context nothing is written to these files, by whatever name, symbolic and hard links included."""
+    token = _inputs.set((*_inputs.get(), *paths))
+    try:
+        yield
+    finally:
+        _inputs.reset(token)
+
+
+def check_not_an_input(path: Path) -> None:
+    """Raise `InputError` where `path` is, or leads to, one of the `protected` files, or to nowhere in a circle."""
+    try:
+        target = path.resolve()
+        if path.is_symlink():
+            os.stat(path)
+    except FileNotFoundError:
+        pass
+    except (OSError, RuntimeError) as error:
+        reason = "links that lead in a circle" if "loop" in str(error).lower() or "symbolic" in str(error) else error
+        raise InputError(f"{path}: output: expected a file name, found {reason}") from None
+    for source in _inputs.get():
+        same = target == source.absolute() or target == _resolved(source)
+        with suppress(OSError):
+            same = same or path.samefile(source)
+        if same:
+            raise InputError(f"{path}: output: expected another file than the input {source}, which would be lost")
+
+
+def check_same_kind(path: Path, content: bytes) -> None:
+    """Raise `InputError` where `path` holds a file of another kind than `content`; empty files may be replaced."""
+    if not path.exists():
+        return
+    old, new = kind_of_file(path), kind(content)
+    if old not in ("empty", "unreadable", new) and not (old == DAMAGED and new.startswith("HDF5")):
+        raise InputError(f"{path}: output: expected a new name or a file of kind {new}, found one of kind {old}")
+
+
+def kind(content: bytes) -> str:
+    """What sort of file `content` is: of HDF5 files their attribute `format` too, of text how it begins."""
+    start = content[:_START]
+    if start.startswith(HDF5_SIGNATURE):
+        return f"HDF5 {_hdf5_format(BytesIO(content))}"
+    binary = next((name for signature, name in _KINDS.items() if start.startswith(signature)), None)
+    text = start.decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n").lower()
+    if binary or not start:
+        return binary or "empty"
+    if "\0" in text:
+        return "binary"
+    if text.startswith("<"):
+        tag = re.search(r"<(?:!doctype +)?([a-z][\w:]*)", text)
+        return tag[1] if tag else "markup"
+    return "JSON" if re.match(r'[{\[]\s*["{\[\]}\d-]', text) else "text"
+
+
+def kind_of_file(path: Path) -> str:
+    """As `kind`, of what is at `path`."""
+    if not path.is_file():
+        return "no regular file"  # a device, a socket: a rename would replace it
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(_START)
+        return f"HDF5 {_hdf5_format(path)}" if start.startswith(HDF5_SIGNATURE) else kind(start)
+    except OSError:
+        return "unreadable"
+
+
+def _hdf5_format(source: Path | BytesIO) -> str:
+    import h5py
+
+    try:
+        if isinstance(source, Path) and checksum.state(source) == "damaged":
+            return "damaged"
+        with h5py.File(source, "r") as file:
+            return str(file.attrs.get("format", "VTKHDF" if "VTKHDF" in file else "of another program"))
+    except Exception:  # whatever h5py makes of a damaged one
+        return "damaged"
+
+
+def _resolved(path: Path) -> Path:
+    with suppress(OSError, RuntimeError):
+        return path.resolve()
+    return path.absolute()

@@ -1,0 +1,85 @@
+"""Everything a scene is made from: the files it names, directly or through its links, and fingerprints of them all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..common.version import program_version
+
+FILE_KEYS = {"link", "modal", "waypoints", "file", "python"}
+"""Keys of scene and link files whose text names a file, "FILE.py:FUNCTION" of Python."""
+
+PROGRAM = "ffrobot"
+"""Stands for the program's version among fingerprints."""
+
+
+def named_files(data: Any, folder: Path) -> Iterator[Path]:  # noqa: ANN401 (whatever TOML may hold)
+    """The files that tables read from a file in `folder` name, and those that link files among them name in turn."""
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+        if isinstance(value, dict | list):
+            yield from named_files(value, folder)
+        elif key in FILE_KEYS and isinstance(value, str):
+            name = value.rpartition(":")[0] if key == "python" else value
+            yield folder / name
+            if key == "link":
+                yield from named_files(read_tables(folder / name), (folder / name).parent)
+
+
+def read_tables(path: Path) -> dict[str, Any]:
+    """The content of a TOML file; empty where it cannot be read, which others tell."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+
+
+def files_of_scene(path: Path) -> list[Path]:
+    """The scene file at `path` and all files that it is made from, as far as they can be found."""
+    return [path, *named_files(read_tables(path), path.parent)]
+
+
+def files_of_tables(path: Path, text: str) -> list[Path]:
+    """Likewise, of a scene with the TOML `text` that was made in Python."""
+    return [path, *named_files(tomllib.loads(text), path.parent)]
+
+
+def files_of_link(path: Path) -> list[Path]:
+    """Likewise, of a link file."""
+    return [path, *named_files(read_tables(path), path.parent)]
+
+
+def fingerprints(scene: Mapping[str, Any], path: Path) -> dict[str, str]:
+    """SHA-256 of the content of everything that the tables `scene`, read from `path`, are made from.
+
+    By the file's name, and `PROGRAM` for the version. TOML files count by their tables: comments change nothing.
+    """
+    files = dict.fromkeys(named_files(dict(scene), path.parent))
+    found = {PROGRAM: program_version(), str(path): digest_of_tables(scene)}
+    return found | {os.path.normpath(file): digest_of_file(file) for file in files}
+
+
+def digest_of_tables(tables: Mapping[str, Any]) -> str:
+    """SHA-256 of the content of a TOML file, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(tables, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def digest_of_file(path: Path) -> str:
+    """SHA-256 of a file's content; "" where it cannot be read."""
+    if path.suffix == ".toml" and (tables := read_tables(path)):
+        return digest_of_tables(tables)
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+def changed(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
+    """What differs between two fingerprints, by name: files by the last part of theirs."""
+    names = sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name))
+    return list(dict.fromkeys(name if name == PROGRAM else Path(name).name for name in names))

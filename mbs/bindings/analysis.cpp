@@ -1,0 +1,9 @@
+#include "bindings/analysis/analysis.h"
+
+#include "bindings/bindings.h"
+
+void bind_analysis(nanobind::module_ &m) {
+  bind_run(m);
+  bind_sampled(m);
+  bind_inverse(m);
+}

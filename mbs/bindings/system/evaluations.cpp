@@ -1,0 +1,170 @@
+#include "core/system/motion.h"
+
+#include <tuple>
+
+#include <nanobind/eigen/dense.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/tuple.h>
+
+#include "bindings/bindings.h"
+#include "bindings/system/system.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace ffrobot;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+namespace {
+
+// (a, lambda) at one state; external_loads may be null
+std::tuple<VectorXd, VectorXd> evaluate_state(const System &system, double t, const VectorXd &q, const VectorXd &v,
+                                              ExternalLoads *external_loads) {
+  check_size("q", q.size(), system.n_q());
+  check_size("v", v.size(), system.n_v());
+  Workspace w(system);
+  VectorXd a(system.n_v());
+  if (external_loads)
+    external_loads->apply(t, w);
+  accelerations(system, t, q.data(), v.data(), w, a.data());
+  return {a, w.lambda.head(static_cast<Eigen::Index>(system.n_bilateral()))};
+}
+
+// (C, C_dot, C_q) at one state
+std::tuple<VectorXd, VectorXd, MatrixXd> constraints(const System &system, double t, const VectorXd &q,
+                                                     const VectorXd &v) {
+  check_size("q", q.size(), system.n_q());
+  check_size("v", v.size(), system.n_v());
+  Workspace w(system);
+  VectorXd value(static_cast<Eigen::Index>(system.rows.size())), rate(value);
+  constraint_residuals(system, t, q.data(), v.data(), w, value.data(), rate.data());
+  const auto m = static_cast<Eigen::Index>(system.n_bilateral());
+  return {value.head(m), rate.head(m), constraint_jacobian(system, w)};
+}
+
+// How far the accelerations a are from C_ddot = 0, relative to the terms that cancel in it
+double acceleration_violation(const System &system, double t, const VectorXd &q, const VectorXd &v, const VectorXd &a) {
+  check_size("q", q.size(), system.n_q());
+  check_size("v", v.size(), system.n_v());
+  check_size("a", a.size(), system.n_v());
+  Workspace w(system);
+  VectorXd value(static_cast<Eigen::Index>(system.rows.size())), rate(value);
+  constraint_residuals(system, t, q.data(), v.data(), w, value.data(), rate.data());
+  return acceleration_residual(system, q.data(), a.data(), w);
+}
+
+// (C_q rows of the rotors' angles, their inertias)
+std::tuple<MatrixXd, VectorXd> rotor_rows(const System &system, const VectorXd &q) {
+  check_size("q", q.size(), system.n_q());
+  Workspace w(system);
+  const VectorXd rest = VectorXd::Zero(system.n_v());
+  update_kinematics(system, q.data(), rest.data(), w);
+  const auto count = static_cast<Eigen::Index>(system.rotors.size());
+  MatrixXd gradients = MatrixXd::Zero(system.n_v(), count);
+  VectorXd inertia(count);
+  MeasureMotion motion;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Rotor &rotor = system.rotors[static_cast<std::size_t>(k)];
+    evaluate(rotor.row, w.bodies, motion);
+    jacobian(rotor.row, motion, system.bodies, w.bodies, system.first_coordinate, gradients.col(k));
+    inertia[k] = 1 / rotor.compliance;
+  }
+  return {gradients.transpose(), inertia};
+}
+
+VectorXd force_at_rest(const System &system, double t, const VectorXd &q) {
+  check_size("q", q.size(), system.n_q());
+  Workspace w(system);
+  VectorXd Q(system.n_v());
+  static_force(system, t, q.data(), w, Q.data());
+  return Q;
+}
+
+// (kinetic, strain, gravitational, dissipated power) of the system, one row per state
+MatrixXd energies(const System &system, const MatrixXd &q, const MatrixXd &v) {
+  check_size("q columns", q.cols(), system.n_q());
+  check_size("v columns", v.cols(), system.n_v());
+  check_size("v rows", v.rows(), q.rows());
+  MatrixXd result = MatrixXd::Zero(q.rows(), 4);
+  Workspace w(system);
+  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+    const VectorXd q_i = q.row(i), v_i = v.row(i);
+    for (std::size_t b = 0; b < system.bodies.size(); ++b) {
+      const auto first = system.first_coordinate[b];
+      const Energy e = energy(system.bodies[b], q_i.data() + first, v_i.data() + first, system.gravity);
+      result.row(i) += Eigen::RowVector4d(e.kinetic, e.strain, e.gravitational, e.dissipated_power);
+    }
+    const JointEnergy e = joint_energy(system, q_i.data(), v_i.data(), w);
+    result(i, 0) += e.kinetic;
+    result(i, 1) += e.strain;
+    result(i, 3) += e.dissipated_power;
+  }
+  return result;
+}
+
+using Samples = nb::ndarray<nb::numpy, double, nb::ndim<3>>;
+
+// C_q (T, constraints, coordinates) at the coordinates q (T, coordinates)
+Samples constraint_jacobians(const System &system, const RowMajorMatrix &q) {
+  check_size("q columns", q.cols(), system.n_q());
+  Workspace w(system);
+  const auto T = static_cast<std::size_t>(q.rows()), m = system.n_bilateral();
+  const auto n = static_cast<std::size_t>(system.n_v());
+  auto *data = new double[T * m * n];
+  nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<double *>(p); });
+  const VectorXd rest = VectorXd::Zero(system.n_v());
+  VectorXd value(static_cast<Eigen::Index>(system.rows.size())), rate(value);
+  for (std::size_t i = 0; i < T; ++i) {
+    const VectorXd q_i = q.row(static_cast<Eigen::Index>(i)).transpose();
+    constraint_residuals(system, 0.0, q_i.data(), rest.data(), w, value.data(), rate.data());
+    Eigen::Map<RowMajorMatrix>(data + i * m * n, static_cast<Eigen::Index>(m), system.n_v()) =
+        constraint_jacobian(system, w);
+  }
+  return Samples(data, {T, m, n}, owner);
+}
+
+VectorXd integrate_coordinates(const System &system, const VectorXd &q, const VectorXd &dq) {
+  check_size("q", q.size(), system.n_q());
+  check_size("dq", dq.size(), system.n_v());
+  VectorXd result(system.n_q());
+  system.space.integrate(q.data(), 1, dq.data(), result.data());
+  return result;
+}
+
+VectorXd difference_of_coordinates(const System &system, const VectorXd &q1, const VectorXd &q0) {
+  check_size("q1", q1.size(), system.n_q());
+  check_size("q0", q0.size(), system.n_q());
+  VectorXd dq(system.n_v());
+  system.space.difference(q1.data(), q0.data(), dq.data());
+  return dq;
+}
+
+double time_evaluations(const System &system, double t, const VectorXd &q, const VectorXd &v, int repetitions) {
+  check_size("q", q.size(), system.n_q());
+  check_size("v", v.size(), system.n_v());
+  Workspace w(system);
+  VectorXd a(system.n_v());
+  for (int i = 0; i < repetitions; ++i)
+    accelerations(system, t, q.data(), v.data(), w, a.data());
+  return a[0];
+}
+
+} // namespace
+
+void bind_evaluations(nb::module_ &m, nb::class_<System> &system) {
+  system.def("integrate", &integrate_coordinates, "q"_a, "dq"_a, "Coordinates (n_q,) moved from q by dq (n_v,).")
+      .def("difference", &difference_of_coordinates, "q1"_a, "q0"_a, "dq (n_v,) with q1 = integrate(q0, dq).")
+      .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a, "external_loads"_a = nb::none(),
+           "Accelerations (n_v,) and multipliers (constraints,).")
+      .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q (constraints, n_v).")
+      .def("acceleration_violation", &acceleration_violation, "t"_a, "q"_a, "v"_a, "a"_a,
+           "The largest |C_ddot| for accelerations a (n_v,), relative to 1 and the terms that cancel in it.")
+      .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, n_v) at q (T, n_q).")
+      .def("rotor_rows", &rotor_rows, "q"_a, "Gradients (rotors, n_v) of the rotors' angles and inertias (rotors,).")
+      .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces (n_v,) of gravity, elasticity, drives.")
+      .def("energies", &energies, "q"_a, "v"_a, "Kinetic, strain, gravitational energy and dissipated power (T, 4).");
+  m.def("time_evaluations", &time_evaluations, "system"_a, "t"_a, "q"_a, "v"_a, "repetitions"_a,
+        "Evaluates the accelerations many times, for benchmarks.");
+}

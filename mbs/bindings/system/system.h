@@ -1,0 +1,10 @@
+// Pieces of bind_system.
+#pragma once
+
+#include "core/system/system.h"
+
+#include <nanobind/nanobind.h>
+
+void bind_parts(nanobind::class_<ffrobot::System> &system);                             // bodies, constraints, loads
+void bind_evaluations(nanobind::module_ &m, nanobind::class_<ffrobot::System> &system); // what is computed of a state
+void bind_tangent(nanobind::module_ &m); // linear equations about a motion

@@ -1,0 +1,177 @@
+"""Signals at random times to all commands: what is left half-written, fails the next time, or is lost.
+
+    python tests/campaigns/kills.py [TRIES] [SEED]
+
+Run by hand, some minutes. Each try starts a command in a folder of its own, sends SIGINT, SIGTERM or SIGKILL after a
+random part of the time that it takes, looks at every file, and runs the same command again, with the same cache. Exit
+code 1 where anything was found.
+"""
+
+import os
+import random
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
+
+import numpy as np
+
+from ffrobot.fe_models.modal_body_file import is_modal_body_file, read_modal_body
+from ffrobot.results.file import Results
+
+PROGRAM = Path(sys.executable).with_name("ffrobot")
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
+LINK = """
+name = "arm"
+material = { youngs_modulus = 70e9, poissons_ratio = 0.33, density = 2700.0 }
+geometry = { kind = "beam", length = 0.6, section = { shape = "tube", outer = 0.02, inner = 0.016 } }
+mesh = { elements = 10 }
+reference = { condition = "cantilever" }
+modes = { count = 3, family = "in-plane-bending" }
+"""
+SCENE = """
+name = "one"
+gravity = [0.0, -9.81]
+body = [{ name = "arm", link = "arm.toml" }]
+joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"] }]
+payload = [{ point = "arm.tip", mass = 0.1 }]
+trajectory = [{ name = "swing", joint = "shoulder", value = "0.1 + 0.08*(1 - cos(10*pi*t))" }]
+pzt = [{ body = "arm", count = 4, length = 0.06, width = 0.02, thickness = 0.5e-3, modulus = 63e9, d31 = 110e-12 }]
+analysis = [
+    { name = "inverse", kind = "pcid", end = 0.5, output_step = 2e-5 },
+    { name = "again", kind = "pcid", end = 0.5, output_step = 2e-5 },
+    { name = "linear", kind = "linear", about = "inverse", times = [0.05] },
+]
+"""
+SWEEP = ["--vary", "payload.0.mass=0.1,0.2", "-j", "2"]
+COMMANDS = {
+    "link": ["link", "arm.toml"],
+    "solve": ["solve", "scene.toml", "--log-file", "log"],
+    "sweep": ["sweep", "scene.toml", *SWEEP],
+    "info": ["info", "scene.results.h5"],
+    "feasibility": ["feasibility", "scene.results.h5"],
+    "linear": ["linear", "scene.results.h5"],
+    "report": ["report", "scene.results.h5"],
+    "plot": ["plot", "scene.results.h5", "--format", "png"],
+    "view": ["view", "scene.results.h5", "--frames", "20", "--no-pictures"],
+    "schema": ["schema", "scene"],
+}
+OFTEN = {"link": 4, "solve": 4, "sweep": 2}
+PATIENCE = 300.0  # s for any command
+
+
+class Campaign:
+    """Its `found` are the failures, by kind."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        self.folder, self.chance = folder, random.Random(seed)
+        self.found: Counter[str] = Counter()
+        self.codes: Counter[str] = Counter()
+        self.ready = folder / "ready"
+        self.cache = folder / "cache"
+        self.prepare(self.ready)
+        self.seconds = {name: self.time(name) for name in COMMANDS}
+
+    def prepare(self, place: Path) -> None:
+        place.mkdir()
+        (place / "arm.toml").write_text(LINK, encoding="utf-8")
+        (place / "scene.toml").write_text(SCENE, encoding="utf-8")
+
+    def start(self, name: str, place: Path, cache: Path) -> Popen[str]:
+        environment = os.environ | {"XDG_CACHE_HOME": str(cache), "OMP_NUM_THREADS": "1"}
+        command = [PROGRAM, *COMMANDS[name]]
+        return Popen(command, cwd=place, env=environment, stdout=DEVNULL, stderr=PIPE, text=True)
+
+    def time(self, name: str) -> float:
+        began = time.monotonic()
+        process = self.start(name, self.ready, self.cache)
+        _, told = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, f"{name}: {told}"
+        return time.monotonic() - began
+
+    def one(self, number: int) -> None:
+        name = self.chance.choice([n for n in COMMANDS for _ in range(OFTEN.get(n, 1))])
+        kind = self.chance.choice(SIGNALS)
+        part = self.chance.random()
+        place, cache = self.folder / f"{number}", self.folder / f"cache{number}"
+        self.prepare(place)
+        fresh = name in ("link", "solve") and self.chance.random() < 0.5  # forms and links not in the cache
+        if not fresh:
+            shutil.copytree(self.cache, cache)
+        if name not in ("link", "solve", "sweep"):
+            shutil.copy(self.ready / "scene.results.h5", place)
+        label = f"{number}: {name}, {kind.name} after {part:.2f}, {'empty' if fresh else 'filled'} cache"
+        process = self.start(name, place, cache)
+        time.sleep(part * self.seconds[name] * (3.0 if fresh else 1.0))
+        process.send_signal(kind)
+        sent = time.monotonic()
+        _, told = process.communicate(timeout=PATIENCE)
+        took = time.monotonic() - sent
+        self.codes[f"{kind.name} {process.returncode}"] += 1
+        if "Traceback" in told:
+            self.note("traceback", f"{label}: {told.splitlines()[-1]}")
+        if took > 1.0 and kind != signal.SIGKILL and "stopping, and keeping" not in told:
+            self.note("slow to stop", f"{label}: {took:.1f} s")
+        self.look(place, label)
+        if name == "solve" and kind != signal.SIGKILL:
+            self.kept(place, label)
+        again = self.start(name, place, cache)
+        _, told = again.communicate(timeout=PATIENCE)
+        if again.returncode != 0:
+            self.note("next run fails", f"{label}: exit code {again.returncode}: {told}")
+        self.look(place, f"{label}, next run")
+        shutil.rmtree(place)
+        shutil.rmtree(cache, ignore_errors=True)
+
+    def look(self, place: Path, label: str) -> None:
+        for path in place.rglob("*"):
+            if path.is_file() and not _is_whole(path):
+                self.note("half-written file", f"{label}: {path.name}")
+
+    def kept(self, place: Path, label: str) -> None:
+        """What the log calls completed is in the results file."""
+        log = place / "log"
+        lines = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
+        done = {line.split('"')[1] for line in lines if 'analysis "' in line and ": completed" in line}
+        path = place / "scene.results.h5"
+        have = set(Results(path).analyses) if path.exists() else set()
+        if done - have:
+            self.note("lost analysis", f"{label}: {done - have}")
+
+    def note(self, what: str, text: str) -> None:
+        self.found[what] += 1
+        print(f"{what}: {text}", flush=True)
+
+
+def _is_whole(path: Path) -> bool:
+    try:
+        if path.suffix == ".h5":
+            read_modal_body(path) if is_modal_body_file(path) else Results(path).close()
+        elif path.suffix == ".npz":
+            np.load(path).close()
+        content = path.read_bytes()
+        ends = {".html": b"</html>", ".png": b"IEND\xaeB`\x82", ".xdmf": b"</Xdmf>"}
+        return ".tmp" not in path.name and content.rstrip().endswith(ends.get(path.suffix, b""))
+    except Exception as error:  # whatever is wrong with it
+        print(f"{path}: {error}")
+        return False
+
+
+def main() -> None:
+    """Prints what was found."""
+    tries, seed = (int(text) for text in [*sys.argv[1:], *("100", "0")[len(sys.argv) - 1 :]])
+    with tempfile.TemporaryDirectory() as folder:
+        campaign = Campaign(Path(folder), seed)
+        print({name: round(seconds, 1) for name, seconds in campaign.seconds.items()}, flush=True)
+        for number in range(tries):
+            campaign.one(number)
+        print(f"{tries} kills, exit codes {dict(campaign.codes)}; found {dict(campaign.found) or 'nothing'}")
+    sys.exit(bool(campaign.found))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,102 @@
+"""Integrators on a state with an orientation: a heavy top with a quaternion (4) in q, angular velocities (3) in v."""
+
+import numpy as np
+import pytest
+import zoo
+from mechanisms import assemble
+
+from ffrobot.mbs import _core
+
+METHODS = _core.MethodKind
+INERTIA, ARM, WEIGHT = np.array([0.02, 0.03, 0.015]), np.array([0.1, 0.05, 0.2]), np.array([0.0, 0.0, -9.81])
+START, SPIN = np.array([0.5, 0.5, -0.5, 0.5]), np.array([2.0, -3.0, 9.0])
+TOP = (INERTIA, ARM, WEIGHT)
+
+
+def steps_of_top(method, steps, end=1.0):
+    """States after equal steps, and in their middle."""
+    states = _core.top_fixed_steps(*TOP, end, steps, START, SPIN, method, 0.8)
+    return states[::2], states[1::2]
+
+
+def rotation(e):
+    w, x, y, z = e
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def distance(state, exact):
+    """Of the orientations, whose sign is free, and of the angular velocities."""
+    sign = np.sign(state[:4] @ exact[:4])
+    return np.hypot(np.linalg.norm(state[:4] - sign * exact[:4]), np.linalg.norm(state[4:] - exact[4:]))
+
+
+@pytest.fixture(scope="module")
+def exact():
+    return steps_of_top(METHODS.dop853, 6400)[0]
+
+
+@pytest.mark.parametrize(
+    ("method", "order", "dense_order", "steps"),
+    [
+        (METHODS.dop853, 8, 8, (25, 50, 100)),
+        (METHODS.dopri5, 5, 5, (100, 200, 400)),
+        (METHODS.radau, 5, 4, (100, 200)),
+        (METHODS.generalized_alpha, 2, 2, (200, 400, 800)),
+    ],
+)
+def test_methods_keep_their_order(exact, method, order, dense_order, steps):
+    ends, middles = [], []
+    for count in steps:
+        states, between = steps_of_top(method, count)
+        every = 6400 // count
+        ends.append(distance(states[-1], exact[-1]))
+        middles.append(max(distance(s, e) for s, e in zip(between, exact[every // 2 :: every], strict=False)))
+    for errors, expected in ((ends, order), (middles, dense_order)):
+        observed = np.diff(np.log(errors)) / -np.log(2)
+        assert np.abs(observed - expected).max() < 0.5, observed
+
+
+@pytest.mark.parametrize("method", [METHODS.dopri5, METHODS.dop853, METHODS.radau, METHODS.generalized_alpha])
+def test_quaternions_keep_their_norm(method):
+    states, between = steps_of_top(method, 1000, end=10.0)
+    for found in (states, between):
+        assert np.abs(np.linalg.norm(found[:, :4], axis=1) - 1).max() < 1e-15
+
+
+def test_the_equations_are_those_of_a_top(exact):
+    """Energy, and the moment of momentum about the axis of the weight."""
+    found = np.array(
+        [
+            (0.5 * INERTIA @ v**2 - WEIGHT @ (rotation(e) @ ARM), (rotation(e) @ (INERTIA * v))[2])
+            for e, v in ((state[:4], state[4:]) for state in exact[::80])
+        ]
+    )
+    assert np.ptp(found, axis=0).max() < 1e-11
+    assert np.ptp(exact[:, 4:], axis=0).min() > 1.0  # it tumbles
+
+
+@pytest.mark.parametrize(
+    ("method", "tolerance"),
+    [(METHODS.dopri5, 1e-8), (METHODS.dop853, 1e-10), (METHODS.radau, 1e-8), (METHODS.generalized_alpha, 1e-4)],
+)
+def test_adaptive_steps_and_their_outputs(exact, method, tolerance):
+    times = np.linspace(0.0, 1.0, 41)
+    controls = _core.IntegrationControls(tolerance=tolerance, max_steps=0, method=method, spectral_radius=0.8)
+    states = _core.top_motion(*TOP, times.tolist(), START, SPIN, controls)
+    assert np.abs(np.linalg.norm(states[:, :4], axis=1) - 1).max() < 1e-15
+    assert max(distance(s, e) for s, e in zip(states, exact[::160], strict=True)) < tolerance
+
+
+def test_planar_coordinates_are_numbers():
+    system = assemble(zoo.build("mixed")).system
+    rng = np.random.default_rng(0)
+    q, dq = rng.standard_normal((2, system.n_q))
+    assert system.n_q == system.n_v == system.coordinates
+    np.testing.assert_array_equal(system.integrate(q, dq), q + dq)
+    np.testing.assert_allclose(system.difference(system.integrate(q, dq), q), dq, rtol=0, atol=1e-15)

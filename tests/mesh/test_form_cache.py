@@ -1,0 +1,98 @@
+"""Compiled forms: whatever a process that was killed has left, the next one uses or repairs at once."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from ffrobot.common.locks import held, is_running, this_process
+
+COMPILE = """
+from ffrobot.mesh.compat import MPI, function_space, create_interval_mesh
+from ffrobot.mesh.form_cache import form_folder
+import numpy as np
+mesh = create_interval_mesh(np.array([0.0, 1.0]), np.array([[0, 1]]))
+{between}
+function_space(mesh, "P", 1)
+"""
+KILLED = """
+with form_folder(MPI.COMM_SELF, "test") as own:
+    (own / "libffcx_forms_x.c").write_text("")
+    print(own, flush=True)
+    import os, signal
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+HOLD = """
+import sys, time
+from ffrobot.common.locks import held
+with held(sys.argv[1], 1.0):
+    print(flush=True)
+    time.sleep(60)
+"""
+
+
+def run(cache, between="", code=0):
+    done = subprocess.run(
+        [sys.executable, "-c", COMPILE.format(between=between)],
+        env=os.environ | {"XDG_CACHE_HOME": str(cache)}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == code, done.stderr
+    return done.stdout.strip()
+
+
+def entries(cache):
+    return sorted(path for path in cache.glob("ffrobot/forms/*/*") if path.is_dir())
+
+
+def test_kept_for_the_next_run_and_whole(tmp_path):
+    run(tmp_path)
+    (made,) = entries(tmp_path)
+    assert made.name.startswith("libffcx_")
+    before = {path.name: path.stat().st_mtime_ns for path in made.iterdir()}
+    run(tmp_path)
+    assert {path.name: path.stat().st_mtime_ns for path in made.iterdir()} == before
+    library = next(made.glob("*.so"))
+    content = library.read_bytes()
+    library.unlink()  # its other names may be in use
+    library.write_bytes(content[:1000])
+    run(tmp_path)
+    assert next(entries(tmp_path)[0].glob("*.so")).stat().st_size == len(content)
+
+
+def test_process_killed_while_it_compiles(tmp_path):
+    own = run(tmp_path, KILLED, code=-9)
+    assert os.path.exists(own)
+    lock = os.path.join(os.path.dirname(own), "compiling.lock")
+    began = time.monotonic()
+    with held(lock, patience=10.0) as had:
+        assert had
+    assert time.monotonic() - began < 1.0
+    run(tmp_path, KILLED, code=-9)  # with the same name of the compiler
+    assert not os.path.exists(own)
+
+
+def test_read_only_cache(tmp_path):
+    (tmp_path / "ffrobot").write_text("a file in the way")
+    run(tmp_path)
+
+
+def test_locks_wait_for_live_processes_only(tmp_path):
+    path = tmp_path / "lock"
+    process = subprocess.Popen([sys.executable, "-c", HOLD, path], stdout=subprocess.PIPE)
+    process.stdout.readline()
+    with held(path, patience=0.1) as had:
+        assert not had
+    process.kill()
+    process.wait()
+    with held(path, patience=1.0) as had:
+        assert had
+    with held(tmp_path / "no" / "folder", patience=1.0) as had:
+        assert not had
+
+
+@pytest.mark.parametrize(("end", "runs"), [("", True), ("0", False)])
+def test_processes_by_number_and_start(end, runs):
+    assert is_running(this_process() + end) == runs
+    assert not is_running("nonsense")

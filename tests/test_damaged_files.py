@@ -1,0 +1,198 @@
+"""Damaged and doctored files: one message each, never other numbers; older files without a checksum are still read."""
+
+import random
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+import ffrobot
+from ffrobot.common import checksum
+from ffrobot.common.errors import InputError
+from ffrobot.fe_models.modal_body_file import read_modal_body
+from ffrobot.results.file import Results
+
+
+@pytest.fixture
+def modal(two_link, tmp_path):
+    with Results(two_link.folder / "scene.results.h5") as results:
+        return shutil.copy(results.modal_files["link1"].path, tmp_path / "link1.h5")
+
+
+@pytest.fixture
+def results(two_link, tmp_path):
+    return shutil.copy(two_link.folder / "scene.results.h5", tmp_path / "r.h5")
+
+
+def damaged(content, kind, chance):
+    """One or four bits flipped, 64 bytes zero, or cut off."""
+    content = bytearray(content)
+    if kind == "truncated":
+        return bytes(content[: chance.randrange(len(content) - 1)])
+    if kind == "zeros":
+        first = chance.randrange(len(content) - 64)
+        content[first : first + 64] = bytes(64)
+    for _ in range({"bit": 1, "bits": 4}.get(kind, 0)):
+        content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+    return bytes(content)
+
+
+@pytest.mark.parametrize("kind", ["bit", "bits", "zeros", "truncated"])
+@pytest.mark.parametrize("file", ["modal", "results"])
+def test_random_damage(request, file, kind):
+    path = request.getfixturevalue(file)
+    content, chance = path.read_bytes(), random.Random(f"{file} {kind}")
+    for _ in range(40):
+        path.write_bytes(changed := damaged(content, kind, chance))
+        if changed != content:
+            with pytest.raises(InputError, match=rf"{path.name}: "):
+                read_modal_body(path) if file == "modal" else Results(path)
+
+
+def test_changes_by_other_programs_are_noticed(modal):
+    with h5py.File(modal, "r+") as file:
+        file["interfaces/tip/rotation"][...] *= 2
+    with pytest.raises(InputError, match="damaged file: its content is not what its checksum was made of"):
+        read_modal_body(modal)
+    checksum.seal(modal)
+    with pytest.raises(InputError, match="interfaces/tip/rotation: expected what stations say"):
+        read_modal_body(modal)
+
+
+def test_files_without_checksums_are_read(modal):
+    expected = read_modal_body(modal)
+    with h5py.File(modal, "r+") as file:
+        del file.attrs[checksum.MARK]
+    assert checksum.state(modal) == "none"
+    np.testing.assert_array_equal(read_modal_body(modal).S_bar, expected.S_bar)
+
+
+def _replace(name, **keys):
+    def edit(file):
+        del file[name]
+        file.create_dataset(name, **keys)
+
+    return edit
+
+
+def _link(name, link):
+    def edit(file):
+        del file[name]
+        file[name] = link
+
+    return edit
+
+
+def _virtual(file):
+    layout = h5py.VirtualLayout(shape=(3, 3), dtype="f8")
+    layout[:] = h5py.VirtualSource("elsewhere.h5", "x", shape=(3, 3))
+    del file["second_moment"]
+    file.create_virtual_dataset("second_moment", layout)
+
+
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        (_link("mass", h5py.ExternalLink("elsewhere.h5", "mass")), "found a link at mass"),
+        (_link("mass", h5py.SoftLink("/length")), "found a link at mass"),
+        (_virtual, "found a virtual or external dataset"),
+        (_replace("second_moment", shape=(3, 3), dtype="f8", external=[("elsewhere", 0, 72)]), "or external dataset"),
+        (_replace("mesh/points", shape=(10**7, 10**6), dtype="f8"), "expected 8e"),
+        (_replace("second_moment", data=-np.eye(3)), "second_moment, about the center of mass: expected no negative"),
+        (_replace("invariants/S_bar", data=np.full((3, 10), 9.0)), "modal_mass, less S_bar: expected no negative"),
+    ],
+)
+def test_doctored_modal_bodies(modal, edit, named):
+    with h5py.File(modal, "r+") as file:
+        edit(file)
+    checksum.seal(modal)
+    with pytest.raises(InputError, match=named):
+        read_modal_body(modal)
+
+
+@pytest.mark.parametrize(
+    ("command", "part"),
+    [
+        ("info", "inverse/time"),
+        ("feasibility", "inverse/pzt/link1"),
+        ("report", "inverse/joints/O/moment"),
+        ("plot", "inverse/points/link2.tip"),
+    ],
+)
+def test_results_with_missing_parts(results, ffrobot, command, part):
+    """Of a file that says nothing about its content."""
+    with h5py.File(results, "r+") as file:
+        del file.attrs[checksum.MARK], file[part]
+        file[part] = "text"
+    done = ffrobot(command, results)
+    assert done.returncode in (0, 2)  # not every command needs every part
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 0 or "r.h5: " in done.stderr
+
+
+SCENE = """
+name = "arm"
+gravity = [0.0, -9.81]
+body = [{ name = "arm", rigid = { mass = 1.0, inertia = 0.1, center = [0.5, 0.0], points = { root = [0.0, 0.0] } } }]
+joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"] }]
+trajectory = [{ name = "turn", joint = "shoulder", value = "sin(9*t)" }]
+analysis = [
+    { name = "inverse", kind = "pcid", end = 1.0, output_step = 0.01, tolerance = 1e-9, max_steps = 4 },
+    { name = "forward", kind = "forward", actuation = "inverse", apply = "joints" },
+]
+"""
+
+
+@pytest.fixture(scope="module")
+def stopped_once(tmp_path_factory):
+    """A scene whose first analysis was stopped, and its results file."""
+    scene = tmp_path_factory.mktemp("stopped") / "scene.toml"
+    scene.write_text(SCENE, encoding="utf-8")
+    with pytest.raises(ffrobot.SolveError, match="too many steps"):
+        ffrobot.solve(scene, scene.with_name("r.h5"))
+    return scene
+
+
+@pytest.fixture
+def stopped(stopped_once, tmp_path):
+    """It, and a copy of its results file."""
+    return stopped_once, shutil.copy(stopped_once.with_name("r.h5"), tmp_path / "r.h5")
+
+
+PEAKS = [f"checkpoint/peaks/{name}" for name in ("velocity", "modal", "groups")]
+RESUMED = ["checkpoint/state", *PEAKS, "q", "v", "a", "lambda_", "tau", "F_p"]
+CHANGES = {
+    "empty": lambda values: values[:0],
+    "short": lambda values: values[:-1],
+    "long": lambda values: np.concatenate([values, values]),
+    "NaN": lambda values: np.full_like(values, np.nan),
+    "flat": lambda values: values.reshape(1, -1, 1),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("name", [*RESUMED, "recording/times", "recording/states"])
+def test_resume_checks_every_size(stopped, name, change):
+    scene, path = stopped
+    with h5py.File(path, "r+") as file:
+        group = file["inverse/resume"]
+        values = group[name][()]
+        changed = CHANGES[change](values)
+        if changed.shape == values.shape and not values.size:
+            pytest.skip("nothing to change: the body is rigid")
+        del group[name]
+        group[name] = changed
+    checksum.seal(path)
+    with pytest.raises(ffrobot.InputError, match=r"r\.h5: inverse"):
+        ffrobot.solve(scene, path, resume=True)
+
+
+@pytest.mark.parametrize("attribute", [{"outputs": 5000}, {"outputs": 2**31}, {"time": -1.0}, {"time": np.nan}])
+def test_resume_checks_where_it_goes_on(stopped, attribute):
+    scene, path = stopped
+    with h5py.File(path, "r+") as file:
+        file["inverse/resume/checkpoint"].attrs.update(attribute)
+    checksum.seal(path)
+    with pytest.raises(ffrobot.InputError, match=r"r\.h5: inverse"):
+        ffrobot.solve(scene, path, resume=True)
