@@ -196,8 +196,10 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
         return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
     found = item["input"]
     if kind == "union_tag_not_found":
-        key = key_path((*loc, context["discriminator"].replace("'", "")), data)
-        return _Problem(key, f"expected {_EXPECTED['missing']}", ", found none")
+        tag_key = context["discriminator"].replace("'", "")
+        near = get_close_matches(tag_key, list(item["input"]), n=1)
+        instead = f'"{near[0]}" (did you mean "{tag_key}"?)' if near else "none"
+        return _Problem(key_path((*loc, tag_key), data), f"expected {_EXPECTED['missing']}", f", found {instead}")
     if kind == "union_tag_invalid":
         tags = context["expected_tags"].replace("'", "").split(", ")
         key = key_path((*loc, context["discriminator"].replace("'", "")), data)

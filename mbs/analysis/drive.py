@@ -96,20 +96,7 @@ def drive(
         continuation = Continuation(_core.Checkpoint(), recording)
     else:
         integrator, continuation = earlier.statistics.integrator, earlier.continuation
-    common: dict[str, Any] = {
-        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments, "times": times.tolist(),
-        "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
-    }  # fmt: skip
-    if control is None:
-        run = _core.run(
-            **common, external_loads=steering, actuator_forces=resolver, recording=continuation.recording,
-            checkpoint=continuation.checkpoint,
-        )  # fmt: skip
-    else:
-        run = _core.run_sampled(
-            **common, motors=control.motors, patches=control.voltages, first_command=control.first,
-            sensing=control.sensing, samples=control.times.tolist(), delay=control.delay, controller=control.controller,
-        )  # fmt: skip
+    run = _integrated(assembly, analysis, start, times, integrator, steering, control, resolver, continuation, progress)
     seconds = time.perf_counter() - began
     statistics = statistics_of(assembly, run, integrator, seconds)
     if statistics.status == "step underflow" and not statistics.cause:
@@ -124,6 +111,33 @@ def drive(
     )
     outcome = outcome if reported is None else outcome.in_coordinates_of(reported)
     return outcome if earlier is None else _joined(earlier, outcome)
+
+
+def _integrated(
+    assembly: MechanismSystem,
+    analysis: IntegratedAnalysis,
+    start: State,
+    times: Array,
+    integrator: Choice,
+    steering: _core.ExternalLoads | None,
+    control: SampledControl | None,
+    resolver: _core.ActuatorForces | None,
+    continuation: Continuation,
+    progress: Progress,
+) -> _core.Run:
+    common: dict[str, Any] = {
+        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments, "times": times.tolist(),
+        "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
+    }  # fmt: skip
+    if control is None:
+        return _core.run(
+            **common, external_loads=steering, actuator_forces=resolver, recording=continuation.recording,
+            checkpoint=continuation.checkpoint,
+        )  # fmt: skip
+    return _core.run_sampled(
+        **common, motors=control.motors, patches=control.voltages, first_command=control.first,
+        sensing=control.sensing, samples=control.times.tolist(), delay=control.delay, controller=control.controller,
+    )  # fmt: skip
 
 
 def motion_of(assembly: MechanismSystem, run: _core.Run | _core.FcidOutputs, times: Array) -> Motion:

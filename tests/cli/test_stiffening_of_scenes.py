@@ -95,7 +95,7 @@ def test_a_wrong_value_is_named(spin_up):
 def test_points_without_it_are_named(spin_up, tmp_path):
     done, _ = spin_up('geometric_stiffening = true\n[[load]]\npoint = "beam.mid"\ny = 1.0')
     assert done.returncode == 2
-    assert "load: point: expected, with geometric_stiffening, a point" in done.stderr
+    assert "load no. 1: point: expected, with geometric_stiffening, a point" in done.stderr
     assert '"beam.mid"' in done.stderr
 
 
