@@ -6,16 +6,19 @@ from __future__ import annotations
 class FfrobotError(Exception):
     """Base of all errors whose message is meant for the user: shown without a traceback."""
 
+    __module__ = "ffrobot"  # where users import them from, and tracebacks name them
     exit_code = 1
 
 
 class InputError(FfrobotError):
     """A file, key or value given by the user is wrong: the message names file, key, expected and found."""
 
+    __module__ = "ffrobot"
     exit_code = 2
 
 
 class SolveError(FfrobotError):
     """An analysis could not be completed: the message says where, why and what to try next."""
 
+    __module__ = "ffrobot"
     exit_code = 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -136,7 +136,8 @@ def _compute(
     compute = _computation(link, source_path, force)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
-        return compute(link, source_path, digest, progress or _silent)
+        body = compute(link, source_path, progress or _silent)
+        return replace(body, input_hash=digest, modes_hash=modes_hash(link))
 
     if processes() > 1 and isinstance(link, BeamLink):  # too small to share out
         on_first(lambda: write(make()))
@@ -162,7 +163,8 @@ def _has_mesh(link: Link) -> bool:
     """Whether the mesh of the link is kept from an earlier run."""
     if not isinstance(link, SolidLink):
         return False
-    return kept_path(link.geometry, link.mesh, link.interface, link.surface_patch).is_file()
+    outlines = link.surface_patch.outlines(link.geometry.length) if link.surface_patch else None
+    return kept_path(link.geometry, link.mesh, link.interface, outlines).is_file()
 
 
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:

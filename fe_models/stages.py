@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from ..mesh.kept_parts import geometry_content
-from .damping import damping_ratio
 from .link_records import BeamLink, Link, SolidLink
-from .lumped_masses import lumps
 from .modal_body import ModalBody, StressPoint
+from .modal_body.damping import damping_ratio
+from .modal_body.lumped_masses import lumps
 from .modal_body_file import FORMAT_VERSION
 
 # To be raised whenever the same link file gives other numbers than before.

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .mbs.scene.load import make_scene
     from .mbs.scene.scene import Scene
     from .results.file import Results
+    from .run.solution import Watcher
 
     __version__: str
 
@@ -43,6 +44,7 @@ _HOME = {
     "make_scene": ".mbs.scene.load",
     "Scene": ".mbs.scene.scene",
     "Results": ".results.file",
+    "Watcher": ".run.solution",
 }
 
 __all__ = [
@@ -52,6 +54,7 @@ __all__ = [
     "Results",
     "Scene",
     "SolveError",
+    "Watcher",
     "load_scene",
     "make_link",
     "make_scene",

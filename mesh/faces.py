@@ -20,7 +20,7 @@ from ..common.arrays import Array, Integers
 from ..common.errors import InputError
 from ..common.validation import did_you_mean, quoted
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
-from .records import InterfaceRecord, RectangleSection, SolidGeometry, SurfacePatches
+from .records import Outlines, PlaceRecord, RectangleSection, SolidGeometry
 from .source import Source
 
 Choice = Integers
@@ -121,8 +121,8 @@ class SmoothFace:
 def named_faces(
     source: Source,
     geometry: SolidGeometry,
-    interfaces: Sequence[InterfaceRecord],
-    patches: SurfacePatches | None,
+    places: Sequence[PlaceRecord],
+    outlines: Outlines | None,
     path: Path,
 ) -> PartMesh:
     """The part of `source`, placed, with its faces named and tagged.
@@ -133,18 +133,18 @@ def named_faces(
     part = source.part
     boundary = Boundary.of(part)
     chosen: dict[str, Choice] = {}
-    tables = {item.name: item for item in interfaces}
+    tables = {item.name: item for item in places}
     for name, x, outward in (("root", 0.0, -1.0), ("tip", geometry.length, 1.0)):
         table = tables.get(name)
         if table is None or (table.group is None and table.position is None):
             chosen[name] = _end_face(boundary, name, x, outward, geometry.length, path)
-    for table in interfaces:
+    for table in places:
         if table.group is not None:
             chosen[table.name] = _group(source, boundary, table.group, f"{path}: interface.group of {table.name}")
         elif isinstance(table.position, tuple):
             chosen[table.name] = _nearest(boundary, table, path)
-    if patches is not None:
-        chosen |= _patch_beds(boundary, geometry, patches, path)
+    if outlines is not None:
+        chosen |= _patch_beds(boundary, geometry, outlines, path)
     return _tagged(part, boundary, chosen, path)
 
 
@@ -185,7 +185,7 @@ def _group(source: Source, boundary: Boundary, group: str, where: str) -> Choice
     )
 
 
-def _nearest(boundary: Boundary, table: InterfaceRecord, path: Path) -> Choice:
+def _nearest(boundary: Boundary, table: PlaceRecord, path: Path) -> Choice:
     """The smooth face nearest to the table's position among those that face along its normal."""
     position, normal = np.array(table.position, dtype=np.float64), np.array(table.normal, dtype=np.float64)
     where = f"{path}: interface.position of {table.name}"
@@ -210,21 +210,21 @@ def _nearest(boundary: Boundary, table: InterfaceRecord, path: Path) -> Choice:
     return facing[best].facets
 
 
-def _patch_beds(boundary: Boundary, geometry: SolidGeometry, patches: SurfacePatches, path: Path) -> dict[str, Choice]:
+def _patch_beds(boundary: Boundary, geometry: SolidGeometry, outlines: Outlines, path: Path) -> dict[str, Choice]:
     """The facets under each patch, whose area is that of the patch."""
     assert isinstance(geometry.section, RectangleSection)
     slack = IN_PLANE * geometry.length
     corners = boundary.points[boundary.facets]
-    across = np.all(np.abs(corners[..., 2]) <= patches.width / 2 + slack, axis=1)
+    across = np.all(np.abs(corners[..., 2]) <= outlines.width / 2 + slack, axis=1)
     beds: dict[str, Choice] = {}
     for name, y in (("top", geometry.section.height / 2), ("bottom", -geometry.section.height / 2)):
-        if patches.faces not in (name, "both"):
+        if outlines.faces not in (name, "both"):
             continue
         level = across & np.all(np.abs(corners[..., 1] - y) <= slack, axis=1)
-        for k, (begin, end) in enumerate(patches.edges(geometry.length)):
+        for k, (begin, end) in enumerate(outlines.edges):
             along = np.all((corners[..., 0] >= begin - slack) & (corners[..., 0] <= end + slack), axis=1)
             bed = np.flatnonzero(level & along)
-            area, expected = boundary.area[bed].sum(), (end - begin) * patches.width
+            area, expected = boundary.area[bed].sum(), (end - begin) * outlines.width
             if abs(area - expected) > 1e-6 * expected:
                 raise InputError(
                     f"{path}: surface_patch: expected {expected:.6g} m² of free surface under patch {k + 1} ({name}), "

@@ -1,4 +1,4 @@
-"""Shape functions of straight and curved cells in gmsh's order of nodes, with NumPy alone: for checks and volumes."""
+"""Jacobians of straight and curved cells in gmsh's order of nodes, with NumPy alone: for checks."""
 
 from __future__ import annotations
 
@@ -31,11 +31,6 @@ def _exponents(cell: CellName, degree: int) -> list[tuple[int, ...]]:
     """The monomials X^a Y^b Z^c that the shape functions combine."""
     all_of = product(range(degree + 1), repeat=3)
     return [powers for powers in all_of if cell == "hexahedron" or sum(powers) <= degree]
-
-
-def shape_functions(cell: CellName, degree: int, X: Array) -> Array:
-    """(q, v) values at `X` (q, 3)."""
-    return _monomials(cell, degree, X) @ _coefficients(cell, degree)
 
 
 def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:

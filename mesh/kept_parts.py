@@ -10,6 +10,7 @@ import json
 import zipfile
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
@@ -21,14 +22,14 @@ from ..common.errors import SolveError
 from ..common.files import write_atomically
 from .cells import CELLS, CellName
 from .part_mesh import PartMesh
-from .records import InterfaceRecord, SolidGeometry, SolidMeshRecord, SurfacePatches
+from .records import Outlines, PlaceRecord, SolidGeometry, SolidMeshRecord
 
 # To be raised whenever the same keys make another mesh.
 MESH_VERSION = 1
 
 _ARRAYS = ("points", "cells", "cell_tag", "facets", "facet_tag")
 _NAMES = ("regions", "faces")
-_WITHOUT_INFLUENCE = {"coupling", "mass", "inertia"}  # of an interface on the mesh
+_OF_PLACES = set(PlaceRecord.model_fields)  # what else a record of an interface holds has no influence on the mesh
 
 
 def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
@@ -42,8 +43,8 @@ def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
 def kept_path(
     geometry: SolidGeometry,
     record: SolidMeshRecord,
-    interfaces: Sequence[InterfaceRecord],
-    patches: SurfacePatches | None,
+    places: Sequence[PlaceRecord],
+    outlines: Outlines | None,
 ) -> Path:
     """Where in the cache the mesh of a part is, or would be."""
     content = {
@@ -51,8 +52,8 @@ def kept_path(
         "geometry": geometry_content(geometry),
         "suffix": geometry.file.suffix.lower() if geometry.file is not None else "",
         "mesh": record.model_dump(mode="json"),
-        "interfaces": [item.model_dump(mode="json", exclude=_WITHOUT_INFLUENCE) for item in interfaces],
-        "patches": patches and patches.model_dump(mode="json"),
+        "interfaces": [item.model_dump(mode="json", include=_OF_PLACES) for item in places],
+        "outlines": asdict(outlines) if outlines else None,
     }
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     return user_cache_path("ffrobot") / "meshes" / f"{digest}.npz"

@@ -18,7 +18,7 @@ from .defaults import default_order, default_size
 from .faces import named_faces
 from .kept_parts import keep_part, kept_part, kept_path
 from .part_mesh import PartMesh
-from .records import InterfaceRecord, RectangleSection, SolidGeometry, SolidMeshRecord, SurfacePatches
+from .records import Outlines, PlaceRecord, RectangleSection, SolidGeometry, SolidMeshRecord
 from .source import Source, source_from
 from .structured import Divisions, structured_box
 
@@ -30,8 +30,8 @@ _STEP = (".step", ".stp")
 def kept_or_new(
     geometry: SolidGeometry,
     record: SolidMeshRecord,
-    interfaces: Sequence[InterfaceRecord],
-    patches: SurfacePatches | None,
+    places: Sequence[PlaceRecord],
+    outlines: Outlines | None,
     path: Path,
     progress: Progress,
     *,
@@ -39,11 +39,11 @@ def kept_or_new(
 ) -> PartMesh:
     """`part_mesh`, or what it made of the same part before, where gmsh would have to make it and not `remesh`."""
     if not _is_meshed(geometry, record):
-        return part_mesh(geometry, record, interfaces, patches, path, progress)
-    kept = kept_path(geometry, record, interfaces, patches)
+        return part_mesh(geometry, record, places, outlines, path, progress)
+    kept = kept_path(geometry, record, places, outlines)
     part = None if remesh else kept_part(kept)
     if part is None:
-        part = part_mesh(geometry, record, interfaces, patches, path, progress)
+        part = part_mesh(geometry, record, places, outlines, path, progress)
         keep_part(kept, part)
     return part
 
@@ -51,8 +51,8 @@ def kept_or_new(
 def part_mesh(
     geometry: SolidGeometry,
     record: SolidMeshRecord,
-    interfaces: Sequence[InterfaceRecord],
-    patches: SurfacePatches | None,
+    places: Sequence[PlaceRecord],
+    outlines: Outlines | None,
     path: Path,
     progress: Progress,
 ) -> PartMesh:
@@ -61,8 +61,8 @@ def part_mesh(
     Args:
         geometry: of the link file.
         record: its table `mesh`.
-        interfaces: its tables `interface`.
-        patches: its table `surface_patch`.
+        places: its tables `interface`.
+        outlines: of its patches.
         path: the link file, named in errors.
         progress: is told what is being done.
 
@@ -71,7 +71,7 @@ def part_mesh(
     """
     where = f"{path}: geometry" if geometry.file is None else f"{path}: geometry.file: {geometry.file.name}"
     progress("meshing" if geometry.file is None or _is_step(geometry.file) else f"reading {geometry.file.name}")
-    source = _source(geometry, record, patches, path, where)
+    source = _source(geometry, record, outlines, path, where)
     part = _placed(source.part, geometry) if geometry.file is not None else source.part
     check_shape(part, geometry, where)
     part = oriented(part)
@@ -79,7 +79,7 @@ def part_mesh(
         part = straightened(part)
     check_quality(part, where)
     check_connected(part, where)
-    return named_faces(replace(source, part=part), geometry, interfaces, patches, path)
+    return named_faces(replace(source, part=part), geometry, places, outlines, path)
 
 
 def _is_meshed(geometry: SolidGeometry, record: SolidMeshRecord) -> bool:
@@ -94,7 +94,7 @@ def _is_step(file: Path) -> bool:
 
 
 def _source(
-    geometry: SolidGeometry, record: SolidMeshRecord, patches: SurfacePatches | None, path: Path, where: str
+    geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outlines | None, path: Path, where: str
 ) -> Source:
     file = geometry.file
     if file is None:
@@ -102,7 +102,7 @@ def _source(
             return Source(_box(geometry, record), {}, {})
         from .shapes import mesh_shape
 
-        return mesh_shape(geometry, record, patches, path)
+        return mesh_shape(geometry, record, outlines, path)
     if _is_step(file):
         from .step import mesh_step
 

@@ -1,4 +1,4 @@
-"""The tables of a link file that say what a link looks like: geometry, mesh, interfaces. No mesh library is loaded.
+"""The tables of a link file that say what a link looks like: geometry, mesh, places. No mesh library is loaded.
 
 A stepped beam gives `[[geometry.segment]]` tables in place of `section`: each with the `section` that holds from the
 end of the segment before (from the root, for the first) to `until` (m from the root); the last one ends at `length`.
@@ -9,6 +9,7 @@ A solid has a `section` as a beam has, drawn out along x, or comes from a `file`
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -19,7 +20,6 @@ Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Vector = tuple[float, float, float]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
-Coupling = Literal["mean", "rigid"]
 
 
 class RectangleSection(Record):
@@ -118,10 +118,10 @@ class SolidMeshRecord(Record):
     )
 
 
-class InterfaceRecord(Record):
-    """A place where joints and loads attach, and what is fixed to it there: a hub, a gripper.
+class PlaceRecord(Record):
+    """A place on a link: where an interface is.
 
-    A beam's `position` is a number, m from the root. A solid's interface is a face: that of a physical `group` of the
+    A beam's `position` is a number, m from the root. A solid's place is a face: that of a physical `group` of the
     mesh file, or the one nearest to the point `position` (m, link frame) that faces along `normal`; a number as
     `position` is the cross section at that distance from the root. The faces of `root` and `tip` need no table: they
     are the plane faces at x = 0 and x = length, unless a table of that name says otherwise.
@@ -131,25 +131,18 @@ class InterfaceRecord(Record):
     position: NotNegative | Vector | None = None
     normal: Vector | None = None  # outward
     group: Annotated[str, Field(min_length=1)] | None = None
-    coupling: Coupling | None = None
-    mass: NotNegative = 0.0  # kg, rigidly attached, its center at the interface
-    inertia: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)  # about x, y, z through there, kg·m²
 
 
-class SurfacePatches(Record):
-    """Piezoelectric patches outlined in the mesh of a solid, on the faces at its largest or smallest y.
+@dataclass(frozen=True)
+class Outlines:
+    """Rectangles to outline in the mesh of a solid, on the faces at its largest or smallest y, about z = 0.
 
-    Same meaning of the keys as in a scene's `[[pzt]]`: centres at (k − ½)·length of link / count, or `centers`.
+    Attributes:
+        edges: begin and end of each along x, m from the root.
+        width: of all along z, m.
+        faces: "top" at the largest y, "bottom" at the smallest.
     """
 
-    count: Annotated[int, Field(ge=1)] | None = None
-    centers: Annotated[tuple[Positive, ...], Field(min_length=1)] | None = None  # m from the root
-    length: Positive  # m
-    width: Positive  # m
+    edges: tuple[tuple[float, float], ...]
+    width: float
     faces: Literal["top", "bottom", "both"] = "both"
-
-    def edges(self, length: float) -> list[tuple[float, float]]:
-        """Begin and end of each patch on a link of `length`, m from the root."""
-        count = self.count or 1
-        centers = self.centers or [(k + 0.5) * length / count for k in range(count)]
-        return [(center - self.length / 2, center + self.length / 2) for center in centers]

@@ -13,11 +13,11 @@ from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_sur
 from .records import (
     CircleSection,
     Hole,
+    Outlines,
     RectangleSection,
     SectionRecord,
     SolidGeometry,
     SolidMeshRecord,
-    SurfacePatches,
 )
 from .source import Source, source_from
 
@@ -25,8 +25,8 @@ _VOLUME, _FACE = 3, 2
 DimTags = list[tuple[int, int]]
 
 
-def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, patches: SurfacePatches | None, path: Path) -> Source:
-    """Tetrahedra in the shape that `geometry` describes, the outlines of the `patches` along edges of elements.
+def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outlines | None, path: Path) -> Source:
+    """Tetrahedra in the shape that `geometry` describes, the `outlines` along edges of elements.
 
     Raises:
         InputError: a hole leaves the section, or the shape cannot be meshed.
@@ -36,8 +36,8 @@ def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, patches: Surfac
         body = _body(geometry)
         for hole in geometry.hole:
             body, _ = gmsh.model.occ.cut(body, [_hole(hole, geometry.section)])
-        if patches is not None:
-            _outline(body, geometry, patches)
+        if outlines is not None:
+            _outline(body, geometry, outlines)
         gmsh.model.occ.synchronize()
         size = record.size or default_size(*volume_and_surface(), record.order or default_order("tetrahedron"))
         around = BAR if isinstance(geometry.section, CircleSection) else CIRCLE
@@ -115,16 +115,16 @@ def _height(geometry: SolidGeometry, x: float) -> float:
     return root + (tip - root) * x / geometry.length
 
 
-def _outline(body: DimTags, geometry: SolidGeometry, patches: SurfacePatches) -> None:
-    """Press the rectangles under the patches into the faces at largest and smallest y."""
+def _outline(body: DimTags, geometry: SolidGeometry, outlines: Outlines) -> None:
+    """Press the outlined rectangles into the faces at largest and smallest y."""
     assert isinstance(geometry.section, RectangleSection)
     half = geometry.section.height / 2
-    sides = {"top": [half], "bottom": [-half], "both": [half, -half]}[patches.faces]
+    sides = {"top": [half], "bottom": [-half], "both": [half, -half]}[outlines.faces]
     rectangles: DimTags = []
-    for begin, end in patches.edges(geometry.length):
+    for begin, end in outlines.edges:
         begin, end = max(begin, 0.0), min(end, geometry.length)
         for y in sides:
-            face = gmsh.model.occ.addRectangle(begin, -patches.width / 2, 0, end - begin, patches.width)
+            face = gmsh.model.occ.addRectangle(begin, -outlines.width / 2, 0, end - begin, outlines.width)
             gmsh.model.occ.rotate([(_FACE, face)], 0, 0, 0, 1, 0, 0, 1.5707963267948966)
             gmsh.model.occ.translate([(_FACE, face)], 0, y, 0)
             rectangles.append((_FACE, face))

@@ -20,7 +20,7 @@ from .cells import CellName
 from .compat import create_solid_mesh, geometry_nodes
 from .part import kept_or_new
 from .part_mesh import PartMesh, facet_keys
-from .records import InterfaceRecord, SolidGeometry, SolidMeshRecord, SurfacePatches
+from .records import Outlines, PlaceRecord, SolidGeometry, SolidMeshRecord
 from .surface import Surface, boundary, reference_facets, surface_of
 
 if TYPE_CHECKING:
@@ -59,8 +59,8 @@ class SolidMesh:
 def solid_mesh(
     geometry: SolidGeometry,
     record: SolidMeshRecord,
-    interfaces: Sequence[InterfaceRecord],
-    patches: SurfacePatches | None,
+    places: Sequence[PlaceRecord],
+    outlines: Outlines | None,
     path: Path,
     comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Progress | None = None,
@@ -72,8 +72,8 @@ def solid_mesh(
     Args:
         geometry: of the link file.
         record: its table `mesh`.
-        interfaces: its tables `interface`.
-        patches: its table `surface_patch`.
+        places: its tables `interface`.
+        outlines: of its patches.
         path: the link file, named in errors.
         comm: all its processes call.
         progress: is told what is being done.
@@ -85,7 +85,7 @@ def solid_mesh(
     outcome: PartMesh | FfrobotError | None = None
     if comm.rank == 0:
         try:
-            outcome = kept_or_new(geometry, record, interfaces, patches, path, progress or _silent, remesh=remesh)
+            outcome = kept_or_new(geometry, record, places, outlines, path, progress or _silent, remesh=remesh)
         except FfrobotError as error:
             outcome = error
     failure = comm.bcast(outcome if isinstance(outcome, FfrobotError) else None)

@@ -21,7 +21,7 @@ from ...common.arrays import Array, Integers
 from ...mesh.compat import ElementName, assemble_matrix, basix_element, cell_dofs, cell_vertices, function_space
 from ...mesh.interval import cells_containing
 from ..link_records import BeamLink, Family
-from .section import Section
+from ..link_records.section import Section
 
 # Rows of a station: displacement and rotation of the cross section about x, y, z.
 U_X, U_Y, U_Z, R_X, R_Y, R_Z = range(6)

@@ -15,14 +15,14 @@ from ...common.version import program_version
 
 # First of all that load dolfinx: mesh.compat sets PETSc up.
 from ...mesh.interval import graded_nodes, interval_mesh, with_points
-from ..damping import damping_ratio
-from ..eigen import lowest_modes
-from ..invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
 from ..link_records import FAMILIES, BeamLink, Family
-from ..lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
-from ..stages import modes_hash
-from .beam import R_X, U_X, FamilyModel, family_model
+from ..modal_body.damping import damping_ratio
+from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
+from ..modal_body.signs import canonical_signs
+from .beam import R_X, FamilyModel, family_model
+from .eigen import lowest_modes
+from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
 from .section_outline import section_outlines
 from .stress import beam_stresses, segments
 
@@ -40,8 +40,8 @@ class Mode(NamedTuple):
     x: Array
 
 
-def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progress) -> ModalBody:
-    """Compute the modal body of `link`, read from `path`.
+def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody:
+    """Compute the modal body of `link`, read from `path`; its hashes are left empty.
 
     Raises:
         InputError: more modes are asked for than the mesh has.
@@ -60,7 +60,8 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         models[family] = _loaded(family_model(link, family, mesh, stations.x), link, stations.x)
     progress(f"{link.name}: solving for the modes")
     modes = select(models, _wanted(link, models, path))
-    fields = canonical(station_fields(models, modes, stations.x.size))
+    fields = station_fields(models, modes, stations.x.size)
+    fields = fields * canonical_signs(fields)
     progress(f"{link.name}: integrating the inertia")
     interfaces = {name: _interface(stations, fields, place) for name, place in named.items()}
     attached = lumps(link.interface, interfaces)
@@ -88,8 +89,6 @@ def beam_modal_body(link: BeamLink, path: Path, input_hash: str, progress: Progr
         stations=kept,
         stress=beam_stresses(link, kept, omega**2, attached),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
-        input_hash=input_hash,
-        modes_hash=modes_hash(link),
         ffrobot_version=program_version(),
     )
 
@@ -137,27 +136,6 @@ def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> A
             if one.family == other.family:
                 products[i, j] = products[j, i] = one.x @ (models[one.family].M @ other.x)
     return products
-
-
-def canonical(fields: Array) -> Array:
-    """`fields` (6, k, n) with the sign of each mode as formulation.md, section 1, wants it.
-
-    The dominant translation is positive at the station nearest the root where it exceeds half its largest value; of a
-    mode without translation, the twist.
-    """
-    return fields * canonical_signs(fields)
-
-
-def canonical_signs(fields: Array) -> Array:
-    """(n,) 1 or −1: what `canonical` multiplies each mode by."""
-    signs = np.ones(fields.shape[2])
-    for k in range(signs.size):
-        rows = fields[U_X:R_X, :, k]
-        if not np.any(rows):
-            rows = fields[R_X:, :, k]
-        dominant = rows[np.argmax(np.abs(rows).max(axis=1))]
-        signs[k] = np.sign(dominant[np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max())])
-    return signs
 
 
 def _element_boundaries(link: BeamLink) -> Array:

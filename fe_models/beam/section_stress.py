@@ -12,7 +12,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mesh.records import CircleSection, RectangleSection, SectionRecord, TubeSection
-from .section import Section
+from ..link_records.section import Section
 
 TERMS = 2000  # of the series for rectangles: 2e-4 of the largest stress at their corners, far less elsewhere
 

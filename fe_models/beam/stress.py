@@ -15,8 +15,8 @@ from scipy.special import roots_legendre
 
 from ...common.arrays import Array, Booleans, Integers
 from ..link_records import BeamLink
-from ..lumped_masses import Lump
 from ..modal_body import Stations, StressPoint
+from ..modal_body.lumped_masses import Lump
 from .section_stress import section_stress
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...common.arrays import Array
-from ..invariants import Invariants
+from ..modal_body.invariants import Invariants
 from .elasticity import SolidModel
 from .strain_energy import geometric_stiffness, internal_forces
 from .supports import Flexibility

@@ -19,15 +19,14 @@ from ...mesh.compat import lagrange_element, node_map
 from ...mesh.defaults import default_order
 from ...mesh.interval import with_points
 from ...mesh.solid_mesh import SolidMesh, solid_mesh
-from ..beam.link import canonical_signs
-from ..damping import damping_ratio
-from ..families import section_motion
 from ..link_records import SolidLink
-from ..lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
-from ..stages import modes_hash
+from ..modal_body.damping import damping_ratio
+from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
+from ..modal_body.signs import canonical_signs
 from .eigen import Mass
 from .elasticity import MaterialMap, SolidModel, material_map, solid_model
+from .families import section_motion
 from .functionals import Averages, face_averages, section_averages
 from .invariants import prestressed, shape_integrals
 from .modes import wanted_modes
@@ -65,7 +64,6 @@ class Places(NamedTuple):
 def solid_modal_body(
     link: SolidLink,
     path: Path,
-    input_hash: str,
     progress: Progress,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
@@ -73,15 +71,14 @@ def solid_modal_body(
 ) -> ModalBody:
     """Compute the modal body of `link`, read from `path`; collective over `comm`, the same on all its processes.
 
-    A mesh kept from an earlier run is used unless `remesh`.
+    A mesh kept from an earlier run is used unless `remesh`. The hashes are left empty.
 
     Raises:
         InputError: the part cannot be meshed, a face is missing, or more modes are asked for than the mesh has.
         SolveError: the stiffness cannot be factorised, or the eigensolver did not converge.
     """
-    solid = solid_mesh(
-        link.geometry, link.mesh, link.interface, link.surface_patch, path, comm, progress, remesh=remesh
-    )
+    outlines = link.surface_patch.outlines(link.geometry.length) if link.surface_patch else None
+    solid = solid_mesh(link.geometry, link.mesh, link.interface, outlines, path, comm, progress, remesh=remesh)
     progress(f"{link.name}: assembling")
     model = solid_model(solid.mesh, link.mesh.order or default_order(solid.cell), _materials(link, solid, path))
     places = _places(link, model, solid)
@@ -136,8 +133,6 @@ def solid_modal_body(
             if link.surface_patch
             else None
         ),
-        input_hash=input_hash,
-        modes_hash=modes_hash(link),
         ffrobot_version=program_version(),
     )
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..families import NEARLY, SectionMotion, aligned, names
 from ..link_records import SolidLink
 from .eigen import Mass, lowest_modes
 from .elasticity import SolidModel
+from .families import NEARLY, SectionMotion, aligned, names
 from .strain_energy import strain_energy
 from .supports import Flexibility
 

@@ -72,6 +72,16 @@ std::tuple<VectorXd, VectorXd, MatrixXd> constraints(const System &system, doubl
   return {value.head(held), rate.head(held), constraint_jacobian(system, w)};
 }
 
+// How far the accelerations a are from C_ddot = 0, relative to the terms that cancel in it
+double acceleration_violation(const System &system, double t, const VectorXd &q, const VectorXd &v, const VectorXd &a) {
+  for (const auto &[name, size] : {std::pair("q", q.size()), std::pair("v", v.size()), std::pair("a", a.size())})
+    check_size(name, size, system.coordinates);
+  Workspace w(system);
+  VectorXd value(static_cast<Eigen::Index>(system.constraints.size())), rate(value);
+  constraint_residuals(system, t, q.data(), v.data(), w, value.data(), rate.data());
+  return acceleration_residual(system, q.data(), a.data(), w);
+}
+
 // x of N x + C_q^T nu = r, C_q x = c (iteration_matrix.h)
 VectorXd newton_step(const System &system, double t, const VectorXd &q, const VectorXd &v, double damping_factor,
                      double stiffness_factor, const VectorXd &r, const VectorXd &c) {
@@ -249,6 +259,8 @@ void bind_system(nb::module_ &m) {
       .def("evaluate", &evaluate_state, "t"_a, "q"_a, "v"_a, "steering"_a = nb::none(),
            "Accelerations (coordinates,) and multipliers (constraints,).")
       .def("constraints", &constraints, "t"_a, "q"_a, "v"_a, "C, C_dot (constraints,) and C_q.")
+      .def("acceleration_violation", &acceleration_violation, "t"_a, "q"_a, "v"_a, "a"_a,
+           "The largest |C_ddot| for accelerations a (coordinates,), relative to 1 and the terms that cancel in it.")
       .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, coordinates).")
       .def("rotor_rows", &rotor_rows, "q"_a, "Gradients (rotors, coordinates) of the rotors' angles and inertias.")
       .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces of gravity, elasticity and drives.")

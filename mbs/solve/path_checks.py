@@ -13,6 +13,7 @@ SAMPLES = 2001
 LOOKED_INTO = 5  # intervals between samples, the roughest ones
 HALVINGS = 25
 JUMP = 1e-4  # in terms of the largest value or velocity: less is rounded numbers in an expression
+RESTING = 1e-6  # of the largest value, within the run: a path that moves less stands still, and what jumps is rounding
 
 
 def check_smooth(assembly: MechanismSystem, end: float) -> None:
@@ -38,8 +39,9 @@ def check_smooth(assembly: MechanismSystem, end: float) -> None:
 def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float, float] | None:
     """Time, value before and after of the first jump that is found in a derivative of that order; None without one."""
     times = np.linspace(0.0, end, SAMPLES)
-    samples = function.sample(times)[order]
-    size = float(np.ptp(samples)) if order == 0 else float(np.abs(samples).max())
+    values, *_ = derivatives = function.sample(times)
+    samples, still = derivatives[order], RESTING * float(np.abs(values).max())
+    size = max(float(np.ptp(samples)), still) if order == 0 else max(float(np.abs(samples).max()), still / end)
     if not (np.isfinite(samples).all() and size > 0):
         return None
     jumps = []

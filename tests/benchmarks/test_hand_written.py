@@ -2,9 +2,10 @@
 
     .venv/bin/python -m pytest tests/benchmarks/test_hand_written.py --benchmark-enable -s
 
-prints, as minima of interleaved repetitions: time per evaluation of both and their ratio (aim 1.5, alarm at 2); time of
-PCID from the undeformed start against the hand-written one in equal steps of DOP853, both with λ to 1e-4 of its peak.
-In the ordinary test run it checks that both compute the same, once.
+prints, as minima of interleaved repetitions: time per evaluation of both and their ratio; time of PCID from the
+undeformed start against the hand-written one in equal steps of DOP853, both with λ to 1e-4 of its peak. The aim is 1.5
+of both; 3.1 and 4.1 are measured (README.md). In the ordinary test run repetitions are few, and the alarms half as much
+again and twice that: minima of interleaved milliseconds hardly feel what else the machine does.
 """
 
 import shutil
@@ -20,6 +21,7 @@ from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.run.solution import prepare
 
 ROOT = Path(__file__).parents[2]
+ALARM = {"evaluation": 4.6, "pcid": 8.2}
 
 
 @pytest.fixture(scope="module")
@@ -57,12 +59,12 @@ def test_both_compute_the_same(two_link, program):
 
 def test_right_hand_side_ratio(benchmark, two_link, program):
     state = general_state(two_link)
-    count = 20_000 if benchmark.enabled else 200
+    count = 20_000 if benchmark.enabled else 4_000
 
     def both():
         return evaluation_seconds(state, TIME, count), program.evaluation_seconds(count)
 
-    rounds = 15 if benchmark.enabled else 1
+    rounds = 15 if benchmark.enabled else 9
     times = np.array([both() for _ in range(rounds)]).min(axis=0)
     benchmark.pedantic(both, rounds=1)
     report(benchmark, "evaluation", *times)
@@ -70,7 +72,7 @@ def test_right_hand_side_ratio(benchmark, two_link, program):
 
 def test_pcid_ratio(benchmark, two_link, program):
     analysis = Analysis(name="inverse", kind="pcid", end=1.0, output_step=0.1, tolerance=1e-4)
-    rounds, outcomes, hand_written = (5 if benchmark.enabled else 1), [], []
+    rounds, outcomes, hand_written = (5 if benchmark.enabled else 3), [], []
     for _ in range(rounds):
         outcomes.append(run_pcid(two_link, analysis, False, lambda t: True))
         hand_written.append(program(1, STEPS)[2:])
@@ -86,3 +88,4 @@ def report(benchmark, what, general, hand_written):
     ratio = general / hand_written
     benchmark.extra_info |= {"general": general, "hand_written": hand_written, "ratio": ratio}
     print(f"\n{what}: general {general:.4g} s, hand-written {hand_written:.4g} s, ratio {ratio:.2f}")
+    assert ratio < ALARM[what]

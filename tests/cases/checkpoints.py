@@ -110,3 +110,13 @@ def _check_numbers(item):
     if isinstance(item, h5py.Dataset):
         assert item.dtype == np.float64, item.name
         assert np.all(np.isfinite(item)), item.name
+
+
+def peak(values):
+    return float(np.abs(values[()]).max())
+
+
+def tip_error(file, analysis, source, tip="link2.tip"):
+    """Largest distance of the tip from where the inverse analysis has it, m."""
+    way = file[f"{analysis}/points/{tip}/position"][()] - file[f"{source}/points/{tip}/position"][()]
+    return float(np.linalg.norm(way, axis=1).max())

@@ -5,17 +5,7 @@ import re
 import h5py
 import numpy as np
 import pytest
-from checkpoints import CASES, check_table, readme_table
-
-
-def peak(values):
-    return float(np.abs(values[()]).max())
-
-
-def tip_error(file, analysis, source, tip="link2.tip"):
-    """Largest distance of the tip from where the inverse analysis has it, m."""
-    way = file[f"{analysis}/points/{tip}/position"][()] - file[f"{source}/points/{tip}/position"][()]
-    return float(np.linalg.norm(way, axis=1).max())
+from checkpoints import CASES, check_table, peak, readme_table, tip_error
 
 
 def vibration(file, analysis, window=100):

@@ -4,8 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from checkpoints import check_table, readme_table
-from test_actuation_cases import peak, tip_error
+from checkpoints import check_table, peak, readme_table, tip_error
 
 
 @pytest.fixture(scope="module")

@@ -1,13 +1,7 @@
 """Wrong input: one message that names file, key, expected and found; exit code 2; nothing written, nothing lost."""
 
-import sys
-from pathlib import Path
-
 import h5py
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from mistakes import MISTAKES, PAGE, row, without_folder
 
 

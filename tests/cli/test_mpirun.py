@@ -1,15 +1,10 @@
 """`mpirun -n 2 ffrobot link` makes the file that one process makes."""
 
 import subprocess
-import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "fe_models"))
-
 from solids import write_solid
 
 
@@ -44,7 +39,9 @@ def test_two_processes_make_the_same_file(ffrobot, link_on_two, tmp_path, condit
     alone, together = arrays(one), arrays(two)
     assert alone.keys() == together.keys()
     for name, array in alone.items():
-        tolerance = 1e-10 * largest_alike(name, alone)
+        # Two processes add in another order. A slender bar's stiffness has a condition number above 1e6, so that shapes
+        # agree to some 1e-10; which digit is the last differs from one processor type to the next.
+        tolerance = 1e-9 * largest_alike(name, alone)
         np.testing.assert_allclose(together[name], array, rtol=0, atol=tolerance, err_msg=name)
 
 

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from ffrobot.common.errors import SolveError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.beam import family_model
-from ffrobot.fe_models.eigen import lowest_modes
+from ffrobot.fe_models.beam.eigen import lowest_modes
 from ffrobot.fe_models.link_records import FAMILIES, BeamLink
 from ffrobot.mesh.interval import interval_mesh
 

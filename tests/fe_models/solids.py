@@ -61,7 +61,7 @@ def write_solid(
 
 
 def body_of(path):
-    return solid_modal_body(read_link(path), path, "", lambda _: None)
+    return solid_modal_body(read_link(path), path, lambda _: None)
 
 
 def model_of(path):

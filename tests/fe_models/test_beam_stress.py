@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from ffrobot.common.errors import InputError
-from ffrobot.fe_models.beam.section import rectangle, tube
 from ffrobot.fe_models.beam.section_stress import section_stress
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.link_file import read_link
+from ffrobot.fe_models.link_records.section import rectangle, tube
 from ffrobot.mesh.records import CircleSection, RectangleSection, TubeSection
 
 E, NU, RHO, H, B, L = 2.068427e11, 0.3, 7850.0, 0.015, 0.025, 1.0

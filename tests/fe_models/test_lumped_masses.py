@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from ffrobot.fe_models.invariants import Invariants
 from ffrobot.fe_models.link import make_link
-from ffrobot.fe_models.lumped_masses import Lump, with_lumped_loads, with_lumped_masses
 from ffrobot.fe_models.modal_body import Interface
+from ffrobot.fe_models.modal_body.invariants import Invariants
+from ffrobot.fe_models.modal_body.lumped_masses import Lump, with_lumped_loads, with_lumped_masses
 from ffrobot.mbs.model.planar_body import from_modal_body, with_payload
 
 EI, RHO_A, L = 2.068427e11 * 0.025 * 0.015**3 / 12, 7850.0 * 0.015 * 0.025, 1.0

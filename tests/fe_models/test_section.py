@@ -4,7 +4,7 @@ from math import pi
 
 import pytest
 
-from ffrobot.fe_models.beam.section import rectangle, tube
+from ffrobot.fe_models.link_records.section import rectangle, tube
 
 
 @pytest.mark.parametrize(

@@ -8,47 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import ufl
-from dolfinx import fem, mesh
+from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
+from fields import CELLS, NU, PATH, B, C, E, H, L, bending, box, field, patch_tags
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.fe_models.link_records import Material
-from ffrobot.fe_models.solid.constitutive import stiffness
 from ffrobot.fe_models.solid.strains import locate, pulled_back
 from ffrobot.fe_models.solid.stress import point_stresses, surface_stresses
 from ffrobot.fe_models.solid.surface_patches import outlined_patches
 from ffrobot.mesh.compat import create_solid_mesh, geometry_nodes, lagrange_space
-from ffrobot.mesh.records import SurfacePatches
-
-E, NU = 2.0e11, 0.3
-C = stiffness(Material(youngs_modulus=E, poissons_ratio=NU, density=7850.0))
-PATH = Path("link.toml")
-L, H, B = 1.0, 0.2, 0.1
-CELLS = {"tetrahedron": mesh.CellType.tetrahedron, "hexahedron": mesh.CellType.hexahedron}
-
-
-def box(cell, divisions=(6, 2, 2), skew=0.0):
-    """L × H × B about the x axis; `skew` moves inner nodes, by fractions of a cell."""
-    corners = [[0, -H / 2, -B / 2], [L, H / 2, B / 2]]
-    domain = mesh.create_box(MPI.COMM_WORLD, corners, divisions, CELLS[cell])
-    x = domain.geometry.x
-    bubble = x[:, 0] * (L - x[:, 0]) * (H**2 / 4 - x[:, 1] ** 2) * (B**2 / 4 - x[:, 2] ** 2)
-    bubble /= L**2 * H**2 * B**2 / 64
-    x += skew * bubble[:, None] * np.array([L / divisions[0], H / divisions[1], B / divisions[2]])
-    return domain
-
-
-def field(space, function):
-    u = fem.Function(space)
-    u.interpolate(function)
-    return u.x.array.reshape(-1, 1).copy()
-
-
-def bending(x):
-    """Pure bending of curvature 1: σ_xx = −E y, all else zero (Timoshenko & Goodier, §102)."""
-    return np.stack([-x[0] * x[1], (x[0] ** 2 + NU * (x[1] ** 2 - x[2] ** 2)) / 2, NU * x[1] * x[2]])
 
 
 @pytest.mark.parametrize("cell", CELLS)
@@ -142,8 +112,7 @@ def test_two_processes_give_the_same(tmp_path):
 import sys
 import numpy as np
 from mpi4py import MPI
-sys.path.insert(0, {folder!r})
-from test_solid_stress import C, PATH, L, H, B, bending, box, field, lagrange_space, patch_tags
+from fields import C, PATH, L, H, B, bending, box, field, lagrange_space, patch_tags
 from ffrobot.fe_models.solid.stress import point_stresses
 from ffrobot.fe_models.solid.surface_patches import outlined_patches
 space = lagrange_space(box("tetrahedron", (8, 2, 2)), 1, vector=True)
@@ -157,33 +126,17 @@ if MPI.COMM_WORLD.rank == 0:
 """
     # This process has started MPI itself, which leaves its mark in the environment.
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    environment["PYTHONPATH"] = str(Path(__file__).parent)
     results = []
     for count in (1, 2):
         output = str(tmp_path / f"{count}.npy")
-        text = script.format(folder=str(Path(__file__).parent), output=output)
+        text = script.format(output=output)
         command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(count), sys.executable, "-c", text]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
         assert done.returncode == 0, done.stderr
         results.append(np.load(output))
     assert np.abs(results[0]).max() > 0.05
     np.testing.assert_allclose(results[1], results[0], rtol=0, atol=1e-12)
-
-
-def patch_tags(domain):
-    """One patch on each face, from x = ¼ to ½ and over the whole width."""
-    tags, faces = [], {}
-    for tag, (side, y) in enumerate((("top", H / 2), ("bottom", -H / 2)), 1):
-
-        def on_patch(x, y=y):
-            return np.isclose(x[1], y) & (x[0] > 0.25 - 1e-9) & (x[0] < 0.5 + 1e-9)
-
-        facets = mesh.locate_entities_boundary(domain, 2, on_patch)
-        tags.append(np.stack([facets, np.full(len(facets), tag)]))
-        faces[f"patch/0/{side}"] = tag
-    facets, values = np.concatenate(tags, axis=1)
-    order = np.argsort(facets)
-    record = SurfacePatches(centers=(0.375,), length=0.25, width=B)
-    return mesh.meshtags(domain, 2, facets[order].astype(np.int32), values[order].astype(np.int32)), faces, record
 
 
 @pytest.mark.parametrize("cell", CELLS)

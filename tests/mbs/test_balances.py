@@ -3,21 +3,13 @@
 import numpy as np
 import pytest
 import zoo
+from balances import OUTPUT_STEP, energy_and_losses
 from links import arm, arm_links
 from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
 from scipy.integrate import simpson
 
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
 from ffrobot.mbs.quantities.observation import energies
-
-OUTPUT_STEP = 2.5e-4  # fine enough that Simpson's rule errs by less than 1e-10 here
-
-
-def energy_and_losses(outcome):
-    """Total energy (T,) and what damping has taken by the end."""
-    parts = energies(outcome)
-    total = parts["kinetic"] + parts["strain"] + parts["gravitational"]
-    return total, simpson(parts["dissipated_power"], x=outcome.time)
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, arm, arm_links
 from mechanisms import always, forward, make_model, pcid, relative, revolute
-from test_balances import OUTPUT_STEP, energy_and_losses
-from test_rigid_limit import rod
+from rods import rod
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid, run_static

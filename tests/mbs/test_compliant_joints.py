@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, TIP, arm, arm_links, quintic
 from mechanisms import always, forward, make_model, pcid, relative, revolute
+from rods import rod
 from scipy.integrate import simpson
-from test_balances import OUTPUT_STEP, energy_and_losses
-from test_rigid_limit import rod
 
 from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import robot_modes

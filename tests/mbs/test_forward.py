@@ -4,27 +4,14 @@ import numpy as np
 import pytest
 from links import arm
 from mechanisms import always, forward, oracle_of, pcid, relative, revolute
+from patch_sets import FULL, N, patches
 from scipy.optimize import lsq_linear
 
-from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
 from ffrobot.mbs.analysis.fcid import run_fcid
 from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.mbs.scene.analysis_records import Analysis
-
-N = 3  # modes of a link
-UNLIMITED = np.full(N, np.inf)
-
-
-def patches(Phi, limit=UNLIMITED):
-    """The same patches on both links."""
-    return {
-        name: _core.Allocation(Phi, np.eye(N), np.linalg.pinv(Phi), limit, np.ones(N)) for name in ("link1", "link2")
-    }
-
-
-FULL = ActuatorSet(patches(np.eye(N)))  # patches that reach every mode
 
 
 @pytest.fixture(scope="module")

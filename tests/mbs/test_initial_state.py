@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, ritz_link
 from mechanisms import always, assemble, make_model, pcid, revolute
-from test_rigid_limit import slider_crank
+from rods import slider_crank
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.analyses import initial_state, run_pcid, run_static

@@ -4,19 +4,12 @@ import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic
 from mechanisms import always, make_model, pcid, relative, revolute
+from rods import rod, slider_crank
 
 from ffrobot.mbs.analysis.analyses import run_pcid
-from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.quantities.observation import joint_forces, trajectory_force
-from ffrobot.mbs.scene.mechanism_records import RigidBody
 
 G = 9.81
-
-
-def rod(name, length, mass):
-    points = {"root": (0.0, 0.0), "tip": (length, 0.0)}
-    body = RigidBody(mass=mass, inertia=mass * length**2 / 12, center=(length / 2, 0.0), points=points)
-    return from_rigid_body(name, body)
 
 
 def inverse(model, **keys):
@@ -52,19 +45,6 @@ def test_two_link_arm_needs_the_moments_of_the_textbook():
     tau_A = M12 * a1_ddot + arm2 * a2_ddot + quadratic * a1_dot**2 + gravity2
     for joint, tau in (("O", tau_O), ("A", tau_A)):
         assert relative(joint_forces(outcome, joint).motor, tau) < 1e-10
-
-
-def slider_crank(path, **keys):
-    joints = [
-        revolute("O", "ground", "crank.root", motor=True),
-        revolute("A", "crank.tip", "rod.root"),
-        revolute("B", "rod.tip", "slider.pin"),
-        {"name": "rail", "type": "prismatic", "between": ("ground", "slider.pin"), "axis": (1.0, 0.0)},
-    ]
-    slider = from_rigid_body("slider", RigidBody(mass=0.4, inertia=0.01, center=(0.0, 0.0), points={"pin": (0.0, 0.0)}))
-    bodies = [rod("crank", 0.2, 1.0), rod("rod", 0.5, 1.5), slider]
-    initial = {"angles": {"crank": 0.9, "rod": -0.3}}
-    return make_model(bodies, joint=joints, trajectory=[path], initial=initial, **keys)
 
 
 def test_slider_crank_moves_as_its_geometry_says():

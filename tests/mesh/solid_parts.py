@@ -3,13 +3,24 @@
 import basix
 import numpy as np
 
-from ffrobot.mesh.jacobian import jacobians, shape_functions
+from ffrobot.mesh.jacobian import jacobians, reference_nodes
 from ffrobot.mesh.part_mesh import facet_geometry
 from ffrobot.mesh.records import RectangleSection
 
 
 def rectangle(height=0.015, width=0.025, **more):
     return RectangleSection(shape="rectangle", height=height, width=width, **more)
+
+
+def shape_functions(cell, degree, X):
+    """(q, v) values at `X` (q, 3) of the polynomials that are 1 at one of the reference nodes and 0 at the others."""
+    powers = np.array(list(np.ndindex((degree + 1,) * 3)))
+    powers = powers if cell == "hexahedron" else powers[powers.sum(axis=1) <= degree]
+
+    def monomials(points):
+        return np.prod(points[:, None, :] ** powers, axis=2)
+
+    return np.linalg.solve(monomials(reference_nodes(cell, degree)).T, monomials(X).T).T
 
 
 def integrate(part, function=lambda x: 1.0):

@@ -6,7 +6,7 @@ from solid_parts import face_area, rectangle
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.faces import Boundary
-from ffrobot.mesh.records import CircleSection, Hole, InterfaceRecord, SurfacePatches
+from ffrobot.mesh.records import CircleSection, Hole, Outlines, PlaceRecord
 
 
 def fork(occ):
@@ -18,11 +18,11 @@ def fork(occ):
 
 
 def bore(name, x, y=0.0):
-    return InterfaceRecord(name=name, position=(x, y, 0.0), normal=(0.0, 0.0, 1.0))
+    return PlaceRecord(name=name, position=(x, y, 0.0), normal=(0.0, 0.0, 1.0))
 
 
 def at(name, position, normal):
-    return InterfaceRecord(name=name, position=position, normal=normal)
+    return PlaceRecord(name=name, position=position, normal=normal)
 
 
 def test_a_box_has_six_smooth_faces(solid, mesh_part):
@@ -96,12 +96,12 @@ def test_two_names_may_share_a_face_but_not_a_part_of_it(solid, mesh_part):
         mesh_part(
             solid(),
             (at("grip", (0.5, 0.0075, 0.0), (0.0, 1.0, 0.0)),),
-            SurfacePatches(count=2, length=0.1, width=0.02),
+            Outlines(((0.2, 0.3), (0.7, 0.8)), 0.02),
         )
 
 
 def test_a_table_may_only_add_to_root_and_tip(solid, mesh_part):
-    part = mesh_part(solid(), (InterfaceRecord(name="tip", mass=1.0), InterfaceRecord(name="half", position=0.5)))
+    part = mesh_part(solid(), (PlaceRecord(name="tip"), PlaceRecord(name="half", position=0.5)))
     assert set(part.faces) == {"root", "tip"}
 
 

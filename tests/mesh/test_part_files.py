@@ -8,7 +8,7 @@ from solid_parts import face_area, integrate
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.gmsh_session import gmsh_session
-from ffrobot.mesh.records import InterfaceRecord
+from ffrobot.mesh.records import PlaceRecord
 from ffrobot.mesh.structured import structured_box
 
 VOLUME = 0.015 * 0.025
@@ -166,7 +166,7 @@ def write_mesh(path, order=1, hexahedra=False, version=4.1):
 @pytest.mark.parametrize("version", [2.2, 4.1])
 def test_gmsh_meshes_keep_their_groups(solid, mesh_part, tmp_path, hexahedra, order, version):
     path = write_mesh(tmp_path / "part.msh", order, hexahedra, version)
-    part = mesh_part(solid(file=path, unit="mm"), (InterfaceRecord(name="root", group="left"),))
+    part = mesh_part(solid(file=path, unit="mm"), (PlaceRecord(name="root", group="left"),))
     assert part.cell == ("hexahedron" if hexahedra else "tetrahedron")
     assert part.degree == 1  # straight: the nodes on edges are not needed
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
@@ -178,7 +178,7 @@ def test_gmsh_meshes_keep_their_groups(solid, mesh_part, tmp_path, hexahedra, or
 def test_a_group_inside_the_part_is_no_face(solid, mesh_part, tmp_path):
     path = write_mesh(tmp_path / "part.msh")
     with pytest.raises(InputError, match=r"interface.group of hub: expected a face on the boundary .* not connected"):
-        mesh_part(solid(file=path, unit="mm"), (InterfaceRecord(name="hub", group="joint"),))
+        mesh_part(solid(file=path, unit="mm"), (PlaceRecord(name="hub", group="joint"),))
 
 
 def test_a_missing_group_is_told_with_those_there(solid, mesh_part, tmp_path):
@@ -186,7 +186,7 @@ def test_a_missing_group_is_told_with_those_there(solid, mesh_part, tmp_path):
     with pytest.raises(
         InputError, match=r'groups of faces or nodes "joint", "left", found "lift" \(did you mean "left"'
     ):
-        mesh_part(solid(file=path, unit="mm"), (InterfaceRecord(name="hub", group="lift"),))
+        mesh_part(solid(file=path, unit="mm"), (PlaceRecord(name="hub", group="lift"),))
 
 
 @pytest.mark.parametrize("ending", ["inp", "bdf", "vtk", "vtu", "med", "xdmf"])
@@ -250,7 +250,7 @@ def test_abaqus_sets_name_regions_and_faces(solid, mesh_part, tmp_path, second_s
     left = ", ".join(str(k + 1) for k in np.flatnonzero(box.points[:, 0] == 0))
     text = ABAQUS.format(nodes=nodes, first=first, second=second, second_set=second_set, left=left)
     (tmp_path / "part.inp").write_text(text)
-    part = mesh_part(solid(file=tmp_path / "part.inp"), (InterfaceRecord(name="root", group="LEFT"),))
+    part = mesh_part(solid(file=tmp_path / "part.inp"), (PlaceRecord(name="root", group="LEFT"),))
     named = {name: part.points[part.corners[part.cell_tag == tag]][..., 0].max() for name, tag in part.regions.items()}
     assert named["ARM"] == pytest.approx(0.5)
     assert face_area(part, "root") == pytest.approx(0.04)

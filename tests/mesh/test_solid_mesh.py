@@ -14,7 +14,7 @@ from solid_parts import rectangle
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.compat import coordinate_element, geometry_nodes
-from ffrobot.mesh.records import CircleSection, InterfaceRecord, SolidMeshRecord, SurfacePatches
+from ffrobot.mesh.records import CircleSection, Outlines, PlaceRecord, SolidMeshRecord
 from ffrobot.mesh.solid_mesh import distributed, solid_mesh
 from ffrobot.mesh.structured import structured_box
 
@@ -27,7 +27,7 @@ def total(form):
 
 @pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
 def test_faces_and_volume_by_dolfinx(solid, cell):
-    grip = InterfaceRecord(name="grip", position=(0.5, 0.0, 0.0125), normal=(0.0, 0.0, 1.0))
+    grip = PlaceRecord(name="grip", position=(0.5, 0.0, 0.0125), normal=(0.0, 0.0, 1.0))
     body = solid_mesh(solid(), SolidMeshRecord(cell=cell), (grip,), None, LINK)
     ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
     one = fem.Constant(body.mesh, 1.0)
@@ -39,7 +39,7 @@ def test_faces_and_volume_by_dolfinx(solid, cell):
 
 
 def test_patches_by_dolfinx(solid):
-    body = solid_mesh(solid(), SolidMeshRecord(), (), SurfacePatches(count=2, length=0.05, width=0.02), LINK)
+    body = solid_mesh(solid(), SolidMeshRecord(), (), Outlines(((0.225, 0.275), (0.725, 0.775)), 0.02), LINK)
     ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
     x = ufl.SpatialCoordinate(body.mesh)
     assert total(x[0] * ds(body.faces["patch/1/bottom"])) == pytest.approx(0.75 * 0.05 * 0.02)
@@ -85,7 +85,7 @@ def test_surface_points_are_where_their_cells_say(solid):
 
 
 def test_errors_reach_the_caller(solid):
-    lost = InterfaceRecord(name="a", position=(0.5, 1.0, 0.0), normal=(0.0, 1.0, 0.0))
+    lost = PlaceRecord(name="a", position=(0.5, 1.0, 0.0), normal=(0.0, 1.0, 0.0))
     with pytest.raises(InputError, match=r"link.toml: interface.position of a"):
         solid_mesh(solid(section=rectangle()), SolidMeshRecord(), (lost,), None, LINK)
 
@@ -104,14 +104,14 @@ from ffrobot.mesh.solid_mesh import solid_mesh
 comm = MPI.COMM_WORLD
 geometry = SolidGeometry(kind="solid", length=1.0, section=RectangleSection(shape="rectangle", height=0.06, width=0.02),
                          hole=(Hole(position=0.5, diameter=0.04),))
-grip = InterfaceRecord(name="grip", position=(0.5, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
-lost = InterfaceRecord(name="lost", position=(0.5, 9.0, 0.0), normal=(0.0, 0.0, 1.0))
+grip = PlaceRecord(name="grip", position=(0.5, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+lost = PlaceRecord(name="lost", position=(0.5, 9.0, 0.0), normal=(0.0, 0.0, 1.0))
 try:
     solid_mesh(geometry, SolidMeshRecord(), (lost,), None, Path("link.toml"), comm)
     raised = False
 except InputError:
     raised = True
-body = solid_mesh(geometry, SolidMeshRecord(), (grip,), SurfacePatches(count=2, length=0.05, width=0.02),
+body = solid_mesh(geometry, SolidMeshRecord(), (grip,), Outlines(((0.225, 0.275), (0.725, 0.775)), 0.02),
                   Path("link.toml"), comm)
 ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
 x = ufl.SpatialCoordinate(body.mesh)

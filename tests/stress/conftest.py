@@ -1,14 +1,10 @@
 """Options of the stress tests, the table they fill, and beams of the paper's material."""
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "mbs"))  # mechanisms, links, zoo
-
 from table import PAGE, ROWS, Table, render
 
 from ffrobot.fe_models.link import cached_modal_body

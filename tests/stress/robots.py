@@ -3,7 +3,7 @@
 import numpy as np
 from links import arm, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
-from test_rigid_limit import rod
+from rods import rod
 
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
 from ffrobot.mbs.model.planar_body import from_rigid_body

@@ -1,13 +1,12 @@
 """The table of what was tried, the limit found and how failure is reported: rows in a file, and the page of them."""
 
-import math
 from pathlib import Path
 
 ROWS = Path(__file__).with_name("table.json")
 PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
 
-SAME = 10.0  # factor within which numbers of another machine count as the same
-ROUNDING = 1e-13
+SAME = 0.1  # relative difference within which numbers of another machine count as the same
+ROUNDING = 1e-12
 
 HEAD = """# Stability
 
@@ -51,9 +50,8 @@ class Table:
 
 
 def same(one, other):
-    if max(abs(one), abs(other)) <= ROUNDING:
-        return True
-    return one * other > 0 and abs(math.log(one / other)) < math.log(SAME)
+    size = max(abs(one), abs(other))
+    return size <= ROUNDING or abs(one - other) <= SAME * size
 
 
 def number(value):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from links import arm
 from mechanisms import always, forward, make_model, pcid, revolute
+from patch_sets import FULL
 from robots import free_run
-from test_forward import FULL
-from test_rigid_limit import rod
+from rods import rod
 
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid

@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from links import arm, quintic, ritz_link
 from mechanisms import always, assemble, forward, oracle_of, pcid, random_state, relative
-from test_forward import FULL
+from patch_sets import FULL
 
 from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
 

@@ -5,7 +5,7 @@ import pytest
 from links import arm
 from mechanisms import make_model, relative, revolute
 from robots import free_run, inverse, pendulum, reaching
-from test_rigid_limit import rod
+from rods import rod
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import run_fcid

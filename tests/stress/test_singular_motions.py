@@ -5,7 +5,7 @@ import pytest
 from links import arm_links
 from mechanisms import make_model, revolute
 from robots import free_run, inverse, parallelogram, reaching, slider_crank, through_dead_centre
-from test_rigid_limit import rod
+from rods import rod
 
 from ffrobot.common.errors import InputError
 

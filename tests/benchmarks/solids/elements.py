@@ -52,7 +52,7 @@ def run(mesh: dict[str, object]) -> tuple[int, float, np.ndarray]:
     """Unknowns, seconds from assembly to modes, first five in-plane bending frequencies in Hz."""
     link = validate(SolidLink, BAR | {"mesh": mesh}, Path("bar.toml"))
     stamps: list[tuple[float, str]] = []
-    body = solid_modal_body(link, Path("bar.toml"), "", lambda line: stamps.append((time.perf_counter(), line)))
+    body = solid_modal_body(link, Path("bar.toml"), lambda line: stamps.append((time.perf_counter(), line)))
     times = {line.removeprefix("bar: ").split()[0]: moment for moment, line in stamps}
     unknowns = next(int(line.split()[-2]) for _, line in stamps if "factorising" in line)
     bending = [k for k, family in enumerate(body.family) if family == "in-plane-bending"][:5]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..common.arrays import Array, Integers
-from ..common.errors import InputError
+from ...common.arrays import Array, Integers
+from ...common.errors import InputError
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -9,17 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..common.arrays import Array
-from ..mesh.records import InterfaceRecord
-from .modal_body import Interface
-from .solid.tensors import LEVI_CIVITA
-
-if TYPE_CHECKING:
-    from .invariants import Invariants
+from ...common.arrays import Array
+from ..link_records import InterfaceRecord
+from .body import Interface
+from .invariants import Invariants
+from .tensors import LEVI_CIVITA
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common.arrays import Array
-from .link_records import Link
+from ...common.arrays import Array
+from ..link_records import Link
 
 
 def damping_ratio(link: Link, omega: Array) -> Array:

@@ -16,25 +16,14 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 
-from ..common.arrays import Array, Integers
-from ..mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
-from .beam.beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
-from .link_records import BeamLink
+from ...common.arrays import Array, Integers
+from ...mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
+from ..link_records import BeamLink
+from ..modal_body.invariants import Invariants
+from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
 
 # N in N at x (m), and at which cell by its middle: N may jump from cell to cell.
 AxialForce = Callable[[Array, Array], Array]
-
-
-@dataclass(frozen=True)
-class Invariants:
-    """Shapes and meaning as in `ModalBody`."""
-
-    mass: float
-    first_moment: Array
-    second_moment: Array
-    S_bar: Array
-    I_bar: Array
-    S_bar_kl: Array
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from ..common.arrays import Array
-from ..common.errors import SolveError
+from ...common.arrays import Array
+from ...common.errors import SolveError
 
 # Multipliers amplify relative errors of the model data some 400 times within 0.2 s of the two-link case.
 TOLERANCE = 1e-13
@@ -21,7 +21,7 @@ ROUNDING_LIMIT = 1e-6
 def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, count: int) -> tuple[Array, Array]:
     """Lowest eigenpairs of K x = ω² M x by Krylov–Schur, shift-inverted at zero, K factorised by Cholesky.
 
-    MechanismSystem rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
+    Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
     Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
     them, and tells where a mesh is too fine for double precision.
 

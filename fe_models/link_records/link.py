@@ -7,13 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from ..common.validation import Record
-from ..mesh.records import (
+from ...common.validation import Record
+from ...mesh.records import (
     BeamGeometry,
     BeamMesh,
     CircleSection,
-    Coupling,
-    InterfaceRecord,
     Name,
     NotNegative,
     Positive,
@@ -21,11 +19,11 @@ from ..mesh.records import (
     SectionRecord,
     SolidGeometry,
     SolidMeshRecord,
-    SurfacePatches,
     TubeSection,
     Vector,
 )
-from .beam.section import Section, rectangle, tube
+from .attached import Coupling, InterfaceRecord, SurfacePatches
+from .section import Section, rectangle, tube
 
 Family = Literal["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
 
@@ -79,7 +77,7 @@ class BeamModel(Record):
 
 
 class Reference(Record):
-    """How the link's frame is held to it (formulation.md, section 2).
+    """How the link's frame is held to it.
 
     `coupling` says how a solid's end faces are held; default: mean for simply-supported, rigid for cantilever. A beam's
     section moves as a plate in any case: both words mean the same there.

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..common.arrays import Array, Integers
-from .link_records import FAMILIES
-from .solid.functionals import Averages
+from ...common.arrays import Array, Integers
+from ..link_records import FAMILIES
+from .functionals import Averages
 
 LOCAL = "local"
 # Relative distance up to which neighbouring ω² are one repeated value.

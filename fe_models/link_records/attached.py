@@ -1,0 +1,43 @@
+"""The tables of a link file that say what is attached to a link: masses at its interfaces, patches on its surface."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ...common.validation import Record
+from ...mesh.records import NotNegative, Outlines, PlaceRecord, Positive
+
+Coupling = Literal["mean", "rigid"]
+
+
+class InterfaceRecord(PlaceRecord):
+    """A place where joints and loads attach, and what is fixed to it there: a hub, a gripper."""
+
+    coupling: Coupling | None = None
+    mass: NotNegative = 0.0  # kg, rigidly attached, its center at the interface
+    inertia: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)  # about x, y, z through there, kg·m²
+
+
+class SurfacePatches(Record):
+    """Piezoelectric patches outlined in the mesh of a solid, on the faces at its largest or smallest y.
+
+    Same meaning of the keys as in a scene's `[[pzt]]`: centres at (k − ½)·length of link / count, or `centers`.
+    """
+
+    count: Annotated[int, Field(ge=1)] | None = None
+    centers: Annotated[tuple[Positive, ...], Field(min_length=1)] | None = None  # m from the root
+    length: Positive  # m
+    width: Positive  # m
+    faces: Literal["top", "bottom", "both"] = "both"
+
+    def edges(self, length: float) -> list[tuple[float, float]]:
+        """Begin and end of each patch on a link of `length`, m from the root."""
+        count = self.count or 1
+        centers = self.centers or [(k + 0.5) * length / count for k in range(count)]
+        return [(center - self.length / 2, center + self.length / 2) for center in centers]
+
+    def outlines(self, length: float) -> Outlines:
+        """What the mesh of a solid of `length` (m) outlines for them."""
+        return Outlines(tuple(self.edges(length)), self.width, self.faces)

@@ -1,0 +1,5 @@
+"""The modal body, and what beams and solids share in making one."""
+
+from .body import Interface, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
+
+__all__ = ["Interface", "ModalBody", "OutlinedPatches", "PictureMesh", "Stations", "StressPoint"]

@@ -1,0 +1,44 @@
+"""Which trajectories jump: real jumps are refused, rounding of a path that stands still is none."""
+
+import numpy as np
+import pytest
+
+import ffrobot
+from ffrobot import InputError
+
+
+def arm(folder, **trajectory):
+    """A rigid arm whose joint follows a trajectory for a tenth of a second."""
+    points = {"root": [0.0, 0.0], "tip": [0.5, 0.0]}
+    return ffrobot.make_scene(
+        folder=folder,
+        name="arm",
+        gravity=[0.0, -9.81],
+        body=[{"name": "arm", "rigid": {"mass": 1.0, "inertia": 0.1, "center": [0.1, 0.0], "points": points}}],
+        joint=[{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+        trajectory=[{"name": "path", "joint": "shoulder", **trajectory}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
+    )
+
+
+@pytest.mark.parametrize("value", [0.1, 0.3, 1.0, 0.001, -0.7, 1e-6])
+@pytest.mark.parametrize("rows", [3, 5, 11, 101, 1001])
+def test_a_joint_held_by_waypoints_stands_still(tmp_path, value, rows):
+    lines = [f"{t:.10g},{value}" for t in np.linspace(0.0, 0.1, rows)]
+    (tmp_path / "held.csv").write_text("\n".join(["t,value", *lines]) + "\n", encoding="utf-8")
+    moment = ffrobot.solve(arm(tmp_path, waypoints="held.csv"))["inverse/joints/shoulder/moment"]
+    # The second derivative of a spline through equal numbers is their rounding over the square of the spacing.
+    np.testing.assert_allclose(moment, 9.81 * 0.1 * np.cos(value), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("value", "quantity"),
+    [
+        ("where(t < 0.05, 0.3, 0.3001)", "value"),
+        ("0.3 + 1e-3*abs(t - 0.05)", "velocity"),
+        ("1e-7*abs(t-0.05)", "velocity"),
+    ],
+)
+def test_a_small_jump_is_still_one(tmp_path, value, quantity):
+    with pytest.raises(InputError, match=f"expected a continuous {quantity}, found a jump"):
+        ffrobot.solve(arm(tmp_path, value=value))
