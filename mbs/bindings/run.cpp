@@ -80,8 +80,11 @@ void bind_run(nb::module_ &m) {
           "times"_a, "states"_a, "method"_a, "spectral_radius"_a, "tolerance"_a,
           "That of an earlier run: times (N,), states (N x 2 coordinates) one after the other.")
       .def_prop_ro("steps", [](const Recording &r) { return r.times.size(); })
-      .def_prop_ro("times", [](const Recording &r) { return Eigen::VectorXd(as_vector(r.times)); })
-      .def_prop_ro("states", [](const Recording &r) { return Eigen::VectorXd(as_vector(r.states)); });
+      // moved: a property's value is else taken for a part of its object, as which nanobind 2.5 keeps a dead address
+      .def_prop_ro(
+          "times", [](const Recording &r) { return Eigen::VectorXd(as_vector(r.times)); }, nb::rv_policy::move)
+      .def_prop_ro(
+          "states", [](const Recording &r) { return Eigen::VectorXd(as_vector(r.states)); }, nb::rv_policy::move);
 
   nb::class_<Checkpoint>(m, "Checkpoint", "Where a run has stopped, and all that its next step depends on.")
       .def(nb::init<>())
