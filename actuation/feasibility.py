@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..common.arrays import Array, Booleans
-from ..mbs.analysis.analyses import Outcome
+from ..mbs.analysis.outcome import Outcome
+from ..mbs.joints.joint import JointRecord
 from ..mbs.quantities.joint_space import motor_rates
-from ..mbs.scene.mechanism_records import Joint
 from .patches.patches import PatchArray
 from .patches.voltages import Voltages, voltage_gain
 
@@ -136,21 +136,18 @@ def judge_patches(
     )
 
 
-def judge_motors(outcome: Outcome, joints: dict[str, Joint]) -> dict[str, MotorFeasibility]:
+def judge_motors(outcome: Outcome, joints: Mapping[str, JointRecord]) -> dict[str, MotorFeasibility]:
     """Peaks of every motor against its limits."""
     moments = outcome.motor_moments
     assert moments is not None
     rates = motor_rates(outcome)
     judged = {}
     for k, name in enumerate(outcome.assembly.model.motors):
-        joint, moment, speed = joints[name], np.abs(moments[:, k]), np.abs(rates[:, k])
-        limits = [
-            np.inf if limit is None else limit for limit in (joint.moment_limit, joint.speed_limit, joint.power_limit)
-        ]
+        limits, moment, speed = joints[name].motor_limits, np.abs(moments[:, k]), np.abs(rates[:, k])
         power = np.abs(moments[:, k] * rates[:, k])
-        beyond = np.any([values > limit for values, limit in zip((moment, speed, power), limits, strict=True)], axis=0)
+        beyond = (moment > limits.moment) | (speed > limits.speed) | (power > limits.power)
         judged[name] = MotorFeasibility(
-            float(moment.max()), limits[0], float(speed.max()), limits[1], float(power.max()), limits[2],
+            float(moment.max()), limits.moment, float(speed.max()), limits.speed, float(power.max()), limits.power,
             float(_first_time(outcome.time, beyond[:, None])[0]),
         )  # fmt: skip
     return judged

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -10,15 +11,46 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError
+from ..common.plane import rotated
+from ..common.validation import Record
 from ..fe_models.modal_body import ModalBody
 from ..mbs import _core
-from ..mbs.analysis.analyses import Outcome
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import PointActuator
+from ..mbs.fields.field_types import Name
+from ..mbs.fields.references import Reference
 from ..mbs.model.planar_body import PlanarBody, PlanarPoint
-from ..mbs.scene.actuator_records import ActuationPoints
 
 DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same
 AXES = {"axial": (1.0, 0.0), "transverse": (0.0, 1.0)}
+
+
+Place = float | Name
+"""Where on a link: the distance from its root (m), or the name of one of its points."""
+
+
+class ActuationPoints(Record):
+    """Components of force on one body that carry its generalized driving forces (Shaban 2022, sec. 4).
+
+    `axial` and `transverse` say at which places a component along x or y of the body's frame acts. Without either,
+    as many as the body has coordinates are chosen.
+    """
+
+    body: str
+    axial: tuple[Place, ...] = ()
+    transverse: tuple[Place, ...] = ()
+
+    @property
+    def is_automatic(self) -> bool:
+        """Whether the components are left to the program."""
+        return not (self.axial or self.transverse)
+
+    def references(self) -> Iterator[Reference]:
+        """The body, and the places on it that are named."""
+        yield Reference("body", self.body)
+        for place in (*self.axial, *self.transverse):
+            if isinstance(place, str):
+                yield Reference("", f"{self.body}.{place}")
 
 
 @dataclass(frozen=True)
@@ -130,15 +162,14 @@ def driving_forces(outcome: Outcome, body: str) -> Array:
     assembly, columns = outcome.assembly, outcome.coordinates(body)
     C_q = assembly.system.constraint_jacobians(outcome.q)[:, assembly.is_trajectory][:, :, columns]
     Q_a: Array = -np.einsum("trk,tr->tk", C_q, outcome.lambda_[:, assembly.is_trajectory])
-    if outcome.shape_force is not None:
-        Q_a[:, 3:] += outcome.shape_force[:, outcome.modal_columns(body)]
+    if outcome.details.shape_force is not None:
+        Q_a[:, 3:] += outcome.details.shape_force[:, outcome.modal_columns(body)]
     return Q_a
 
 
 def _to_global(theta: Array, Q: Array) -> Array:
-    c, s = np.cos(theta), np.sin(theta)
-    turned = np.column_stack([c * Q[:, 0] - s * Q[:, 1], s * Q[:, 0] + c * Q[:, 1]])
-    return np.hstack([turned, Q[:, 2:]])
+    """Forces Q (T, 3 + n) on (R, θ, p) of a body whose R part is in body axes, with it in global axes; θ (T,)."""
+    return np.hstack([rotated(theta, Q[:, :2]), Q[:, 2:]])
 
 
 def _automatic(key: str, name: str, body: ModalBody | None, planar: PlanarBody) -> PointSet:

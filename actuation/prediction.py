@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.analysis.analyses import Outcome
+from ..common.plane import rotated
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.joint_space import held_joint_motion
-from ..mbs.quantities.observation import rotated
 from .patches.voltages import Voltages
 
 

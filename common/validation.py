@@ -25,6 +25,19 @@ class Record(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
+    @classmethod
+    def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
+        """What to say of a key that only `others` of the records have that may stand in the place of this one.
+
+        Nothing where it is to be called an unknown key.
+        """
+        return ""
+
+    @classmethod
+    def demand_key(cls, key: str) -> str:
+        """What to say where `key` is missing; nothing where the general words do."""
+        return ""
+
 
 R = TypeVar("R", bound=Record)
 
@@ -110,6 +123,12 @@ def quoted(words: Iterable[str]) -> str:
     return ", ".join(f'"{word}"' for word in words) or "none"
 
 
+def either(words: Iterable[str]) -> str:
+    """`"a", "b" or "c"`."""
+    *first, last = (f'"{word}"' for word in words)
+    return f"{', '.join(first)} or {last}" if first else last
+
+
 class _Problem(NamedTuple):
     key: str
     expected: str
@@ -149,8 +168,6 @@ _EXPECTED = {
     "greater_than_equal": "a number of at least {ge:g}",
     "less_than": "a number less than {lt:g}",
     "less_than_equal": "a number of at most {le:g}",
-    "union_tag_invalid": "one of {expected_tags}",
-    "union_tag_not_found": "a table with the key {discriminator}",
 }
 
 
@@ -161,7 +178,9 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
     if kind == "value_error":
         return _Problem(key, str(context["error"]), "")
     if kind == "extra_forbidden":
-        known = _known_keys(record, loc[:-1])
+        if refusal := _refusal(record, loc):
+            return _Problem(key_path(loc[:-1], data, kind=""), refusal, "")
+        known = _known_keys(_alternatives(record, loc[:-1])[0])
         return _Problem(
             key,
             f"expected one of the keys {', '.join(known)}",
@@ -170,18 +189,25 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any])
     if kind == "missing" and isinstance(loc[-1], int):
         return _Problem(key, "expected a list with more entries", f", found {_show(item['input'])}")
     if kind == "missing":
+        if demand := _demand(record, loc):
+            return _Problem(key_path(loc[:-1], data, kind=""), demand, "")
         return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
     found = item["input"]
+    if kind == "union_tag_not_found":
+        key = key_path((*loc, context["discriminator"].replace("'", "")), data)
+        return _Problem(key, f"expected {_EXPECTED['missing']}", ", found none")
     if kind == "union_tag_invalid":
-        key = f"{key}.{context['discriminator']}".replace("'", "")
-        found = context["tag"]
+        tags = context["expected_tags"].replace("'", "").split(", ")
+        key = key_path((*loc, context["discriminator"].replace("'", "")), data)
+        return _Problem(
+            key, f"expected {either(tags)}", f", found {_show(context['tag'])}{did_you_mean(context['tag'], tags)}"
+        )
     template = _EXPECTED.get(kind)
     expected = template.format_map(context) if template else item["msg"].removeprefix("Input should be ")
     expected = expected.replace("'", '"')  # as TOML writes it
     hint = ""
-    if kind in ("literal_error", "union_tag_invalid") and isinstance(found, str):
-        choices = context.get("expected") or context.get("expected_tags", "")
-        hint = did_you_mean(found, choices.replace("'", "").replace(" or ", ", ").split(", "))
+    if kind == "literal_error" and isinstance(found, str):
+        hint = did_you_mean(found, context["expected"].replace("'", "").replace(" or ", ", ").split(", "))
     return _Problem(key, f"expected {expected}", f", found {_show(found)}{hint}")
 
 
@@ -215,9 +241,11 @@ def _label(table: dict[str, Any], index: int) -> str:
     return f'"{name}"' if isinstance(name, str) else f"no. {index + 1}"
 
 
-def _known_keys(record: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
-    """The keys of the table at `loc`."""
-    candidates = [record]
+def _alternatives(
+    record: type[BaseModel], loc: Sequence[int | str]
+) -> tuple[list[type[BaseModel]], list[type[BaseModel]]]:
+    """The records that the table at `loc` may be, and all those that may stand there with another tag."""
+    candidates = allowed = [record]
     for part in loc:
         if not isinstance(part, str):
             continue
@@ -226,8 +254,27 @@ def _known_keys(record: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
         ]
         # A part that is no key tells which alternative of a union was taken.
         tagged = [c for c in candidates if any(part in get_args(f.annotation) for f in c.model_fields.values())]
+        allowed = inner or allowed
         candidates = inner or tagged or candidates
-    return list(dict.fromkeys(field.alias or name for c in candidates for name, field in c.model_fields.items()))
+    return candidates, allowed
+
+
+def _known_keys(records: Iterable[type[BaseModel]]) -> list[str]:
+    """The keys of tables."""
+    return list(dict.fromkeys(field.alias or name for c in records for name, field in c.model_fields.items()))
+
+
+def _refusal(record: type[BaseModel], loc: Sequence[int | str]) -> str:
+    """What a record itself says of the key at `loc`, which others in its place have."""
+    (taken, *more), allowed = _alternatives(record, loc[:-1])
+    others = [other for other in allowed if issubclass(other, Record) and str(loc[-1]) in _known_keys([other])]
+    return taken.refuse_key(str(loc[-1]), others) if others and not more and issubclass(taken, Record) else ""
+
+
+def _demand(record: type[BaseModel], loc: Sequence[int | str]) -> str:
+    """What a record itself says where its key at `loc` is missing."""
+    (taken, *more), _ = _alternatives(record, loc[:-1])
+    return taken.demand_key(str(loc[-1])) if not more and issubclass(taken, Record) else ""
 
 
 def _models(annotation: object) -> list[type[BaseModel]]:

@@ -1,4 +1,4 @@
-"""Modal bodies in HDF5 files (interfaces.md, "Modal body file"); needs h5py, no finite element library."""
+"""Modal bodies in HDF5 files (docs/reference/files.md); needs h5py, no finite element library."""
 
 from __future__ import annotations
 

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from .api import load_scene, make_link, plot_results, read_modal_body, solve, view_file, write_report
     from .common.errors import FfrobotError, InputError, SolveError
     from .fe_models.modal_body import ModalBody
-    from .mbs.scene.load import make_scene
-    from .mbs.scene.scene import Scene
     from .results.file import Results
-    from .run.solution import Watcher
+    from .run.watcher import Watcher
+    from .scene.load import make_scene
+    from .scene.scene import Scene
 
     __version__: str
 
@@ -41,10 +41,10 @@ _HOME = {
     "InputError": ".common.errors",
     "SolveError": ".common.errors",
     "ModalBody": ".fe_models.modal_body",
-    "make_scene": ".mbs.scene.load",
-    "Scene": ".mbs.scene.scene",
+    "make_scene": ".scene.load",
+    "Scene": ".scene.scene",
     "Results": ".results.file",
-    "Watcher": ".run.solution",
+    "Watcher": ".run.watcher",
 }
 
 __all__ = [

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
-    from .mbs.scene.scene import Scene
     from .results.file import Results
-    from .run.solution import Watcher
+    from .run.watcher import Watcher
+    from .scene.scene import Scene
 
 AnyPath = str | PathLike[str]
 
@@ -29,12 +29,12 @@ def solve(
     """
     from .common.errors import InputError
     from .common.files import check_output
-    from .mbs.scene.scene import Scene
-    from .results.file import Results
-    from .results.write import FORMAT, results_image, write_results
-    from .run.resume import how_to_go_on
-    from .run.resume import resume as run_on
-    from .run.solution import solve as run
+    from .results.file import FORMAT, Results
+    from .results.resume import how_to_go_on
+    from .results.resume import resume as run_on
+    from .results.write import results_image, write_results
+    from .run.solve import solve as run
+    from .scene.scene import Scene
 
     if output is not None:
         check_output(Path(output), FORMAT)
@@ -56,7 +56,7 @@ def solve(
 
 def load_scene(path: AnyPath) -> Scene:
     """Read and validate a scene file. Raises `InputError` with a line for each wrong key."""
-    from .mbs.scene.load import load_scene
+    from .scene.load import load_scene
 
     return load_scene(Path(path))
 

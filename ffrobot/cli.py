@@ -80,10 +80,11 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
     from .common.files import check_output
     from .present.progress import Display
     from .present.summary import print_summary, summary_console
-    from .results.write import FORMAT, write_results
-    from .run.resume import how_to_go_on
-    from .run.resume import resume as resume_scene
-    from .run.solution import solve as solve_scene
+    from .results.file import FORMAT
+    from .results.resume import how_to_go_on
+    from .results.resume import resume as resume_scene
+    from .results.write import write_results
+    from .run.solve import solve as solve_scene
 
     path = output or scene_file.with_suffix(".results.h5")
     check_output(path, FORMAT)
@@ -179,10 +180,11 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
 @click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Where to write [RESULTS.npz].")
 def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
     """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
-    from .results.linear import export_linear
+    from .results.file import Results
 
     path = output or results_file.with_suffix(".npz")
-    name = export_linear(results_file, analysis, path)
+    with Results(results_file) as results:
+        name = results.export_linear(analysis, path)
     click.echo(f"{path}: linear model of {name}")
 
 

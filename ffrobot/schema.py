@@ -17,7 +17,7 @@ DIALECT = GenerateJsonSchema.schema_dialect
 def schema(kind: str) -> dict[str, Any]:
     """The JSON schema of a "link" or "scene" file, as a dictionary."""
     if kind == "scene":
-        from .mbs.scene.scene import SceneKeys
+        from .scene.scene import SceneKeys
 
         described = TypeAdapter(SceneKeys).json_schema()
         for link in ("BeamLink", "SolidLink"):

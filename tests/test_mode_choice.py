@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.scene.load import make_scene
 from ffrobot.present.summary import print_summary, summary_console
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.mode_choice import ErrorEstimate, difference, reported
-from ffrobot.run.solution import solve
+from ffrobot.run.solve import solve
+from ffrobot.scene.load import make_scene
 
 CASE = Path(__file__).parents[1] / "cases" / "two_link"
 S = "(10*t**3-15*t**4+6*t**5)"  # from rest to rest with zero acceleration at both ends
@@ -30,11 +30,15 @@ def scene(state="static", path=QUINTIC, modes=None, forward=(), **analysis):
     return make_scene(folder=CASE, **keys)
 
 
+def reported_of(solution, name):
+    return reported(solution.scene, solution.analyses[name])
+
+
 @pytest.fixture(scope="module", params=["static", "undeformed"])
 def truth(request):
     """The state at the start, what is specified from there on, and the solution with all modes."""
     path = QUINTIC if request.param == "static" else None
-    return request.param, path, reported(solve(scene(request.param, path, tolerance=1e-5)), "inverse")
+    return request.param, path, reported_of(solve(scene(request.param, path, tolerance=1e-5)), "inverse")
 
 
 def test_the_estimate_is_honest_and_meets_the_tolerance(truth):
@@ -45,7 +49,7 @@ def test_the_estimate_is_honest_and_meets_the_tolerance(truth):
     for tolerance in tolerances:
         solution = solve(scene(state, path, "auto", tolerance=tolerance))
         choice = solution.mode_choice
-        errors = difference(reported(solution, "inverse"), with_all)
+        errors = difference(reported_of(solution, "inverse"), with_all)
         assert set(errors) == {"deflections", "forces", "motors", "voltages"}
         worst, estimated = max(errors.values()), max(choice.errors["inverse"].values())
         assert worst <= tolerance
@@ -83,7 +87,7 @@ def test_what_forces_and_voltages_do_forwards_with_fewer_modes():
     run = {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints+pzt"}
     solution = solve(scene(modes=3, forward=[run], end=0.2, tolerance=1e-7))
     assert all(array.of_all_modes is not None for array in solution.patches.values())
-    inverse, back = (reported(solution, name)["deflections"] for name in ("inverse", "forward"))
+    inverse, back = (reported_of(solution, name)["deflections"] for name in ("inverse", "forward"))
     for point, deflection in inverse.items():
         np.testing.assert_allclose(back[point], deflection, rtol=0, atol=1e-8)
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import ffrobot
-from ffrobot.run.solution import Watcher
+from ffrobot.run.watcher import Watcher
 
 END = 0.08
 SHORT = {"end = 1.0": f"end = {END}"}

@@ -10,7 +10,7 @@ import pytest
 
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link_file import read_link
-from ffrobot.mbs.scene.load import load_scene, make_scene
+from ffrobot.scene.load import load_scene, make_scene
 from ffrobot.schema import schema
 
 CASES = Path(__file__).parents[1] / "cases"

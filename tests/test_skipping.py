@@ -11,11 +11,12 @@ import pytest
 from ffrobot.fe_models.link import make_link
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis import fcid
-from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.model.planar_body import core_arguments, vanishing_terms
-from ffrobot.mbs.scene.load import make_scene
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.results.write import results_image
-from ffrobot.run.solution import prepare, solve
+from ffrobot.run.prepare import prepare
+from ffrobot.run.solve import solve
+from ffrobot.scene.load import make_scene
 
 LINK = """
 name = "{name}"
@@ -80,10 +81,10 @@ def test_planar_scenes_have_no_coordinates_out_of_their_plane(folder):
     in_plane = sum(family in ("in-plane-bending", "axial") for family in families)
     assert families.count("in-plane-bending") < in_plane < len(families) == 14
     assert solution.outcomes["run"].q.shape[1] == 3 + 3 + in_plane
-    line = next(line for line in solution.skipped if "do not move in the plane" in line)
+    line = next(line for line in solution.omissions if "do not move in the plane" in line)
     assert line.startswith(f"arm: {14 - in_plane} of 14 modes")
     assert f"{families.count('out-of-plane-bending')} out-of-plane-bending" in line
-    assert "coordinates out of the plane" in solution.skipped
+    assert "coordinates out of the plane" in solution.omissions
     with h5py.File(BytesIO(results_image(solution))) as file:
         assert file["run/bodies/arm/modal"].shape == (11, in_plane)
         assert file["run/bodies/arm/modal_transform"].shape == (14, in_plane)
@@ -94,7 +95,7 @@ def test_rigid_bodies_have_no_modal_blocks(folder):
     stick, flexible = solution.model.bodies
     assert core_arguments(stick, [], [])["W"].shape == (3, 0)
     assert MechanismSystem(solution.model, solution.model.joints).system.coordinates == 3 + 3 + flexible.n_modes
-    assert "modal coordinates of stick, rigid" in solution.skipped
+    assert "modal coordinates of stick, rigid" in solution.omissions
 
 
 def test_terms_that_vanish_are_not_multiplied(folder):
@@ -105,7 +106,7 @@ def test_terms_that_vanish_are_not_multiplied(folder):
     for term, symbol, shape in (("S_tilde", "S̃", (n, n)), ("j", "j", (n,))):
         assert of_bending[term].size == 0
         assert of_both[term].shape == shape
-        assert f"{symbol}, which is zero" in bending.skipped
+        assert f"{symbol}, which is zero" in bending.omissions
         assert f"{symbol}, which is zero" not in both.skipped
     assert of_bending["damping"].size == of_bending["m_xy"].size == 0
     assert vanishing_terms(bending.model.bodies[0]) == ()
@@ -120,20 +121,20 @@ def test_algebraic_analyses_integrate_nothing(folder, monkeypatch):
     analysis = {"name": "stiff", "kind": "fcid", "shape": "static", "end": 0.1, "output_step": 0.01}
     solution = solve(arm(folder, "bending", analysis=[analysis]))
     outcome = solution.outcomes["stiff"]
-    assert outcome.steps == outcome.evaluations == 0
+    assert outcome.statistics.steps == outcome.statistics.evaluations == 0
     assert outcome.q.shape[0] == 11
     assert np.abs(outcome.lambda_).max() > 1.0
-    assert "integration of stiff, algebraic" in solution.skipped
+    assert "integration of stiff, algebraic" in solution.omissions
 
 
 def test_only_runs_that_are_replayed_are_recorded(folder):
     run = {"kind": "pcid", "end": 0.02, "output_step": 0.01, "tolerance": 1e-4}
     forward = {"name": "back", "kind": "forward", "actuation": "first", "apply": "joints"}
     solution = solve(arm(folder, "bending", analysis=[run | {"name": "first"}, run | {"name": "second"}, forward]))
-    assert solution.outcomes["first"].recording is not None
-    assert solution.outcomes["second"].recording is None
-    assert not solution.stresses["first"]  # the modal body file has no modal stresses
-    assert not solution.voltages["first"]  # no patches
+    assert solution.outcomes["first"].continuation.recording is not None
+    assert solution.outcomes["second"].continuation.recording is None
+    assert not solution.analyses["first"].stresses  # the modal body file has no modal stresses
+    assert not solution.analyses["first"].voltages  # no patches
 
 
 def test_no_analysis_loads_finite_elements_or_plotting(folder):

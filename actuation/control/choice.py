@@ -8,18 +8,17 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mbs.model.model import Model
-from ...mbs.scene.analysis_records import Analysis
-from ...mbs.scene.loop_records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
-from ...mbs.scene.loop_records import Controller as Record
 from ..patches.patches import PatchArray
 from .controllers import Controller, Setup, joint_pid, modal_velocity
 from .python_controller import PythonControl, load_function
+from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
+from .records import Controller as Record
 from .rigid_arm import ComputedTorqueControl, RigidArm
 
 
-def needed_sensors(model: Model, analysis: Analysis, patches: Mapping[str, PatchArray]) -> Iterator[Sensor]:
-    """Sensors without which the controllers of an analysis could not act; ideal unless the scene gives them."""
-    for record in analysis.controller:
+def needed_sensors(model: Model, controllers: Sequence[Record], patches: Mapping[str, PatchArray]) -> Iterator[Sensor]:
+    """Sensors without which the `controllers` of an analysis could not act; ideal unless the scene gives them."""
+    for record in controllers:
         if isinstance(record, JointPid):
             for joint in record.joints:
                 yield Sensor.model_validate({record.side: joint})

@@ -2,34 +2,118 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, Literal, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from ...common.arrays import Array
-from ...mbs import _core
-from ...mbs.analysis.analyses import STATUS, Outcome, Progress, as_long_as, initial_state
+from ...mbs._core import TimeFunction
+from ...mbs.analysis.drive import Progress, SampledControl, drive, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
-from ...mbs.analysis.replay import actuation_source, motor_limits
-from ...mbs.model.model import ZERO, MechanismSystem, Model, load_rows
-from ...mbs.scene.analysis_records import Analysis
-from ...mbs.scene.loop_records import ComputedTorque, Lqr
-from ...mbs.solve.initial_state import State
-from ...mbs.solve.integrators import METHODS, choose_integrator
+from ...mbs.analysis.outcome import Details, Forces, Outcome
+from ...mbs.analysis.replay import motor_limits, replay_times
+from ...mbs.fields.field_types import NotNegative, PointReference, Positive
+from ...mbs.fields.references import Reference, under
+from ...mbs.model.model import ZERO, Model, load_measures
+from ...mbs.model.system import MechanismSystem
+from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
+from ...mbs.scene.loads import Load
+from ...mbs.solve.state import State
+from ..context import ActuatedContext
 from ..patches.patches import PatchArray
 from ..patches.voltages import allocation
 from .choice import make_controller, needed_sensors
 from .controllers import Controller, Setup
+from .loop import Loop
 from .metrics import Metrics, measure
+from .records import ComputedTorque, Lqr, Sensor
+from .records import Controller as ControllerKeys
 from .signals import Signal, input_names, merged, sensing, signals
 
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
 
 
+class ClosedLoop(ActuatedAnalysis):
+    """Motion under sampled control; the earlier inverse analysis `actuation` gives reference, feed-forward and start.
+
+    Samples are at 0, sample_time, …; the command of each acts `delay` later and is held. Moments and voltages keep
+    within the limits of the scene unless `unlimited`. The run starts as the inverse analysis does, or as [initial] of
+    the scene says, on the trajectories. `seed` starts the noise. `tip` is the point whose error is reported.
+    """
+
+    kind: Literal["closed-loop"]
+    sample_time: Positive
+    delay: NotNegative = 0.0
+    start: Literal["actuation", "scene"] = "actuation"
+    feed_forward: Literal["none", "joints", "joints+pzt"] = "joints"
+    unlimited: bool = False
+    seed: Annotated[int, Field(ge=0)] = 0
+    tip: PointReference | None = None
+    controller: tuple[ControllerKeys, ...] = ()
+    sensor: tuple[Sensor, ...] = ()
+    disturbance: tuple[Load, ...] = ()
+
+    findings = ("diverged", "step underflow")  # what a controller does is what is to be found out
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.actuation is None:
+            raise ValueError(f'expected the key "actuation" in kind = "{self.kind}", found none')
+        if any(load.point is None for load in self.disturbance):
+            raise ValueError("expected disturbances at points, found one elsewhere")
+        for k, load in enumerate(self.disturbance, 1):
+            if load.force is not None:
+                raise ValueError(
+                    f"disturbance no. {k}: force: expected expressions in t, found a function, which only a [[load]]"
+                    " may have"
+                )
+        end = self.end
+        if end and self.delay >= end:
+            raise ValueError(f"expected a delay shorter than the run ({end:g} s), found {self.delay:g} s")
+        if end and self.sample_time > end:
+            raise ValueError(f"expected a sample_time of at most the run ({end:g} s), found {self.sample_time:g} s")
+        return self
+
+    def needs(self) -> Iterator[Need]:
+        """Patches where voltages are fed forward."""
+        if self.feed_forward == "joints+pzt":
+            yield Need("feed_forward", self.feed_forward, "pzt")
+
+    def references(self) -> Iterator[Reference]:
+        """What is measured, disturbed, controlled and reported."""
+        for label, records in (
+            ("sensor", self.sensor), ("disturbance", self.disturbance), ("controller", self.controller)
+        ):  # fmt: skip
+            for k, record in enumerate(records, 1):
+                yield from under(f"{label} no. {k}", record.references())
+        if self.tip is not None:
+            yield Reference("tip", self.tip, needs_marker=True)
+
+    def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
+        """The disturbances."""
+        for k, load in enumerate(self.disturbance, 1):
+            for component, function in load.components.items():
+                yield f"disturbance no. {k}: {component}", function, 0
+
+    def replay_problems(self, source: Analysis) -> Iterator[str]:
+        """Whether `source` found what is to be fed forward."""
+        if self.feed_forward == "joints+pzt" and source.applicable and self.feed_forward not in source.applicable:
+            yield (
+                f'feed_forward: expected "joints" with an analysis of kind "{source.kind}", found "{self.feed_forward}"'
+            )
+
+    def run(self, context: ActuatedContext) -> Outcome:
+        """Motion and commands."""
+        source = context.source(self.actuation)
+        assert source is not None
+        return run_closed_loop(context.model, self, source, context.patches, context.progress)
+
+
 @dataclass(frozen=True)
-class LoopRecord:
+class LoopRecord(Details):
     """What happened at the samples of a closed loop.
 
     Attributes:
@@ -53,116 +137,97 @@ class LoopRecord:
     warnings: tuple[str, ...]
 
 
-class Loop:
-    """What the core asks at every sample: noise and resolution, controllers, limits."""
-
-    def __init__(
-        self, setup: Setup, read: Sequence[Signal], controllers: Sequence[Controller], limit: Array, seed: int
-    ) -> None:
-        samples = (len(setup.times), len(read))
-        noise = np.array([signal.noise for signal in read])
-        self._noise = np.random.default_rng(seed).standard_normal(samples) * noise if noise.any() else None
-        resolution = np.array([signal.resolution for signal in read])
-        self._coarse = np.flatnonzero(resolution)
-        self._resolution = resolution[self._coarse]
-        self._controllers, self._limit, self._feed_forward = controllers, limit, setup.feed_forward
-        self.readings = np.zeros(samples)
-        self.commands, self.wanted = np.zeros_like(setup.feed_forward), np.zeros_like(setup.feed_forward)
-        self.first: Array = np.clip(setup.feed_forward[0], -limit, limit)
-        self.taken = 0
-
-    def __call__(self, k: int, _t: float, y: Array) -> Array:
-        """Commands at sample k for what the sensors are exposed to."""
-        if self._noise is not None:
-            y += self._noise[k]
-        if self._coarse.size:
-            y[self._coarse] = np.round(y[self._coarse] / self._resolution) * self._resolution
-        wanted = self._feed_forward[k].copy()
-        for controller in self._controllers:
-            wanted += controller(k, y)
-        command: Array = np.minimum(np.maximum(wanted, -self._limit), self._limit)
-        self.readings[k], self.wanted[k], self.commands[k], self.taken = y, wanted, command, k + 1
-        return command
-
-
 def run_closed_loop(
     model: Model,
-    analysis: Analysis,
+    analysis: ClosedLoop,
     source: Outcome,
     patches: Mapping[str, PatchArray],
     progress: Progress,
-) -> tuple[Outcome, LoopRecord]:
-    """Run the closed loop of `analysis` about the motion of the inverse analysis `source`, from its initial state.
+) -> Outcome:
+    """The closed loop of `analysis` about the motion of the inverse analysis `source`, from its initial state.
 
-    A run that diverges ends there and is kept. Raises `InputError` for controllers that do not fit the robot,
-    `SolveError` where a user's function fails.
+    The outcome's details are a `LoopRecord`. A run that diverges ends there and is kept. Raises `InputError` for
+    controllers that do not fit the robot, `SolveError` where a user's function fails.
     """
-    analysis, loads, T = as_long_as(source, analysis), model.loads, analysis.sample_time
-    assert T is not None
-    if source.inversion is not None:
-        loads = source.inversion.servo.loads
-    inputs, built = input_names(model, patches), with_compliance(model)
-    moved = with_rotors(source, built)
-    needed = [s for sensor in needed_sensors(model, analysis, patches) for s in signals(built, patches, sensor)]
-    read = merged([s for sensor in analysis.sensor for s in signals(built, patches, sensor)], needed)
-    rows = [signal.row for signal in read if signal.row is not None]
-    drives = [*((row, ZERO) for row in built.motors.values()), *loads]
-    drives += load_rows(model.scene, analysis.disturbance)
-    assembly = MechanismSystem(built, built.joints, drives, rows)
-    sensor = sensing(assembly, read)
-
-    begin, duration = analysis.times[0], np.ptp(analysis.times)
-    times = begin + np.arange(int(np.ceil(duration / T * (1 - 1e-12)))) * T
-    reference = _at(times, source.time, sensor.read(*(np.ascontiguousarray(x) for x in (moved.q, moved.v, moved.a))))
-    feed_forward = _feed_forward(model, analysis, source, patches, times)
-    setup = Setup(
-        model, patches, inputs, tuple(s.name for s in read), times, T, analysis.delay, reference, feed_forward, source
-    )  # fmt: skip
+    built = with_compliance(model)
+    moved, read = with_rotors(source, built), _read(model, built, analysis, patches)
+    assembly = _assembly(model, built, analysis, source, read)
+    sensor, outputs = sensing(assembly, read), replay_times(source, analysis)
+    setup = _setup(model, analysis, source, patches, read, outputs, sensor.read(*_states(moved)))
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     limit = np.concatenate([motor_limits(model), *(array.limit for array in patches.values())])
     limit = np.full_like(limit, np.inf) if analysis.unlimited else limit
     loop = Loop(setup, read, acting, limit, analysis.seed)
-    outcome = _integrate(assembly, analysis, moved, model, patches, sensor, loop, times, progress)
-    taken = slice(loop.taken)
-    held = _held(outcome.time, times[taken] + analysis.delay, loop.commands[taken], loop.first)
-    outcome = replace(outcome, tau=held[:, : len(model.motors)])
-    tip_error, metrics = measure(outcome, source, setup, loop, held)
-    record = LoopRecord(
-        inputs, setup.outputs, times[taken], loop.readings[taken], reference[taken], loop.commands[taken],
-        loop.wanted[taken], tip_error, metrics, tuple(_warnings(analysis, acting, metrics, bool(built.gears))),
-    )  # fmt: skip
-    return outcome, record
-
-
-def _integrate(
-    assembly: MechanismSystem,
-    analysis: Analysis,
-    source: Outcome,
-    rigid: Model,
-    patches: Mapping[str, PatchArray],
-    sensor: _core.Sensing,
-    loop: Loop,
-    times: Array,
-    progress: Progress,
-) -> Outcome:
-    began = time.perf_counter()
-    start = State(source.q[0].copy(), source.v[0].copy())
-    if analysis.start == "scene":
-        start = initial_state(MechanismSystem(rigid, [*rigid.joints, *rigid.trajectories], rigid.loads))
-        start = rotors_like(assembly.model, start, source)
-    integrator = choose_integrator(assembly, analysis, start)
     voltages = [(assembly.index[body], array.Phi_V) for body, array in patches.items()]
-    run = _core.run_sampled(
-        assembly.system, assembly.groups, assembly.moments, analysis.times.tolist(), start.q, start.v,
-        analysis.tolerance, analysis.max_steps, METHODS[integrator.name], analysis.spectral_radius,
-        len(assembly.model.motors), voltages, loop.first, sensor, times.tolist(), analysis.delay, loop, progress,
+    control = SampledControl(len(model.motors), voltages, loop.first, sensor, setup.times, analysis.delay, loop)
+    start = _start(assembly, analysis, moved, model)
+    outcome = drive(assembly, analysis, start, progress, times=outputs, control=control)
+    return _recorded(outcome, source, setup, loop, acting)
+
+
+def _read(model: Model, built: Model, analysis: ClosedLoop, patches: Mapping[str, PatchArray]) -> tuple[Signal, ...]:
+    """The readings that the scene asks for, and those that its controllers need."""
+    needed = [
+        s for sensor in needed_sensors(model, analysis.controller, patches) for s in signals(built, patches, sensor)
+    ]
+    return merged([s for sensor in analysis.sensor for s in signals(built, patches, sensor)], needed)
+
+
+def _assembly(
+    model: Model, built: Model, analysis: ClosedLoop, source: Outcome, read: Sequence[Signal]
+) -> MechanismSystem:
+    """The robot with its motors, loads and disturbances, and the rows along which sensors read."""
+    loads = model.loads if source.details.loads is None else source.details.loads
+    drives = [*((row, ZERO) for row in built.motors.values()), *loads]
+    drives += load_measures(built.scene, analysis.disturbance)
+    return MechanismSystem(built, built.joints, drives, [signal.row for signal in read if signal.row is not None])
+
+
+def _setup(
+    model: Model,
+    analysis: ClosedLoop,
+    source: Outcome,
+    patches: Mapping[str, PatchArray],
+    read: Sequence[Signal],
+    outputs: Array,
+    readings: Array,
+) -> Setup:
+    """What controllers may know; `readings` (T, sensors) are those of the motion of `source` at its outputs."""
+    T = analysis.sample_time
+    times = outputs[0] + np.arange(int(np.ceil(np.ptp(outputs) / T * (1 - 1e-12)))) * T
+    return Setup(
+        model, patches, input_names(model, patches), tuple(s.name for s in read), times, T, analysis.delay,
+        _at(times, source.time, readings), _feed_forward(model, analysis, source, patches, times), source,
     )  # fmt: skip
-    seconds = time.perf_counter() - began
-    reached, held = len(run.q), len(assembly.constraints)
-    return Outcome(
-        analysis, assembly, analysis.times[:reached], run.q, run.v, run.a, run.multipliers[:, :held], None, None,
-        run.residual, STATUS[run.status], run.steps, run.rejected, run.evaluations, seconds, integrator,
+
+
+def _states(outcome: Outcome) -> tuple[Array, ...]:
+    return tuple(np.ascontiguousarray(x) for x in (outcome.q, outcome.v, outcome.a))
+
+
+def _start(assembly: MechanismSystem, analysis: ClosedLoop, source: Outcome, rigid: Model) -> State:
+    """As `source` starts, or as the scene says, with the rotors of elastic gears wound as in `source`."""
+    if analysis.start == "actuation":
+        return State(source.q[0].copy(), source.v[0].copy())
+    start = initial_state(MechanismSystem(rigid, [*rigid.joints, *rigid.trajectories], rigid.loads))
+    return rotors_like(assembly.model, start, source)
+
+
+def _recorded(outcome: Outcome, source: Outcome, setup: Setup, loop: Loop, acting: Sequence[Controller]) -> Outcome:
+    """`outcome` with the moments that were commanded, and the record of its samples."""
+    analysis, taken = outcome.analysis, slice(loop.taken)
+    assert isinstance(analysis, ClosedLoop)
+    held = _held(outcome.time, setup.times[taken] + setup.delay, loop.commands[taken], loop.first)
+    outcome = replace(outcome, forces=Forces(tau=held[:, : len(setup.model.motors)]))
+    tip_error, metrics = measure(
+        outcome, source, analysis.tip, setup, loop, held, is_disturbed=bool(analysis.disturbance)
+    )
+    warnings = tuple(_warnings(analysis, acting, metrics, bool(outcome.assembly.model.gears)))
+    record = LoopRecord(
+        setup.inputs, setup.outputs, setup.times[taken], loop.readings[taken], setup.reference[taken],
+        loop.commands[taken], loop.wanted[taken], tip_error, metrics, warnings,
     )  # fmt: skip
+    return replace(outcome, details=record)
 
 
 def _at(times: Array, known: Array, values: Array) -> Array:
@@ -176,10 +241,9 @@ def _at(times: Array, known: Array, values: Array) -> Array:
 
 
 def _feed_forward(
-    model: Model, analysis: Analysis, source: Outcome, patches: Mapping[str, PatchArray], times: Array
+    model: Model, analysis: ClosedLoop, source: Outcome, patches: Mapping[str, PatchArray], times: Array
 ) -> Array:
     """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
-    assert analysis.sample_time is not None
     voltages = [np.zeros((len(times), len(array.edges))) for array in patches.values()]
     moments = np.zeros((len(times), len(model.motors)))
     middle = np.minimum(times + analysis.delay + analysis.sample_time / 2, source.time[-1])
@@ -199,9 +263,10 @@ def _found(source: Outcome, times: Array) -> tuple[Array, Array | None]:
     """τ and F_p that an inverse analysis found, at any time where it was recorded or is algebraic, else by a spline."""
     moments, F_p = source.motor_moments, source.F_p
     assert moments is not None
-    if source.recording is None and source.shape is None:
+    anytime = source.details.actuation_source(source) if F_p is not None else None
+    if anytime is None:
         return _at(times, source.time, moments), None if F_p is None else _at(times, source.time, F_p)
-    tau, F_p = actuation_source(source).sample(times.tolist())
+    tau, F_p = anytime.sample(times.tolist())
     return _at(times, source.time, moments) if source.gears else tau, F_p
 
 
@@ -211,8 +276,7 @@ def _held(times: Array, since: Array, commands: Array, first: Array) -> Array:
     return np.vstack([first, commands])[which]
 
 
-def _warnings(analysis: Analysis, controllers: Sequence[Controller], metrics: Metrics, gears: bool) -> list[str]:
-    assert analysis.sample_time is not None
+def _warnings(analysis: ClosedLoop, controllers: Sequence[Controller], metrics: Metrics, gears: bool) -> list[str]:
     lines = [line for controller in controllers for line in getattr(controller, "warnings", ())]
     fastest = max((controller.bandwidth for controller in controllers), default=0.0)
     sampling = 2 * np.pi / analysis.sample_time

@@ -11,11 +11,11 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.validation import quoted
-from ...mbs.analysis.analyses import Outcome
+from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.model import Model
-from ...mbs.scene.loop_records import JointPid, ModalVelocity
 from ..patches.patches import PatchArray
 from ..patches.voltages import voltage_gain
+from .records import JointPid, ModalVelocity
 from .signals import volts_per_modal_coordinate
 
 

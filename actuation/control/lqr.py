@@ -9,11 +9,11 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...mbs.scene.loop_records import JointPid, Lqr
 from ...mbs.solve.linearisation import LinearMechanism, linearise
 from .controllers import Setup, modal_columns, modal_estimate
 from .linear_model import LinearModel, linear_model
 from .modes import controllability, observability
+from .records import JointPid, Lqr
 
 MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion
 

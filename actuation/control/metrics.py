@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...common.arrays import Array
-from ...mbs.analysis.analyses import Outcome
+from ...mbs.analysis.outcome import Outcome
 from ...mbs.quantities.joint_space import motor_rates
 from ...mbs.quantities.observation import point_motion
 from .controllers import Setup
-
-if TYPE_CHECKING:
-    from .closed_loop import Loop
+from .loop import Loop
 
 SETTLED = 0.05  # of the largest error
 WINDOW, CUBIC = 0.1, 3  # s, over which motion that a cubic follows is no vibration: below about 80 rad/s
@@ -50,9 +47,14 @@ class Metrics:
     saturated: float
 
 
-def measure(outcome: Outcome, source: Outcome, setup: Setup, loop: Loop, held: Array) -> tuple[Array, Metrics]:
-    """Distance of the tip from its place (T,), and the metrics; `held` (T, inputs) are the commands at the outputs."""
-    error = _tip_error(outcome, source)
+def measure(
+    outcome: Outcome, source: Outcome, tip: str | None, setup: Setup, loop: Loop, held: Array, is_disturbed: bool
+) -> tuple[Array, Metrics]:
+    """Distance of the tip from its place (T,), and the metrics.
+
+    `tip` is the point that the scene names, if any; `held` (T, inputs) are the commands at the outputs.
+    """
+    error = _tip_error(outcome, source, tip or default_tip(outcome))
     distance = np.linalg.norm(error, axis=1)
     t, motors = outcome.time, len(setup.model.motors)
     shaking = np.linalg.norm(error - _slow(t, error), axis=1)
@@ -61,7 +63,7 @@ def measure(outcome: Outcome, source: Outcome, setup: Setup, loop: Loop, held: A
     work = np.abs(held[:, :motors] * motor_rates(outcome)).sum(axis=1)
     cut = (loop.commands[taken] != loop.wanted[taken]).any(axis=1)
     return distance, Metrics(
-        _verdict(outcome, shaking),
+        _verdict(outcome, shaking, is_disturbed),
         float(np.sqrt(np.mean(distance**2))),
         float(distance.max()),
         _settling(t, distance),
@@ -75,11 +77,9 @@ def measure(outcome: Outcome, source: Outcome, setup: Setup, loop: Loop, held: A
     )
 
 
-def tip_of(outcome: Outcome) -> str:
-    """The point whose error is reported: the analysis says, or the first trajectory of a point, or the last tip."""
+def default_tip(outcome: Outcome) -> str:
+    """The point whose error is reported: that of the first trajectory of a point, or the last tip."""
     scene = outcome.assembly.model.scene
-    if outcome.analysis.tip is not None:
-        return outcome.analysis.tip
     driven = [trajectory.point for trajectory in scene.trajectory if trajectory.point is not None]
     if driven:
         return driven[0]
@@ -87,14 +87,14 @@ def tip_of(outcome: Outcome) -> str:
     return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"
 
 
-def _tip_error(outcome: Outcome, source: Outcome) -> Array:
+def _tip_error(outcome: Outcome, source: Outcome, point: str) -> Array:
     """(T, 2) m; where the tip should be is where its trajectory says, or where it is in the inverse analysis."""
-    point = tip_of(outcome)
     place = _interpolated(outcome.time, source.time, point_motion(source, point).position)
+    on_path = np.clip(outcome.time, 0.0, outcome.analysis.last_time)
     for trajectory in outcome.assembly.model.scene.trajectory:
         if trajectory.point == point:  # held where it is before the path and after it
             for component, target in trajectory.components.items():
-                place[:, "xy".index(component)] = target.sample(np.clip(outcome.time, 0.0, outcome.analysis.end))[0]
+                place[:, "xy".index(component)] = target.sample(on_path)[0]
     error: Array = point_motion(outcome, point).position - place
     return error
 
@@ -126,9 +126,9 @@ def _settling(t: Array, distance: Array) -> float:
     return float(t[outside[-1] + 1]) if outside[-1] + 1 < len(t) else float("nan")
 
 
-def _verdict(outcome: Outcome, shaking: Array) -> str:
+def _verdict(outcome: Outcome, shaking: Array, is_disturbed: bool) -> str:
     if outcome.status != "completed":
         return "diverges"
     quarters = [part.max(initial=0.0) for part in np.array_split(shaking, 4)]
     growing = quarters[1] < quarters[2] < quarters[3] and quarters[3] > GROWTH * quarters[1]
-    return "grows" if growing and not outcome.analysis.disturbance else "stable"
+    return "grows" if growing and not is_disturbed else "stable"

@@ -5,27 +5,76 @@ Mass and stiffness of patches, where the scene adds them to the link, stay where
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 from math import ceil, comb
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
+from ...mbs.analysis.operating_points import InstantAnalysis, operating_points
+from ...mbs.analysis.outcome import Details, Outcome
+from ...mbs.fields.references import Reference
 from ...mbs.model.planar_body import PlanarBody
-from ...mbs.scene.actuator_records import PztLayout
-from ...mbs.scene.control_records import Placement
+from ...mbs.scene.analysis import Surroundings
+from ..context import ActuatedContext
 from ..patches.patches import PatchArray, patch_array
+from ..patches.records import PztLayout
+from .linear import linear_models
 from .linear_model import LinearModel
+from .records import Placement
 
 SHARE = 0.1  # of a mode's strain energy in the link, for the mode to be its business
 CHUNK = 200  # sets whose voltages over the path are held in memory together
 SEED = 0  # of the evolution: the same scene gives the same patches
 STEPS = 2  # candidates per length of a patch, where the scene gives no spacing
+
+
+class PatchPlacement(InstantAnalysis):
+    """A search for the places of patches; see `placement` for what it is `about`."""
+
+    kind: Literal["placement"]
+    placement: Placement
+
+    @property
+    def is_over_path(self) -> bool:
+        """Whether the voltages of a whole motion count, not the robot at one instant."""
+        return self.placement.criterion == "voltage"
+
+    @property
+    def needs_times(self) -> bool:
+        """Unless the whole motion counts."""
+        return not self.is_over_path
+
+    def references(self) -> Iterator[Reference]:
+        """The link."""
+        yield from self.placement.references()
+
+    def problems(self, among: Surroundings) -> Iterator[str]:
+        """Whether what it is about gives what the criterion judges by."""
+        if not self.is_over_path:
+            if self.instants is not None and len(self.instants) != 1:
+                yield f"times: expected one time to place patches for, found {len(self.instants)}"
+        else:
+            source = next((other for other in among.earlier if other.name == self.source), None)
+            if source is None or "joints+pzt" not in source.applicable:
+                found = "none" if source is None else f'"{source.name}" of kind "{source.kind}"'
+                yield (
+                    f"about: expected an earlier analysis of kind {among.replayable('joints+pzt')} for"
+                    f' placement.criterion = "voltage", found {found}'
+                )
+        yield from super().problems(among)
+
+    def run(self, context: ActuatedContext) -> Outcome:
+        """The operating point, or those of the path, with what was `Placed`."""
+        source = context.source(self.source)
+        outcome = operating_points(context.model, self, source)
+        return replace(outcome, details=_placed(self, context, outcome, source))
 
 
 @dataclass(frozen=True)
@@ -50,7 +99,7 @@ class Evaluation:
 
 
 @dataclass(frozen=True)
-class Placed:
+class Placed(Details):
     """What a search found.
 
     Attributes:
@@ -82,6 +131,23 @@ class ModalReach:
     frequency: Array
     shape: Array
     share: Array
+
+
+def _placed(analysis: PatchPlacement, context: ActuatedContext, outcome: Outcome, source: Outcome | None) -> Placed:
+    """The best places for the patches of one body, about `outcome` or over the path of its `source`."""
+    robot, wanted, model, F_p = context.model, analysis.placement, None, None
+    if analysis.is_over_path:
+        assert source is not None
+        if source.F_p is None:
+            raise InputError(
+                f'{robot.scene.path}: analysis "{analysis.name}": placement.criterion: expected motors that fit the'
+                f' mechanism for "voltage", found {len(robot.motors)} for {robot.degrees_of_freedom}'
+            )
+        F_p = source.F_p[:, source.modal_columns(wanted.body)]
+    else:
+        (model,) = linear_models(outcome, {})
+    layout, link = context.patches[wanted.body].layout, context.links[wanted.body]
+    return place(robot.scene.path, wanted, layout, link, robot.body(wanted.body), model, F_p)
 
 
 def held_modes(model: LinearModel, planar: PlanarBody, count: int) -> ModalReach:

@@ -10,12 +10,13 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...mbs import _core
-from ...mbs.analysis.analyses import Outcome
-from ...mbs.model.model import ZERO, Constraint, MechanismSystem, Model
+from ...mbs.analysis.outcome import Outcome
+from ...mbs.model.model import ZERO, Constraint, Model
 from ...mbs.model.planar_body import PlanarBody, PlanarPoint
-from ...mbs.scene.loop_records import ComputedTorque
+from ...mbs.model.system import MechanismSystem
 from ...mbs.solve.initial_state import undeformed_state
 from .controllers import Setup
+from .records import ComputedTorque
 
 TOLERANCE, MOST_ITERATIONS = 1e-10, 20
 

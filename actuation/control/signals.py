@@ -9,10 +9,11 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mbs import _core
-from ...mbs.model.measures import Marker, Measure, joint_coordinate
-from ...mbs.model.model import MechanismSystem, Model
-from ...mbs.scene.loop_records import PERMITTIVITY, Sensor
+from ...mbs.joints.measure import Marker, Measure
+from ...mbs.model.model import Model
+from ...mbs.model.system import MechanismSystem
 from ..patches.patches import PatchArray
+from .records import PERMITTIVITY, Sensor
 
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 
@@ -46,9 +47,7 @@ def signals(model: Model, patches: Mapping[str, PatchArray], sensor: Sensor) -> 
     order, ending = ORDERS[sensor.measure], "" if sensor.measure == "value" else f"/{sensor.measure}"
     quality = sensor.resolution, sensor.noise
     if sensor.joint is not None:
-        joint = next(joint for joint in model.scene.joint if joint.name == sensor.joint)
-        row = joint_coordinate(model.scene, joint)
-        yield Signal(f"joint/{sensor.joint}{ending}", order, *quality, row)
+        yield Signal(f"joint/{sensor.joint}{ending}", order, *quality, model.scene.coordinate(sensor.joint))
     elif sensor.motor is not None:
         yield Signal(f"motor/{sensor.motor}{ending}", order, *quality, model.motors[sensor.motor])
     elif sensor.point is not None:
@@ -89,6 +88,6 @@ def merged(given: Sequence[Signal], needed: Sequence[Signal]) -> tuple[Signal, .
 def sensing(assembly: MechanismSystem, read: Sequence[Signal]) -> _core.Sensing:
     """What reads these signals in the core; the motor rows of `assembly` are those of the signals along rows."""
     orders = [signal.order for signal in read if signal.row is not None]
-    along = list(zip(assembly.motor_rows, orders, strict=True))
+    along = list(zip(assembly.motor_measures, orders, strict=True))
     modal = [(assembly.index[s.body], s.vector, s.order) for s in read if s.row is None]
     return _core.Sensing(assembly.system, along, modal)

@@ -12,7 +12,7 @@ from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.planar_body import PlanarBody
-from ...mbs.scene.actuator_records import PztLayout
+from .records import PztLayout
 
 STEP = 0.1  # of the height, from one station to the next; less is a taper
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding

@@ -9,9 +9,10 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import Interface, ModalBody
-from ...mbs.model.planar_body import PlanarBody, PlanarPoint, with_masses
-from ...mbs.scene.actuator_records import PztLayout
+from ...mbs.model.masses import with_masses
+from ...mbs.model.planar_body import PlanarBody, PlanarPoint
 from .patches import patch_edges, section_height
+from .records import PztLayout
 
 GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 

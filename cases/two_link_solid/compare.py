@@ -13,7 +13,8 @@ import matplotlib as mpl
 import numpy as np
 
 from ffrobot.mbs.quantities.observation import joint_forces, trajectory_force
-from ffrobot.run.solution import Solution, solve
+from ffrobot.run.solution import Solution
+from ffrobot.run.solve import solve
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

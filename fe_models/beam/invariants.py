@@ -60,7 +60,7 @@ def station_space(mesh: Mesh) -> StationSpace:
 
 
 def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> Invariants:
-    """Integrals of formulation.md, section 3, over axis and cross section.
+    """Inertia shape integrals (docs/theory.md) over axis and cross section.
 
     With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
     Φ0 = (u, v, w), Φy = (−θ_z, 0, φ), Φz = (θ_y, −φ, 0); principal axes leave ∫y = ∫z = ∫yz = 0.
@@ -123,7 +123,7 @@ def geometric_stiffness(
 ) -> dict[str, Array]:
     """(n, n) ∫N(x) (v'v' + w'w') dx of the axial force N that each unit load causes, positive in tension.
 
-    Loads (formulation.md, section 3) on the undeformed link, held axially at its root: inertia of unit frame
+    Loads (docs/theory.md, Geometric stiffness) on the undeformed link, held axially at its root: inertia of unit frame
     acceleration `t_x` … `t_z`, of unit angular acceleration `r_x` …, of unit products of angular velocity `omega_xx` …;
     `force/NAME/x` … and `moment/NAME/x` …. Those that load a straight axis across, or twist it, leave N = 0: zero.
 

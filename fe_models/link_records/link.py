@@ -77,7 +77,7 @@ class BeamModel(Record):
 
 
 class Reference(Record):
-    """How the link's frame is held to it.
+    """How the link's frame is held to it (docs/theory.md, Reference conditions).
 
     `coupling` says how a solid's end faces are held; default: mean for simply-supported, rigid for cantilever. A beam's
     section moves as a plate in any case: both words mean the same there.

@@ -127,7 +127,7 @@ class OutlinedPatches:
 class ModalBody:
     """A flexible link in mass-orthonormal modal coordinates; immutable, checked when made. SI units, the link's frame.
 
-    Symbols: formulation.md, section 3 (Shabana, Dynamics of Multibody Systems, ch. 5); n modes.
+    Symbols: docs/theory.md, Inertia shape integrals (Shabana, Dynamics of Multibody Systems, ch. 5); n modes.
 
     Attributes:
         name: of the link.

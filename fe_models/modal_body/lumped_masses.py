@@ -2,7 +2,7 @@
 
 A lump of mass m sits with its center at the interface x_I and has the inertia tensor J = diag(J_x, J_y, J_z) there. Its
 material points x_I + ξ move by Φ0 + φ × ξ, with translation Φ0 and rotation φ (3, n) of the interface, and
-∫ρ ξ dV = 0, ∫ρ ξ ξᵀ dV = E = ½ tr(J) I − J. All else is formulation.md, section 3, with these.
+∫ρ ξ dV = 0, ∫ρ ξ ξᵀ dV = E = ½ tr(J) I − J. The integrals are those of docs/theory.md, Inertia shape integrals.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Inertia shape integrals of a solid, and the unit loads whose prestress stiffens it.
 
-With displacements and coordinates in the same space, every integral of formulation.md, section 3, is a product with the
-scalar mass matrix: x is its own nodal interpolation, so nothing is lumped and nothing is approximated.
+With displacements and coordinates in the same space, every integral of docs/theory.md is a product with the scalar mass
+matrix: x is its own nodal interpolation, so nothing is lumped and nothing is approximated.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
 
 
 def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, Array]:
-    """(3 owned,) consistent nodal forces of each unit load of formulation.md, section 3; collective.
+    """(3 owned,) consistent nodal forces of each unit load (docs/theory.md, Geometric stiffness); collective.
 
     D'Alembert forces −ρ(a + α × x + ω × (ω × x)) of unit a, α and products of ω (of xy, the terms of ω_x ω_y and
     ω_y ω_x together), and unit forces and moments at interfaces.

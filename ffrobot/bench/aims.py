@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
-from ..mbs.scene.load import make_scene
-from ..mbs.scene.scene import Scene
-from ..run.solution import Watcher, prepare
+from ..run.prepare import prepare
+from ..run.watcher import Watcher
+from ..scene.load import make_scene
+from ..scene.scene import Scene
 from .errors import KINDS
 from .evaluation import State, evaluation_seconds
 from .hand_written import TIME, HandWritten, general_state

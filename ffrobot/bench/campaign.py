@@ -13,10 +13,11 @@ from rich.table import Table
 from ..common.errors import InputError
 from ..common.files import check_folder
 from ..common.validation import did_you_mean, quoted
-from ..mbs.scene.analysis_records import TIGHTEST_TOLERANCE
-from ..mbs.scene.load import load_scene
-from ..mbs.scene.scene import Scene
-from ..run.solution import Watcher, prepare
+from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
+from ..run.prepare import prepare
+from ..run.watcher import Watcher
+from ..scene.load import load_scene
+from ..scene.scene import Scene
 from . import OF_A_SCENE, PEER
 from .aims import measure_aims
 from .axes import measure_axes

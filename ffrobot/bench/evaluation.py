@@ -6,7 +6,7 @@ import time
 
 from ..common.arrays import Array
 from ..mbs import _core
-from ..mbs.model.model import MechanismSystem
+from ..mbs.model.system import MechanismSystem
 
 State = tuple[MechanismSystem, Array, Array]
 """Equations, q and v."""

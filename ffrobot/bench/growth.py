@@ -13,12 +13,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..mbs.analysis.analyses import run_pcid
-from ..mbs.model.model import MechanismSystem, build_model
+from ..mbs.analysis.pcid import Pcid, run_pcid
+from ..mbs.model.model import build_model
 from ..mbs.model.planar_body import PlanarBody, PlanarPoint
-from ..mbs.scene.analysis_records import Analysis
-from ..mbs.scene.scene import Scene
-from ..run.solution import Watcher
+from ..mbs.model.system import MechanismSystem
+from ..run.watcher import Watcher
+from ..scene.scene import Scene
 from .evaluation import State, evaluation_seconds
 from .precision import Row
 
@@ -114,8 +114,8 @@ def output_timer(outputs: int) -> Callable[[], float]:
     """Measures the seconds of a short run with so many outputs; the integration in it is always the same."""
     model = chain(2, MODES_IN_CHAINS, False)[0].model
     keys = {"name": "inverse", "kind": "pcid", "end": RUN_LENGTH, "output_step": RUN_LENGTH / outputs}
-    analysis = Analysis.model_validate({**keys, "tolerance": 1e-6, "integrator": "dop853"})
-    return lambda: run_pcid(model, analysis, False, lambda t: True).wall_seconds
+    analysis = Pcid.model_validate({**keys, "tolerance": 1e-6, "integrator": "dop853"})
+    return lambda: run_pcid(model, analysis, False, lambda t: True).statistics.wall_seconds
 
 
 def measure_growth(repeat: int, display: Watcher) -> list[Row]:

@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import InputError, SolveError
-from ..mbs.model.model import MechanismSystem, Model
+from ..mbs.model.model import Model
 from ..mbs.model.planar_body import PlanarBody
+from ..mbs.model.system import MechanismSystem
 from ..mbs.solve.initial_state import undeformed_state
 from .evaluation import State
 
 SOURCE = Path("tests/benchmarks/hand_written/two_link.cpp")
 FLAGS = ("-std=c++20", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")
-STEPS = 30_000  # of DOP853 over the second: λ within 5e-5 of its peak (core_notes.md, tests/benchmarks)
+STEPS = 30_000  # of DOP853 over the second: λ within 5e-5 of its peak (tests/benchmarks/test_hand_written.py)
 TIME = 0.3  # s, at which both evaluate
 
 

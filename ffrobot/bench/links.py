@@ -10,7 +10,7 @@ from typing import Any
 import tomli_w
 
 from ..fe_models.link_file import link_keys, link_path
-from ..mbs.scene.scene import Scene
+from ..scene.scene import Scene
 
 Keys = dict[str, Any]
 

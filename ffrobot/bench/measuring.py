@@ -9,14 +9,15 @@ from dataclasses import dataclass, field
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.validation import did_you_mean, quoted
-from ..mbs.scene.analysis_records import Analysis
-from ..mbs.scene.scene import Scene
+from ..mbs.scene.analysis import IntegratedAnalysis
 from ..results.file import Results
 from ..results.write import results_image
-from ..run.solution import Watcher, solve
+from ..run.solve import solve
+from ..run.watcher import Watcher
+from ..scene.kinds import AnyKind
+from ..scene.scene import Scene
 from .errors import histories
 
-INTEGRATED = ("pcid", "forward")
 UNLIMITED = 10**12  # steps: the budget ends a run
 
 
@@ -65,9 +66,9 @@ class Deadline(Watcher):
         return self.display.advance(t, end) and not self.passed
 
 
-def find_analysis(scene: Scene, name: str | None) -> Analysis:
+def find_analysis(scene: Scene, name: str | None) -> IntegratedAnalysis:
     """The analysis of that name, or the first that integrates. Raises `InputError` where there is none."""
-    integrated = [analysis for analysis in scene.analysis if analysis.kind in INTEGRATED]
+    integrated = [a for a in scene.analysis if isinstance(a, IntegratedAnalysis) and a.is_resumable]
     if not integrated:
         kinds = quoted(sorted({analysis.kind for analysis in scene.analysis}))
         raise InputError(
@@ -92,11 +93,11 @@ def find_analysis(scene: Scene, name: str | None) -> Analysis:
 
 def with_analysis(scene: Scene, name: str, **changes: object) -> Scene:
     """The scene with one analysis only, and the one whose actuation it takes; `changes` of keys concern both."""
-    kept: list[Analysis] = []
+    kept: list[AnyKind] = []
     for analysis in reversed(scene.analysis):
-        if analysis.name == name or any(later.actuation == analysis.name for later in kept):
-            alike = changes if analysis.kind in INTEGRATED else {}
-            kept.append(analysis.model_copy(update={"max_steps": UNLIMITED, **alike}))
+        if analysis.name == name or any(later.takes_actuation and later.source == analysis.name for later in kept):
+            alike = {"max_steps": UNLIMITED, **changes} if analysis.is_resumable else {}
+            kept.append(analysis.model_copy(update=alike))
     return scene.model_copy(update={"analysis": tuple(reversed(kept))})
 
 
@@ -110,7 +111,7 @@ def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool 
     solution = solve(scene, deadline)
     outcomes = list(solution.outcomes.values())
     last = outcomes[-1]
-    status = last.status
+    status, runs = last.status, [outcome.statistics for outcome in outcomes]
     if status == "interrupted":
         if not deadline.passed:
             raise KeyboardInterrupt
@@ -120,12 +121,12 @@ def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool 
         with Results.from_image(results_image(solution), scene.path) as results:
             found = histories(results, name)
     return Run(
-        last.integrator.name,
+        last.statistics.integrator.name,
         status,
-        sum(outcome.wall_seconds for outcome in outcomes),
-        sum(outcome.steps for outcome in outcomes),
-        sum(outcome.rejected for outcome in outcomes),
-        sum(outcome.evaluations for outcome in outcomes),
+        sum(each.wall_seconds for each in runs),
+        sum(each.steps for each in runs),
+        sum(each.rejected for each in runs),
+        sum(each.evaluations for each in runs),
         found,
         {name: body.file_hash for name, body in solution.bodies.items() if body.path},
     )

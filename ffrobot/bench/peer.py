@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..common.errors import InputError, SolveError
-from ..mbs.scene.scene import Scene
-from ..run.solution import Watcher
+from ..run.watcher import Watcher
+from ..scene.scene import Scene
 from .errors import relative
 from .precision import PATIENCE, Point, Reference, Row, fastest, repeat_point
 

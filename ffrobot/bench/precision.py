@@ -8,9 +8,9 @@ from statistics import median
 
 from ..common.arrays import Array
 from ..common.errors import SolveError
-from ..mbs.scene.analysis_records import TIGHTEST_TOLERANCE
-from ..mbs.scene.scene import Scene
-from ..run.solution import Watcher
+from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
+from ..run.watcher import Watcher
+from ..scene.scene import Scene
 from .errors import KINDS, errors
 from .measuring import Run, run, with_analysis
 

@@ -1,6 +1,6 @@
 """How the bodies of a scene move, as a results file has it: what every moving picture is drawn from.
 
-r = R + A (x + s Φ p) with the exaggeration s (formulation.md, section 1). Exaggerated bodies would come apart at their
+r = R + A (x + s Φ p) with the exaggeration s (docs/theory.md, Kinematics). Exaggerated bodies would come apart at their
 joints: each is moved with the point it hangs from, along a tree of joints that starts at the ground.
 """
 
@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from ..common.arrays import Array, Indices
+from ..common.plane import rotated
+from ..mbs.joints.joints import JOINT_TYPES
+from ..mbs.scene.topology import Edge, Topology, spanning_forest
 from ..results.file import Results
 
-GROUND = "ground"
 VISIBLE_DEFORMATION = 0.05  # of the mechanism's size
 
 
@@ -44,12 +46,12 @@ class BodyMotion:
     @property
     def global_points(self) -> Array:
         """Where the points are in global axes (T, k, 2), m."""
-        return self.position[:, None] + rotated(self.angle, self.points + self.deflection)
+        return self.position[:, None] + rotated(self.angle[:, None], self.points + self.deflection)
 
     def global_deflection(self, point: str) -> Array:
         """A Φ p of a point (T, 2), in m: how much a unit of s moves it in global axes."""
         k = self.point_names.index(point)
-        return rotated(self.angle, self.deflection[:, k : k + 1])[:, 0]
+        return rotated(self.angle, self.deflection[:, k])
 
 
 def body_motion(results: Results, analysis: str, name: str, frames: Indices) -> BodyMotion:
@@ -59,7 +61,7 @@ def body_motion(results: Results, analysis: str, name: str, frames: Indices) -> 
     labels = [label for label in results.names(points) if label.startswith(f"{name}.")]
     deflection = _stacked([results[f"{points}/{label}/deflection"][frames] for label in labels], len(frames))
     reached = _stacked([results[f"{points}/{label}/position"][frames] for label in labels], len(frames))
-    at = (rotated(-angle[:1], reached[:1] - position[:1, None]) - deflection[:1])[0]
+    at = (rotated(-angle[:1, None], reached[:1] - position[:1, None]) - deflection[:1])[0]
     along = np.argsort(at[:, 0], kind="stable")
     modal = results.modal(analysis, name)[frames] if name in results.modal_files else None
     return BodyMotion(name, position, angle, modal, tuple(labels[i] for i in along), at[along], deflection[:, along])
@@ -67,26 +69,13 @@ def body_motion(results: Results, analysis: str, name: str, frames: Indices) -> 
 
 def ordered_bodies(scene: Mapping[str, Any]) -> list[str]:
     """Bodies in an order in which each comes after the one it hangs from."""
-    tree = hanging(scene)
-    return [*tree, *(body["name"] for body in scene["body"] if body["name"] not in tree)]
+    return list(topology(scene).carriers)
 
 
-def hanging(scene: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
-    """For each body the joint's (own point, point or ground it hangs from), nearest to the ground first."""
-    tree: dict[str, tuple[str, str]] = {}
-    reached, joints = {GROUND}, list(scene.get("joint", []))
-    while True:
-        found = [
-            (own, other)
-            for joint in joints
-            for own, other in (joint["between"], joint["between"][::-1])
-            if _body(other) in reached and _body(own) not in reached
-        ]
-        if not found:
-            return tree
-        own, other = found[0]
-        tree[_body(own)] = (own, other)
-        reached.add(_body(own))
+def topology(scene: Mapping[str, Any]) -> Topology:
+    """Which joint carries which body, of a scene as a results file has it."""
+    edges = [Edge(tuple(joint["between"]), JOINT_TYPES[joint["type"]].locates) for joint in scene.get("joint", [])]
+    return spanning_forest([body["name"] for body in scene["body"]], edges)
 
 
 def carried(bodies: Sequence[BodyMotion], scene: Mapping[str, Any]) -> dict[str, Array]:
@@ -94,15 +83,17 @@ def carried(bodies: Sequence[BodyMotion], scene: Mapping[str, Any]) -> dict[str,
 
     `bodies` are all those of the scene, as `ordered_bodies` has them.
     """
-    by_name, tree = {body.name: body for body in bodies}, hanging(scene)
+    by_name, carriers = {body.name: body for body in bodies}, topology(scene).carriers
     shift: dict[str, Array] = {}
     for body in bodies:
-        own, other = tree.get(body.name, ("", GROUND))
         shift[body.name] = np.zeros_like(body.position)
-        if own in body.point_names:
-            shift[body.name] -= body.global_deflection(own)
-        if other in (parent := by_name.get(_body(other), body)).point_names:
-            shift[body.name] += shift[parent.name] + parent.global_deflection(other)
+        if (carrier := carriers[body.name]) is None:
+            continue
+        if carrier.own in body.point_names:
+            shift[body.name] -= body.global_deflection(carrier.own)
+        parent = by_name.get(carrier.parent)
+        if parent is not None and carrier.other in parent.point_names:
+            shift[body.name] += shift[parent.name] + parent.global_deflection(carrier.other)
     return shift
 
 
@@ -110,17 +101,6 @@ def visible_exaggeration(size: float, deflection: float) -> float:
     """The largest of 1, 2, 5, 10, … 1000 that keeps `deflection` to a visible part of the mechanism's `size`, in m."""
     steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
     return max((s for s in steps if s * deflection <= VISIBLE_DEFORMATION * size), default=1.0)
-
-
-def rotated(angle: Array, vectors: Array) -> Array:
-    """A(θ) times vectors (T, k, 2), for θ (T,)."""
-    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
-
-
-def _body(side: str) -> str:
-    return side.partition(".")[0]
 
 
 def _stacked(arrays: Sequence[Array], outputs: int) -> Array:

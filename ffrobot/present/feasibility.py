@@ -16,7 +16,7 @@ from ..common.validation import quoted
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:
     """Tables of one analysis of the results file at `path`, or of all. Raises `InputError` where there are none."""
-    from ..results.write import FORMAT
+    from ..results.file import FORMAT
 
     try:
         with h5py.File(path, "r") as file:

@@ -17,8 +17,9 @@ from ..common.errors import InputError
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
-from ..results.loop import HEADINGS, metrics_of, metrics_row
-from ..results.write import FORMAT as RESULTS_FORMAT
+from ..results.control import read_metrics
+from ..results.file import FORMAT as RESULTS_FORMAT
+from .control import LOOP_COLUMNS, loop_row
 
 
 def describe(path: Path) -> str:
@@ -82,7 +83,7 @@ def _results(file: h5py.File) -> str:
         lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
     analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "wall (s)")
     datasets = Table("dataset", "shape")
-    loops = Table(*HEADINGS, box=None, padding=(0, 1, 0, 0))
+    loops = Table(*LOOP_COLUMNS, box=None, padding=(0, 1, 0, 0))
     for name, group in file.items():
         time, attributes = group["time"], group.attrs
         analyses.add_row(
@@ -90,7 +91,7 @@ def _results(file: h5py.File) -> str:
             f"{attributes['wall_seconds']:.3f}",
         )  # fmt: skip
         if "control/commands" in group:
-            loops.add_row(*metrics_row(name, metrics_of(group["control"].attrs)))
+            loops.add_row(*loop_row(name, read_metrics(group["control"].attrs)))
         group.visititems(
             lambda _, item: datasets.add_row(item.name, str(item.shape)) if isinstance(item, h5py.Dataset) else None
         )

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from ..common.parallel import is_first
-from ..run.solution import Watcher
+from ..run.watcher import Watcher
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID

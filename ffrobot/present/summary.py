@@ -10,16 +10,16 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..mbs.analysis.analyses import Outcome
+from ..actuation.control.closed_loop import LoopRecord
+from ..actuation.feasibility import Feasibility
 from ..mbs.analysis.elastic_joints import unresolved_gears
-from ..mbs.analysis.motors_only import describe_zeros, is_minimum_phase, path_error
-from ..mbs.model.geometric_stiffening import NOTABLE
+from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.truncation import modes_kept
-from ..mbs.solve.stable_inversion import Inversion
-from ..results.loop import HEADINGS, metrics_row
-from ..run.mode_choice import ModeChoice
-from ..run.solution import Solution
-from .control_summary import LINEAR_COLUMNS, PLACEMENT_COLUMNS, linear_lines, linear_table, placement_table
+from ..mbs.quantities.stiffening import NOTABLE
+from ..run.solution import ModeChoice, Solution
+from .control import control_lines, control_tables
+from .tables import plain_table
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
 
@@ -37,9 +37,10 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     for table in _tables(solution):
         console.print()
         console.print(table)
-    for name in solution.feasibility:
-        console.print(f"{name}: {_verdict(solution, name)}")
-    for line in linear_lines(solution):
+    for name, result in solution.analyses.items():
+        if result.feasibility is not None:
+            console.print(f"{name}: {_verdict(result.feasibility)}")
+    for line in control_lines(solution):
         console.print(line)
     notes = Table.grid(padding=(0, 2))
     for title, text in _notes(solution, seconds):
@@ -51,38 +52,34 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
 
 def _tables(solution: Solution) -> Iterator[Table]:
     """What was found of each kind, where there is any."""
-    if any(solution.voltages.values()):
+    if any(result.voltages for result in solution.analyses.values()):
         yield _voltages(solution)
-    if solution.loops:
-        yield _loops(solution)
-    if any(solution.stresses.values()):
+    if any(result.stresses for result in solution.analyses.values()):
         yield _stresses(solution)
-    if solution.linear:
-        yield linear_table(solution, _table(*LINEAR_COLUMNS))
-    if solution.placements:
-        yield placement_table(solution, _table(*PLACEMENT_COLUMNS))
+    yield from control_tables(solution)
 
 
 def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     outcomes = solution.outcomes
     chosen = {
-        name: f"{outcome.integrator.name}; {outcome.integrator.reason}"
+        name: f"{chosen.name}; {chosen.reason}"
         for name, outcome in outcomes.items()
-        if outcome.analysis.integrated and outcome.analysis.integrator == "auto"
+        if outcome.analysis.is_integrated and (chosen := outcome.statistics.integrator).is_automatic
     }
     yield from (("integrator", line) for line in _alike(chosen.items()))
     for name, outcome in outcomes.items():
-        if outcome.inversion is not None:
-            yield "motors only", f"{name}: {_inversion(outcome, outcome.inversion)}"
+        if isinstance(outcome.details, InvertedPath):
+            yield "motors only", f"{name}: {_inversion(outcome, outcome.details)}"
     if solution.mode_choice is not None:
         yield "modes", _modes(solution, solution.mode_choice)
-    warnings = [(name, line) for name, loop in solution.loops.items() for line in loop.warnings]
+    loops = {name: outcome.details for name, outcome in outcomes.items() if isinstance(outcome.details, LoopRecord)}
+    warnings = [(name, line) for name, loop in loops.items() for line in loop.warnings]
     warnings += [(name, line) for name, outcome in outcomes.items() for line in unresolved_gears(outcome.gears)]
     yield from (("warning", line) for line in _alike(warnings))
     yield _stiffening(solution)
     yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
-    if solution.skipped:
-        yield "skipped", "; ".join(solution.skipped)
+    if solution.omissions:
+        yield "skipped", "; ".join(solution.omissions)
 
 
 def _alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
@@ -118,8 +115,9 @@ def _modes(solution: Solution, choice: ModeChoice) -> str:
     return "\n".join(lines)
 
 
-def _inversion(outcome: Outcome, inversion: Inversion) -> str:
+def _inversion(outcome: Outcome, found: InvertedPath) -> str:
     """What the zeros are, how the path was inverted, and what that leaves of it."""
+    inversion = found.inversion
     linear, factor = inversion.linearisation, inversion.servo.factor
     error = np.abs(path_error(inversion, outcome.time, outcome.q)).max()
     left = f"largest error of the path {error:.2g}"
@@ -128,14 +126,14 @@ def _inversion(outcome: Outcome, inversion: Inversion) -> str:
         return f"{output}: minimum phase, integrated forward; {left}"
     return (
         f"not minimum phase, zeros at {describe_zeros(linear)} 1/s; stable inversion with"
-        f" {outcome.analysis.pre_actuation:.3g} s of pre- and {outcome.analysis.post_actuation:.3g} s of post-actuation"
+        f" {found.pre_actuation:.3g} s of pre- and {found.post_actuation:.3g} s of post-actuation"
         f" (start off rest by {inversion.off_rest:.1g}); {left}"
     )
 
 
 def _stiffening(solution: Solution) -> tuple[str, str]:
     """What loads along the links do to their stiffness, and whether the equations know."""
-    effect = max(solution.stiffening_effects.values(), default=0.0)
+    effect = max((result.stiffening_effect for result in solution.analyses.values()), default=0.0)
     changes = f"loads change a mode's stiffness by up to {100 * effect:.2g} %"
     if solution.stiffened:
         return "stiffening", f"geometric stiffening is on: {changes}"
@@ -145,27 +143,27 @@ def _stiffening(solution: Solution) -> tuple[str, str]:
 
 
 def _analyses(solution: Solution) -> Table:
-    table = _table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
+    table = plain_table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
-        analysis, reached = outcome.analysis, outcome.time[-1]
-        integrated = analysis.integrated
+        analysis, run, reached = outcome.analysis, outcome.statistics, outcome.time[-1]
+        integrated = analysis.is_integrated
         table.add_row(
             name,
             analysis.kind,
-            outcome.integrator.name if integrated else "",
-            f"{reached:g}" if outcome.status == "completed" else f"{reached:g} of {analysis.end:g}",
-            f"{outcome.steps}" if integrated else "",
+            run.integrator.name if integrated else "",
+            f"{reached:g}" if run.status == "completed" else f"{reached:g} of {analysis.last_time:g}",
+            f"{run.steps}" if integrated else "",
             f"{analysis.tolerance:.0e}" if integrated else "",
             _violation(outcome),
-            f"{outcome.wall_seconds:.3f}",
+            f"{run.wall_seconds:.3f}",
         )
     return table
 
 
 def _voltages(solution: Solution) -> Table:
-    table = _table("voltages of", "on", "largest (V)", "limit (V)", "times limit", "cond Φ_V")
-    for name, by_body in solution.voltages.items():
-        for body, values in by_body.items():
+    table = plain_table("voltages of", "on", "largest (V)", "limit (V)", "times limit", "cond Φ_V")
+    for name, result in solution.analyses.items():
+        for body, values in result.voltages.items():
             patches = solution.patches[body]
             limit = patches.limit.min()
             table.add_row(
@@ -179,39 +177,21 @@ def _voltages(solution: Solution) -> Table:
     return table
 
 
-def _verdict(solution: Solution, analysis: str) -> str:
+def _verdict(feasibility: Feasibility) -> str:
     """Whether the actuators can do it, and which cannot."""
-    short = solution.feasibility[analysis].short
+    short = feasibility.short
     if not short:
         return "motors and patches can do it, as far as limits are given"
     lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
     return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility"
 
 
-def _loops(solution: Solution) -> Table:
-    table = _table(*HEADINGS)
-    for name, loop in solution.loops.items():
-        table.add_row(*metrics_row(name, loop.metrics))
-    return table
-
-
 def _stresses(solution: Solution) -> Table:
-    table = _table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)")
-    for name, by_body in solution.stresses.items():
-        for body, stress in by_body.items():
+    table = plain_table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)")
+    for name, result in solution.analyses.items():
+        for body, stress in result.stresses.items():
             value, k, place = stress.largest()
-            table.add_row(name, body, f"{value / 1e6:.4g}", place, f"{solution.outcomes[name].time[k]:g}")
-    return table
-
-
-def _table(*headers: str) -> Table:
-    """Columns of text without lines: the first ones left, numbers right; names fold where they must."""
-    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    for k, header in enumerate(headers):
-        if k < 2 or header == "integrator":
-            table.add_column(header, overflow="fold")
-        else:
-            table.add_column(header, justify="right", no_wrap=True)
+            table.add_row(name, body, f"{value / 1e6:.4g}", place, f"{result.outcome.time[k]:g}")
     return table
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..common.validation import did_you_mean
+from ..common.validation import did_you_mean, quoted
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_modal_body
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from ..actuation.control.linear_model import LinearModel
 
-
+FORMAT = "ffrobot-results"
 COLUMN = re.compile(r"(?P<dataset>.*?)\[(?P<column>\d+)\]")
 
 
@@ -135,15 +135,36 @@ class Results:
 
     def modal(self, analysis: str, body: str) -> Array:
         """P (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""
-        group = f"{analysis}/bodies/{body}"
-        p, transform = self[f"{group}/modal"], f"{group}/modal_transform"
-        return p @ self[transform].T if self.has(transform) else p
+        from .bodies import (
+            read_modal,  # here, as below: what writes a group loads the core, which reading can do without
+        )
+
+        self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none
+        return read_modal(self._file[analysis], body)
 
     def linear(self, analysis: str) -> tuple[LinearModel, ...]:
-        """The linear models of an analysis of kind "linear", one for each of its times."""
+        """The linear models of an analysis, one for each of its times. Raises `InputError` where it has none."""
+        if not self.has(f"{analysis}/linear"):
+            raise InputError(
+                f'{self.path}: expected a linear analysis ({quoted(self._with_models())}), found "{analysis}"'
+            )
         from .linear import read_linear
 
-        return read_linear(self, analysis)
+        return read_linear(self._file, analysis)
+
+    def export_linear(self, analysis: str | None, path: Path) -> str:
+        """Write the linear models of an analysis, the first that has any if not named, to .npz or .mat; its name."""
+        known = self._with_models()
+        if analysis is None and not known:
+            raise InputError(f'{self.path}: expected an analysis of kind = "linear", found none')
+        from .linear import save_models
+
+        name = analysis or known[0]
+        save_models(self.linear(name), path)
+        return name
+
+    def _with_models(self) -> list[str]:
+        return [name for name in self.analyses if self.has(f"{name}/linear")]
 
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`."""

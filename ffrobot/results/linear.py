@@ -1,28 +1,26 @@
-"""What linear analyses and placements leave in a results file, and the way back to a model."""
+"""Linear models in results files, and in files of their own."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from ..actuation.control.linear_analysis import LinearAnalysis
+from ..actuation.control.linear import LinearModels
 from ..actuation.control.linear_model import LinearModel, save_arrays
-from ..actuation.control.placement import Placed
 from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
-from ..common.errors import InputError
-from ..common.validation import quoted
-from ..mbs.analysis.analyses import Outcome
-from .file import Results
+from ..mbs.analysis.outcome import Outcome
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
 NAMES = ("state_names", "input_names", "output_names")
 
 
-def write_linear(group: h5py.Group, linear: LinearAnalysis, outcome: Outcome) -> None:
-    """Models (T, …), poles, frequencies, shapes of all bodies, reach and zeros."""
+def write_linear(group: h5py.Group, outcome: Outcome, linear: LinearModels) -> None:
+    """Of an analysis: linear/, with models (T, …), poles, frequencies, shapes of all bodies, reach and zeros."""
+    group = group.create_group("linear")
     for key in MATRICES:
         group[key] = np.array([getattr(model, key) for model in linear.models])
     for key in NAMES:
@@ -56,52 +54,23 @@ def _write_zeros(group: h5py.Group, name: str, pair: tuple[str, ...], found: tup
     dataset.attrs["minimum_phase"] = [zeros.minimum_phase for zeros in found]
 
 
-def write_placement(group: h5py.Group, placed: Placed) -> None:
-    """The patches found and those spread evenly, what each reaches, and what one patch would reach anywhere."""
-    group.attrs.update({"body": placed.wanted.body, "criterion": placed.wanted.criterion})
-    group.attrs.update({"measure": placed.wanted.measure, "sets": placed.sets, "method": placed.method})
-    for key, found in (("best", placed.best), ("even", placed.even)):
-        for name, values in vars(found).items():
-            group[f"{key}/{name}"] = values
-    for key in ("frequency", "share", "largest_voltage", "candidates", "candidate_reach"):
-        group[key] = getattr(placed, key)
-
-
-def read_linear(results: Results, analysis: str) -> tuple[LinearModel, ...]:
-    """The linear models of an analysis. Raises `InputError` where it has none."""
-    group = f"{analysis}/linear"
-    if not results.has(group):
-        known = [name for name in results.analyses if results.has(f"{name}/linear")]
-        raise InputError(f'{results.path}: expected a linear analysis ({quoted(known)}), found "{analysis}"')
-    attributes = results.attributes(group)
-    matrices = [results[f"{group}/{key}"] for key in MATRICES]
-    states, inputs, outputs = (tuple(str(name) for name in attributes[key]) for key in NAMES)
-    time = results.time(analysis)
+def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
+    """The linear models of an analysis that has them."""
+    group, time = file[f"{analysis}/linear"], file[f"{analysis}/time"][()]
+    states, inputs, outputs = (tuple(str(name) for name in group.attrs[key]) for key in NAMES)
     models = []
     for k, t in enumerate(time):
-        A, B, C, D, mass, transformation = (values[k] for values in matrices)
+        A, B, C, D, mass, transformation = (np.asarray(group[key][k], dtype=float) for key in MATRICES)
         models.append(LinearModel(A, B, C, D, states, inputs, outputs, float(t), mass, transformation))
     return tuple(models)
 
 
-def export_linear(results_path: Path, analysis: str | None, path: Path) -> str:
-    """Write the linear models of an analysis (the first with one, if not named) to .npz or .mat; returns its name.
-
-    One model as it is; several with a first axis over their times.
-    """
-    with Results(results_path) as results:
-        if analysis is None:
-            known = [name for name in results.analyses if results.has(f"{name}/linear")]
-            if not known:
-                raise InputError(f'{results_path}: expected an analysis of kind = "linear", found none')
-            analysis = known[0]
-        models = read_linear(results, analysis)
+def save_models(models: Sequence[LinearModel], path: Path) -> None:
+    """Write models to .npz or .mat: one as it is, several with a first axis over their times."""
     if len(models) == 1:
         models[0].save(path)
-    else:
-        arrays = models[0].arrays()
-        stacked: dict[str, Array] = {
-            key: np.array([getattr(model, key) for model in models]) for key in (*MATRICES, "time")
-        }
-        save_arrays(arrays | stacked, path)
-    return analysis
+        return
+    stacked: dict[str, Array] = {
+        key: np.array([getattr(model, key) for model in models]) for key in (*MATRICES, "time")
+    }
+    save_arrays(models[0].arrays() | stacked, path)

@@ -14,8 +14,9 @@ from ..common.validation import did_you_mean, quoted
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.fields.field_types import split_point
-from ..mbs.model.planar_body import PlanarBody, from_modal_body, from_rigid_body, with_payload
-from ..mbs.scene.scene import Scene
+from ..mbs.model.masses import with_payload
+from ..mbs.model.planar_body import PlanarBody, from_modal_body, from_rigid_body
+from ..scene.scene import Scene
 
 
 @dataclass(frozen=True)

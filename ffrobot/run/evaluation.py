@@ -1,63 +1,59 @@
-"""What follows from the motion and forces of the analyses: what patches and motors can do, stresses, placements."""
+"""What follows from the motion and forces of an analysis: what patches and motors can do, stresses."""
 
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
-from ..actuation.control.linear_analysis import linear_models
-from ..actuation.control.placement import Placed, place
 from ..actuation.feasibility import Feasibility, MotorFeasibility, judge_motors, judge_patches
 from ..actuation.patches.patches import with_patch_count
-from ..actuation.points import solve_point_forces
+from ..actuation.points import PointForces, solve_point_forces
 from ..actuation.prediction import predicted_shift, unmet_modal_forces
-from ..common.errors import InputError
-from ..mbs.analysis.analyses import Outcome
+from ..common.arrays import Array
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.observation import modes_of_file
 from ..mbs.quantities.stress import BodyStress, body_stress
-from ..mbs.scene.control_records import Placement
-
-if TYPE_CHECKING:
-    from .solution import Solution
-
-ALLOCATED = ("pcid", "fcid", "static")  # kinds of analysis whose forces patches and actuation points have to meet
+from .solution import AnalysisResult, Solution
 
 
-def evaluate(solution: Solution) -> None:
-    """What follows from the motion and forces of all analyses."""
-    for name, outcome in solution.outcomes.items():
-        started = time.perf_counter()
-        _judge_actuation(solution, outcome)
-        solution.stresses[name] = _stresses(solution, outcome)
-        solution.seconds[name] += time.perf_counter() - started
+def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
+    """The result with all that follows from its outcome."""
+    began, outcome = time.perf_counter(), result.outcome
+    result = replace(
+        result,
+        point_forces=_point_forces(solution, outcome),
+        predicted_shift=_predicted_shift(solution, result),
+        feasibility=_feasibility(solution, result),
+        stresses=_stresses(solution, outcome),
+    )
+    return replace(result, seconds=result.seconds + time.perf_counter() - began)
 
 
-def _judge_actuation(solution: Solution, outcome: Outcome) -> None:
-    """What patches and actuation points have to do for what an inverse analysis found, and whether they can."""
-    name = outcome.analysis.name
-    if outcome.F_p is not None:
-        if solution.patches:
-            unmet = unmet_modal_forces(outcome, solution.voltages[name])
-            solution.predicted_shift[name] = predicted_shift(outcome, unmet)
-        solution.feasibility[name] = _judge(solution, outcome)
-    elif outcome.inversion is not None:
-        solution.feasibility[name] = Feasibility(_judge_motors(solution, outcome), {})
-    if outcome.analysis.kind in ALLOCATED and any(outcome.assembly.is_trajectory):
-        solution.point_forces[name] = {
-            body: solve_point_forces(points, outcome) for body, points in solution.points.items()
-        }
+def _point_forces(solution: Solution, outcome: Outcome) -> dict[str, PointForces]:
+    if not (outcome.analysis.allocates_patches and any(outcome.assembly.is_trajectory)):
+        return {}
+    return {body: solve_point_forces(points, outcome) for body, points in solution.points.items()}
 
 
-def _judge(solution: Solution, outcome: Outcome) -> Feasibility:
-    """Whether motors and patches can do what an inverse analysis found."""
-    scene, name = solution.scene, outcome.analysis.name
+def _predicted_shift(solution: Solution, result: AnalysisResult) -> dict[str, Array]:
+    if result.outcome.F_p is None or not solution.patches:
+        return {}
+    return predicted_shift(result.outcome, unmet_modal_forces(result.outcome, result.voltages))
+
+
+def _feasibility(solution: Solution, result: AnalysisResult) -> Feasibility | None:
+    """Whether motors and patches can do what an inverse analysis or an equilibrium found."""
+    outcome = result.outcome
+    if outcome.F_p is None:
+        found = outcome.analysis.applicable and outcome.tau is not None
+        return Feasibility(_judge_motors(solution, outcome), {}) if found else None
     patches = {}
     for body, array in solution.patches.items():
         loaded = solution.bodies[body]
         assert loaded.modal is not None
-        trial = partial(with_patch_count, scene.path, array.layout, loaded.modal, loaded.planar)
-        patches[body] = judge_patches(array, solution.voltages[name][body], outcome, trial)
+        trial = partial(with_patch_count, solution.scene.path, array.layout, loaded.modal, loaded.planar)
+        patches[body] = judge_patches(array, result.voltages[body], outcome, trial)
     return Feasibility(_judge_motors(solution, outcome), patches)
 
 
@@ -73,22 +69,3 @@ def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
         if body.modal is not None
     }
     return {name: stress for name, stress in found.items() if stress is not None}
-
-
-def place_patches(solution: Solution, wanted: Placement, outcome: Outcome) -> Placed:
-    """The best places for the patches of one body, about `outcome` or over the path that it stands on."""
-    path, loaded = solution.scene.path, solution.bodies[wanted.body]
-    assert loaded.modal is not None
-    model, F_p = None, None
-    if wanted.criterion == "voltage":
-        source = solution.outcomes[str(outcome.analysis.source)]
-        if source.F_p is None:
-            raise InputError(
-                f'{path}: analysis "{outcome.analysis.name}": placement.criterion: expected motors that fit the'
-                f' mechanism for "voltage", found {len(solution.model.motors)} for {solution.model.degrees_of_freedom}'
-            )
-        F_p = source.F_p[:, source.modal_columns(wanted.body)]
-    else:
-        (model,) = linear_models(outcome, {})
-    layout = solution.patches[wanted.body].layout
-    return place(path, wanted, layout, loaded.modal, loaded.planar, model, F_p)

@@ -5,9 +5,9 @@ The first solves are cheap: few modes leave out the high frequencies, which hold
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,40 +15,17 @@ from ..common.arrays import Array
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.truncation import loaded_points, with_fewer_modes
 from ..mbs.quantities.observation import joint_forces, point_motion, trajectory_force
-from ..mbs.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from .solution import Solution
+from ..scene.scene import Scene
+from .bodies import LoadedBody
+from .solution import AnalysisResult, Errors, ModeChoice, Solution
 
 Reported = Mapping[str, Mapping[str, Array]]
 """Quantities of an analysis by kind and name, (T, …)."""
-Errors = Mapping[str, Mapping[str, float]]
-"""By analysis and kind of quantity, relative to peaks."""
 
 GROWTH = 1.5  # of the number of modes from one solve to the next
 LEAST_RATIO = 0.1  # of two differences one after the other: better ones are luck
 MARGIN = 0.5  # part of the tolerance that an estimate has to meet: it may be too small
 SMALLEST = 1e-3  # of the largest peak of its kind: quantities below are measured against that
-
-
-@dataclass(frozen=True)
-class ModeChoice:
-    """What the search for the number of modes found.
-
-    Attributes:
-        errors: estimated error that leaving out modes makes of the largest quantity of each kind, relative to its peak,
-            by analysis and kind; 0 where all modes of the files were needed.
-        before: likewise, how much the last solve differs from the one before it.
-        tried: numbers of modal coordinates of all bodies together in the solves; the last is the one kept.
-        seconds: of the solves before the last.
-        highest: ω (rad/s) of the highest mode kept, and of the highest there is.
-    """
-
-    errors: Errors
-    before: Errors
-    tried: Sequence[int]
-    seconds: float
-    highest: tuple[float, float]
 
 
 @dataclass
@@ -114,24 +91,66 @@ def difference(now: Reported, before: Reported) -> dict[str, float]:
     return found
 
 
+class ModeSearch:
+    """How many modes to solve a scene with next, and when there are enough."""
+
+    def __init__(self, solution: Solution) -> None:
+        self._tolerances = error_tolerances(solution.scene)
+        self._levels = truncation_levels(solution.scene, whole_bodies(solution.bodies))
+        self._estimate, self._tried = ErrorEstimate(), list[int]()
+        self._level, self._is_over, self._completed = 0, False, False
+        self._began = self._last = time.perf_counter()
+
+    def next_bodies(self) -> Mapping[str, PlanarBody] | None:
+        """The bodies to solve with; None where the last solve is the one to keep."""
+        self._last = self._last if self._is_over else time.perf_counter()
+        return None if self._is_over else self._levels[self._level]
+
+    def add(self, solution: Solution, *, last: bool) -> None:
+        """Take in a solve with the bodies asked for, which is the `last` one in any case where that is said."""
+        self._tried.append(sum(body.n_modes for body in self._levels[self._level].values()))
+        results = solution.analyses
+        self._completed = all(result.outcome.status == "completed" for result in results.values())
+        if self._completed:
+            self._estimate.add({name: reported(solution.scene, result) for name, result in results.items()})
+        enough = self._completed and self._estimate.meets(self._tolerances)
+        self._is_over = not self._more or last or enough
+        if not self._is_over:
+            hopeless = not self._completed or self._estimate.is_hopeless(self._tolerances, self._more - 1)
+            self._level = len(self._levels) - 1 if hopeless else self._level + 1
+
+    @property
+    def _more(self) -> int:
+        """How many levels there are with more modes."""
+        return len(self._levels) - 1 - self._level
+
+    def choice(self) -> ModeChoice:
+        """What was found."""
+        errors = self._estimate.errors if self._completed else {}
+        if not self._more:
+            errors = {name: dict.fromkeys(of, 0.0) for name, of in errors.items()}
+        kept, every = (
+            max(float(np.sqrt(b.stiffness.max(initial=0.0))) for b in level.values())
+            for level in (self._levels[self._level], self._levels[-1])
+        )
+        seconds = self._last - self._began
+        return ModeChoice(errors, self._estimate.differences, tuple(self._tried), seconds, (kept, every))
+
+
 def error_tolerances(scene: Scene) -> dict[str, float]:
     """What the error of each analysis may be; algebraic ones that do not say follow the tightest that is integrated."""
-    integrated = [analysis.tolerance for analysis in scene.analysis if analysis.kind in ("pcid", "forward")]
-    tightest = min(integrated, default=None)
+    tightest = min((analysis.tolerance for analysis in scene.analysis if analysis.is_resumable), default=None)
     return {
         analysis.name: tightest
-        if tightest is not None
-        and analysis.kind not in ("pcid", "forward")
-        and "tolerance" not in analysis.model_fields_set
+        if tightest is not None and not analysis.is_resumable and "tolerance" not in analysis.model_fields_set
         else analysis.tolerance
         for analysis in scene.analysis
     }
 
 
-def reported(solution: Solution, analysis: str) -> Reported:
+def reported(scene: Scene, result: AnalysisResult) -> Reported:
     """Everything of an analysis whose error counts."""
-    outcome = solution.outcomes[analysis]
-    scene, bodies = solution.scene, outcome.assembly.model.bodies
+    outcome, bodies = result.outcome, result.outcome.assembly.model.bodies
     points = [f"{body.name}.{point}" for body in bodies if body.n_modes for point in body.points]
     held = {c.owner for c in outcome.assembly.constraints if c.is_trajectory}
     joints = {joint.name: joint_forces(outcome, joint.name) for joint in scene.joint}
@@ -140,9 +159,14 @@ def reported(solution: Solution, analysis: str) -> Reported:
         "forces": {f"trajectory {name}": trajectory_force(outcome, name) for name in held}
         | {f"joint {name}": of.reaction for name, of in joints.items()},
         "motors": {name: of.motor for name, of in joints.items() if of.motor is not None},
-        "voltages": {body: of.required for body, of in solution.voltages.get(analysis, {}).items()},
+        "voltages": {body: of.required for body, of in result.voltages.items()},
     }
     return {kind: quantities for kind, quantities in found.items() if quantities}
+
+
+def whole_bodies(bodies: Mapping[str, LoadedBody]) -> dict[str, PlanarBody]:
+    """The planar bodies with all their modes."""
+    return {n: b.planar if b.planar.reduction is None else b.planar.reduction.whole for n, b in bodies.items()}
 
 
 def truncation_levels(scene: Scene, bodies: Mapping[str, PlanarBody]) -> list[dict[str, PlanarBody]]:

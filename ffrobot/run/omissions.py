@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.planar_body import PlanarBody, vanishing_terms
 from ..mbs.model.truncation import modes_kept
-from ..mbs.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from .bodies import LoadedBody
+from ..scene.scene import Scene
+from .bodies import LoadedBody
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
 
 _TERMS = {"D_ff": "damping", "S_tilde": "S̃", "j": "j"}
 
 
-def skipped(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
+def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
     """One line for each thing left out."""
     for name, body in bodies.items():
         if body.modal is None:
@@ -41,7 +38,7 @@ def skipped(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
         if of:
             whose = "" if of == flexible else f" of {', '.join(of)}"
             yield f"{symbol}{whose}, which is zero"
-    algebraic = [analysis.name for analysis in scene.analysis if analysis.kind in ("fcid", "static")]
+    algebraic = [analysis.name for analysis in scene.analysis if analysis.is_algebraic]
     if algebraic:
         yield f"integration of {', '.join(algebraic)}, algebraic"
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.parallel import is_first, processes
-from ..run.solution import Watcher
+from ..run.watcher import Watcher
 from .files import write_run
 from .runs import RESULTS, ROW, Row, Run, collected, finished_row, perform
 from .table import write_table
@@ -123,7 +123,7 @@ def _check_first(sweep: Sweep) -> None:
     from tempfile import TemporaryDirectory
 
     from ..fe_models.link_file import read_link
-    from ..mbs.scene.load import load_scene
+    from ..scene.load import load_scene
 
     with TemporaryDirectory() as folder:
         run = Run(0, sweep.points[0], Path(folder))

@@ -7,47 +7,27 @@ them. What a gear transmits is then known, and where its motor has to be follows
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
 from .. import _core
-from ..fields.time_functions import spline
-from ..model.measures import Marker, Measure
-from ..model.model import ZERO, Constraint, MechanismSystem, Model
+from ..fields.waypoints import spline
+from ..joints.measure import Marker, Measure
+from ..joints.transmission import ElasticGear
+from ..model.model import ZERO, Constraint, Model
 from ..model.planar_body import PlanarBody, from_rigid_body
-from ..model.transmissions import Gear, joint_gears, joint_rotors
-from ..scene.analysis_records import Analysis
-from ..scene.mechanism_records import RigidBody
-from ..solve.initial_state import State, output_angle
-
-if TYPE_CHECKING:
-    from .analyses import Outcome
+from ..model.system import MechanismSystem
+from ..model.transmissions import joint_gears, joint_rotors
+from ..scene.bodies import RigidBody
+from ..solve.initial_state import output_angle
+from ..solve.state import State
+from .outcome import GearMotion, Outcome
 
 DEGREE = 5
 UNRESOLVED = 0.001  # of a motor's largest moment: what every second output may change of it
-
-
-@dataclass(frozen=True)
-class GearMotion:
-    """What a gear that gives does in an inverse analysis, one row per output.
-
-    Attributes:
-        gear_moment: (T,) τ_s = k (θ_m − γ) + c (θ̇_m − γ̇), N·m: what the gear does to the second body.
-        angle, rate, acceleration: (T,) of the motor behind its gear, θ_m, rad.
-        moment: (T,) τ_s + J N ψ̈ of the motor, behind its gear.
-        unresolved: part of the largest moment by which it changes when only every second output is known.
-    """
-
-    gear_moment: Array
-    angle: Array
-    rate: Array
-    acceleration: Array
-    moment: Array
-    unresolved: float
 
 
 def with_compliance(model: Model) -> Model:
@@ -75,7 +55,7 @@ def with_compliance(model: Model) -> Model:
         for gear in gears
         for kind in (_core.MeasureKind.x, _core.MeasureKind.y)
     ]
-    firm = [joint for joint in model.scene.joint if joint.stiffness is None]
+    firm = [joint for joint in model.scene.joint if joint.elastic_gear("section") is None]
     rigid = model.scene.model_copy(update={"joint": tuple(firm)})
     turned = {gear.coordinate: gear.motor for gear in gears}
     return replace(
@@ -89,7 +69,7 @@ def with_compliance(model: Model) -> Model:
     )
 
 
-def _rotor(model: Model, gear: Gear) -> PlanarBody:
+def _rotor(model: Model, gear: ElasticGear) -> PlanarBody:
     """J N² about its center; its mass moves nowhere and only makes it as large as the body beside it."""
     beside = next(model.body(end.body) for end in (gear.coordinate.a, gear.coordinate.b) if end.body is not None)
     inertia = gear.inertia * gear.ratio**2
@@ -121,19 +101,19 @@ def add_transmission(outcome: Outcome) -> Outcome:
     return replace(outcome, gears=motions)
 
 
-def _angles(outcome: Outcome, gear: Gear) -> tuple[Array, Array]:
+def _angles(outcome: Outcome, gear: ElasticGear) -> tuple[Array, Array]:
     """γ and α_a with their rates and accelerations, each (T, 3)."""
     ground = Measure("", _core.MeasureKind.angle, Marker(None), gear.coordinate.a)
     rows = [gear.coordinate, *([] if gear.coordinate.a.body is None else [ground])]
     model = outcome.assembly.model
     assembly = MechanismSystem(model, model.joints, (), rows)
-    along = [(row, order) for row in assembly.motor_rows for order in range(3)]
+    along = [(row, order) for row in assembly.motor_measures for order in range(3)]
     x = (np.ascontiguousarray(values) for values in (outcome.q, outcome.v, outcome.a))
     read = _core.Sensing(assembly.system, along, []).read(*x)
     return read[:, :3], read[:, 3:] if len(rows) > 1 else np.zeros((len(read), 3))
 
 
-def _gear_motion(gear: Gear, time: Array, tau: Array, gamma: Array, alpha: Array) -> GearMotion:
+def _gear_motion(gear: ElasticGear, time: Array, tau: Array, gamma: Array, alpha: Array) -> GearMotion:
     J, N = gear.inertia, gear.ratio
     psi_ddot = N * gamma[:, 2] + alpha[:, 2]
     transmitted = tau - J * N * psi_ddot
@@ -147,7 +127,7 @@ def _gear_motion(gear: Gear, time: Array, tau: Array, gamma: Array, alpha: Array
     return GearMotion(transmitted, angle, rate, acceleration, moment, unresolved)
 
 
-def _twist(gear: Gear, time: Array, moment: Array) -> Array:
+def _twist(gear: ElasticGear, time: Array, moment: Array) -> Array:
     """δ, δ̇, δ̈ (T, 3) with k δ + c δ̇ = `moment` at all outputs, δ a quintic spline without knots next to the ends."""
     if len(time) <= DEGREE:
         return np.column_stack([moment / gear.stiffness, *np.zeros((2, len(time)))])
@@ -189,7 +169,7 @@ def with_rotors(source: Outcome, model: Model) -> Outcome:
     assembly = MechanismSystem(model, [*known_rows, *pins])
     lambda_ = np.zeros((len(q), len(assembly.constraints)))  # nothing pulls at the pins
     lambda_[:, [assembly.constraints.index(row) for row in known_rows]] = source.lambda_
-    return replace(source, assembly=assembly, q=q, v=v, a=a, lambda_=lambda_)
+    return replace(source, assembly=assembly, motion=replace(source.motion, q=q, v=v, a=a, lambda_=lambda_))
 
 
 def rotors_like(model: Model, state: State, source: Outcome) -> State:
@@ -210,15 +190,6 @@ def drive_sizes(source: Outcome, limit: Array) -> list[_core.TimeFunction]:
     assert tau is not None
     cut = np.clip(tau, -limit, limit)
     return spline(source.time, cut, 1 if np.any(cut != tau) else DEGREE)
-
-
-def check_applied(model: Model, analysis: Analysis) -> None:
-    """Raise `InputError` for an actuation that leaves motors behind gears that give without their moments."""
-    if analysis.apply not in ("joints", "joints+pzt"):
-        raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" beside joints'
-            f' with stiffness, found "{analysis.apply}"'
-        )
 
 
 def unresolved_gears(gears: Mapping[str, GearMotion]) -> Iterator[str]:

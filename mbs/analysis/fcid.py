@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..fields.time_functions import spline
-from ..model.model import ZERO, MechanismSystem, Model
+from ..fields.field_types import Expression, Name
+from ..fields.references import Reference
+from ..fields.waypoints import spline
+from ..model.model import ZERO, Model
 from ..model.planar_body import PlanarBody
-from ..scene.analysis_records import Analysis
-from ..solve.initial_state import check_reach, undeformed_state
-from ..solve.integrators import NOT_INTEGRATED
+from ..model.system import MechanismSystem
+from ..scene.analysis import Need, TimedAnalysis
+from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
-from .analyses import Outcome, resolver_of
+from ..solve.reach import check_reach
+from .context import Context
+from .drive import motion_of, resolver_of
+from .elastic_joints import add_transmission
+from .outcome import Details, Forces, Outcome, Statistics
 
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
 
@@ -27,7 +36,66 @@ Shape = list[list[TimeFunction]]
 """p_k(t) of each body, in the coordinates of its `PlanarBody`."""
 
 
-def run_fcid(model: Model, analysis: Analysis) -> Outcome:
+class Fcid(TimedAnalysis):
+    """Forces that move the robot along its trajectories while the modal coordinates p(t) follow a prescribed shape.
+
+    `shape`: no deflection, that of the static equilibrium at every instant, or the one given in `modal`: expressions
+    for the first modes of a body, as its modal file numbers them; all others are 0.
+    """
+
+    kind: Literal["fcid"]
+    shape: Literal["zero", "static", "given"]
+    modal: dict[Name, tuple[Expression, ...]] | None = None
+
+    is_algebraic = True
+    allocates_patches = True
+    applicable = ("joints", "joints+pzt", "points")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.modal is not None and self.shape != "given":
+            raise ValueError(f'expected the key "modal" only in shape = "given", found shape = "{self.shape}"')
+        if self.modal is None and self.shape == "given":
+            raise ValueError('expected the key "modal" in shape = "given", found none')
+        return self
+
+    def needs(self) -> Iterator[Need]:
+        """Something to follow."""
+        yield Need("kind", self.kind, "trajectory")
+
+    def references(self) -> Iterator[Reference]:
+        """The links whose shape is given."""
+        for body in self.modal or ():
+            yield Reference("modal", body)
+            yield Reference("modal", body, "flexible body")
+
+    def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
+        """The given shape."""
+        for body, functions in (self.modal or {}).items():
+            for k, function in enumerate(functions):
+                yield f"modal.{body}[{k}]", function, 2
+
+    def run(self, context: Context) -> Outcome:
+        """Motion and forces."""
+        return add_transmission(run_fcid(context.model, self))
+
+
+@dataclass(frozen=True)
+class PrescribedShape(Details):
+    """`functions`: p_k(t) of each body; `shape_force` holds it."""
+
+    functions: Shape
+    shape_force: Array
+
+    def actuation_source(self, outcome: Outcome) -> _core.ActuationSource:
+        """Everything is algebraic: it is solved for again at any time."""
+        assembly = outcome.assembly
+        return _core.FullyConstrainedActuation(
+            assembly.system, self.functions, outcome.q[0], assembly.is_trajectory, outcome.resolver()
+        )
+
+
+def run_fcid(model: Model, analysis: Fcid) -> Outcome:
     """Motion and forces for the trajectories and the shape that the analysis prescribes.
 
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
@@ -58,14 +126,17 @@ def run_fcid(model: Model, analysis: Analysis) -> Outcome:
             " prescribed shape takes the trajectory out of reach"
         )
     return Outcome(
-        analysis, assembly, analysis.times, run.q, run.v, run.a, run.multipliers[:, :frames],
-        run.tau if resolver else None, run.F_p if resolver else None, run.residual,
-        "completed", 0, 0, 0, seconds, NOT_INTEGRATED, shape_force=run.shape_force, shape=shape,
-    )  # fmt: skip
+        analysis=analysis,
+        assembly=assembly,
+        motion=motion_of(assembly, run, analysis.times),
+        forces=Forces(run.tau, run.F_p) if resolver else Forces(),
+        statistics=Statistics(wall_seconds=seconds),
+        details=PrescribedShape(shape, run.shape_force),
+    )
 
 
 def prescribed_shape(
-    assembly: MechanismSystem, analysis: Analysis, guess: Array, resolver: _core.ActuatorForces | None
+    assembly: MechanismSystem, analysis: Fcid, guess: Array, resolver: _core.ActuatorForces | None
 ) -> Shape:
     """p(t) of every body, with its derivatives."""
     bodies = assembly.model.bodies
@@ -76,9 +147,7 @@ def prescribed_shape(
     return [[ZERO] * body.n_modes for body in bodies]
 
 
-def _static(
-    assembly: MechanismSystem, analysis: Analysis, guess: Array, resolver: _core.ActuatorForces | None
-) -> Shape:
+def _static(assembly: MechanismSystem, analysis: Fcid, guess: Array, resolver: _core.ActuatorForces | None) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
     nodes = _nodes(analysis)
     p = _core.static_shape(assembly.system, nodes.tolist(), guess, resolver)
@@ -90,11 +159,11 @@ def _static(
     return _by_body(assembly.model.bodies, spline(nodes, p))
 
 
-def _nodes(analysis: Analysis) -> Array:
+def _nodes(analysis: Fcid) -> Array:
     return np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1))
 
 
-def _given(scene_path: Path, bodies: Sequence[PlanarBody], analysis: Analysis) -> Shape:
+def _given(scene_path: Path, bodies: Sequence[PlanarBody], analysis: Fcid) -> Shape:
     """The expressions of the scene; by way of a spline where the modes were made anew (payloads, patches)."""
     given: Mapping[str, tuple[TimeFunction, ...]] = analysis.modal or {}
     shape: Shape = []

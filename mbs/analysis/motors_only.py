@@ -9,21 +9,31 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..fields.time_functions import spline
+from .. import _core
+from .._core import TimeFunction
+from ..fields.field_types import NotNegative
+from ..fields.waypoints import spline
+from ..joints.measure import Measure
 from ..model.model import Model
-from ..scene.analysis_records import Analysis
-from ..solve.initial_state import check_reach, undeformed_state
+from ..scene.analysis import Need, TimedAnalysis, output_times
+from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice
+from ..solve.reach import check_reach
 from ..solve.servo import SINGULAR, Servo, is_unstable, make_servo
 from ..solve.stable_inversion import Inversion, Linearisation, invert, linearise
-from .analyses import Outcome
+from .context import Context
+from .drive import Progress, motion_of
+from .elastic_joints import add_transmission
+from .outcome import Details, Forces, Outcome, Statistics
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
 FACTOR_STEP = 0.02  # of the search for the largest factor
@@ -32,7 +42,59 @@ GROWTH = 1.0  # ln of what a motion of the zero dynamics may grow by along a pat
 REST = 1e-9  # speed of a path at rest, relative to its mean speed
 
 
-def run_motors_only(model: Model, analysis: Analysis, progress: Callable[[float], bool]) -> Outcome:
+class MotorsOnly(TimedAnalysis):
+    """Moments by which motors alone, without patches, move the robot along its trajectories.
+
+    `output` "tip" has the path's own points follow it, "redefined" where they would be with `factor` times the
+    vibration (nine tenths of the largest that is minimum phase where none is given). `pre_actuation` and
+    `post_actuation` (s) are how long motors act before and after the path, which is held there; where they are not
+    given, as long as the zero dynamics asks for.
+    """
+
+    kind: Literal["motors-only"]
+    output: Literal["tip", "redefined"] = "tip"
+    factor: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    pre_actuation: NotNegative | None = None
+    post_actuation: NotNegative | None = None
+
+    is_integrated = True
+    applicable = ("joints",)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.factor is not None and self.output != "redefined":
+            raise ValueError(f'expected the key "factor" only with output = "redefined", found "{self.output}"')
+        return self
+
+    @property
+    def times(self) -> Array:
+        """Output times (T,), s: from 0 to `end`, and the pre- and post-actuation besides where they are given."""
+        return output_times(self.end, self.output_step, self.pre_actuation or 0.0, self.post_actuation or 0.0)
+
+    def needs(self) -> Iterator[Need]:
+        """Something to follow."""
+        yield Need("kind", self.kind, "trajectory")
+
+    def run(self, context: Context) -> Outcome:
+        """Motion and moments."""
+        return add_transmission(run_motors_only(context.model, self, context.progress))
+
+
+@dataclass(frozen=True)
+class InvertedPath(Details):
+    """How the path was inverted; `loads` are held before and after it."""
+
+    inversion: Inversion
+    pre_actuation: float
+    post_actuation: float
+    loads: tuple[tuple[Measure, TimeFunction], ...]
+
+    def actuation_source(self, outcome: Outcome) -> _core.ActuationSource:
+        """The motors' forces at any time, from p(t)."""
+        return self.inversion.source()
+
+
+def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> Outcome:
     """Motion and motor forces for the trajectories, no other force acting.
 
     Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of reach,
@@ -46,8 +108,7 @@ def run_motors_only(model: Model, analysis: Analysis, progress: Callable[[float]
     _check_rest(servo, analysis, needs_future)
     pre, post = _durations(analysis, linear, needs_future)
     inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
-    analysis = analysis.model_copy(update={"pre_actuation": pre, "post_actuation": post})
-    return _outcome(analysis, inversion, time.perf_counter() - began)
+    return _outcome(analysis, InvertedPath(inversion, pre, post, servo.loads), time.perf_counter() - began)
 
 
 def path_error(inversion: Inversion, times: Array, q: Array) -> Array:
@@ -58,7 +119,7 @@ def path_error(inversion: Inversion, times: Array, q: Array) -> Array:
     return np.array([path.system.constraints(t, one, rest)[0][rows] for t, one in zip(times, q, strict=True)])
 
 
-def _output(model: Model, analysis: Analysis) -> tuple[Servo, Linearisation]:
+def _output(model: Model, analysis: MotorsOnly) -> tuple[Servo, Linearisation]:
     """The output the path is for: the point itself, or as near to it as is minimum phase or as the scene says."""
     end = analysis.end
     if analysis.output == "tip" or analysis.factor is not None:
@@ -120,7 +181,7 @@ def _check_relative_degree(servo: Servo, linear: Linearisation) -> None:
         )
 
 
-def _check_rest(servo: Servo, analysis: Analysis, needs_future: bool) -> None:
+def _check_rest(servo: Servo, analysis: MotorsOnly, needs_future: bool) -> None:
     """Raise `InputError` for a path that moves where the robot has to be at rest."""
     ends = [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
     for constraint in servo.path.model.trajectories:
@@ -136,7 +197,7 @@ def _check_rest(servo: Servo, analysis: Analysis, needs_future: bool) -> None:
                 )
 
 
-def _durations(analysis: Analysis, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
+def _durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
     """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
     s = linear.zeros[[0, -1]]
     grow, decay = s.real[is_unstable(s)], -s.real[s.real < 0]
@@ -148,19 +209,28 @@ def _durations(analysis: Analysis, linear: Linearisation, needs_future: bool) ->
     return tuple(math.ceil(value / step - 1e-9) * step for value in chosen)  # type: ignore[return-value]
 
 
-def _outcome(analysis: Analysis, inversion: Inversion, seconds: float) -> Outcome:
-    servo = inversion.servo
-    times = analysis.times
+def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> Outcome:
+    inversion, servo = found.inversion, found.inversion.servo
+    times = output_times(analysis.end, analysis.output_step, found.pre_actuation, found.post_actuation)
     inside = times <= inversion.curve.x[-1] + 1e-9 * analysis.end  # what an integration reached
     run = servo.core().outputs(times[inside].tolist(), inversion.shape, servo.resolver())
-    reached = run.reached
+    rows = slice(run.reached)
     how = "two-point problem" if is_unstable(inversion.linearisation.zeros[0]).any() else "integrated forward"
     outcome = Outcome(
-        analysis, servo.driven, times[:reached], run.q[:reached], run.v[:reached], run.a[:reached],
-        run.multipliers[:reached, : len(servo.driven.constraints)], run.tau[:reached], None,
-        run.residual[:reached], inversion.status,
-        len(inversion.curve.x) - 1, 0, inversion.iterations, seconds, Choice("collocation", how), inversion=inversion,
-    )  # fmt: skip
-    if not reached:  # an iteration that left the numbers: no motion to keep
-        replace(outcome, time_reached=float(inversion.curve.x[0])).check_completed()
+        analysis=analysis,
+        assembly=servo.driven,
+        motion=motion_of(servo.driven, run, times).at(rows),
+        forces=Forces(tau=run.tau).at(rows),
+        statistics=Statistics(
+            status=inversion.status,
+            integrator=Choice("collocation", how),
+            steps=len(inversion.curve.x) - 1,
+            evaluations=inversion.iterations,
+            wall_seconds=seconds,
+            time_reached=None if run.reached else float(inversion.curve.x[0]),
+        ),
+        details=found,
+    )
+    if not run.reached:  # an iteration that left the numbers: no motion to keep
+        outcome.check_completed()
     return outcome

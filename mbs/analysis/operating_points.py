@@ -2,19 +2,69 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from pydantic import Field
 
+from ...common.arrays import Array
 from ...common.errors import InputError
-from ..model.model import MechanismSystem, Model
-from ..scene.analysis_records import Analysis
+from ...common.validation import did_you_mean, quoted
+from ..fields.field_types import NotNegative
+from ..model.model import Model
+from ..model.system import MechanismSystem
+from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 from ..solve.initial_state import undeformed_state
 from ..solve.linearisation import held_by_motors
-from .analyses import Outcome, run_static
 from .elastic_joints import add_transmission, with_compliance, with_rotors
+from .outcome import Forces, Outcome
+from .static import run_static
 
+STATIC = "static"  # instead of an analysis' name: about the static equilibrium
 NEAR = 1e-9  # of the end of an analysis: how far from an output a time may be for rounding
+
+
+class InstantAnalysis(Analysis):
+    """`about` the static equilibrium (not given, or "static") or an earlier analysis at `times`."""
+
+    about: str | None = None
+    instants: tuple[NotNegative, ...] | None = Field(default=None, alias="times", min_length=1)
+
+    is_motion = False
+
+    @property
+    def times(self) -> Array:
+        """The instants (T,), s; 0 where none are given."""
+        return np.zeros(1) if self.instants is None else np.array(self.instants)
+
+    @property
+    def source(self) -> str | None:
+        """Name of the analysis it is about; None for the equilibrium."""
+        return None if self.about == STATIC else self.about
+
+    @property
+    def needs_times(self) -> bool:
+        """Whether a motion is of use only at given times."""
+        return True
+
+    def problems(self, among: Surroundings) -> Iterator[str]:
+        """Whether there is such a motion, and times that fit it."""
+        if self.source is None:
+            if self.instants is not None:
+                yield f'times: expected none about "{STATIC}", found {quoted(f"{t:g}" for t in self.instants)}'
+            return
+        sources = {other.name: other for other in among.earlier if other.is_motion}
+        source = sources.get(self.source)
+        if source is None:
+            known, hint = quoted((STATIC, *sources)), did_you_mean(self.source, sources)
+            yield f'about: expected an earlier analysis of a motion, {known}, found "{self.source}"{hint}'
+            return
+        if self.instants is None and self.needs_times:
+            yield f'times: expected the times of "{source.name}" about which to be linear, found none'
+        for t in self.instants or ():
+            if t > source.last_time:
+                yield f'times: expected at most {source.last_time:g}, where "{source.name}" ends, found {t:g}'
 
 
 def operating_points(model: Model, analysis: Analysis, source: Outcome | None) -> Outcome:
@@ -29,22 +79,18 @@ def operating_points(model: Model, analysis: Analysis, source: Outcome | None) -
             start = undeformed_state(MechanismSystem(model, model.joints))
             held = replace(model, trajectories=tuple(held_by_motors(model, start.q)))
         outcome = with_rotors(add_transmission(run_static(held, analysis)), with_compliance(model))
-        return replace(outcome, tau=None, F_p=None)
-    source = with_rotors(source, with_compliance(model))
+        return replace(outcome, forces=Forces())
+    moved = with_rotors(source, with_compliance(model))
     rows = [_row(model, analysis, source, t) for t in analysis.times]
-    return replace(
-        source, analysis=analysis, time=source.time[rows], q=source.q[rows], v=source.v[rows], a=source.a[rows],
-        lambda_=source.lambda_[rows], residual=source.residual[rows], tau=None, F_p=None, recording=None, shape=None,
-        shape_force=None, steps=0, rejected=0, evaluations=0, wall_seconds=0.0,
-    )  # fmt: skip
+    return Outcome(analysis, moved.assembly, moved.motion.at(rows), gears=moved.gears)
 
 
 def _row(model: Model, analysis: Analysis, source: Outcome, t: float) -> int:
     row = int(np.abs(source.time - t).argmin())
-    if abs(source.time[row] - t) > NEAR * max(1.0, source.analysis.end):
-        step = source.analysis.output_step
+    if abs(source.time[row] - t) > NEAR * max(1.0, source.analysis.last_time):
+        every = f"every {source.analysis.output_step:g} s " if isinstance(source.analysis, TimedAnalysis) else ""
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": times: expected output times of "{source.analysis.name}",'
-            f" every {step:g} s up to {source.time[-1]:g} s, found {t:g}"
+            f" {every}up to {source.time[-1]:g} s, found {t:g}"
         )
     return row

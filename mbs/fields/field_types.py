@@ -9,7 +9,9 @@ from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
 from ...common.validation import Record, existing_file, quoted
 from .._core import TimeFunction
-from .time_functions import Waypoints, load_waypoints, parse_expression, user_function
+from .expressions import parse_expression
+from .functions import user_function
+from .waypoints import Waypoints, load_waypoints
 
 GROUND = "ground"
 

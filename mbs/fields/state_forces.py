@@ -8,7 +8,7 @@ import numpy as np
 
 from ...common.errors import InputError
 from .._core import StateFunction
-from .time_functions import name_of
+from .functions import name_of
 
 
 def state_function(function: object) -> StateFunction:

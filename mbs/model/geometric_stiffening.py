@@ -2,7 +2,7 @@
 
 A unit load has the geometric stiffness K (n, n) of the prestress it causes. By virtual work, the displacement along
 that load is then Φp − ½ pᵀK p: to second order, a bent link is shorter. Everything else follows from it: mass matrix,
-velocity terms, gravity, constraints (formulation.md, section 4).
+velocity terms, gravity, constraints (docs/theory.md, Geometric stiffness).
 """
 
 from __future__ import annotations
@@ -10,18 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
-
-if TYPE_CHECKING:
-    from ...fe_models.modal_body import ModalBody
-    from ..analysis.analyses import Outcome
+from ...fe_models.modal_body import ModalBody
 
 NEGLIGIBLE = 1e-12
-NOTABLE = 0.01  # relative change of a mode's stiffness from which on the summary warns, and "auto" switches it on
 
 
 @dataclass(frozen=True)
@@ -91,33 +86,3 @@ def second_order_displacement(stiffening: GeometricStiffening | None, point: str
         return np.zeros((len(p), 2))
     displacement: Array = -0.5 * np.einsum("ti,kij,tj->tk", p, stiffening.K_points[point][:2], p)
     return displacement
-
-
-def estimated_effect(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> float:
-    """Largest relative change of a mode's stiffness by the loads of a run, whether it was on in the run or not.
-
-    Loads are those of θ̇², of the frame's acceleration less gravity, of θ̈, and of the constraints.
-    """
-    assembly, gravity = outcome.assembly, np.array(outcome.assembly.model.scene.gravity)
-    wrenches = assembly.constraint_wrenches(outcome.q, outcome.lambda_)
-    largest = 0.0
-    for body in assembly.model.bodies:
-        known = stiffening.get(body.name)
-        if known is None or not body.n_modes:
-            continue
-        columns = outcome.coordinates(body.name)
-        q, v, a = outcome.q[:, columns], outcome.v[:, columns], outcome.a[:, columns]
-        diagonal = np.outer(v[:, 2] ** 2, np.diag(known.K_omega)) - np.outer(a[:, 2], np.diag(known.K_h))
-        pull = _in_body_axes(q[:, 2], gravity - a[:, :2])
-        diagonal += pull @ np.einsum("kii->ki", known.K_s)
-        for point, wrench in wrenches.get(body.name, {}).items():
-            if point in known.K_points:
-                loads = np.column_stack([_in_body_axes(q[:, 2], wrench[:, :2]), wrench[:, 2]])
-                diagonal += loads @ np.einsum("kii->ki", known.K_points[point])
-        largest = max(largest, float((np.abs(diagonal) / body.stiffness).max(initial=0.0)))
-    return largest
-
-
-def _in_body_axes(theta: Array, vector: Array) -> Array:
-    c, s = np.cos(theta), np.sin(theta)
-    return np.column_stack([c * vector[:, 0] + s * vector[:, 1], c * vector[:, 1] - s * vector[:, 0]])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
-from ..scene.mechanism_records import RigidBody
+from ..scene.bodies import RigidBody
 from . import geometric_stiffening
 from .geometric_stiffening import GeometricStiffening
 
@@ -30,7 +30,7 @@ class PlanarPoint:
 
 @dataclass(frozen=True)
 class PlanarBody:
-    """Constants of one body in the equations of motion (formulation: Shabana, Dynamics of Multibody Systems, ch. 5).
+    """Constants of one body in the equations of motion (docs/theory.md; Shabana, Dynamics of Multibody Systems, ch. 5).
 
     Arrays are over the n modes that move in the plane; p of the modal file is `modal_transform` (n_file, n) times p.
     `m_ff` is the identity. Symbols: S_bar = S̄ (2, n); h = Ī_12 − Ī_21 (n,); j = Ī_11 + Ī_22 (n,);
@@ -63,7 +63,7 @@ class PlanarBody:
 
 @dataclass(frozen=True)
 class Reduction:
-    """How a body came by fewer modes: see `fewer_modes.with_fewer_modes`.
+    """How a body came by fewer modes: see `truncation.with_fewer_modes`.
 
     Attributes:
         whole: the body with all n modes that move in the plane.
@@ -114,7 +114,7 @@ def from_modal_body(name: str, body: ModalBody) -> PlanarBody:
         length=body.length,
         stiffening=geometric_stiffening.from_modal_body(body, in_plane),
     )
-    return _diagonalised(planar, body.stiffness[block], np.eye(len(in_plane)))
+    return diagonalised(planar, body.stiffness[block], np.eye(len(in_plane)))
 
 
 def from_rigid_body(name: str, body: RigidBody) -> PlanarBody:
@@ -143,43 +143,7 @@ def from_rigid_body(name: str, body: RigidBody) -> PlanarBody:
     )
 
 
-def with_payload(body: PlanarBody, point: str, mass: float, inertia: float) -> PlanarBody:
-    """The body with a point mass (kg) and moment of inertia (kg·m²) on one of its points, modes made anew."""
-    at = body.points[point]
-    stiffening = body.stiffening and body.stiffening.with_payload(point, at.position, mass, inertia)
-    return with_masses(replace(body, stiffening=stiffening), [at], np.array([mass]), np.array([inertia]))
-
-
-def with_masses(
-    body: PlanarBody, points: Sequence[PlanarPoint], masses: Array, inertias: Array, stiffness: Array | None = None
-) -> PlanarBody:
-    """The body with point masses (kg) and moments of inertia (kg·m²) at points of it, and more stiffness (n, n).
-
-    Masses are summed into every invariant as more material points (integrals become sums); the modal mass
-    I + Σ m ΦᵀΦ + I_p φᵀφ is brought back to the identity by a small eigenproblem. Geometric stiffening is left to the
-    caller: what it has to be depends on how the body takes the loads of their inertia.
-    """
-    x, y = np.array([at.position for at in points]).T
-    Phi_x, Phi_y = np.array([at.translation for at in points]).transpose(1, 0, 2)
-    phi = np.array([at.rotation for at in points])
-    xy = (Phi_x.T * masses) @ Phi_y
-    loaded = replace(
-        body,
-        mass=body.mass + float(masses.sum()),
-        inertia=body.inertia + float(masses @ (x * x + y * y) + inertias.sum()),
-        first_moment=body.first_moment + np.array([masses @ x, masses @ y]),
-        S_bar=body.S_bar + np.array([masses @ Phi_x, masses @ Phi_y]),
-        h=body.h + (masses * x) @ Phi_y - (masses * y) @ Phi_x + inertias @ phi,
-        j=body.j + (masses * x) @ Phi_x + (masses * y) @ Phi_y,
-        S_tilde=body.S_tilde + xy - xy.T,
-        m_xy=body.m_xy + (Phi_x.T * masses) @ Phi_x + (Phi_y.T * masses) @ Phi_y,
-    )
-    m_ff = np.eye(body.n_modes) + loaded.m_xy - body.m_xy + (phi.T * inertias) @ phi
-    K_ff = np.diag(body.stiffness)
-    return _diagonalised(loaded, K_ff if stiffness is None else K_ff + stiffness, m_ff)
-
-
-def _diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:
+def diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:
     """The body in modal coordinates that make m_ff the identity and K_ff diagonal; unchanged if they are already."""
     off_diagonal = K_ff - np.diag(np.diag(K_ff))
     if np.array_equal(m_ff, np.eye(len(m_ff))) and np.abs(off_diagonal).max(initial=0.0) <= 1e-9 * np.abs(K_ff).max(

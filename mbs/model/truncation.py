@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...common.arrays import Array
-from ..fields.field_types import GROUND, split_point
-from ..scene.scene import SceneKeys
+from ..scene.mechanism import MechanismKeys
 from .planar_body import PlanarBody, Reduction, transformed
 
 IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is rounding
@@ -48,13 +47,10 @@ def modes_kept(body: PlanarBody) -> str:
     return f"{lowest} of {body.reduction.whole.n_modes} modes{shapes}"
 
 
-def loaded_points(scene: SceneKeys, body: str) -> list[str]:
+def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
     """Points of a body at which joints, trajectories and loads of the scene act."""
-    sides = [side for joint in scene.joint for side in joint.between]
-    sides += [reference for t in scene.trajectory for reference in (t.point, t.angle) if reference is not None]
-    sides += [load.point for load in scene.load if load.point is not None]
-    found = [split_point(side) for side in sides if side != GROUND and "." in side]
-    return list(dict.fromkeys(point for name, point in found if name == body))
+    found = [reference.body_and_point for reference in scene.references() if reference.loaded]
+    return list(dict.fromkeys(part[1] for part in found if part is not None and part[0] == body))
 
 
 def interface_loads(body: PlanarBody, loaded: Sequence[str]) -> Array:
@@ -67,9 +63,9 @@ def interface_loads(body: PlanarBody, loaded: Sequence[str]) -> Array:
         if label in loaded:
             rows.append(np.sqrt(body.mass) * np.vstack([at.translation, (body.length or 1.0) * at.rotation]))
     B = np.vstack(rows)
-    size = np.linalg.norm(B, axis=1)
-    moving = size > IMMOBILE
-    return np.asarray((B[moving] / size[moving, None]).T)
+    magnitude = np.linalg.norm(B, axis=1)
+    moving = magnitude > IMMOBILE
+    return np.asarray((B[moving] / magnitude[moving, None]).T)
 
 
 def _static_modes(squares: Array, B_T: Array) -> tuple[Array, Array]:

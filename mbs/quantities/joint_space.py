@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array
-from ..analysis.analyses import Outcome
-from ..model.model import ZERO, Constraint, MechanismSystem
+from ..analysis.outcome import Outcome
+from ..model.model import ZERO, Constraint
+from ..model.system import MechanismSystem
 
 
 def motor_rates(outcome: Outcome) -> Array:

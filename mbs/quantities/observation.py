@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.plane import rotated
 from .. import _core
-from ..analysis.analyses import Outcome
+from ..analysis.outcome import Outcome
 from ..fields.field_types import split_point
 from ..model.geometric_stiffening import second_order_displacement
-from ..model.measures import Marker
-from ..model.model import Constraint, MechanismSystem
 from ..model.planar_body import PlanarBody
+from ..model.system import MechanismSystem
 
 
 @dataclass(frozen=True)
@@ -88,26 +88,23 @@ def trajectory_force(outcome: Outcome, trajectory: str) -> Array:
 def trajectory_target(outcome: Outcome, trajectory: str) -> Array:
     """Specified values (T, m) in the order of `trajectory_force`; held before 0 and after the end of the analysis."""
     targets = [c.target for c in outcome.assembly.model.trajectories if c.owner == trajectory]
-    return np.column_stack([target.sample(np.clip(outcome.time, 0.0, outcome.analysis.end))[0] for target in targets])
+    return np.column_stack(
+        [target.sample(np.clip(outcome.time, 0.0, outcome.analysis.last_time))[0] for target in targets]
+    )
 
 
 def joint_forces(outcome: Outcome, joint: str) -> JointForces:
     """Reaction of a joint on its second body, and what its motor does."""
-    reaction, moment = np.zeros((len(outcome.time), 2)), None
-    for i, constraint in enumerate(outcome.assembly.constraints):
+    assembly, reaction, moment = outcome.assembly, np.zeros((len(outcome.time), 2)), None
+    for i, constraint in enumerate(assembly.constraints):
         if constraint.is_trajectory or constraint.owner != joint:
             continue
         force = -outcome.lambda_[:, i]
-        match constraint.row.kind:
-            case _core.MeasureKind.x:
-                reaction[:, 0] += force
-            case _core.MeasureKind.y:
-                reaction[:, 1] += force
-            case _core.MeasureKind.slide:
-                reaction += force[:, None] * _direction(outcome, constraint)
-            case _core.MeasureKind.angle:
-                moment = force
-    motors = list(outcome.assembly.model.motors)
+        if constraint.measure.carries_moment:
+            moment = force
+        else:
+            reaction += force[:, None] * assembly.force_direction(constraint.measure, outcome.q)
+    motors = list(assembly.model.motors)
     moments = outcome.motor_moments
     motor = moments[:, motors.index(joint)] if moments is not None and joint in motors else None
     return JointForces(reaction, moment, motor)
@@ -122,7 +119,7 @@ def motor_angle(outcome: Outcome, joint: str) -> Array | None:
     if not rows:
         return None
     assembly = MechanismSystem(model, model.joints, (), rows)
-    sensing = _core.Sensing(assembly.system, [(assembly.motor_rows[0], 0)], [])
+    sensing = _core.Sensing(assembly.system, [(assembly.motor_measures[0], 0)], [])
     angle: Array = sensing.read(outcome.q, outcome.v, outcome.a)[:, 0]
     return angle
 
@@ -131,21 +128,3 @@ def energies(outcome: Outcome) -> dict[str, Array]:
     """Kinetic, strain and gravitational energy (J) and dissipated power (W), each (T,)."""
     values = outcome.assembly.system.energies(outcome.q, outcome.v)
     return dict(zip(("kinetic", "strain", "gravitational", "dissipated_power"), values.T, strict=True))
-
-
-def _direction(outcome: Outcome, constraint: Constraint) -> Array:
-    """The direction (T, 2) of a slide in global axes: fixed to the section of its first end."""
-    return rotated(_section_angle(outcome, constraint.row.a), np.array(constraint.row.direction))
-
-
-def _section_angle(outcome: Outcome, end: Marker) -> Array:
-    if end.body is None:
-        return np.zeros(len(outcome.time))
-    q = outcome.q[:, outcome.coordinates(end.body)]
-    return q[:, 2] + q[:, 3:] @ outcome.assembly.model.body(end.body).points[end.point].rotation
-
-
-def rotated(theta: Array, vector: Array) -> Array:
-    """A(θ) times vectors of the body frame, (T, 2)."""
-    x, y = np.broadcast_to(vector, (len(theta), 2)).T
-    return np.column_stack([np.cos(theta) * x - np.sin(theta) * y, np.sin(theta) * x + np.cos(theta) * y])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array
-from ..model.model import MechanismSystem
-from .initial_state import State, frame_gradients
+from ..model.masses import system_mass_matrix
+from ..model.system import MechanismSystem
 from .path_checks import JUMP
-from .vibration import system_mass_matrix
+from .position import frame_gradients
+from .state import State
 
 NEARLY_SINGULAR = 1e-3  # ratio of singular values of C_q; a motion that only comes near it has no trouble there
 FAR_BENT = 0.5  # of a link's length, in the mean
@@ -32,7 +33,7 @@ def find_cause(assembly: MechanismSystem, t: float, state: State) -> str:
 def _not_a_number(assembly: MechanismSystem, t: float, state: State) -> str:
     for constraint in assembly.constraints:
         if not np.isfinite(constraint.target(t)).all():
-            return f"{constraint.row.label} has no finite value, velocity or acceleration there"
+            return f"{constraint.measure.label} has no finite value, velocity or acceleration there"
     if not np.isfinite(assembly.system.evaluate(t, state.q, state.v)[0]).all():
         return "the accelerations there are no finite numbers: a load or a target grows without bound"
     return ""
@@ -69,7 +70,7 @@ def _load_jumps(assembly: MechanismSystem, t: float) -> str:
     """Whether a load jumps there: its size just after t is not what its value and slope just before t make of it."""
     dt = 1e-9 * max(t, 1e-9)
     loads = [(row.label, size) for row, size in assembly.model.loads]
-    loads += [(f'load of the patches of "{load.body}"', load.size) for load in assembly.model.modal_loads]
+    loads += [(f'load of the patches of "{load.body}"', load.magnitude) for load in assembly.model.modal_loads]
     for label, size in loads:
         before, after = (size(s) for s in (t - dt, t + dt))
         if not np.isfinite(after).all():
@@ -109,7 +110,7 @@ def _singular(assembly: MechanismSystem, t: float, q: Array) -> str:
     if ratio > NEARLY_SINGULAR:
         return ""
     weights = np.abs(left[:, -1])
-    involved = dict.fromkeys(c.row.label for c, w in zip(assembly.constraints, weights, strict=True) if w > 0.1)
+    involved = dict.fromkeys(c.measure.label for c, w in zip(assembly.constraints, weights, strict=True) if w > 0.1)
     return (
         f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; {'; '.join(involved)}):"
         " an arm stretched or folded, or a mechanism at a dead centre, where no finite force on the driven point says"

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
-from ..model.model import MechanismSystem
-from ..scene.analysis_records import Analysis
-from .initial_state import State
+from ..model.system import MechanismSystem
+from ..scene.analysis import IntegratedAnalysis
+from .state import State
 from .vibration import modal_excitation, vibrations
 
 METHODS = {
@@ -33,6 +33,7 @@ NEGLIGIBLE_DOP853, NEGLIGIBLE_RADAU = 0.1, 1.0
 
 MOST_COORDINATES = 600  # beyond them the eigenproblem takes longer than many a run
 MANY_PERIODS = 1e5
+ASKED_FOR = "asked for"
 
 
 @dataclass(frozen=True)
@@ -42,12 +43,21 @@ class Choice:
     name: str
     reason: str
 
+    @property
+    def is_automatic(self) -> bool:
+        """Whether the program made it, not the scene."""
+        return self.reason != ASKED_FOR
+
 
 NOT_INTEGRATED = Choice("none", "nothing to integrate")
 
 
 def choose_integrator(
-    assembly: MechanismSystem, analysis: Analysis, start: State, steering: _core.ExternalLoads | None = None
+    assembly: MechanismSystem,
+    analysis: IntegratedAnalysis,
+    start: State,
+    steering: _core.ExternalLoads | None,
+    outputs: int,
 ) -> Choice:
     """The integrator for an analysis from `start`, under the actuation `steering` that it replays, if any.
 
@@ -55,8 +65,8 @@ def choose_integrator(
     rings above the tolerance. The rule estimates the number of steps of both; a wrong guess costs time, not accuracy.
     """
     if analysis.integrator != "auto":
-        return Choice(analysis.integrator, "asked for")
-    if len(analysis.times) == 1:
+        return Choice(analysis.integrator, ASKED_FOR)
+    if outputs == 1:
         return Choice("dop853", "nothing to integrate")
     if assembly.model.gears:
         return Choice("dop853", "springs in joints are not among the stiff forces of implicit integrators")
@@ -74,7 +84,7 @@ def choose_integrator(
     phase = partial(_ringing_phase, modes.frequency, modes.damping_ratio, excited, analysis.end)
     explicit = phase(NEGLIGIBLE_DOP853 * analysis.tolerance) / (RESOLVED_DOP853 * scale ** (1 / 8))
     implicit = phase(NEGLIGIBLE_RADAU * analysis.tolerance) / (RESOLVED_RADAU * scale ** (1 / 5))
-    explicit, implicit = max(analysis.end * top / STABLE, explicit), max(len(analysis.times), implicit)
+    explicit, implicit = max(analysis.end * top / STABLE, explicit), max(outputs, implicit)
     rings = excited > analysis.tolerance
     felt = f"{modes.frequency[rings].max():.3g} rad/s" if rings.any() else "no frequency"
     reason = f"vibrations up to {top:.3g} rad/s, ringing above the tolerance up to {felt}"
@@ -82,7 +92,7 @@ def choose_integrator(
     return Choice("radau" if cost * implicit < explicit else "dop853", reason)
 
 
-def beyond_order(choice: Choice, analysis: Analysis) -> str:
+def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:
     """A sentence where steps have become too short with a method of order 2; empty with any other."""
     if choice.name != "generalized-alpha":
         return ""

@@ -16,9 +16,9 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
-from ..fields.field_types import split_point
-from ..model.measures import FRAME, Marker, Measure, joint_coordinate
-from ..model.model import ZERO, Constraint, MechanismSystem, Model
+from ..joints.measure import FRAME, GROUND_FRAME, Marker, Measure, marker_at
+from ..model.model import ZERO, Constraint, Model
+from ..model.system import MechanismSystem
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
 
@@ -68,15 +68,17 @@ class Linearisation:
     """
 
     def __init__(self, model: Model, q: Array, points: Sequence[str] = ()) -> None:
-        joints = {f"joint/{name}": row for name, row in _joint_coordinates(model).items()}
-        give = {gear.joint for gear in model.gears}
-        motors = {f"{'motor' if name in give else 'joint'}/{name}": row for name, row in model.motors.items()}
-        candidates = [motors, {name: row for name, row in joints.items() if name not in motors}, _frames(model)]
+        joints = {f"joint/{name}": measure for name, measure in _joint_coordinates(model).items()}
+        elastic = {gear.joint for gear in model.gears}
+        motors = {
+            f"{'motor' if name in elastic else 'joint'}/{name}": measure for name, measure in model.motors.items()
+        }
+        candidates = [motors, {name: joint for name, joint in joints.items() if name not in motors}, _frames(model)]
         places = {f"{point}/{axis}": _place(point, axis) for point in points for axis in "xy"}
-        rows = [row for group in (*candidates, joints, places) for row in group.values()]
+        measures = [measure for group in (*candidates, joints, places) for measure in group.values()]
         self.model = model
-        self.assembly = MechanismSystem(model, model.joints, model.loads, rows)
-        core = iter(self.assembly.motor_rows)
+        self.assembly = MechanismSystem(model, model.joints, model.loads, measures)
+        core = iter(self.assembly.motor_measures)
         known = [{name: next(core) for name in group} for group in (*candidates, joints, places)]
         self._motors = {f"joint/{name}": row for name, row in zip(model.motors, known[0].values(), strict=True)}
         self._joints = {name: row for name, row in known[0].items() if name not in known[3]} | known[3]
@@ -128,23 +130,23 @@ def held_by_motors(model: Model, q: Array) -> list[Constraint]:
 
 
 def _joint_coordinates(model: Model) -> dict[str, Measure]:
-    """Coordinates of the joints that move, by name; a motor's is the row that it drives."""
-    moving = [joint for joint in model.scene.joint if joint.type != "weld"]
-    rows = model.motors | {gear.joint: gear.coordinate for gear in model.gears}
-    return {joint.name: rows.get(joint.name) or joint_coordinate(model.scene, joint) for joint in moving}
+    """Coordinates of the joints that move, by name; a motor's is the measure that it drives."""
+    own = {joint.name: joint.coordinate(model.scene.motors) for joint in model.scene.joint}
+    driven = model.motors | {gear.joint: gear.coordinate for gear in model.gears}
+    return {name: driven.get(name, measure) for name, measure in own.items() if measure is not None}
 
 
 def _frames(model: Model) -> dict[str, Measure]:
     """Angles and places of the frames."""
     return {
-        f"frame/{body.name}/{kind.name}": Measure(f"frame of {body.name}", kind, Marker(None), Marker(body.name, FRAME))
+        f"frame/{body.name}/{kind.name}": Measure(f"frame of {body.name}", kind, GROUND_FRAME, Marker(body.name, FRAME))
         for kind in (_core.MeasureKind.angle, _core.MeasureKind.x, _core.MeasureKind.y)
         for body in model.bodies
     }
 
 
 def _place(point: str, axis: str) -> Measure:
-    return Measure(f"{point}/{axis}", getattr(_core.MeasureKind, axis), Marker(None), Marker(*split_point(point)))
+    return Measure(f"{point}/{axis}", getattr(_core.MeasureKind, axis), GROUND_FRAME, marker_at(point))
 
 
 def _choose(
@@ -159,7 +161,7 @@ def _choose(
         result: Array = _core.row_tangents(assembly.system, rows, q, rest, rest)[0][:, frames]
         return result
 
-    basis = np.linalg.qr(gradients(assembly.constraint_rows).T)[0]
+    basis = np.linalg.qr(gradients(assembly.constraint_measures).T)[0]
     chosen: dict[str, _core.Measure] = {}
     for group in groups:
         missing = len(frames) - basis.shape[1]

@@ -7,7 +7,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from .._core import TimeFunction
-from ..model.model import MechanismSystem
+from ..model.system import MechanismSystem
 
 SAMPLES = 2001
 LOOKED_INTO = 5  # intervals between samples, the roughest ones
@@ -30,8 +30,8 @@ def check_smooth(assembly: MechanismSystem, end: float) -> None:
             if found is not None:
                 t, before, after = found
                 raise InputError(
-                    f"{assembly.model.scene.path}: {constraint.row.label}: expected a continuous {quantity}, found a"
-                    f" jump from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot"
+                    f"{assembly.model.scene.path}: {constraint.measure.label}: expected a continuous {quantity}, found"
+                    f" a jump from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot"
                     " follow; round it off (waypoints make a smooth curve)"
                 )
 

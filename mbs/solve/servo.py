@@ -14,8 +14,9 @@ from ...common.arrays import Array, Booleans, ComplexArray
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..model.measures import Measure
-from ..model.model import ZERO, Constraint, MechanismSystem, Model
+from ..joints.measure import Measure
+from ..model.model import ZERO, Constraint, Model
+from ..model.system import MechanismSystem
 from .initial_state import undeformed_state
 
 MOST_ITERATIONS = 50
@@ -44,13 +45,13 @@ class Servo:
         order = [c.owner for c in self.driven.constraints]
         numbers = [order.index(motor_owner(name)) for name in self.path.model.motors]
         return _core.ServoConstraint(
-            self.path.system, self.path.motor_rows, self.driven.system, numbers, self.factor, list(self.offset),
+            self.path.system, self.path.motor_measures, self.driven.system, numbers, self.factor, list(self.offset),
             self.guess,
         )  # fmt: skip
 
     def resolver(self) -> _core.ActuatorForces:
         """What reads the motors' forces off the multipliers."""
-        return _core.ActuatorForces(self.driven.system, self.driven.is_trajectory, self.driven.motor_rows)
+        return _core.ActuatorForces(self.driven.system, self.driven.is_trajectory, self.driven.motor_measures)
 
     def source(self, shape: list[list[TimeFunction]]) -> _core.ActuationSource:
         """The motors' forces for p(t), at any time."""
@@ -85,7 +86,7 @@ def make_servo(model: Model, end: float, factor: float) -> Servo:
             ' kind = "pcid" gives their motors\' forces'
         )
     rows = list(model.motors.values())
-    held = [Constraint(c.row, c.target.held(0.0, end), c.owner, c.component, True) for c in model.trajectories]
+    held = [Constraint(c.measure, c.target.held(0.0, end), c.owner, c.component, True) for c in model.trajectories]
     motors = [Constraint(row, ZERO, motor_owner(name), "value", True) for name, row in model.motors.items()]
     loads = tuple((row, size.held(0.0, end)) for row, size in model.loads)
     path = MechanismSystem(model, [*model.joints, *held], loads, rows)

@@ -7,8 +7,9 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
-from ..model.model import MechanismSystem
-from .initial_state import State, with_rates
+from ..model.system import MechanismSystem
+from .position import with_rates
+from .state import State
 
 MOST_ITERATIONS = 60
 TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, positions to the size of the robot
@@ -22,7 +23,7 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
     Raises `SolveError` where the robot has no equilibrium near the start.
     """
     system, n = assembly.system, assembly.system.coordinates
-    rest, sizes = np.zeros(n), assembly.sizes
+    rest, sizes = np.zeros(n), assembly.scales
 
     def residual(x: Array) -> tuple[Array, float]:
         C, _, C_q = system.constraints(0.0, x[:n], rest)
@@ -35,7 +36,7 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
     x, largest = np.concatenate([start.q, multipliers]), np.inf
     for _ in range(MOST_ITERATIONS):
         r, size = residual(x)
-        closed = np.abs(r[n:] / assembly.row_sizes).max(initial=0.0) <= TOLERANCE
+        closed = np.abs(r[n:] / assembly.measure_scales).max(initial=0.0) <= TOLERANCE
         if closed and (np.abs(r[:n]).max() <= TOLERANCE * size or largest <= ROUNDING):
             return with_rates(assembly, x[:n], start.v)
         try:

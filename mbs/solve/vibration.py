@@ -8,9 +8,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
-from ..model.model import MechanismSystem
-from ..model.planar_body import PlanarBody
-from .initial_state import State
+from ..model.masses import block_diagonal, system_mass_matrix
+from ..model.system import MechanismSystem
+from .state import State
 
 
 @dataclass(frozen=True)
@@ -28,30 +28,12 @@ class Vibrations:
     mass: Array
 
 
-def mass_matrix(body: PlanarBody, q: Array) -> Array:
-    """M of one body at its coordinates q = (R, θ, p): formulation.md, section 4 (Shabana, ch. 5)."""
-    theta, p = q[2], q[3:]
-    c, s = np.cos(theta), np.sin(theta)
-    A, A_theta = np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]])
-    s, s_p, inertia, h = body.first_moment + body.S_bar @ p, body.S_bar, body.m_xy, body.h + p @ body.S_tilde
-    if (K := body.stiffening) is not None:
-        s, s_p, inertia, h = s - 0.5 * p @ K.K_s @ p, s_p - K.K_s @ p, inertia - K.K_omega, h - K.K_h @ p
-    M = np.eye(len(q))
-    M[:2, :2] = body.mass * np.eye(2)
-    M[:2, 2] = M[2, :2] = A_theta @ s
-    M[:2, 3:] = A @ s_p
-    M[3:, :2] = M[:2, 3:].T
-    M[2, 2] = body.inertia + 2 * body.j @ p + p @ inertia @ p
-    M[2, 3:] = M[3:, 2] = h
-    return M
-
-
 def vibrations(assembly: MechanismSystem, state: State) -> Vibrations:
     """The constrained vibrations about `state`, with the stiffness of the links alone (no loads, no rotation)."""
     bodies = assembly.model.bodies
     M = system_mass_matrix(assembly, state.q)
     K = _stiffness(assembly)
-    D = _block_diagonal([block for body in bodies for block in (np.zeros((3, 3)), body.damping)])
+    D = block_diagonal([block for body in bodies for block in (np.zeros((3, 3)), body.damping)])
     _, _, C_q = assembly.system.constraints(0.0, state.q, np.zeros_like(state.q))
     free = np.linalg.svd(C_q)[2][len(C_q) :].T if len(C_q) else np.eye(len(K))
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
@@ -67,23 +49,6 @@ def vibrations(assembly: MechanismSystem, state: State) -> Vibrations:
 def _stiffness(assembly: MechanismSystem) -> Array:
     """Diagonal of K over all coordinates."""
     return np.concatenate([np.concatenate([np.zeros(3), body.stiffness]) for body in assembly.model.bodies])
-
-
-def system_mass_matrix(assembly: MechanismSystem, q: Array) -> Array:
-    """M (coordinates, coordinates) of all bodies and of the rotors in joints."""
-    blocks = zip(assembly.model.bodies, assembly.first, strict=True)
-    M = _block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
-    gradient, inertia = assembly.system.rotor_rows(q)
-    return M + gradient.T @ (inertia[:, None] * gradient)
-
-
-def _block_diagonal(blocks: list[Array]) -> Array:
-    size = sum(len(block) for block in blocks)
-    matrix, first = np.zeros((size, size)), 0
-    for block in blocks:
-        matrix[first : first + len(block), first : first + len(block)] = block
-        first += len(block)
-    return matrix
 
 
 def modal_excitation(

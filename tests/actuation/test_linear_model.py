@@ -11,8 +11,8 @@ from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import controllability, observability, robot_modes
 from ffrobot.actuation.control.zeros import zeros
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.model import MechanismSystem
-from ffrobot.mbs.model.planar_body import with_payload
+from ffrobot.mbs.model.masses import with_payload
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.linearisation import linearise
 

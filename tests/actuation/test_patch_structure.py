@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.actuation.patches.structure import structure_effect, with_patches
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.model.planar_body import from_modal_body
-from ffrobot.mbs.scene.actuator_records import PztLayout
 
 E, RHO, H, B = 2.068427e11, 7850.0, 0.015, 0.025
 E_P, RHO_P, T_P = 63e9, 7600.0, 0.75e-3

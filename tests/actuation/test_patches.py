@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from ffrobot.actuation.patches.patches import check_reach, patch_array
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.modal_body import OutlinedPatches
-from ffrobot.mbs.model.planar_body import from_modal_body, with_payload
-from ffrobot.mbs.scene.actuator_records import PztLayout
+from ffrobot.mbs.model.masses import with_payload
+from ffrobot.mbs.model.planar_body import from_modal_body
 
 EI = 2.068427e11 * 0.025 * 0.015**3 / 12
 C = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2  # Shaban 2022, Eq. 14
@@ -32,7 +33,7 @@ def tip_deflection(planar, array, voltage):
 
 
 def test_moment_per_volt(cantilever):
-    np.testing.assert_allclose(patches(cantilever(10)).moment_per_volt, 1.364344e-3, rtol=1e-6)  # formulation, sec. 9
+    np.testing.assert_allclose(patches(cantilever(10)).moment_per_volt, 1.364344e-3, rtol=1e-6)  # c of docs/theory.md
     np.testing.assert_allclose(patches(cantilever(10)).moment_per_volt, C, rtol=1e-12)
 
 

@@ -9,12 +9,12 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.placement import held_modes, place
+from ffrobot.actuation.control.records import Placement
 from ffrobot.actuation.patches.patches import patch_array
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.model import MechanismSystem
 from ffrobot.mbs.model.planar_body import from_modal_body
-from ffrobot.mbs.scene.actuator_records import PztLayout
-from ffrobot.mbs.scene.control_records import Placement
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.linearisation import linearise
 

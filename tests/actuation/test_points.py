@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ffrobot.actuation.points import point_set, with_points
+from ffrobot.actuation.points import ActuationPoints, point_set, with_points
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.planar_body import from_modal_body, from_rigid_body, with_payload
-from ffrobot.mbs.scene.actuator_records import ActuationPoints
-from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.model.masses import with_payload
+from ffrobot.mbs.model.planar_body import from_modal_body, from_rigid_body
+from ffrobot.mbs.scene.bodies import RigidBody
 
 SCENE = Path("scene.toml")
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ffrobot.actuation.patches.patches import patch_array
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.model.planar_body import from_modal_body
-from ffrobot.mbs.scene.actuator_records import PztLayout
 
 LINK = """
 name = "link"

@@ -6,7 +6,7 @@ import pytest
 from ffrobot.actuation.points import driving_forces
 from ffrobot.mbs.quantities.joint_space import motor_rates
 from ffrobot.mbs.quantities.observation import trajectory_force
-from ffrobot.run.solution import solve
+from ffrobot.run.solve import solve
 
 SCENE = """
 name = "two_link"
@@ -142,7 +142,7 @@ def patch_power(solution, outcome, which):
     """Of the patches of each link, and of the modal forces they leave unmet."""
     patches, unmet = [], []
     for body, array in solution.patches.items():
-        voltages = solution.voltages[outcome.analysis.name][body]
+        voltages = solution.analyses[outcome.analysis.name].voltages[body]
         p_dot = velocity(outcome, body)[:, 3:]
         patches.append(((getattr(voltages, which) @ array.Phi_V.T) * p_dot).sum(axis=1))
         unmet.append((voltages.unmet * p_dot).sum(axis=1))
@@ -176,7 +176,7 @@ def test_power_at_the_actuation_points_is_that_of_Q_a(solution, analysis):
     """Thirteen components on each link, chosen by the program, carry all of Q_a."""
     outcome = solution.outcomes[analysis]
     for body in ("link1", "link2"):
-        chosen, forces = solution.points[body], solution.point_forces[analysis][body]
+        chosen, forces = solution.points[body], solution.analyses[analysis].point_forces[body]
         assert forces.rank == 13
         assert forces.condition_number < 1e4
         assert np.all(forces.residual <= 1e-11 * np.abs(forces.force).max())
@@ -206,7 +206,7 @@ def test_power_that_limits_leave_unmet_is_residual_times_velocity(limited, analy
     outcome = limited.outcomes[analysis]
     patches, unmet = patch_power(limited, outcome, "within_limit")
     assert np.abs(unmet).max() > 10 * np.abs(patches).max() or analysis == "straight"
-    assert np.abs(limited.voltages[analysis]["link1"].within_limit).max() == 200.0
+    assert np.abs(limited.analyses[analysis].voltages["link1"].within_limit).max() == 200.0
     check_sum_is_zero(motor_power(limited, outcome), patches, unmet, -driving_power(outcome))
 
 
@@ -221,7 +221,7 @@ def test_power_that_motors_alone_leave_unmet_is_that_of_the_modal_forces(solutio
 def test_power_that_too_few_points_leave_unmet_is_residual_times_velocity(limited, analysis):
     outcome = limited.outcomes[analysis]
     for body in ("link1", "link2"):
-        forces = limited.point_forces[analysis][body]
+        forces = limited.analyses[analysis].point_forces[body]
         assert forces.force.shape == (6, 3)
         Q_a = (driving_forces(outcome, body) * velocity(outcome, body)).sum(axis=1)
         if np.any(Q_a):
@@ -231,8 +231,8 @@ def test_power_that_too_few_points_leave_unmet_is_residual_times_velocity(limite
 
 
 def test_checkpoint_of_voltages(solution):
-    """formulation.md, section 9, at t = 0.1 s: kilovolts, of which link 1 needs none with motors at the frames."""
-    voltages = solution.voltages["inverse"]
+    """At t = 0.1 s: kilovolts, of which link 1 needs none with motors at the frames."""
+    voltages = solution.analyses["inverse"].voltages
     expected = {"section": [91903.83, 76997.78, 22644.86], "frame": [0.0, 0.0, 0.0]}[solution.scene.motors]
     np.testing.assert_allclose(voltages["link1"].required[-1, [0, 3, 9]], expected, atol=1e-5 * 92000)
     np.testing.assert_allclose(

@@ -41,7 +41,7 @@ def evaluate(core, count):
     sys.modules[spec.name] = ffrobot.mbs._core = module
     spec.loader.exec_module(module)
     from ffrobot.bench.hand_written import TIME, general_state
-    from ffrobot.run.solution import prepare
+    from ffrobot.run.prepare import prepare
 
     assembly, q, v = general_state(prepare(SCENE).model)
     module.time_evaluations(assembly.system, TIME, q, v, count)
@@ -83,7 +83,7 @@ def per_evaluation(command):
 
 def main():
     from ffrobot.bench.hand_written import FLAGS, HandWritten
-    from ffrobot.run.solution import prepare
+    from ffrobot.run.prepare import prepare
 
     with TemporaryDirectory() as name:
         folder = Path(name)

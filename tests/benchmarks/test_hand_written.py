@@ -16,9 +16,8 @@ import pytest
 
 from ffrobot.bench.evaluation import evaluation_seconds
 from ffrobot.bench.hand_written import STEPS, TIME, HandWritten, general_state
-from ffrobot.mbs.analysis.analyses import run_pcid
-from ffrobot.mbs.scene.analysis_records import Analysis
-from ffrobot.run.solution import prepare
+from ffrobot.mbs.analysis.pcid import Pcid, run_pcid
+from ffrobot.run.prepare import prepare
 
 ROOT = Path(__file__).parents[2]
 ALARM = {"evaluation": 4.6, "pcid": 8.2}
@@ -52,7 +51,7 @@ def test_both_compute_the_same(two_link, program):
     assembly, q, v = general_state(two_link)
     a, lambda_ = assembly.system.evaluate(TIME, q, v)
     _, (force_x, force_y, alpha, _) = program(1, 0)
-    # the program takes displacements of 1e-12 m at supports for zero; forces amplify that (formulation.md, section 3)
+    # the program takes displacements of 1e-12 m at supports for zero; forces amplify that
     np.testing.assert_allclose(tip_force(assembly, lambda_), [force_x, force_y], rtol=1e-8)
     assert alpha == pytest.approx(a[assembly.first[0] + 2], abs=1e-8 * np.abs(a).max())
 
@@ -71,7 +70,7 @@ def test_right_hand_side_ratio(benchmark, two_link, program):
 
 
 def test_pcid_ratio(benchmark, two_link, program):
-    analysis = Analysis(name="inverse", kind="pcid", end=1.0, output_step=0.1, tolerance=1e-4)
+    analysis = Pcid(name="inverse", kind="pcid", end=1.0, output_step=0.1, tolerance=1e-4)
     rounds, outcomes, hand_written = (5 if benchmark.enabled else 3), [], []
     for _ in range(rounds):
         outcomes.append(run_pcid(two_link, analysis, False, lambda t: True))
@@ -80,7 +79,7 @@ def test_pcid_ratio(benchmark, two_link, program):
     peak = 67.0  # N, of the tip force (cases/two_link)
     np.testing.assert_allclose(force, hand_written[0][1][:2], atol=2e-4 * peak)
     benchmark.pedantic(lambda: None, rounds=1)
-    general = min(outcome.wall_seconds for outcome in outcomes)
+    general = min(outcome.statistics.wall_seconds for outcome in outcomes)
     report(benchmark, "pcid", general, min(run[0][0] for run in hand_written))
 
 

@@ -34,11 +34,11 @@ from scipy.optimize import lsq_linear
 from ffrobot.bench.evaluation import evaluation_seconds
 from ffrobot.bench.hand_written import TIME, general_state
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.analyses import initial_state, run_pcid
-from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.model.model import MechanismSystem
-from ffrobot.mbs.scene.analysis_records import Analysis
-from ffrobot.run.solution import prepare
+from ffrobot.mbs.analysis.drive import initial_state
+from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.model.system import MechanismSystem
+from ffrobot.run.prepare import prepare
 
 INVERSE = '\n[[analysis]]\nname = "inverse"\nkind = "pcid"\nend = 1.0\noutput_step = 0.001\ntolerance = 1e-6\n'
 EVALUATIONS = 1000
@@ -89,7 +89,7 @@ def test_right_hand_side(benchmark, scene):
 def test_pcid_of_one_second(benchmark, scene):
     model = prepare(scene).model
     outcome = benchmark(run_pcid, model, model.scene.analysis[0], False, lambda t: True)
-    benchmark.extra_info |= {"steps": outcome.steps, "evaluations": outcome.evaluations}
+    benchmark.extra_info |= {"steps": outcome.statistics.steps, "evaluations": outcome.statistics.evaluations}
     assert outcome.status == "completed"
     assert outcome.wall_seconds < 5 * outcome.evaluations * evaluation(model)
 
@@ -97,9 +97,9 @@ def test_pcid_of_one_second(benchmark, scene):
 @pytest.mark.parametrize(("shape", "evaluations"), [("zero", 40), ("static", 120)])
 def test_fcid_of_1000_outputs(benchmark, scene, shape, evaluations):
     model = prepare(scene).model
-    analysis = Analysis(name="fcid", kind="fcid", shape=shape, end=1.0, output_step=0.001)
+    analysis = Fcid(name="fcid", kind="fcid", shape=shape, end=1.0, output_step=0.001)
     outcome = benchmark(run_fcid, model, analysis)
-    benchmark.extra_info |= {"solver": outcome.wall_seconds}
+    benchmark.extra_info |= {"solver": outcome.statistics.wall_seconds}
     assert len(outcome.time) == 1001
     again = min(run_fcid(model, analysis).wall_seconds for _ in range(3))
     assert again < evaluations * 1001 * evaluation(model)

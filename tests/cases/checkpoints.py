@@ -30,12 +30,35 @@ def readme_table(case, first):
     return rows
 
 
-def check_table(case, first, measured, relative=0.02):
-    """Every number of the README to `relative`."""
+# Tables of the READMEs, by case and by the head of their first column: how far from them a number may be, relatively.
+# The program wrote these numbers itself, in two to five digits: they show that nothing has changed unnoticed
+# (regression), not that it is right. What is right is tested against closed forms, by identities and by orders, and in
+# test_two_link.py and test_slider_crank.py against independent codes.
+TABLES = {
+    ("two_link_fcid", "analysis"): 0.02,
+    ("two_link_patched", "link"): 0.05,  # changes of frequency in percent, of two digits
+    ("two_link_patched", "peak of"): 1e-3,
+    ("straight_slew", "run"): 0.01,
+    ("two_link_split", "run"): 0.05,  # errors that rounding has a share in
+    ("two_link_linear", "about"): 1e-3,
+    ("two_link_linear", "from → to"): 1e-3,
+    ("two_link_placement", "analysis"): 0.01,
+    ("geared_arm", "joint"): 0.02,
+    ("compliant_arm", "gears"): 1e-3,
+    ("compliant_arm", "joint"): 0.02,
+    ("compliant_arm", "run"): 0.02,
+    ("two_link_closed_loop", "run"): 0.02,
+    ("two_link_rest_to_rest", "run"): 0.02,
+    ("two_link_rest_to_rest", "times less"): 0.03,  # quotients of the above
+}
+
+
+def check_table(case, first, measured, smallest=0.0):
+    """Every number of the README as `TABLES` says; what is below `smallest` counts as nothing."""
     expected = readme_table(case, first)
     assert expected.keys() == measured.keys()
     for name, numbers in expected.items():
-        np.testing.assert_allclose(measured[name], numbers, rtol=relative, err_msg=name)
+        np.testing.assert_allclose(measured[name], numbers, rtol=TABLES[case, first], atol=smallest, err_msg=name)
 
 
 def column(group, name):
@@ -66,7 +89,7 @@ def check_column(case, analysis, name, times, printed, relative):
 
 
 def check_layout(case, analyses, output_times, flexible, rigid):
-    """Names, shapes and attributes of interfaces.md, "Results file".
+    """Names, shapes and attributes of a results file (docs/reference/files.md).
 
     `flexible` maps bodies to mode numbers, `rigid` bodies to their points; `output_times` holds for every analysis.
     """

@@ -79,7 +79,7 @@ def _loaded(program, cwd, environment):
 
 
 def test_stage_2_loads_no_finite_elements(short_scene, ffrobot, tmp_path):
-    assert _loaded("import ffrobot.mbs, ffrobot.mbs.analysis.analyses", tmp_path, ffrobot.environment) == []
+    assert _loaded("import ffrobot.mbs, ffrobot.scene.kinds", tmp_path, ffrobot.environment) == []
     solve = f"""
 import sys
 sys.argv = ["ffrobot", "solve", "scene.toml", "-o", {str(tmp_path / "r.h5")!r}]

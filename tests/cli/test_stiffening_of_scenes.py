@@ -1,4 +1,4 @@
-"""The key `geometric_stiffening` of a scene, from link files to results: formulation.md, sections 4 and 11."""
+"""The key `geometric_stiffening` of a scene, from link files to results: docs/theory.md, Geometric stiffness."""
 
 import h5py
 import numpy as np
@@ -117,7 +117,7 @@ def test_loads_of_the_file_have_their_signs(spin_up, tmp_path, ffrobot):
 
 
 def test_two_link_case_moves_by_some_percent(ffrobot, case_copy):
-    """Its tip force by about 2 % in the mean within 0.2 s (formulation.md, section 4); the summary warns without it."""
+    """Its tip force by about 2 % in the mean within 0.2 s; the summary warns without it."""
     forces = {}
     for key in ("false", "true"):
         scene = case_copy("two_link")

@@ -112,7 +112,8 @@ def test_two_processes_give_the_same(tmp_path):
 import sys
 import numpy as np
 from mpi4py import MPI
-from fields import C, PATH, L, H, B, bending, box, field, lagrange_space, patch_tags
+from fields import C, PATH, L, H, B, bending, box, field, patch_tags
+from ffrobot.mesh.compat import lagrange_space
 from ffrobot.fe_models.solid.stress import point_stresses
 from ffrobot.fe_models.solid.surface_patches import outlined_patches
 space = lagrange_space(box("tetrahedron", (8, 2, 2)), 1, vector=True)

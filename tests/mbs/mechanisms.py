@@ -5,9 +5,12 @@ from pathlib import Path
 import numpy as np
 from oracle import Mechanism
 
-from ffrobot.mbs.model.model import MechanismSystem, build_model
-from ffrobot.mbs.scene.analysis_records import Analysis
-from ffrobot.mbs.scene.scene import Scene
+from ffrobot.mbs.analysis.forward import Forward
+from ffrobot.mbs.analysis.pcid import Pcid
+from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.system import MechanismSystem
+from ffrobot.scene.load import make_scene
+from ffrobot.scene.scene import Scene
 
 PLACEHOLDER = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # the bodies themselves are passed beside the scene
 
@@ -29,12 +32,24 @@ def make_model(bodies, modal_loads=(), **keys):
     return build_model(scene, bodies, modal_loads)
 
 
+def checked_scene(joints, bodies=("a",)):
+    """The scene of rigid bodies with these joints, checked as one in a file is."""
+    rigid = PLACEHOLDER | {"points": {"root": (0.0, 0.0), "tip": (1.0, 0.0)}}
+    return make_scene(
+        name="test",
+        gravity=(0.0, -9.81),
+        body=[{"name": name, "rigid": rigid} for name in bodies],
+        joint=joints,
+        analysis=[{"name": "rest", "kind": "static"}],
+    )
+
+
 def pcid(name="inverse", end=1.0, output_step=0.01, **keys):
-    return Analysis(name=name, kind="pcid", end=end, output_step=output_step, **keys)
+    return Pcid(name=name, kind="pcid", end=end, output_step=output_step, **keys)
 
 
 def forward(name="forward", end=1.0, output_step=0.01, **keys):
-    return Analysis(name=name, kind="forward", end=end, output_step=output_step, **keys)
+    return Forward(name=name, kind="forward", end=end, output_step=output_step, **keys)
 
 
 def revolute(name, first, second, **keys):
@@ -67,9 +82,9 @@ def oracle_of(assembly):
     return Mechanism(
         model.bodies,
         model.scene.gravity,
-        [(constraint.row, constraint.target) for constraint in assembly.constraints],
+        [(constraint.measure, constraint.target) for constraint in assembly.constraints],
         model.loads,
-        [(load.body, load.vector, load.size) for load in model.modal_loads],
+        [(load.body, load.vector, load.magnitude) for load in model.modal_loads],
         model.rotors,
         model.frictions,
     )

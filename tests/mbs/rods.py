@@ -3,7 +3,7 @@
 from mechanisms import make_model, revolute
 
 from ffrobot.mbs.model.planar_body import from_rigid_body
-from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.scene.bodies import RigidBody
 
 
 def rod(name, length, mass):

@@ -23,7 +23,7 @@ def resolved(assembly, seed=0):
     q, v = start.q.copy(), start.v + rng.standard_normal(len(start.v))
     for body, first in zip(assembly.model.bodies, assembly.first, strict=True):
         q[first + 3 : first + 3 + body.n_modes] = 0.05 * rng.standard_normal(body.n_modes)
-    resolver = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_rows)
+    resolver = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
     run = _core.run(
         assembly.system, assembly.groups, assembly.moments, None, [0.0, 1e-6], q, v, 1e-6, 1, DOP853, 0.8,
         resolver, always, None, None,

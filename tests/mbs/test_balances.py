@@ -8,7 +8,8 @@ from links import arm, arm_links
 from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
 from scipy.integrate import simpson
 
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.quantities.observation import energies
 
 

@@ -4,21 +4,24 @@ import numpy as np
 import pytest
 from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, arm, arm_links
-from mechanisms import always, forward, make_model, pcid, relative, revolute
+from mechanisms import always, checked_scene, forward, make_model, pcid, relative, revolute
 from rods import rod
 
+from ffrobot.common.errors import InputError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid, run_static
-from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.analysis.motors_only import run_motors_only
+from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.motors_only import MotorsOnly, run_motors_only
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet, actuation_source
-from ffrobot.mbs.model.model import ZERO, MechanismSystem
+from ffrobot.mbs.analysis.static import Static, run_static
+from ffrobot.mbs.model.masses import mass_matrix
+from ffrobot.mbs.model.model import ZERO
 from ffrobot.mbs.model.planar_body import from_rigid_body
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.quantities.observation import joint_forces
-from ffrobot.mbs.scene.analysis_records import Analysis
-from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.scene.bodies import RigidBody
 from ffrobot.mbs.solve.initial_state import undeformed_state
-from ffrobot.mbs.solve.vibration import mass_matrix
 
 G = 9.81
 AT_REST = {"state": "static", "angles": ANGLES}
@@ -107,7 +110,7 @@ def test_geared_two_link_arm_needs_the_moments_of_spong():
             initial={"angles": {"a": 0.4, "b": 0.0}},
         )
         if kind == "fcid":
-            return run_fcid(model, Analysis(name="i", kind="fcid", shape="zero", end=1.0, output_step=0.01))
+            return run_fcid(model, Fcid(name="i", kind="fcid", shape="zero", end=1.0, output_step=0.01))
         return run_pcid(model, pcid(tolerance=1e-9), False, always)
 
     for kind in ("pcid", "fcid"):
@@ -124,7 +127,7 @@ def test_geared_two_link_arm_needs_the_moments_of_spong():
 def test_motors_alone_carry_rotors_and_friction_along():
     """Inverse dynamics with motors only, applied to the flexible arm, brings its tip along the path."""
     model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION, initial=AT_REST)
-    servo = Analysis(name="servo", kind="motors-only", end=1.0, output_step=0.01)
+    servo = MotorsOnly(name="servo", kind="motors-only", end=1.0, output_step=0.01)
     source = run_motors_only(model, servo, always)
     replay = forward(actuation="servo", apply="joints", tolerance=1e-7)
     outcome = run_forward(model, replay, source, ActuatorSet(), always)
@@ -185,7 +188,7 @@ def test_a_prismatic_joint_moves_the_reflected_mass():
 
 
 def test_equilibrium_knows_neither_rotors_nor_friction():
-    keys = {"analysis": (Analysis(name="static", kind="static"),), "motors": "section"}
+    keys = {"analysis": (Static(name="static", kind="static"),), "motors": "section"}
     with_them = run_static(geared_arm(None, GEARED | FRICTION, GEARED | FRICTION, **keys), keys["analysis"][0])
     without = run_static(geared_arm(None, {}, {}, **keys), keys["analysis"][0])
     np.testing.assert_allclose(with_them.q, without.q, atol=1e-12)
@@ -195,13 +198,12 @@ def test_equilibrium_knows_neither_rotors_nor_friction():
 @pytest.mark.parametrize(
     ("keys", "expected"),
     [
-        ({"rotor_inertia": -1.0}, "greater than or equal to 0"),
+        ({"rotor_inertia": -1.0}, "a number of at least 0"),
         ({"gear_ratio": 0.0}, "greater than 0"),
         ({"friction_speed": 0.1}, "only beside coulomb_friction"),
-        ({"type": "weld", "viscous_friction": 1.0}, "in a weld"),
+        ({"type": "weld", "viscous_friction": 1.0}, "in a weld joint"),
     ],
 )
 def test_bad_keys_are_refused(keys, expected):
-    joint = revolute("O", "ground", "a.root") | keys
-    with pytest.raises(ValueError, match=expected):
-        make_model([rod("a", 1.0, 1.0)], joint=[joint])
+    with pytest.raises(InputError, match=expected):
+        checked_scene([revolute("O", "ground", "a.root") | keys])

@@ -6,16 +6,19 @@ import zoo
 from links import ANGLES, TIP, arm, arm_links
 from mechanisms import always, assemble, forward, oracle_of, pcid
 
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet
-from ffrobot.mbs.solve.initial_state import State, undeformed_state
-from ffrobot.mbs.solve.vibration import mass_matrix, modal_excitation, vibrations
+from ffrobot.mbs.model.masses import mass_matrix
+from ffrobot.mbs.solve.initial_state import undeformed_state
+from ffrobot.mbs.solve.state import State
+from ffrobot.mbs.solve.vibration import modal_excitation, vibrations
 
 AT_REST = {"angles": ANGLES, "state": "static"}
 
 
 def chosen(model, **keys):
-    return run_pcid(model, pcid(**keys), False, always).integrator
+    return run_pcid(model, pcid(**keys), False, always).statistics.integrator
 
 
 def test_mass_matrix_is_the_oracle_s():
@@ -103,7 +106,7 @@ def test_a_replay_that_does_not_ring_is_integrated_implicitly(at_rest):
     model, inverse = at_rest
     analysis = forward(tolerance=1e-3, actuation="inverse", apply="trajectory")
     outcome = run_forward(model, analysis, inverse, ActuatorSet(), always)
-    assert outcome.integrator.name == "radau"
+    assert outcome.statistics.integrator.name == "radau"
     assert np.abs(outcome.q - inverse.q).max() < 1e-4
 
 
@@ -112,7 +115,7 @@ def test_motors_without_the_modal_forces_that_went_with_them_let_links_ring(at_r
     model, inverse = at_rest
     analysis = forward(tolerance=1e-3, actuation="inverse", apply="joints", max_steps=100)
     outcome = run_forward(model, analysis, inverse, ActuatorSet(), always)
-    assert (inverse.integrator.name, outcome.integrator.name) == ("radau", "dop853")
+    assert (inverse.statistics.integrator.name, outcome.statistics.integrator.name) == ("radau", "dop853")
 
 
 def test_a_choice_of_the_scene_is_kept():

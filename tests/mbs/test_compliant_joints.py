@@ -4,20 +4,22 @@ import numpy as np
 import pytest
 from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, TIP, arm, arm_links, quintic
-from mechanisms import always, forward, make_model, pcid, relative, revolute
+from mechanisms import always, checked_scene, forward, make_model, pcid, relative, revolute
 from rods import rod
 from scipy.integrate import simpson
 
+from ffrobot.actuation.control.linear import Linear
 from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import robot_modes
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid, run_static
 from ffrobot.mbs.analysis.elastic_joints import add_transmission, unresolved_gears, with_compliance
-from ffrobot.mbs.analysis.motors_only import run_motors_only
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.motors_only import MotorsOnly, run_motors_only
 from ffrobot.mbs.analysis.operating_points import operating_points
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet
+from ffrobot.mbs.analysis.static import Static, run_static
 from ffrobot.mbs.quantities.observation import joint_forces, motor_angle, point_motion
-from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.mbs.solve.linearisation import linearise
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
@@ -161,7 +163,7 @@ def test_motors_alone_carry_flexible_links_behind_gears_that_give(second, left):
     """
     path = {"name": "tip", "point": "link2.tip", "x": nonic(TIP[0], 0.4), "y": nonic(TIP[1], 1.5)}
     model = geared_arm(GEARED, second, initial={"state": "static", "angles": ANGLES}, trajectory=[path])
-    servo = Analysis(name="servo", kind="motors-only", end=1.0, output_step=0.005)
+    servo = MotorsOnly(name="servo", kind="motors-only", end=1.0, output_step=0.005)
     source = add_transmission(run_motors_only(model, servo, always))
     replay = forward(actuation="servo", apply="joints", tolerance=1e-8, output_step=0.005)
     outcome = run_forward(model, replay, source, ActuatorSet(), always)
@@ -178,7 +180,7 @@ def test_coarse_outputs_are_told_of():
 
 def test_equilibrium_winds_the_gears():
     """About it, forces are needed along the motors alone: springs carry the links."""
-    analysis = Analysis(name="linear", kind="linear")
+    analysis = Linear(name="linear", kind="linear")
     model = geared_arm(GEARED, analysis=(analysis,), trajectory=[])
     about = operating_points(model, analysis, None)
     rest = np.zeros(about.q.shape[1])
@@ -190,7 +192,7 @@ def test_equilibrium_winds_the_gears():
 
 
 def test_static_moments_are_those_of_the_gears():
-    analysis = Analysis(name="static", kind="static")
+    analysis = Static(name="static", kind="static")
     static = add_transmission(run_static(geared_arm(GEARED, analysis=(analysis,)), analysis))
     for joint in "OA":
         np.testing.assert_allclose(static.gears[joint].gear_moment, joint_forces(static, joint).motor)
@@ -207,8 +209,8 @@ def test_static_moments_are_those_of_the_gears():
     ],
 )
 def test_bad_keys_are_refused(keys, expected):
-    with pytest.raises(ValueError, match=expected):
-        make_model([rod("a", 1.0, 1.0)], joint=[revolute("O", "ground", "a.root") | keys])
+    with pytest.raises(InputError, match=expected):
+        checked_scene([revolute("O", "ground", "a.root") | keys])
 
 
 def test_what_does_not_go_is_refused():

@@ -5,7 +5,7 @@ import pytest
 import zoo
 from mechanisms import assemble, oracle_of, random_state, relative
 
-from ffrobot.mbs.fields.time_functions import parse_expression
+from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.model.model import ModalLoad
 
 T = 0.37

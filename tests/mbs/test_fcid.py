@@ -9,10 +9,11 @@ from mechanisms import assemble, make_model, oracle_of, pcid, relative, revolute
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.analyses import Outcome, run_pcid
-from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.fields.time_functions import parse_expression, spline
-from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
+from ffrobot.mbs.analysis.outcome import Outcome
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.fields.expressions import parse_expression
+from ffrobot.mbs.fields.waypoints import spline
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 OPEN = ["chain of 2", "backwards", "mixed", "mixed backwards", "tree", "loaded", "stiffened, driven"]
@@ -22,7 +23,7 @@ TIMES = np.linspace(0.0, 0.2, 5)
 
 
 def fcid(shape, **keys):
-    return Analysis(name="fcid", kind="fcid", shape=shape, end=0.2, output_step=0.05, **keys)
+    return Fcid(name="fcid", kind="fcid", shape=shape, end=0.2, output_step=0.05, **keys)
 
 
 def given_shapes(model):
@@ -49,7 +50,7 @@ def test_equations_of_motion_hold_with_the_forces_reported(name):
         q, v, a = outcome.q[k], outcome.v[k], outcome.a[k]
         C, C_dot, C_q = mechanism.constraint_values(t, q, v)
         held = np.zeros(mechanism.size)
-        held[modal] = outcome.shape_force[k]
+        held[modal] = outcome.details.shape_force[k]
         inertia, Q = mechanism.mass_matrix(q) @ a, mechanism.forces(t, q, v)
         assert relative(inertia + C_q.T @ outcome.lambda_[k], Q + held, np.abs(Q).max()) < 1e-11
         bias = [row.bias for row in mechanism.rows(q, v)]
@@ -116,7 +117,7 @@ def rigid(body):
 def test_zero_shape_is_the_rigid_arm_in_closed_form():
     """Two uniform links: τ of the double pendulum (Spong and Vidyasagar 1989, ch. 6); F_p of rods that move rigidly."""
     model = arm()
-    outcome = run_fcid(model, Analysis(name="fcid", kind="fcid", shape="zero", end=1.0, output_step=0.05))
+    outcome = run_fcid(model, Fcid(name="fcid", kind="fcid", shape="zero", end=1.0, output_step=0.05))
     theta, w, alpha = (
         np.array([x[:, outcome.coordinates(name)][:, 2] for name in ("link1", "link2")])
         for x in (outcome.q, outcome.v, outcome.a)
@@ -171,7 +172,7 @@ def test_static_shape_needs_only_what_its_own_motion_takes():
     """Inertia of p̈ is all that is left where loads vary slowly: orders of magnitude below links held straight."""
     model = arm(arm_links(EI=3e4))
     static, zero = (
-        run_fcid(model, Analysis(name="f", kind="fcid", shape=shape, end=1.0, output_step=0.01))
+        run_fcid(model, Fcid(name="f", kind="fcid", shape=shape, end=1.0, output_step=0.01))
         for shape in ("static", "zero")
     )
     assert np.abs(static.F_p).max() < 1e-3 * np.abs(zero.F_p).max()
@@ -220,7 +221,7 @@ def test_pcid_and_fcid_meet_in_stiff_links():
     for EI in (3e3, 3e4):
         model = arm(arm_links(EI=EI), initial={"state": "static", "angles": {"link1": 0.4, "link2": 1.3}})
         free: Outcome = run_pcid(model, pcid(output_step=0.05), False, lambda _: True)
-        held = run_fcid(model, Analysis(name="f", kind="fcid", shape="zero", end=1.0, output_step=0.05))
+        held = run_fcid(model, Fcid(name="f", kind="fcid", shape="zero", end=1.0, output_step=0.05))
         differences.append(relative(held.tau, free.tau))
     assert differences[1] == pytest.approx(differences[0] / np.sqrt(10), rel=0.3)
     assert differences[1] < 1e-3

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from links import arm, ritz_link
 
+from ffrobot.mbs.model.masses import mass_matrix
 from ffrobot.mbs.model.truncation import interface_loads, loaded_points, with_fewer_modes
-from ffrobot.mbs.solve.vibration import mass_matrix
 
 POINTS = ["root", "tip"]
 

@@ -7,11 +7,11 @@ from mechanisms import always, forward, oracle_of, pcid, relative, revolute
 from patch_sets import FULL, N, patches
 from scipy.optimize import lsq_linear
 
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
-from ffrobot.mbs.analysis.fcid import run_fcid
+from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import point_motion
-from ffrobot.mbs.scene.analysis_records import Analysis
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_recordings_of_other_integrators_are_replayed(model, integrator):
 @pytest.mark.parametrize("shape", ["zero", "static"])
 def test_forward_run_under_fcid_keeps_path_and_shape(model, shape):
     """Links that ring in PCID keep a shape that is prescribed: straight, or sagging."""
-    analysis = Analysis(name="fcid", kind="fcid", shape=shape, end=1.0, output_step=0.01)
+    analysis = Fcid(name="fcid", kind="fcid", shape=shape, end=1.0, output_step=0.01)
     inverse = run_fcid(model, analysis)
     following = forward(tolerance=1e-6, actuation="fcid", apply="joints+pzt")
     outcome = run_forward(model, following, inverse, FULL, always)
@@ -122,7 +122,7 @@ def test_saturated_actuators_give_what_their_limits_leave(kind):
     inverse = (
         run_pcid(model, pcid(tolerance=1e-7), True, always)
         if kind == "pcid"
-        else run_fcid(model, Analysis(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01))
+        else run_fcid(model, Fcid(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01))
     )
     analysis = forward(tolerance=1e-7, actuation="inverse", apply="joints+pzt", limits=True)
     actuator_set = ActuatorSet(limited_patches=patches(Phi, limit))

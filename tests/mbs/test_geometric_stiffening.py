@@ -8,11 +8,12 @@ from links import arm, arm_links, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
 
 from ffrobot.common.errors import SolveError
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
-from ffrobot.mbs.model.geometric_stiffening import estimated_effect
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.quantities.observation import energies, point_motion
+from ffrobot.mbs.quantities.stiffening import estimated_effect
 
-# Wu and Haug's spin-up (formulation.md, section 11)
+# Wu and Haug's spin-up (Int. J. Numer. Meth. Eng. 26, 1988)
 LENGTH, MASS, EI, SPEED, RISE = 8.0, 8.0 * 0.2019, 566.6, 4.0, 15.0
 SPIN = f"where(t < 15, {SPEED}/15*(t**2/2 + (15/(2*pi))**2*(cos(2*pi*t/15) - 1)), {SPEED}*(t - 7.5))"
 
@@ -49,7 +50,7 @@ def test_frequency_of_a_spinning_cantilever():
 
 
 def test_spin_up_lags_as_it_should_and_settles():
-    """The tip lags by at most 0.535 m, at 6.77 s (formulation.md, section 11)."""
+    """The tip lags by at most 0.535 m, at 6.77 s (Wu and Haug 1988)."""
     outcome = run_pcid(spinning(True), pcid(end=30.0, output_step=0.01), False, always)
     assert outcome.status == "completed"
     lag = -point_motion(outcome, "beam.tip").deflection[:, 1]

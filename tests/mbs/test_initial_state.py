@@ -7,10 +7,11 @@ from mechanisms import always, assemble, make_model, pcid, revolute
 from rods import slider_crank
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.mbs.analysis.analyses import initial_state, run_pcid, run_static
+from ffrobot.mbs.analysis.drive import initial_state
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.analysis.static import Static, run_static
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.quantities.observation import point_motion
-from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 HOLD = {"name": "tip", "point": "link2.tip", "x": repr(TIP[0]), "y": repr(TIP[1])}
@@ -138,7 +139,7 @@ def test_static_start_of_a_moving_robot_meets_its_rates():
 def test_static_shape_of_a_horizontal_cantilever():
     """Welded to the ground, sagging under its weight: w(L) = m g L³/(8 EI), and F L³/(3 EI) from a force at the tip."""
     weld = {"name": "wall", "type": "weld", "between": ("ground", "beam.root")}
-    static = Analysis(name="rest", kind="static")
+    static = Static(name="rest", kind="static")
     beam = ritz_link("beam", "cantilever", mass=2.0, EI=50.0)
     load = [{"point": "beam.tip", "y": "-3"}]
     outcome = run_static(make_model([beam], joint=[weld], load=load, analysis=(static,)), static)

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from links import ANGLES, TIP, arm, arm_links
+from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import always, assemble, pcid, relative
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.analyses import run_pcid
-from ffrobot.mbs.scene.analysis_records import TIGHTEST_TOLERANCE
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.scene.analysis import TIGHTEST_TOLERANCE
 from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.statics import static_equilibrium
 
@@ -30,7 +30,7 @@ TOLERANCES = {
     "dop853": (1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
     "dopri5": (1e-3, 1e-4, 1e-5),
     "radau": (1e-2, 1e-3, 1e-4, 1e-5),
-    "generalized-alpha": (1e-2, 1e-3),
+    "generalized-alpha": (1e-2, 3e-3, 1e-3),
 }
 
 
@@ -100,21 +100,52 @@ def test_errors_of_all_reported_quantities_are_within_the_tolerance(tight, integ
     assert ratios["lambda_"] > 0.003, "far more work than the tolerance asks for"
 
 
+# The factors by which the integrators tighten the tolerance (`error_share`) were found with `arm()`. These arms had no
+# part in that: links, path and start drawn once, by seed.
+HELD_OUT = (11, 12, 13, 14)
+
+
+def held_out(seed):
+    """A two-link arm of random links, angles and end of the path, from the undeformed start."""
+    rng = np.random.default_rng(seed)
+    links = [
+        ritz_link(name, condition, rng.uniform(0.6, 1.5), rng.uniform(0.4, 2), 10 ** rng.uniform(1.2, 2.2), modes=2)
+        for name, condition in (("link1", "simply-supported"), ("link2", "cantilever"))
+    ]
+    first, second = rng.uniform(-1, 1), rng.uniform(0.6, 1.8)
+    angles = {"link1": first, "link2": first + second}
+    tip = sum(link.length * np.exp(1j * angle) for link, angle in zip(links, angles.values(), strict=True))
+    end = tip * (1 - 0.2 * rng.uniform()) * np.exp(0.3j * rng.uniform(-1, 1))
+    path = {"name": "tip", "point": "link2.tip", "x": quintic(tip.real, end.real), "y": quintic(tip.imag, end.imag)}
+    return arm(links, trajectory=[path], initial={"angles": angles})
+
+
+@pytest.mark.parametrize("seed", HELD_OUT)
+def test_errors_are_within_the_tolerance_for_arms_that_nothing_was_tuned_with(seed):
+    model = held_out(seed)
+    exact = inverse(model, tolerance=TIGHTEST_TOLERANCE, integrator="dop853")
+    for integrator, tolerance in (("dop853", 1e-5), ("dopri5", 1e-4), ("radau", 1e-3), ("generalized-alpha", 1e-2)):
+        outcome = inverse(model, tolerance=tolerance, integrator=integrator)
+        ratios = {name: relative(getattr(outcome, name), getattr(exact, name)) / tolerance for name in REPORTED}
+        assert max(ratios.values()) <= 1.0, (integrator, ratios)
+        assert ratios["lambda_"] > 0.001, (integrator, ratios)
+
+
 @pytest.mark.parametrize(
     ("integrator", "order"), [("dop853", 8), ("dopri5", 5), ("radau", 5), ("generalized-alpha", 2)]
 )
 def test_errors_fall_with_the_order_in_the_number_of_steps(tight, integrator, order):
     outcomes = [inverse(arm(), tolerance=tolerance, integrator=integrator) for tolerance in TOLERANCES[integrator]]
     errors = [relative(outcome.lambda_, tight.lambda_) for outcome in outcomes]
-    slope = np.polyfit(np.log([outcome.steps for outcome in outcomes]), np.log(errors), 1)[0]
-    assert slope == pytest.approx(-order, abs=0.5)
+    slope = np.polyfit(np.log([outcome.statistics.steps for outcome in outcomes]), np.log(errors), 1)[0]
+    assert slope == pytest.approx(-order, rel=0.06)
 
 
 def test_newton_s_method_of_radau_hardly_iterates_and_keeps_its_matrix():
     """Three slopes an iteration, two for the step's end: under 13 a step are little more than three iterations."""
     outcome = inverse(arm(initial={"angles": ANGLES, "state": "static"}), tolerance=1e-4, integrator="radau")
-    assert outcome.rejected <= 2
-    assert outcome.evaluations < 13 * outcome.steps
+    assert outcome.statistics.rejected <= 2
+    assert outcome.statistics.evaluations < 13 * outcome.statistics.steps
 
 
 @pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
@@ -122,7 +153,7 @@ def test_stiff_links_at_rest_do_not_hold_implicit_steps(integrator):
     """Twelve modes a link, up to 34 krad/s, none of which is felt at a percent."""
     model = arm(arm_links(modes=12, extra=2), initial={"angles": ANGLES, "state": "static"})
     outcome = inverse(model, tolerance=1e-2, integrator=integrator)
-    assert outcome.steps < (10_000 if integrator == "generalized-alpha" else 600)
+    assert outcome.statistics.steps < (10_000 if integrator == "generalized-alpha" else 600)
 
 
 def test_radau_damps_away_what_rings_below_the_tolerance():
@@ -133,7 +164,7 @@ def test_radau_damps_away_what_rings_below_the_tolerance():
     model = arm(arm_links(EI=300.0, modes=12, extra=2), initial={"angles": ANGLES, "state": "static"})
     exact = inverse(model, tolerance=1e-6, integrator="dop853")
     outcome = inverse(model, tolerance=1e-4, integrator="radau")
-    assert outcome.steps < 3500
+    assert outcome.statistics.steps < 3500
     assert relative(outcome.lambda_, exact.lambda_) < 1e-4
 
 
@@ -152,7 +183,7 @@ def test_outputs_between_steps_are_as_good_as_outputs_at_steps(tight):
 
 def test_output_times_do_not_steer_the_steps():
     few, many = (inverse(arm(), output_step=step, tolerance=1e-6, integrator="dop853") for step in (0.1, 0.001))
-    assert few.steps == many.steps
+    assert few.statistics.steps == many.statistics.steps
     np.testing.assert_allclose(few.q, many.q[::100], rtol=0, atol=1e-13)  # the times differ in their last bit
 
 
@@ -167,7 +198,7 @@ def test_constraints_hold_at_every_output(integrator):
 def test_a_run_ends_at_max_steps_and_says_so():
     outcome = run_pcid(arm(), pcid(max_steps=100), False, always)
     assert outcome.status == "too many steps"
-    assert outcome.steps + outcome.rejected == 100
+    assert outcome.statistics.steps + outcome.statistics.rejected == 100
     assert 0 < outcome.time[-1] < 1
 
 
@@ -195,4 +226,4 @@ def test_a_start_at_rest_costs_no_more_steps_than_the_motion(tolerance):
     keys = {"tolerance": tolerance, "integrator": "dop853"}
     at_rest = run_pcid(arm(initial=initial), pcid(max_steps=20_000, **keys), False, always)
     assert at_rest.status == "completed"
-    assert at_rest.steps < 1.2 * inverse(arm(), **keys).steps
+    assert at_rest.statistics.steps < 1.2 * inverse(arm(), **keys).statistics.steps

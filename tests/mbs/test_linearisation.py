@@ -10,9 +10,9 @@ from mechanisms import always, make_model, oracle_of, pcid, relative, revolute
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.analyses import run_pcid
-from ffrobot.mbs.model.measures import joint_coordinate
-from ffrobot.mbs.model.model import MechanismSystem, ModalLoad
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.model.model import ModalLoad
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.linearisation import Linearisation, held_by_motors, linearise
 
@@ -110,8 +110,7 @@ def test_outputs_and_inputs_are_dual(motion):
 
 def with_motors(model, *names):
     """The model with motors on these joints, and where it starts."""
-    joints = {joint.name: joint for joint in model.scene.joint}
-    model = replace(model, motors={name: joint_coordinate(model.scene, joints[name]) for name in names})
+    model = replace(model, motors={name: model.scene.coordinate(name) for name in names})
     return model, undeformed_state(MechanismSystem(model, model.joints)).q
 
 

@@ -8,7 +8,7 @@ import zoo
 from links import arm, arm_links
 from mechanisms import always, assemble, pcid, random_state, relative
 
-from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.planar_body import PlanarPoint
 from ffrobot.mbs.quantities.observation import energies, joint_forces, point_motion, trajectory_force
 

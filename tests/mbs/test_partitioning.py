@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from partitioning import choose_partition, complete, integrate_partitioned
 
-from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.solve.initial_state import undeformed_state
-from ffrobot.run.solution import solve
+from ffrobot.run.solve import solve
 
 CASES = Path(__file__).parents[2] / "cases"
 

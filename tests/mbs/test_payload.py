@@ -9,10 +9,11 @@ from mechanisms import assemble, make_model, random_state, relative
 from oracle import Mechanism
 
 from ffrobot.mbs._core import MeasureKind
-from ffrobot.mbs.fields.time_functions import parse_expression
-from ffrobot.mbs.model.measures import Marker, Measure
-from ffrobot.mbs.model.planar_body import from_rigid_body, with_payload
-from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.fields.expressions import parse_expression
+from ffrobot.mbs.joints.measure import Marker, Measure
+from ffrobot.mbs.model.masses import with_payload
+from ffrobot.mbs.model.planar_body import from_rigid_body
+from ffrobot.mbs.scene.bodies import RigidBody
 
 MASS = 0.7
 

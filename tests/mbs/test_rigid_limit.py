@@ -6,7 +6,7 @@ from links import ANGLES, TIP, arm, arm_links, quintic
 from mechanisms import always, make_model, pcid, relative, revolute
 from rods import rod, slider_crank
 
-from ffrobot.mbs.analysis.analyses import run_pcid
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.quantities.observation import joint_forces, trajectory_force
 
 G = 9.81

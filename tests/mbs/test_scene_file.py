@@ -8,7 +8,7 @@ import pytest
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.fields.field_types import split_point
-from ffrobot.mbs.scene.load import load_scene
+from ffrobot.scene.load import load_scene
 
 SCENE = """
 name = "two_link"
@@ -328,7 +328,7 @@ def test_split_point():
 
 
 def test_import_stays_light():
-    code = "import sys, ffrobot.mbs.scene.load; print(*sys.modules)"
+    code = "import sys, ffrobot.scene.load; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert "ffrobot.mbs.scene.load" in loaded
+    assert "ffrobot.scene.load" in loaded
     assert not {"scipy", "h5py", "dolfinx", "gmsh", "petsc4py", "mpi4py", "matplotlib", "rich"} & set(loaded)

@@ -8,11 +8,10 @@ from numpy.polynomial import Polynomial
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs._core import TimeFunction
-from ffrobot.mbs.analysis.analyses import run_forward
-from ffrobot.mbs.analysis.motors_only import is_minimum_phase, path_error, run_motors_only
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase, path_error, run_motors_only
 from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import point_motion
-from ffrobot.mbs.scene.analysis_records import Analysis
 from ffrobot.mbs.solve import stable_inversion
 from ffrobot.mbs.solve.servo import equilibrium, is_unstable, linear_dynamics, make_servo, zeros
 
@@ -20,7 +19,7 @@ C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
 
 
 def motors_only(**keys):
-    return Analysis(**({"name": "inverse", "kind": "motors-only", "end": 1.0, "output_step": 0.01} | keys))
+    return MotorsOnly(**({"name": "inverse", "kind": "motors-only", "end": 1.0, "output_step": 0.01} | keys))
 
 
 def single_link(path, modes=4, damping_ratio=0.0, **keys):
@@ -72,7 +71,7 @@ def test_zeros_of_joint_motion_are_the_frequencies_with_the_joint_locked():
 
 
 def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
-    """M of r is Lᵀ M Z: Z keeps C_m and C_s, L C_m and the motors' coordinates (formulation.md, sections 5 and 8)."""
+    """M of r is Lᵀ M Z: Z keeps C_m and C_s, L C_m and the motors' coordinates (docs/theory.md, Motors alone)."""
     model = arm()
     servo, dynamics = at_rest(model)
     p = iter(equilibrium(servo, servo.core(), 0.0))
@@ -147,7 +146,7 @@ def test_tip_follows_its_path_with_the_motors_alone(two_links, carried):
     replayed = exact_forward(two_links, carried)
     np.testing.assert_array_equal(replayed.time, carried.time)
     way = np.ptp(point_motion(carried, "link2.tip").position, axis=0).max()
-    assert np.abs(path_error(carried.inversion, replayed.time, replayed.q)).max() < 1e-7 * way
+    assert np.abs(path_error(carried.details.inversion, replayed.time, replayed.q)).max() < 1e-7 * way
 
 
 def test_equations_of_motion_hold_with_the_motors_moments(carried):
@@ -160,7 +159,7 @@ def test_equations_of_motion_hold_with_the_motors_moments(carried):
         Q = mechanism.forces(float(np.clip(carried.time[k], 0, 1)), q, v)
         reaction = C_q[~motor].T @ carried.lambda_[k][~motor] - C_q[motor].T @ carried.tau[k]
         assert relative(mechanism.mass_matrix(q) @ a + reaction, Q, np.abs(Q).max()) < 1e-6
-    assert np.abs(path_error(carried.inversion, carried.time, carried.q)).max() < 1e-12
+    assert np.abs(path_error(carried.details.inversion, carried.time, carried.q)).max() < 1e-12
 
 
 def test_actuation_begins_before_the_path_and_ends_after_it(carried):
@@ -168,18 +167,18 @@ def test_actuation_begins_before_the_path_and_ends_after_it(carried):
     pre, post = carried.analysis.pre_actuation, carried.analysis.post_actuation
     assert carried.time[0] == -pre < -0.1
     assert carried.time[-1] == pytest.approx(1 + post)
-    assert carried.inversion.off_rest < 1e-9
+    assert carried.details.inversion.off_rest < 1e-9
     before = carried.time < -1e-9
     assert np.abs(carried.tau[before] - carried.tau[0]).max() > 0.01 * np.abs(np.ptp(carried.tau, axis=0)).max()
-    s = carried.inversion.linearisation.zeros[0]
+    s = carried.details.inversion.linearisation.zeros[0]
     assert is_unstable(s).sum() == 6  # as many zeros grow as decay
 
 
 def test_shorter_pre_actuation_starts_off_rest_as_told(two_links, carried):
     short = run_motors_only(two_links, motors_only(pre_actuation=0.05), always)
     assert short.status == "completed"
-    assert 1e-4 < short.inversion.off_rest < 1.0
-    assert np.abs(path_error(short.inversion, short.time, short.q)).max() < 1e-12
+    assert 1e-4 < short.details.inversion.off_rest < 1.0
+    assert np.abs(path_error(short.details.inversion, short.time, short.q)).max() < 1e-12
 
 
 def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
@@ -187,14 +186,14 @@ def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
     model = arm(arm_links(damping_ratio=0.01, modes=2))
     outcome = run_motors_only(model, motors_only(output="redefined"), always)
     assert outcome.status == "completed"
-    assert is_minimum_phase(outcome.inversion.linearisation)
-    factor = outcome.inversion.servo.factor
+    assert is_minimum_phase(outcome.details.inversion.linearisation)
+    factor = outcome.details.inversion.servo.factor
     assert 0.5 < factor < 1.0
-    left = np.abs(path_error(outcome.inversion, outcome.time, outcome.q))
+    left = np.abs(path_error(outcome.details.inversion, outcome.time, outcome.q))
     assert 1e-4 < left.max() < 0.05  # m, of a path of 1 m
     assert left[0].max() < 1e-6  # at rest nothing is left
     replayed = exact_forward(model, outcome)
-    same = np.abs(path_error(outcome.inversion, replayed.time, replayed.q))
+    same = np.abs(path_error(outcome.details.inversion, replayed.time, replayed.q))
     np.testing.assert_allclose(same, left, atol=1e-6)
     with pytest.raises(InputError, match=r"minimum phase.*right half plane"):
         run_motors_only(model, motors_only(output="redefined", factor=min(0.99, factor + 0.1)), always)
@@ -207,9 +206,9 @@ def test_joint_trajectories_need_no_future():
     outcome = run_motors_only(model, motors_only(), always)
     assert outcome.status == "completed"
     assert outcome.time[0] == 0.0
-    assert is_minimum_phase(outcome.inversion.linearisation)
+    assert is_minimum_phase(outcome.details.inversion.linearisation)
     replayed = exact_forward(model, outcome)
-    assert np.abs(path_error(outcome.inversion, replayed.time, replayed.q)).max() < 1e-6
+    assert np.abs(path_error(outcome.details.inversion, replayed.time, replayed.q)).max() < 1e-6
 
 
 def test_path_that_does_not_start_at_rest_is_refused():

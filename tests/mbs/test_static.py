@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ffrobot.mbs.quantities.observation import point_motion
-from ffrobot.run.solution import solve
+from ffrobot.run.solve import solve
 
 LINK = """
 name = "arm"

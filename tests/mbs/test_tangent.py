@@ -9,8 +9,8 @@ from mechanisms import assemble, oracle_of, random_state, relative
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.state_forces import state_function
-from ffrobot.mbs.model.measures import Marker
-from ffrobot.mbs.model.model import MechanismSystem
+from ffrobot.mbs.joints.measure import Marker
+from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 T = 0.37
@@ -89,7 +89,7 @@ def test_tangent_of_a_force_that_depends_on_the_motion(name):
 
 def test_tangents_of_rows_are_the_derivatives_of_their_accelerations(case):
     assembly, oracle, (q, v, a), _ = case
-    rows = [(c.row, core) for c, core in zip(assembly.constraints, assembly.constraint_rows, strict=True)]
+    rows = [(c.measure, core) for c, core in zip(assembly.constraints, assembly.constraint_measures, strict=True)]
     by_acceleration, by_velocity, by_position = _core.row_tangents(assembly.system, [r for _, r in rows], q, v, a)
 
     def accelerations(q, v):
@@ -114,7 +114,7 @@ def test_external_drives_take_part():
 
 def reduced_force(assembly, oracle, near, t):
     """Generalized forces on s = (motor coordinates, p) that a motion (s, ṡ, s̈) with closed joints needs."""
-    rows = [c.row for c in assembly.constraints] + list(assembly.model.motors.values())
+    rows = [c.measure for c in assembly.constraints] + list(assembly.model.motors.values())
     modes = np.setdiff1d(np.arange(oracle.size), assembly.frame_coordinates)
     held, k = len(assembly.constraints), len(assembly.model.motors)
 
@@ -156,7 +156,7 @@ def test_reduction_is_the_derivative_of_the_equations_in_independent_coordinates
     s, force = reduced_force(assembly, oracle_of(assembly), near, T)
     s_dot, s_ddot = rng.standard_normal((2, len(s)))
     expected, (q, v, a) = force(s, s_dot, s_ddot)
-    linear = _core.reduce(assembly.system, assembly.motor_rows, T, q, v, a, 1)
+    linear = _core.reduce(assembly.system, assembly.motor_measures, T, q, v, a, 1)
     assert relative(linear.force, expected) < 1e-10
     assert_derivative(linear.M, lambda x: force(s, s_dot, x)[0], s_ddot)
     assert_derivative(linear.D, lambda x: force(s, x, s_ddot)[0], s_dot)
@@ -167,4 +167,4 @@ def test_reduction_refuses_rows_that_do_not_fit():
     assembly = assemble(zoo.build("chain of 2"))
     q = np.zeros(assembly.system.coordinates)
     with pytest.raises(ValueError, match="expected 6 constraints and independent rows, got 8"):
-        _core.reduce(assembly.system, assembly.motor_rows, T, q, q, q, 1)
+        _core.reduce(assembly.system, assembly.motor_measures, T, q, q, q, 1)

@@ -9,7 +9,9 @@ import pytest
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs._core import Op, TimeFunction
-from ffrobot.mbs.fields.time_functions import ExpressionError, check_domain, load_waypoints, parse_expression
+from ffrobot.mbs.fields.expressions import ExpressionError, parse_expression
+from ffrobot.mbs.fields.functions import check_domain
+from ffrobot.mbs.fields.waypoints import load_waypoints
 
 # Expression and its value, first and second derivative, worked out by hand.
 CLOSED_FORMS = [

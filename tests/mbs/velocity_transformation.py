@@ -3,8 +3,6 @@
 import numpy as np
 from oracle import rotation
 
-from ffrobot.mbs.model.measures import joint_coordinate, joint_rows
-
 
 def open_chain(mechanism, scene, q):
     """D (N, motors + modes), joint by joint from the ground outwards; joints are listed in that order."""
@@ -15,8 +13,8 @@ def open_chain(mechanism, scene, q):
         D[i, k] = 1.0
     placed, rest = {None}, np.zeros(mechanism.size)
     for joint in scene.joint:
-        coordinate, place = joint_coordinate(scene, joint), joint_rows(scene, joint)[0]
-        outwards = coordinate.a.body in placed  # the joint's second side is the new body
+        coordinate, place = joint.coordinate(scene.motors), scene.constraints(joint)[0]
+        outwards = place.a.body in placed  # the joint's second side is the new body
         known, new = (place.a, place.b) if outwards else (place.b, place.a)
         base, tip = mechanism.marker(known, q, rest), mechanism.marker(new, q, rest)
         own = mechanism.columns[new.body]
@@ -24,11 +22,11 @@ def open_chain(mechanism, scene, q):
         rate = np.zeros(D.shape[1])
         if joint.name in driven:
             rate[driven.index(joint.name)] = 1.0 if outwards else -1.0
-        angular = v_base[2].copy()
+        angular, section = v_base[2].copy(), True
         if joint.type == "revolute":
             angular = mechanism.marker(coordinate.a if outwards else coordinate.b, q, rest).L[2] @ D + rate
-        section = coordinate.a.point != "" or coordinate.b.point != ""
-        if joint.type != "revolute" or section:  # `angular` belongs to the section; the frame lacks φ ṗ
+            section = coordinate.a.point != "" or coordinate.b.point != ""
+        if section:  # `angular` belongs to the section; the frame lacks φ ṗ
             angular = angular - tip.L[2, own][3:] @ D[own][3:]
         D[own.start + 2] = angular
         velocity = v_base[:2].copy()

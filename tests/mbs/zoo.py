@@ -6,10 +6,10 @@ import numpy as np
 from material_points import random_cloud
 from mechanisms import make_model, revolute
 
-from ffrobot.mbs.fields.time_functions import parse_expression
+from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.model.geometric_stiffening import GeometricStiffening
+from ffrobot.mbs.model.masses import with_payload
 from ffrobot.mbs.model.model import ModalLoad
-from ffrobot.mbs.model.planar_body import with_payload
 
 LOADS = (
     {"point": "b1.side", "x": "3*sin(t)+1", "y": "-2*cos(t)", "moment": "0.7"},

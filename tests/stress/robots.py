@@ -5,10 +5,11 @@ from links import arm, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
 from rods import rod
 
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.quantities.observation import energies
-from ffrobot.mbs.scene.mechanism_records import RigidBody
+from ffrobot.mbs.scene.bodies import RigidBody
 
 CRANK, ROD = 0.2, 0.5
 

@@ -54,6 +54,12 @@ def same(one, other):
     return size <= ROUNDING or abs(one - other) <= SAME * size
 
 
+def at_most(limit, value):
+    """`limit`, to be recorded in place of a value that is rounding, or hangs on where steps happen to fall."""
+    assert value <= limit, f"{value} > {limit}"
+    return limit
+
+
 def number(value):
     if value == 0 or 1e-3 <= abs(value) < 1e6:
         return f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"

@@ -5,6 +5,7 @@ import pytest
 from links import ANGLES, arm, ritz_link
 from mechanisms import relative
 from robots import inverse
+from table import at_most
 
 from ffrobot.mbs.quantities.observation import point_motion
 
@@ -24,12 +25,15 @@ def test_modes(beams, record):
     one, other = (forces(beams(modes=5), integrator=name) for name in ("dop853", "radau"))
     assert relative(one, other) < 1e-4
     many = forces(beams(modes=40))
+    truncation = relative(one, many)
+    assert truncation < 1e-3  # of a static start: modes 6 … 40 are hardly stirred
+    # DOP853 is at its limit of stability here: where its steps fall, and what they err by, hangs on rounding.
     record(
         GROUP,
         "5 and 40 modes a link, static start",
-        "forces of 5 modes: integrators differ by {integrators}, from 40 modes by {truncation}",
-        integrators=relative(one, other),
-        truncation=relative(one, many),
+        "forces of 5 modes: integrators differ by at most {integrators}, from 40 modes by {truncation}",
+        integrators=at_most(2e-5, relative(one, other)),
+        truncation=truncation,
     )
 
 
@@ -81,6 +85,12 @@ def test_proportions(beams, height, record):
     outcome = inverse(arm(links, initial=STATIC), **keys)
     outcome.check_completed()
     deflection = np.abs(point_motion(outcome, "link2.tip").deflection).max()
+    # Joint and path hold both ends of link 2, and no moment: off the tangent at the root, the tip is at the end slope
+    # times L of a pinned beam under its own weight, w L⁴/24EI with w = ρ A g cos θ and I/A = h²/12. The
+    # six modes, which have a moment at the root, make it 2 % more.
+    sag = 7850.0 * 9.81 * np.cos(ANGLES["link2"]) * 12 / (24 * 2.068427e11 * height**2)
+    at_start = np.linalg.norm(point_motion(outcome, "link2.tip").deflection[0])
+    assert at_start == pytest.approx(sag, rel=0.03)
     record(GROUP, f"links 1 m long and {height:g} m high", "tip deflection {deflection} m", deflection=deflection)
 
 
@@ -88,12 +98,12 @@ def test_too_thin(beams, record):
     """A millimetre of steel a metre long bends under its own weight by more than small deformations allow."""
     outcome = inverse(arm(beams(height=1e-3), initial=STATIC), end=1.0, tolerance=1e-4)
     assert outcome.status == "diverged"
-    assert '"link2" is bent by' in outcome.cause
+    assert '"link2" is bent by' in outcome.statistics.cause
     assert len(outcome.q) == len(outcome.time) > 10  # what there is up to then
     record(
         GROUP,
         "links 1 m long and 0.001 m high",
         "ends at t = {t}",
         'diverged; “"link2" is bent by 103 % of its length …”',
-        t=outcome.time_reached,
+        t=outcome.statistics.time_reached,
     )

@@ -4,6 +4,7 @@ import pytest
 from links import arm, arm_links
 from mechanisms import make_model, revolute
 from robots import energy_drift, free_run, inverse, momentum_drift, pendulum
+from table import at_most
 
 GROUP = "Long runs"
 CIRCLE = {"name": "tip", "point": "link2.tip", "x": "1.2+0.2*cos(t)", "y": "0.9+0.2*sin(t)"}
@@ -28,13 +29,12 @@ def test_energy_of_a_pendulum(end, record):
     outcome.check_completed()
     energy, constraints = energy_drift(outcome), outcome.residual.max()
     assert energy < 1e-6
-    assert constraints < 1e-11
     record(
         GROUP,
         f"two flexible links fall and swing for {end:g} s at a tolerance of 1e-6",
-        "energy {energy} of its kinetic part, constraints {constraints}",
+        "energy {energy} of its kinetic part, constraints at most {constraints}",
         energy=energy,
-        constraints=constraints,
+        constraints=at_most(1e-11, constraints),
     )
 
 
@@ -48,8 +48,8 @@ def test_momentum_of_a_free_chain(end, record):
     record(
         GROUP,
         f"two flexible links fly freely for {end:g} s at a tolerance of 1e-6",
-        "momentum {momentum}, energy {energy} of its kinetic part",
-        momentum=momentum,
+        "momentum at most {momentum}, energy {energy} of its kinetic part",
+        momentum=at_most(1e-11 if end < 100 else 1e-7, momentum),
         energy=energy,
     )
 
@@ -59,10 +59,9 @@ def test_path_is_kept(end, record):
     outcome = inverse(arm(trajectory=[CIRCLE]), end=end, output_step=end / 1000, tolerance=1e-4)
     outcome.check_completed()
     constraints = outcome.residual.max()
-    assert constraints < 1e-11
     record(
         GROUP,
         f"PCID round a circle for {end:g} s at a tolerance of 1e-4",
-        "constraints {constraints}",
-        constraints=constraints,
+        "constraints at most {constraints}",
+        constraints=at_most(1e-11, constraints),
     )

@@ -4,11 +4,12 @@ import re
 
 import numpy as np
 import pytest
+from table import at_most
 
 from ffrobot.actuation.patches.patches import check_reach, patch_array
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.scene.actuator_records import PztLayout
 
 GROUP = "PZT layouts"
 PATCH = {"body": "link2", "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12}
@@ -44,7 +45,10 @@ def test_overlapping(link, record):
     record(GROUP, "patches that overlap", "refused", "input error: which, and where")
 
 
-@pytest.mark.parametrize("apart", [1e-3, 1e-6, 1e-9])
+LEFT = {1e-3: 1e-11, 1e-6: 1e-8, 1e-9: 1e-6}  # the condition number times rounding
+
+
+@pytest.mark.parametrize("apart", LEFT)
 def test_nearly_the_same_place(link, apart, record):
     """Patches much shorter than the modes, side by side: their columns of Φ_V are all but parallel."""
     length = 0.5 * apart
@@ -52,12 +56,16 @@ def test_nearly_the_same_place(link, apart, record):
     voltages = solve_voltages(array, wanted(link))
     left = np.abs(voltages.unmet).max() / np.abs(wanted(link)).max()
     assert left < 1e-16 * array.condition_number + 1e-13
+    condition, measured = "{condition}", {"condition": array.condition_number}
+    if apart < 1e-8:  # the columns differ by rounding alone, and so does their condition
+        assert array.condition_number > 1e8
+        condition, measured = "above 1e8", {}
     record(
         GROUP,
         f"five patches of {length:g} m, two of them {apart:g} m apart, five modes",
-        "condition number {condition}, {left} of the modal forces unmet",
-        condition=array.condition_number,
-        left=left,
+        f"condition number {condition}, at most {{left}} of the modal forces unmet",
+        left=at_most(LEFT[apart], left),
+        **measured,
     )
 
 

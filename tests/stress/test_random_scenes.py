@@ -1,21 +1,40 @@
 """Scenes at random: what holds for every mechanism holds for each of them."""
 
+import os
+
 import numpy as np
+import pytest
 import zoo
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from links import arm, quintic, ritz_link
 from mechanisms import always, assemble, forward, oracle_of, pcid, random_state, relative
 from patch_sets import FULL
+from table import at_most
 
-from ffrobot.mbs.analysis.analyses import run_forward, run_pcid
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
 
 GROUP = "Random scenes"
 SCENES = 40
+# The same scenes every time in continuous integration (.ci/run), others in every other run; one that fails is printed
+# with the line `@reproduce_failure(…)` to paste above its test.
 random_scenes = settings(
-    max_examples=SCENES, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+    max_examples=SCENES,
+    deadline=None,
+    derandomize="CI" in os.environ,
+    database=None,
+    print_blob=True,
+    suppress_health_check=list(HealthCheck),
 )
 T = 0.37
+BOUNDS = {"residual": 1e-10, "jacobian": 1e-8, "power": 1e-5, "round_trip": 1e-6}
+worst = {}  # of all scenes so far
+
+
+def check(what, value):
+    worst[what] = max(worst.get(what, 0.0), float(value))
+    assert value <= BOUNDS[what]
 
 
 @st.composite
@@ -39,7 +58,7 @@ def test_accelerations_are_those_of_the_equations(system):
     _, _, C_q = assembly.system.constraints(T, q, v)
     M, Q = oracle.mass_matrix(q), oracle.forces(T, q, v)
     size = max(np.abs(M @ a).max(), np.abs(C_q.T @ lambda_).max(initial=0.0), np.abs(Q).max())
-    assert np.abs(M @ a + C_q.T @ lambda_ - Q).max() < 1e-10 * size
+    check("residual", np.abs(M @ a + C_q.T @ lambda_ - Q).max() / size)
 
 
 @random_scenes
@@ -54,7 +73,7 @@ def test_jacobians_are_derivatives(system):
     columns = [
         (core.constraints(T, q + h * e, v)[0] - core.constraints(T, q - h * e, v)[0]) / (2 * h) for e in np.eye(len(q))
     ]
-    assert relative(np.array(columns).T, C_q) < 1e-8
+    check("jacobian", relative(np.array(columns).T, C_q))
 
 
 @random_scenes
@@ -79,7 +98,7 @@ def test_power_is_the_rate_of_energy(system):
     power += sum(v[oracle.columns[m.body]][3:] @ m.vector * m.size(T)[0] for m in assembly.model.modal_loads)
     terms = np.abs(v) @ np.abs(oracle.mass_matrix(q) @ a) + abs(power)
     rounding = 1e-15 * energy(0.0)[1] / h
-    assert abs(rate - power) <= 1e-5 * terms + rounding
+    check("power", max(abs(rate - power) - rounding, 0.0) / terms)
 
 
 @settings(random_scenes, max_examples=6)
@@ -103,12 +122,18 @@ def test_forward_follows_inverse(seed):
     replay = run_forward(model, forward(tolerance=1e-6, actuation="inverse", apply="joints+pzt"), inverse, FULL, always)
     inverse.check_completed()
     replay.check_completed()
-    assert relative(replay.q, inverse.q) < 1e-6
+    check("round_trip", relative(replay.q, inverse.q))
 
 
 def test_they_are_in_the_table(record):
+    """Bounds, since the scenes are others in every run; what was found is none of it zero, and below them."""
+    if worst.keys() != BOUNDS.keys():
+        pytest.skip("only after the others")
+    assert min(worst.values()) > 0.0
     record(
         GROUP,
         f"{SCENES} random mechanisms of the zoo each: equations of motion, Jacobians, power; 6 arms: PCID → forward",
-        "residuals below 1e-10, Jacobians against differences 1e-8, power 1e-5, round trip 1e-6",
+        "at most: residuals {residual}, Jacobians against differences {jacobian}, power {power}, round trip"
+        " {round_trip}",
+        **{what: at_most(BOUNDS[what], value) for what, value in worst.items()},
     )

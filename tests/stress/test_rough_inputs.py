@@ -6,11 +6,11 @@ from links import arm
 from mechanisms import make_model, relative, revolute
 from robots import free_run, inverse, pendulum, reaching
 from rods import rod
+from table import at_most
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.analysis.fcid import run_fcid
-from ffrobot.mbs.fields.time_functions import load_waypoints
-from ffrobot.mbs.scene.analysis_records import Analysis
+from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
+from ffrobot.mbs.fields.waypoints import load_waypoints
 
 GROUP = "Rough inputs"
 ELBOW = (-0.2, 1.4)
@@ -46,7 +46,7 @@ def test_jumps_are_refused(x, quantity, kind, record):
 
 
 def zero_shape():
-    return Analysis(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01)
+    return Fcid(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01)
 
 
 def test_jump_of_acceleration(record):
@@ -71,6 +71,10 @@ def test_waypoints_with_a_corner(tmp_path, record):
     record(GROUP, "waypoints with a corner", "their spline rounds it off")
 
 
+# Of the tolerance: what a step across a jump errs by hangs on where in it the jump falls.
+LEFT_AT_JUMPS = {"dop853": 1, "dopri5": 2, "radau": 5}
+
+
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
 def test_load_that_jumps(tolerance, record):
     """A motor switched on within rounding of no time, against a tighter tolerance."""
@@ -78,12 +82,11 @@ def test_load_that_jumps(tolerance, record):
     exact = free_run(model, tolerance=1e-2 * tolerance, integrator="dop853")
     runs = {name: free_run(model, tolerance=tolerance, integrator=name) for name in ("dop853", "dopri5", "radau")}
     errors = {name: relative(outcome.lambda_, exact.lambda_) for name, outcome in runs.items()}
-    assert max(errors.values()) < 5 * tolerance
     record(
         GROUP,
         f"a joint moment that jumps by 20 N·m, tolerance {tolerance:g}",
-        "forces err by {dop853} (DOP853), {dopri5} (DOPRI5), {radau} (Radau IIA)",
-        **errors,
+        "forces err by at most {dop853} (DOP853), {dopri5} (DOPRI5), {radau} (Radau IIA)",
+        **{name: at_most(LEFT_AT_JUMPS[name] * tolerance, error) for name, error in errors.items()},
     )
 
 
@@ -97,8 +100,8 @@ def test_load_that_ends(moment, says, record):
     )
     outcome = free_run(model)
     assert outcome.status == "step underflow"
-    assert says in outcome.cause
-    assert outcome.time_reached <= 0.5
+    assert says in outcome.statistics.cause
+    assert outcome.statistics.time_reached <= 0.5
     assert 10 < len(outcome.q) == len(outcome.time) <= 51
     record(
         GROUP,

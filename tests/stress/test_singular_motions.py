@@ -111,16 +111,16 @@ def test_parallelogram_falls_flat(record):
     """Without a drive nothing can be looked at before: the run creeps, is stopped, and says what is the matter."""
     outcome = free_run(parallelogram(), end=3.0, tolerance=1e-4)
     assert outcome.status == "step underflow"
-    assert "singular or nearly so" in outcome.cause
-    assert outcome.steps < 20_000
+    assert "singular or nearly so" in outcome.statistics.cause
+    assert outcome.statistics.steps < 20_000
     assert len(outcome.q) > 40
     record(
         GROUP,
         "flexible parallelogram falls into its flat position",
         "ends at t = {t} after {steps} steps",
         "step underflow; “the configuration is singular or nearly so (ratio of singular values 1e-06; …)”",
-        t=outcome.time_reached,
-        steps=outcome.steps,
+        t=outcome.statistics.time_reached,
+        steps=outcome.statistics.steps,
     )
 
 

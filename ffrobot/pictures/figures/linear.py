@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.plane import perpendicular, rotation
 from ...results.file import Results
-from ...results.linear import read_linear
 from .configurations import body_shape
 from .figure_file import FigureRecord
 from .style import SIZE, legend, shades
@@ -25,7 +25,7 @@ def draw_bode(figure: FigureRecord, results: Results) -> Figure:
     """Magnitude (SI units of output over input) and phase of `figure.transfers` over the frequency, at one time."""
     assert figure.analysis is not None
     k = _nearest(results, figure)
-    model = read_linear(results, figure.analysis)[k]
+    model = results.linear(figure.analysis)[k]
     frequency = results[f"{figure.analysis}/linear/frequency"][k]
     flexible = frequency[frequency > 0.0]
     first, last = (flexible[0], flexible[min(MODES_SHOWN, len(flexible)) - 1]) if len(flexible) else (1.0, 1.0)
@@ -89,14 +89,12 @@ def _lines(results: Results, analysis: str, body: str, k: int, mode: int) -> tup
     if not len(p):
         places, _ = body_shape(results, f"{analysis}/points", body, k)
         arm = places - position
-        return places, d_position + float(d_angle) * np.column_stack([-arm[:, 1], arm[:, 0]])
+        return places, d_position + float(d_angle) * perpendicular(arm)
     stations = results.modal_body(body).stations
     Phi = stations.translation[:, :2]
-    c, s = np.cos(angle), np.sin(angle)
-    A = np.array([[c, -s], [s, c]])
+    A = rotation(angle)
     arm = (stations.position[:, :2] + Phi @ p) @ A.T
-    turned = np.column_stack([-arm[:, 1], arm[:, 0]])
-    return position + arm, d_position + d_angle * turned + (Phi @ d_p) @ A.T
+    return position + arm, d_position + d_angle * perpendicular(arm) + (Phi @ d_p) @ A.T
 
 
 def _nearest(results: Results, figure: FigureRecord) -> int:

@@ -10,8 +10,9 @@ import numpy as np
 
 from ...common.arrays import Indices
 from ...common.errors import InputError
+from ...mbs.fields.field_types import GROUND
 from ..figures.palette import COLORS
-from ..motion import GROUND, BodyMotion, body_motion, hanging, ordered_bodies, visible_exaggeration
+from ..motion import BodyMotion, body_motion, ordered_bodies, topology, visible_exaggeration
 from ..outline import Outline, body_outline, points_outline
 from .charts import encoded, plain
 from .runs import Run, Target, targets
@@ -90,9 +91,9 @@ def _body_data(run: Run, body: BodyMotion, bodies: Sequence[BodyMotion], outline
         "names": body.point_names,
         "deflection": encoded(body.deflection),
     }
-    own, other = hanging(run.results.scene).get(body.name, ("", ""))
-    if own in body.point_names:
-        data["hangs"] = {"own": body.point_names.index(own), "from": _index(other, bodies)}
+    carrier = topology(run.results.scene).carriers[body.name]
+    if carrier is not None and carrier.own in body.point_names:
+        data["hangs"] = {"own": body.point_names.index(carrier.own), "from": _index(carrier.other, bodies)}
     return data
 
 

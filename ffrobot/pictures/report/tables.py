@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array
+from ...mbs.joints.joints import JOINT_TYPES
 from ...results.file import Results
 from .histories import path_error
 from .runs import Run, sources, targets
@@ -29,7 +30,7 @@ def analyses_table(runs: Sequence[Run]) -> Table:
     rows = []
     for run in runs:
         about, time = run.results.attributes(run.analysis), run.results.time(run.analysis)
-        integrated = about["kind"] != "static"
+        integrated = about["integrator"] != "none"
         counts = tuple(f"{about[key]}" if integrated else "" for key in ("steps", "rejected", "evaluations"))
         violation = run.results[f"{run.analysis}/constraint_violation"].max(initial=0.0)
         rows.append(
@@ -57,7 +58,7 @@ def _peaks(run: Run) -> Iterator[tuple[str, str, Array]]:
     types = {joint["name"]: joint["type"] for joint in results.scene.get("joint", [])}
     for joint in results.names(f"{analysis}/joints"):
         if results.has(f"{analysis}/joints/{joint}/moment"):
-            unit = "N" if types.get(joint) == "prismatic" else "N·m"
+            unit = JOINT_TYPES[types[joint]].force_unit
             yield f"motor of joint {joint}", unit, results[f"{analysis}/joints/{joint}/moment"]
     for point in results.names(f"{analysis}/points"):
         deflection = np.linalg.norm(results[f"{analysis}/points/{point}/deflection"], axis=1)

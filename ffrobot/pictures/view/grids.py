@@ -8,11 +8,12 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, Integers
 from ...common.errors import InputError
+from ...common.plane import rotated
 from ...fe_models.modal_body import ModalBody
 from ...mbs.quantities.stress import von_mises
 from ...results.file import Results
 from ..body_surface import body_surface
-from ..motion import BodyMotion, body_motion, carried, ordered_bodies, rotated
+from ..motion import BodyMotion, body_motion, carried, ordered_bodies
 from ..outline import points_outline
 from .vtkhdf import Grid
 
@@ -85,7 +86,7 @@ def _placed(piece: Piece, shift: Array) -> tuple[Array, Array, Array]:
 
 def _turned(angle: Array, vectors: Array) -> Array:
     """A(θ) times vectors (T, p, 3): a rotation about z."""
-    return np.concatenate([rotated(angle, vectors[..., :2]), vectors[..., 2:]], axis=2)
+    return np.concatenate([rotated(angle[:, None], vectors[..., :2]), vectors[..., 2:]], axis=2)
 
 
 def _in_space(vectors: Array) -> Array:

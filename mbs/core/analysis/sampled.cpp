@@ -115,6 +115,7 @@ Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, con
       motion, times, y, controls, [&](std::size_t i, double t, const double *state) { evaluate(i, t, state); },
       carry_on, nullptr, &breaks);
   result.outputs = evaluate.take(result.report.outputs);
+  result.last = y;
   return result;
 }
 

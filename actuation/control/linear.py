@@ -1,0 +1,104 @@
+"""Linear models about an equilibrium or a motion: the analysis `kind = "linear"`, and what is worth telling of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from ...mbs.analysis.operating_points import InstantAnalysis, operating_points
+from ...mbs.analysis.outcome import Details, Outcome
+from ...mbs.fields.field_types import PointReference
+from ...mbs.fields.references import Reference
+from ...mbs.solve.linearisation import Linearisation
+from ..context import ActuatedContext
+from ..patches.patches import PatchArray
+from .linear_model import LinearModel, linear_model
+from .modes import Reach, RobotModes, controllability, observability, robot_modes
+from .zeros import Zeros, zeros
+
+
+class Linear(InstantAnalysis):
+    """The robot as x' = A x + B u, y = C x + D u: `about` the static equilibrium, or an earlier analysis at `times`.
+
+    `points` are those whose motion and disturbance the model knows.
+    """
+
+    kind: Literal["linear"]
+    points: tuple[PointReference, ...] | None = None
+
+    needs_actuators = True
+
+    def references(self) -> Iterator[Reference]:
+        """The points."""
+        for point in self.points or ():
+            yield Reference("points", point, needs_marker=True)
+
+    def run(self, context: ActuatedContext) -> Outcome:
+        """The operating points, with `LinearModels` about them."""
+        outcome = operating_points(context.model, self, context.source(self.source))
+        return replace(outcome, details=analyse(linear_models(outcome, context.patches, self.points)))
+
+
+@dataclass(frozen=True)
+class LinearModels(Details):
+    """Linear models at the times of an analysis, with their modes, reach and zeros, one of each per time.
+
+    `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
+    (inputs, outputs): from each motor to its own joint and to each coordinate of a point, from all motors to their
+    joints (the frequencies with held joints), and to a point where there are two.
+    """
+
+    models: tuple[LinearModel, ...]
+    modes: tuple[RobotModes, ...]
+    controllable: tuple[Reach, ...]
+    observable: tuple[Reach, ...]
+    zeros: Mapping[tuple[str, ...], tuple[Zeros, ...]]
+
+
+def linear_models(
+    outcome: Outcome, patches: Mapping[str, PatchArray], points: Sequence[str] | None = None
+) -> tuple[LinearModel, ...]:
+    """The linear models about the rows of `outcome`, which know of the `points`, or of those of trajectories."""
+    model = outcome.assembly.model
+    linearisation = Linearisation(model, outcome.q[0], tuple(points or default_points(outcome)))
+    rows = zip(outcome.time, outcome.q, outcome.v, outcome.a, strict=True)
+    return tuple(linear_model(linearisation.at(float(t), q, v, a), patches) for t, q, v, a in rows)
+
+
+def analyse(models: tuple[LinearModel, ...]) -> LinearModels:
+    """Modes, reach and zeros of the models."""
+    first = models[0]
+    acting = [name for name in first.input_names if not name.startswith("force/")]
+    seen = [name for name in first.output_names if not name.startswith("modal/")]
+    return LinearModels(
+        models,
+        tuple(robot_modes(model) for model in models),
+        tuple(controllability(model, acting) for model in models),
+        tuple(observability(model, seen) for model in models),
+        {pair: tuple(zeros(model, *_split(pair)) for model in models) for pair in _pairs(first)},
+    )
+
+
+def default_points(outcome: Outcome) -> tuple[str, ...]:
+    """The points of trajectories; where there are none, the tips of all bodies that have one."""
+    model = outcome.assembly.model
+    points = [trajectory.point for trajectory in model.scene.trajectory if trajectory.point is not None]
+    tips = [f"{body.name}.tip" for body in model.bodies if "tip" in body.points]
+    return tuple(dict.fromkeys(points or tips))
+
+
+def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
+    """(inputs …, outputs …), as many of each."""
+    motors = [name for name in model.input_names if name.startswith("joint/")]
+    places = [name for name in model.output_names if name.startswith("point/")]
+    single = [(motor, output) for motor in motors for output in (motor, *places)]
+    together = [(*motors, *motors)] if len(motors) > 1 else []
+    if len(motors) == 2:
+        together += [(*motors, *pair) for pair in zip(places[::2], places[1::2], strict=True)]
+    return [*single, *together]
+
+
+def _split(pair: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    half = len(pair) // 2
+    return pair[:half], pair[half:]

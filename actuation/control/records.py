@@ -1,0 +1,188 @@
+"""Sensors, controllers and placements of a scene file, key by key. SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+
+from ...common.validation import Record, existing_file, quoted
+from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PointReference, Positive, one_of
+from ...mbs.fields.references import Reference
+
+PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
+
+
+class Sensor(Record):
+    """What is measured, and how well: of a joint its coordinate, of a point x and y, of patches their voltages.
+
+    `motor` names a joint with stiffness, of which the motor's angle behind its gear is read, on the first body.
+    `measure` is the value, its rate, or (points) its acceleration. Readings are whole numbers of `resolution`, after
+    Gaussian noise with the standard deviation `noise`, both in the unit of the reading. `modal` names a body whose
+    modal coordinates are read as they are, which no sensor can. Patches read the
+    charge c [φ'(x2) − φ'(x1)] p over `capacitance` (F; that of the patch itself where it is not given).
+    """
+
+    joint: str | None = None
+    motor: str | None = None
+    point: PointReference | None = None
+    pzt: str | None = None
+    modal: str | None = None
+    measure: Literal["value", "rate", "acceleration"] = "value"
+    resolution: NotNegative = 0.0
+    noise: NotNegative = 0.0
+    capacitance: Positive | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Sensor:
+        subject = one_of(self, ("joint", "motor", "point", "pzt", "modal"))
+        allowed = {"pzt": ("value",), "modal": ("value", "rate"), "joint": ("value", "rate")}
+        allowed["motor"] = allowed["joint"]
+        known = allowed.get(subject, ("value", "rate", "acceleration"))
+        if self.measure not in known:
+            raise ValueError(f'expected one of {quoted(known)} as measure beside "{subject}", found "{self.measure}"')
+        if self.capacitance is not None and subject != "pzt":
+            raise ValueError(f'expected the key "capacitance" only beside "pzt", found it beside "{subject}"')
+        return self
+
+    def references(self) -> Iterator[Reference]:
+        """What is measured."""
+        if self.point is not None:
+            yield Reference("", self.point, needs_marker=True)
+        yield from (Reference("", body) for body in (self.pzt, self.modal) if body is not None)
+        if self.pzt is not None:
+            yield Reference("pzt", self.pzt, "patches")
+        if self.joint is not None:
+            yield Reference("joint", self.joint, "joint")
+        if self.motor is not None:
+            yield Reference("motor", self.motor, "elastic joint")
+
+
+class ControllerRecord(Record):
+    """Base of all controllers."""
+
+    def references(self) -> Iterator[Reference]:
+        """Joints and bodies that a controller names."""
+        yield from ()
+
+
+class JointPid(ControllerRecord):
+    """u = P e + D ė + I ∫e of each joint named, e from the reference; N·m/rad, N·m·s/rad, N·m/(rad·s) or their like.
+
+    Rates are measured, or `rate = "difference"` of the last two readings.
+    """
+
+    kind: Literal["joint-pid"]
+    proportional: dict[Name, NotNegative] = Field(default_factory=dict)
+    derivative: dict[Name, NotNegative] = Field(default_factory=dict)
+    integral: dict[Name, NotNegative] = Field(default_factory=dict)
+    rate: Literal["measured", "difference"] = "measured"
+    side: Literal["joint", "motor"] = "joint"  # of gears that give, on which the angles are read
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints with any gain."""
+        return tuple(dict.fromkeys((*self.proportional, *self.derivative, *self.integral)))
+
+    def references(self) -> Iterator[Reference]:
+        """The joints, and the side of their gears."""
+        for name in self.joints:
+            yield Reference("", name, "joint")
+            if self.side == "motor":
+                yield Reference("side: motor", name, "elastic joint")
+
+
+class ComputedTorque(ControllerRecord):
+    """Moments of the mechanism with rigid links for γ̈_ref + 2 ζ ω ė + ω² e, instead of a feed-forward of moments."""
+
+    kind: Literal["computed-torque"]
+    bandwidth: Positive  # ω, rad/s
+    damping_ratio: Positive = 1.0
+
+
+class ModalVelocity(ControllerRecord):
+    """Patches as dampers of the lowest `modes` of their links: modal forces −2 ζ ω ṗ, ζ the `damping_ratio` added.
+
+    p from the voltages of the same patches (least squares over these modes) and ṗ from two samples, or both ideal.
+    """
+
+    kind: Literal["modal-velocity"]
+    bodies: Annotated[tuple[str, ...], NotEmpty]
+    modes: Annotated[int, Field(gt=0)] = 1
+    damping_ratio: Positive
+    sensor: Literal["pzt", "ideal"] = "pzt"
+
+    def references(self) -> Iterator[Reference]:
+        """The links."""
+        for body in self.bodies:
+            yield Reference("bodies", body)
+            yield Reference("bodies", body, "patches")
+
+
+class Lqr(ControllerRecord):
+    """u = −K x for the sampled linear model about the reference at `time`, links with their lowest `modes`.
+
+    Weights are one over the squares of what is acceptable: angles (rad), rates (rad/s), deflections of the links
+    relative to their length, moments (N·m), voltages (V). `inputs`: all, or motors or
+    patches alone, the latter about joints that a "joint-pid" beside holds. States as in `ModalVelocity`.
+    """
+
+    kind: Literal["lqr"]
+    inputs: Literal["all", "motors", "patches"] = "all"
+    modes: Annotated[int, Field(gt=0)] = 1
+    time: NotNegative = 0.0
+    angle: Positive = 0.01
+    rate: Positive = 0.1
+    deflection: Positive = 1e-3
+    moment: Positive = 10.0
+    voltage: Positive = 100.0
+    sensor: Literal["pzt", "ideal"] = "pzt"
+
+
+def _python_function(value: object, info: ValidationInfo) -> object:
+    """A function that a scene made in Python carries, or "FILE.py:FUNCTION" with the file where it is."""
+    objects = (info.context or {}).get("objects", {})
+    if callable(value) or (isinstance(value, str) and value in objects):
+        return objects.get(value, value)
+    path, colon, function = value.rpartition(":") if isinstance(value, str) else ("", "", "")
+    if not colon or not path or not function.isidentifier():
+        raise ValueError(f'expected "FILE.py:FUNCTION", found "{value}"')
+    return f"{existing_file(Path(path), info)}:{function}"
+
+
+class PythonController(ControllerRecord):
+    """A function of the user's, "FILE.py:FUNCTION" with the file beside the scene, or itself in scenes made in Python.
+
+    See `actuation.control.python_controller`.
+    """
+
+    kind: Literal["python"]
+    python: Annotated[Any, PlainValidator(_python_function, json_schema_input_type=str)]
+
+
+Controller = Annotated[JointPid | ComputedTorque | ModalVelocity | Lqr | PythonController, Field(discriminator="kind")]
+
+
+class Placement(Record):
+    """Where on one link the patches of its [[pzt]] should be, `count` of them.
+
+    `criterion` "controllability": they reach the `modes` lowest modes of the robot with its motors held; "voltage":
+    the largest voltage, relative to its limit, by which they produce the forces of the `modes` lowest modes of the link
+    over the inverse analysis `about`. `measure` says which reach counts: of the worst mode, on average, or the product.
+    Centers are sought every `spacing`, by trying all sets where that is at most `most_sets`, by evolution otherwise.
+    """
+
+    body: str
+    count: Annotated[int, Field(gt=0)] | None = None
+    criterion: Literal["controllability", "voltage"] = "controllability"
+    measure: Literal["worst", "mean", "product"] = "worst"
+    modes: Annotated[int, Field(gt=0)] | None = None
+    spacing: Positive | None = None
+    most_sets: Annotated[int, Field(gt=0)] = 100_000
+
+    def references(self) -> Iterator[Reference]:
+        """The link and its patches."""
+        yield Reference("placement.body", self.body)
+        yield Reference("placement.body", self.body, "patches")

@@ -1,0 +1,75 @@
+"""Patches of a scene file, key by key. SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from ...common.validation import Record
+from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, Positive, one_of
+from ...mbs.fields.references import Reference
+
+
+class PztLayout(Record):
+    """Equal piezoelectric patches along one link. Lengths in m, modulus in Pa, d31 in m/V, density kg/m³, limit in V.
+
+    Centers are distances along the link from its root; `count` places them at (k − ½)·(length of link)/count.
+    `thickness` is that of one of `layers`, which lie on each other on one `face` or on both, driven against each other.
+    Without `face` they bend the link and do nothing else, as in the paper. `limit` is one for all or one for each.
+    `allocation = "least-squares"` is content with fewer patches than modes, or modes that no patch reaches.
+    Where voltages cannot produce all modal forces, `mode_weights` (of the squares of what is left) or `point_weights`
+    (of the squares of the deflections that this causes at points of the link) say what matters.
+    `structural` names what of the patches is added to the link: "mass", "stiffness".
+    Only for the judgement: `depoling_field` (V/m) and `strain_limit` of the material.
+    `coupling`: patches work on the section rotations at their ends, or on the faces of a solid that outlines them.
+    """
+
+    body: str
+    count: Annotated[int, Field(gt=0)] | None = None
+    centers: Annotated[tuple[float, ...], NotEmpty] | None = None
+    length: Positive
+    width: Positive
+    thickness: Positive
+    modulus: Positive
+    d31: float
+    density: Positive | None = None
+    limit: Positive | Annotated[tuple[Positive, ...], NotEmpty] | None = None
+    layers: Annotated[int, Field(gt=0)] = 1
+    face: Literal["+y", "-y", "both"] | None = None
+    allocation: Literal["exact", "least-squares"] = "exact"
+    mode_weights: Annotated[tuple[NotNegative, ...], NotEmpty] | None = None
+    point_weights: dict[Name, NotNegative] | None = None
+    structural: tuple[Literal["mass", "stiffness"], ...] = ()
+    depoling_field: Positive | None = None
+    strain_limit: Positive | None = None
+    coupling: Literal["rotation", "surface"] = "rotation"
+
+    @model_validator(mode="after")
+    def _consistent(self) -> PztLayout:
+        one_of(self, ("count", "centers"))
+        if self.d31 == 0.0:
+            raise ValueError("expected a d31 other than 0, found 0: such patches do nothing")
+        if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
+            raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
+        if "mass" in self.structural and self.density is None:
+            raise ValueError('expected the key "density" beside structural = ["mass"], found none')
+        if self.mode_weights is not None and self.point_weights is not None:
+            raise ValueError('expected one of the keys "mode_weights" and "point_weights", found both')
+        for weights in (self.mode_weights, self.point_weights and tuple(self.point_weights.values())):
+            if weights is not None and not any(weights):
+                raise ValueError("expected weights that are not all 0, found only zeros")
+        return self
+
+    @property
+    def patch_count(self) -> int:
+        """Number of patches."""
+        return len(self.centers) if self.centers is not None else (self.count or 0)
+
+    def references(self) -> Iterator[Reference]:
+        """The link, and the points of it whose deflections weigh."""
+        yield Reference("body", self.body)
+        yield Reference("body", self.body, "flexible body")
+        for point in self.point_weights or ():
+            yield Reference("point_weights", f"{self.body}.{point}")

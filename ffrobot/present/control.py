@@ -1,0 +1,99 @@
+"""Tables and lines of what concerns control: closed loops, linear models, placements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from rich.table import Table
+
+from ..actuation.control.closed_loop import LoopRecord
+from ..actuation.control.linear import LinearModels
+from ..actuation.control.metrics import Metrics
+from ..actuation.control.placement import Placed
+from ..run.solution import Solution
+from .tables import plain_table
+
+FREQUENCIES = 5  # that are listed
+
+LOOP_COLUMNS = (
+    "closed loop", "verdict", "rms (m)", "max (m)", "settled (s)", "vibration (m)", "at end (m)", "work (J)", "N·m",
+    "V", "cut",
+)  # fmt: skip
+
+
+def loop_row(name: str, metrics: Metrics) -> Iterator[str]:
+    """One run as text, below `LOOP_COLUMNS`."""
+    yield name
+    yield metrics.verdict
+    for value in (metrics.tip_error_rms, metrics.tip_error_max):
+        yield f"{value:.3g}"
+    yield "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}"
+    for value in (metrics.vibration, metrics.residual, metrics.motor_work, metrics.peak_moment, metrics.peak_voltage):
+        yield f"{value:.3g}"
+    yield f"{100 * metrics.saturated:.2g} %"
+
+
+def control_tables(solution: Solution) -> Iterator[Table]:
+    """A table of each kind that was found."""
+    details = {name: outcome.details for name, outcome in solution.outcomes.items()}
+    loops = [loop_row(name, found.metrics) for name, found in details.items() if isinstance(found, LoopRecord)]
+    linear = [row for name, found in details.items() if isinstance(found, LinearModels) for row in _linear(name, found)]
+    placements = [_placement(name, found) for name, found in details.items() if isinstance(found, Placed)]
+    for columns, rows in ((LOOP_COLUMNS, loops), (LINEAR_COLUMNS, linear), (PLACEMENT_COLUMNS, placements)):
+        if rows:
+            table = plain_table(*columns)
+            for row in rows:
+                table.add_row(*row)
+            yield table
+
+
+LINEAR_COLUMNS = ("linear model", "t (s)", "freedom", "lowest frequencies (Hz)", "growth (1/s)")
+
+
+def _linear(name: str, found: LinearModels) -> Iterator[tuple[str, ...]]:
+    """Frequencies and growth at every time."""
+    for model, modes in zip(found.models, found.modes, strict=True):
+        vibrating = modes.frequency[modes.frequency > 0.0]
+        lowest = ", ".join(f"{f:.4g}" for f in vibrating[:FREQUENCIES])
+        yield name, f"{model.time:g}", f"{model.freedom}", lowest, f"{modes.growth:.3g}" if modes.growth else ""
+
+
+PLACEMENT_COLUMNS = ("placement", "on", "by", "found", "evenly spread", "of sets")
+
+
+def _placement(name: str, placed: Placed) -> tuple[str, ...]:
+    """The patches found against as many spread evenly: reach of modes, or the largest voltage of the path."""
+    over_path = placed.wanted.criterion == "voltage"
+    pair = placed.largest_voltage if over_path else (placed.best.value, placed.even.value)
+    return (
+        name,
+        placed.wanted.body,
+        "voltage" if over_path else f"{placed.wanted.measure} reach",
+        *(f"{value:.4g}" + (" V" if over_path else "") for value in pair),
+        f"{placed.sets}" + (" (evolution)" if placed.method == "evolution" else ""),
+    )
+
+
+def control_lines(solution: Solution) -> Iterator[str]:
+    """Zeros, modes that nothing moves or sees, and places of patches, a line each."""
+    for name, outcome in solution.outcomes.items():
+        if isinstance(outcome.details, LinearModels):
+            yield from _zeros_and_lost(name, outcome.details)
+    for name, outcome in solution.outcomes.items():
+        if isinstance(outcome.details, Placed):
+            yield f"{name}: centres at {', '.join(f'{x:.4g}' for x in outcome.details.best.centers)} m"
+
+
+def _zeros_and_lost(name: str, linear: LinearModels) -> Iterator[str]:
+    for pair, found in linear.zeros.items():
+        half = len(pair) // 2
+        transfer = f"{', '.join(pair[:half])} → {', '.join(pair[half:])}"
+        worst = next((zeros for zeros in found if not zeros.minimum_phase), found[0])
+        yield f"{name}: {transfer}: {worst.describe()}"
+    for verb, reaches in (
+        ("no motor or patch moves", linear.controllable), ("no joint or point of it sees", linear.observable)
+    ):  # fmt: skip
+        for model, reach in zip(linear.models, reaches, strict=True):
+            if reach.lost:
+                yield f"{name}, t = {model.time:g} s: {verb} {', '.join(reach.lost)}"

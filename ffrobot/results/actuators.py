@@ -1,0 +1,79 @@
+"""What patches, actuation points and motors have to do in results files, and whether they can."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+
+from ..actuation.control.placement import Placed
+from ..actuation.feasibility import Feasibility
+from ..actuation.patches.patches import PatchArray
+from ..actuation.patches.voltages import Voltages
+from ..actuation.points import PointForces, PointSet
+from ..mbs.analysis.outcome import Outcome
+from ..run.solution import AnalysisResult, Solution
+
+
+def write_actuators(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
+    """Of an analysis: pzt/, actuation_points/, patch_structure/, feasibility/, and what is left undone at points/."""
+    for body, voltages in result.voltages.items():
+        _write_voltages(group.create_group(f"pzt/{body}"), solution.patches[body], voltages)
+    for body, forces in result.point_forces.items():
+        _write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)
+    for body, effect in solution.structure.items():
+        for key, pair in vars(effect).items():
+            group[f"patch_structure/{body}/{key}"] = pair
+    for point, shift in result.predicted_shift.items():
+        group[f"points/{point}/predicted_shift"] = shift
+    if result.feasibility is not None:
+        _write_feasibility(group.create_group("feasibility"), solution, result.feasibility)
+
+
+def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) -> None:
+    group["voltage"] = voltages.within_limit
+    group["required_voltage"] = voltages.required
+    group["residual"] = voltages.residual
+    group["edges"] = patches.edges
+    group["moment_per_volt"] = patches.moment_per_volt
+    group.attrs["condition_number"] = patches.condition_number
+    group["residual_force"] = voltages.unmet
+    group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
+
+
+def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
+    for joint, motor in judged.motors.items():
+        group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
+    for body, patches in judged.patches.items():
+        entry, layout = group.create_group(f"pzt/{body}"), solution.patches[body].layout
+        arrays = {key: value for key, value in vars(patches).items() if isinstance(value, np.ndarray)}
+        for key, values in (arrays | {"factor": patches.factor, "mode_factor": patches.mode_factor}).items():
+            entry[key] = values
+        entry.attrs["depoling_field"] = layout.depoling_field or np.inf
+        entry.attrs["strain_limit"] = layout.strain_limit or np.inf
+        entry.create_group("remedies").attrs.update(vars(patches.remedies))
+
+
+def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces) -> None:
+    group["force"] = forces.force
+    group["residual"] = forces.residual
+    group["residual_force"] = forces.unmet
+    group["position"] = np.array([point.position for point in points.points])
+    group["direction"] = points.direction.T
+    group.attrs["components"] = list(points.axes)
+    group.attrs["rank"] = forces.rank
+    group.attrs["condition_number"] = forces.condition_number
+
+
+def write_placement(group: h5py.Group, outcome: Outcome, placed: Placed) -> None:
+    """Of an analysis: placement/, with the patches found and those spread evenly.
+
+    What each reaches, and what one patch would reach anywhere.
+    """
+    group = group.create_group("placement")
+    group.attrs.update({"body": placed.wanted.body, "criterion": placed.wanted.criterion})
+    group.attrs.update({"measure": placed.wanted.measure, "sets": placed.sets, "method": placed.method})
+    for key, found in (("best", placed.best), ("even", placed.even)):
+        for name, values in vars(found).items():
+            group[f"{key}/{name}"] = values
+    for key in ("frequency", "share", "largest_voltage", "candidates", "candidate_reach"):
+        group[key] = getattr(placed, key)

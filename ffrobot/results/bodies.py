@@ -1,0 +1,52 @@
+"""Motion of bodies and points in results files, energies, and stresses in the bodies."""
+
+from __future__ import annotations
+
+import h5py
+
+from ..common.arrays import Array
+from ..mbs.analysis.outcome import Outcome
+from ..mbs.model.truncation import modes_kept
+from ..mbs.quantities.observation import body_motion, energies, point_motion, stored_coordinates
+from ..mbs.quantities.stress import BodyStress
+
+
+def write_motion(group: h5py.Group, outcome: Outcome) -> None:
+    """Of an analysis: bodies/, points/, energy/, and how far the constraints are violated."""
+    group["time"] = outcome.time
+    for body in outcome.assembly.model.links:
+        for key, values in vars(body_motion(outcome, body)).items():
+            group[f"bodies/{body.name}/{key}"] = values
+        transform = stored_coordinates(body)
+        about = "modes of the modal body file"
+        if transform is not None:
+            group[f"bodies/{body.name}/modal_transform"] = transform
+            about = "modes of the modal body file are modal_transform times these"
+        group[f"bodies/{body.name}"].attrs["modal_coordinates"] = about
+        group[f"bodies/{body.name}"].attrs["modes_kept"] = modes_kept(body)
+        for label in body.points:
+            point = f"{body.name}.{label}"
+            for key, values in vars(point_motion(outcome, point)).items():
+                group[f"points/{point}/{key}"] = values
+    for key, values in energies(outcome).items():
+        group[f"energy/{key}"] = values
+    violation = group.create_dataset("constraint_violation", data=outcome.residual)
+    violation.attrs["columns"] = ["position", "velocity", "acceleration"]
+
+
+def read_modal(group: h5py.Group, body: str) -> Array:
+    """P (T, n) of a flexible body of an analysis, in the modes of its modal body file."""
+    entry = group[f"bodies/{body}"]
+    p: Array = entry["modal"][()]
+    return p @ entry["modal_transform"][()].T if "modal_transform" in entry else p
+
+
+def write_stress(group: h5py.Group, stress: BodyStress) -> None:
+    """Of one body, at its stress points and on its surface."""
+    for name, point in stress.points.items():
+        for key, values in vars(point).items():
+            group[f"points/{name}/{key}"] = values
+        group[f"points/{name}/stress"].attrs["columns"] = ["xx", "yy", "zz", "yz", "xz", "xy"]
+    if stress.surface is not None:
+        for key, values in vars(stress.surface).items():
+            group[f"surface/{key}"] = values

@@ -1,0 +1,29 @@
+"""Closed loops in results files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import h5py
+
+from ..actuation.control.closed_loop import LoopRecord
+from ..actuation.control.metrics import Metrics
+from ..mbs.analysis.outcome import Outcome
+
+
+def write_loop(group: h5py.Group, outcome: Outcome, record: LoopRecord) -> None:
+    """Of an analysis: tip_error at its outputs; in control/, samples, with metrics and names as attributes."""
+    group["tip_error"] = record.tip_error
+    group = group.create_group("control")
+    for key in ("time", "readings", "reference", "commands", "wanted"):
+        group[key] = getattr(record, key)
+    group.attrs["inputs"] = list(record.inputs)
+    group.attrs["outputs"] = list(record.outputs)
+    group.attrs["warnings"] = list(record.warnings)
+    group.attrs.update(vars(record.metrics))
+
+
+def read_metrics(attributes: Mapping[str, Any]) -> Metrics:
+    """The metrics among the attributes of control/."""
+    return Metrics(**{key: attributes[key] for key in Metrics.__dataclass_fields__})

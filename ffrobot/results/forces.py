@@ -1,0 +1,58 @@
+"""Forces along trajectories and in joints in results files, and how a path was inverted for motors alone."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+
+from ..mbs.analysis.motors_only import InvertedPath, is_minimum_phase, path_error
+from ..mbs.analysis.outcome import Outcome
+from ..mbs.quantities.observation import joint_forces, motor_angle, trajectory_force, trajectory_target
+
+
+def write_forces(group: h5py.Group, outcome: Outcome) -> None:
+    """Of an analysis: trajectories/ that hold in it, and joints/."""
+    held = {c.owner for c in outcome.assembly.constraints if c.is_trajectory}
+    for trajectory in outcome.assembly.model.scene.trajectory:
+        if trajectory.name in held:
+            entry = group.create_group(f"trajectories/{trajectory.name}")
+            entry["force"] = trajectory_force(outcome, trajectory.name)
+            entry["target"] = trajectory_target(outcome, trajectory.name)
+            entry.attrs["components"] = list(trajectory.components)
+    for joint in outcome.assembly.model.scene.joint:
+        forces = joint_forces(outcome, joint.name)
+        entry = group.create_group(f"joints/{joint.name}")
+        entry.attrs["type"] = joint.type
+        entry["reaction"] = forces.reaction
+        if forces.reaction_moment is not None:
+            entry["reaction_moment"] = forces.reaction_moment
+        if forces.motor is not None:
+            entry["moment"] = forces.motor
+            if joint.given_gear_ratio is not None:
+                entry["motor_moment"] = forces.motor / joint.given_gear_ratio
+        angle = motor_angle(outcome, joint.name)
+        if angle is not None:
+            entry["motor_angle"] = angle
+        if (gear := outcome.gears.get(joint.name)) is not None:
+            entry["gear_moment"] = gear.gear_moment
+            entry.attrs["unresolved"] = gear.unresolved
+
+
+def write_inversion(group: h5py.Group, outcome: Outcome, found: InvertedPath) -> None:
+    """Of motors-only inverse dynamics: no force acts on the path's points, which may be off it."""
+    inversion = found.inversion
+    error, column = path_error(inversion, outcome.time, outcome.q), 0
+    for trajectory in outcome.assembly.model.scene.trajectory:
+        entry, count = group.create_group(f"trajectories/{trajectory.name}"), len(trajectory.components)
+        entry["target"] = trajectory_target(outcome, trajectory.name)
+        entry["error"] = error[:, column : column + count]
+        entry.attrs["components"] = list(trajectory.components)
+        column += count
+    entry = group.create_group("zero_dynamics")
+    entry["time"] = inversion.linearisation.times
+    entry["zeros"] = np.stack([inversion.linearisation.zeros.real, inversion.linearisation.zeros.imag], axis=2)
+    entry.attrs["columns"] = ["real", "imaginary"]
+    entry.attrs["factor"] = inversion.servo.factor
+    entry.attrs["minimum_phase"] = is_minimum_phase(inversion.linearisation)
+    entry.attrs["unmet_force"] = inversion.unmet
+    entry.attrs["off_rest"] = inversion.off_rest

@@ -1,0 +1,106 @@
+"""Everything of a scene but its analyses: bodies, patches, equations."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from ..actuation.patches.patches import PatchArray, check_reach, patch_array
+from ..actuation.patches.structure import StructureEffect
+from ..actuation.points import point_set, with_points
+from ..common.errors import InputError
+from ..mbs.model.model import ModalLoad, build_model
+from ..mbs.model.planar_body import PlanarBody
+from ..scene.load import load_scene
+from ..scene.scene import Scene
+from .bodies import LoadedBody, add_patches, load_bodies
+from .mode_choice import truncation_levels, whole_bodies
+from .omissions import omissions
+from .solution import Solution
+from .watcher import Watcher
+
+
+def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
+    """A solution without analyses; stage 1 runs for links that are not up to date.
+
+    Raises `InputError` for anything wrong with the scene or the files it names.
+    """
+    watcher = watcher or Watcher()
+    began = time.perf_counter()
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene)
+    bodies = {body.name: loaded for body, loaded in zip(scene.body, load_bodies(scene, watcher.stage), strict=True)}
+    seconds = {"links and files": time.perf_counter() - began}
+    structure = add_patches(scene, bodies)
+    first = truncation_levels(scene, whole_bodies(bodies))[0]
+    bodies = {name: replace(body, planar=first.get(name, body.planar)) for name, body in bodies.items()}
+    return _assembled(scene, bodies, structure, seconds, stiffened=scene.geometric_stiffening is True)
+
+
+def with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Solution:
+    """The scene with some of its bodies replaced, nothing solved yet."""
+    bodies = {name: replace(b, planar=planar.get(name, b.planar)) for name, b in solution.bodies.items()}
+    return _assembled(solution.scene, bodies, solution.structure, solution.preparation, solution.stiffened)
+
+
+def stiffened(solution: Solution) -> Solution:
+    """The scene with geometric stiffening, nothing solved yet."""
+    return _assembled(solution.scene, solution.bodies, solution.structure, solution.preparation, stiffened=True)
+
+
+def _assembled(
+    scene: Scene,
+    bodies: Mapping[str, LoadedBody],
+    structure: Mapping[str, StructureEffect],
+    preparation: Mapping[str, float],
+    stiffened: bool,
+) -> Solution:
+    """The equations of a scene, with or without geometric stiffening."""
+    _check_stiffening(scene, bodies, stiffened)
+    patches = {
+        layout.body: patch_array(scene.path, layout, modal, bodies[layout.body].planar)
+        for layout in scene.pzt
+        if (modal := bodies[layout.body].modal) is not None
+    }
+    if any(analysis.allocates_patches for analysis in scene.analysis) and scene.trajectory:
+        for array in patches.values():
+            check_reach(scene.path, array)
+    points = {
+        layout.body: point_set(scene.path, layout, bodies[layout.body].modal, bodies[layout.body].planar)
+        for layout in scene.actuation_points
+    }
+    bodies = {
+        name: replace(body, planar=with_points(body.planar, points[name])) if name in points else body
+        for name, body in bodies.items()
+    }
+    planar = [body.planar if stiffened else replace(body.planar, stiffening=None) for body in bodies.values()]
+    return Solution(
+        scene=scene,
+        model=build_model(scene, planar, list(_voltage_loads(scene, patches))),
+        bodies=bodies,
+        patches=patches,
+        points=points,
+        structure=structure,
+        preparation=preparation,
+        omissions=tuple(omissions(scene, bodies)),
+        stiffened=stiffened,
+    )
+
+
+def _check_stiffening(scene: Scene, bodies: Mapping[str, LoadedBody], stiffened: bool) -> None:
+    """Raise `InputError` for a stiffened body whose file does not say how."""
+    for name, body in bodies.items():
+        if stiffened and body.modal is not None and body.planar.stiffening is None:
+            raise InputError(
+                f"{scene.path}: geometric_stiffening: expected modal bodies with geometric stiffness, found none in"
+                f' that of "{name}"'
+            )
+
+
+def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> Iterator[ModalLoad]:
+    for load in scene.load:
+        if load.pzt is not None:
+            for k, function in enumerate(load.components.values()):
+                yield ModalLoad(load.pzt, patches[load.pzt].Phi_V[:, k], function)

@@ -1,0 +1,131 @@
+"""The analyses of a scene, run one after the other."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from ..actuation.context import ActuatedContext
+from ..actuation.patches.voltages import allocation, solve_voltages
+from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.replay import ActuatorSet
+from ..mbs.quantities.stiffening import NOTABLE, estimated_effect
+from ..scene.kinds import AnyKind
+from ..scene.scene import Scene
+from .evaluation import evaluated
+from .mode_choice import ModeSearch
+from .prepare import prepare, stiffened, with_bodies
+from .solution import AnalysisResult, Solution
+from .watcher import Interruption, Watcher
+
+logger = logging.getLogger(__name__)
+
+
+def solve(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
+    """Run every analysis of a scene or a scene file; stage 1 runs first for links that are not up to date.
+
+    With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
+
+    An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
+    So does Ctrl-C during an analysis.
+    Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
+    """
+    watcher = watcher or Watcher()
+    return run_analyses(prepare(scene, watcher), watcher)
+
+
+def run_analyses(solution: Solution, watcher: Watcher) -> Solution:
+    """What `solve` does with everything prepared; analyses go on from where `solution.earlier` has them."""
+    with Interruption() as interruption:
+        if any(body.modes == "auto" for body in solution.scene.body):
+            solution = _with_enough_modes(solution, watcher, interruption)
+        else:
+            solution = _completed(solution, watcher, interruption)
+    return replace(solution, analyses={name: evaluated(solution, x) for name, x in solution.analyses.items()})
+
+
+def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+    """The scene solved with as many modes as its tolerances need: see `mode_choice`."""
+    search = ModeSearch(solution)
+    while (bodies := search.next_bodies()) is not None:
+        solution = _completed(with_bodies(solution, bodies), watcher, interruption)
+        search.add(solution, last=interruption.requested)
+    return replace(solution, mode_choice=search.choice())
+
+
+def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+    """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
+    results = _run_all(solution, watcher, interruption)
+    if results is None:
+        solution = stiffened(solution)
+        results = _run_all(solution, watcher, interruption)
+    assert results is not None
+    return replace(solution, analyses=results)
+
+
+def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> dict[str, AnalysisResult] | None:
+    """The analyses up to the first that fails; None where `geometric_stiffening = "auto"` asks for them all again."""
+    stiffening = {name: body.planar.stiffening for name, body in solution.bodies.items()}
+    results: dict[str, AnalysisResult] = {}
+    for analysis in solution.scene.analysis:
+        began = time.perf_counter()
+        watcher.stage(f'analysis "{analysis.name}"')
+        outcome = analysis.run(_context(solution, analysis, results, watcher, interruption))
+        effect = estimated_effect(outcome, stiffening)
+        automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
+        if automatic and effect > NOTABLE and outcome.status != "interrupted":
+            return None
+        voltages = {} if outcome.F_p is None else {
+            body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
+            for body, array in solution.patches.items()
+        }  # fmt: skip
+        results[analysis.name] = AnalysisResult(outcome, effect, time.perf_counter() - began, voltages)
+        _log(outcome)
+        if outcome.failed:
+            break
+    return results
+
+
+def _context(
+    solution: Solution,
+    analysis: AnyKind,
+    results: Mapping[str, AnalysisResult],
+    watcher: Watcher,
+    interruption: Interruption,
+) -> ActuatedContext:
+    end, later = analysis.last_time, solution.scene.analysis
+
+    def progress(t: float) -> bool:
+        return watcher.advance(t, end) and not interruption.requested
+
+    return ActuatedContext(
+        model=solution.model,
+        outcomes={name: result.outcome for name, result in results.items()},
+        make_actuators=lambda: _actuator_set(solution),
+        progress=progress,
+        is_replayed=any(other.takes_actuation and other.source == analysis.name for other in later),
+        earlier=solution.earlier.get(analysis.name),
+        patches=solution.patches,
+        links={name: body.modal for name, body in solution.bodies.items() if body.modal is not None},
+    )
+
+
+def _actuator_set(solution: Solution) -> ActuatorSet:
+    """The actuators of the scene, fresh for one run."""
+    return ActuatorSet(
+        {name: allocation(array, limited=False) for name, array in solution.patches.items()},
+        {name: allocation(array, limited=True) for name, array in solution.patches.items()},
+        {name: points.actuator() for name, points in solution.points.items()},
+    )
+
+
+def _log(outcome: Outcome) -> None:
+    run = outcome.statistics
+    logger.info(
+        'analysis "%s": %s at t = %g s, %d steps, %d rejected, %d evaluations, %.3f s; integrator %s: %s',
+        outcome.analysis.name, run.status, outcome.time[-1], run.steps, run.rejected, run.evaluations,
+        run.wall_seconds, run.integrator.name, run.integrator.reason,
+    )  # fmt: skip

@@ -1,0 +1,49 @@
+"""Who is told how a solve goes and may stop it: a watcher, Ctrl-C, a cluster's end of time."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Watcher:
+    """Is told how a solve goes; the command line shows it, a library user need not care."""
+
+    def stage(self, title: str) -> None:
+        """Something that may take long begins."""
+
+    def advance(self, t: float, end: float) -> bool:
+        """An analysis has reached time t of `end`; False stops it."""
+        return True
+
+
+class Interruption:
+    """Within its context the first Ctrl-C (or SIGTERM) only sets `requested`; the next one interrupts as usual.
+
+    Python would raise `KeyboardInterrupt` anywhere, in the calls from the core too, and the outputs so far were lost.
+    Signals reach the main thread only: in any other the context does nothing.
+    """
+
+    def __init__(self) -> None:
+        self.requested = False
+        self._is_main = threading.current_thread() is threading.main_thread()
+
+    def __enter__(self) -> Interruption:
+        if self._is_main:
+            self._previous = {number: signal.signal(number, self._request) for number in SIGNALS}
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        if self._is_main:
+            self._restore()
+
+    def _request(self, number: int, frame: FrameType | None) -> None:
+        self.requested = True
+        self._restore()
+
+    def _restore(self) -> None:
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)

@@ -1,0 +1,1 @@
+"""The scene as a whole: its file, THE list of kinds of analysis, and what its tables refer to."""

@@ -1,0 +1,150 @@
+"""Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import SolveError
+from .. import _core
+from ..model.system import MechanismSystem
+from ..scene.analysis import IntegratedAnalysis
+from ..solve.diagnosis import find_cause, lost_inertia
+from ..solve.initial_state import undeformed_state
+from ..solve.integrators import METHODS, Choice, beyond_order, choose_integrator
+from ..solve.state import State
+from ..solve.statics import static_equilibrium
+from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
+
+Progress = Callable[[float], bool]
+"""Called now and then with the time reached; False stops the run."""
+
+STATUS = {
+    _core.IntegrationStatus.completed: "completed",
+    _core.IntegrationStatus.step_underflow: "step underflow",
+    _core.IntegrationStatus.too_many_steps: "too many steps",
+    _core.IntegrationStatus.interrupted: "interrupted",
+    _core.IntegrationStatus.diverged: "diverged",
+}
+
+
+@dataclass(frozen=True)
+class SampledControl:
+    """What acts on the motors and patches of a system from sample to sample.
+
+    Attributes:
+        motors: how many there are; the first loads of the system are theirs.
+        voltages: body number and Φ_V (n, k) of its patches.
+        first: (inputs,) commands before those of the first sample act.
+        sensing: what is read of the state.
+        times: (K,) s, of the samples; the commands of each act `delay` (s) later.
+        controller: commands (inputs,) from sample number, time and readings.
+    """
+
+    motors: int
+    voltages: Sequence[tuple[int, Array]]
+    first: Array
+    sensing: _core.Sensing
+    times: Array
+    delay: float
+    controller: Callable[[int, float, Array], Array]
+
+
+def drive(
+    assembly: MechanismSystem,
+    analysis: IntegratedAnalysis,
+    start: State,
+    progress: Progress,
+    *,
+    times: Array | None = None,
+    steering: _core.ExternalLoads | None = None,
+    control: SampledControl | None = None,
+    resolver: _core.ActuatorForces | None = None,
+    recording: _core.Recording | None = None,
+    earlier: EarlierRun | None = None,
+) -> Outcome:
+    """The outcome of an integration with outputs at `times`, those of the analysis where not given.
+
+    Under `steering` from outside, or sampled `control`. It goes on with an `earlier` run of the same analysis. An
+    integration that ends early is kept with its cause. Raises `SolveError` for a start without inertia.
+    """
+    times = analysis.times if times is None else times
+    if earlier is not None and earlier.statistics.status == "completed":
+        return Outcome(analysis, assembly, **vars(earlier))
+    if len(times) > 1 and (cause := lost_inertia(assembly, start.q)):
+        raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
+    began = time.perf_counter()
+    if earlier is None:
+        integrator = choose_integrator(assembly, analysis, start, steering, len(times))
+        continuation = Continuation(_core.Checkpoint(), recording)
+    else:
+        integrator, continuation = earlier.statistics.integrator, earlier.continuation
+    method, tolerance, most = METHODS[integrator.name], analysis.tolerance, analysis.max_steps
+    if control is None:
+        run = _core.run(
+            assembly.system, assembly.groups, assembly.moments, steering, times.tolist(), start.q, start.v, tolerance,
+            most, method, analysis.spectral_radius, resolver, progress, continuation.recording, continuation.checkpoint,
+        )  # fmt: skip
+    else:
+        run = _core.run_sampled(
+            assembly.system, assembly.groups, assembly.moments, times.tolist(), start.q, start.v, tolerance,
+            most, method, analysis.spectral_radius, control.motors, control.voltages, control.first, control.sensing,
+            control.times.tolist(), control.delay, control.controller, progress,
+        )  # fmt: skip
+    seconds = time.perf_counter() - began
+    statistics = statistics_of(assembly, run, integrator, seconds)
+    if statistics.status == "step underflow" and not statistics.cause:
+        statistics = replace(statistics, cause=beyond_order(integrator, analysis))
+    outcome = Outcome(
+        analysis=analysis,
+        assembly=assembly,
+        motion=motion_of(assembly, run, times),
+        forces=Forces(run.tau, run.F_p) if resolver else Forces(),
+        statistics=statistics,
+        continuation=continuation if control is None else None,
+    )
+    return outcome if earlier is None else _joined(earlier, outcome)
+
+
+def motion_of(assembly: MechanismSystem, run: _core.Run | _core.FcidOutputs, times: Array) -> Motion:
+    """The motion of a run of the core, as far as it got."""
+    reached, held = len(run.q), len(assembly.constraints)
+    return Motion(times[:reached], run.q, run.v, run.a, run.multipliers[:, :held], run.residual)
+
+
+def statistics_of(assembly: MechanismSystem, run: _core.Run, integrator: Choice, seconds: float) -> Statistics:
+    """How a run of the core went, and why it ended where it failed."""
+    status, cause = STATUS[run.status], ""
+    if status not in ("completed", "interrupted"):
+        cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, 2)))
+    return Statistics(status, integrator, run.steps, run.rejected, run.evaluations, seconds, run.time_reached, cause)
+
+
+def _joined(earlier: EarlierRun, later: Outcome) -> Outcome:
+    """`later`, which went on from the checkpoint of `earlier`: its rows before that mean nothing."""
+    return replace(
+        later,
+        motion=earlier.motion.followed_by(later.motion),
+        forces=earlier.forces.followed_by(later.forces),
+        statistics=later.statistics.added_to(earlier.statistics),
+    )
+
+
+def initial_state(assembly: MechanismSystem) -> State:
+    """The initial state the scene asks for."""
+    start = undeformed_state(assembly)
+    if assembly.model.scene.initial.state == "static":
+        start = static_equilibrium(assembly, start)
+    return start
+
+
+def resolver_of(assembly: MechanismSystem) -> _core.ActuatorForces | None:
+    """What turns trajectory forces into motor and modal forces; None where the motors do not fit the mechanism."""
+    model = assembly.model
+    if not model.trajectories or len(model.motors) != model.degrees_of_freedom:
+        return None
+    return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)

@@ -1,0 +1,168 @@
+"""Forward dynamics under given loads, and under the actuation that an inverse analysis found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from ...common.errors import InputError
+from ...common.validation import either, quoted
+from .. import _core
+from ..joints.measure import Marker, Measure
+from ..model.model import ZERO, Model
+from ..model.system import MechanismSystem
+from ..scene.analysis import ActuatedAnalysis, Analysis, Need
+from ..solve.state import State
+from .context import Context
+from .drive import Progress, drive, initial_state
+from .elastic_joints import drive_sizes, with_compliance, with_rotors
+from .outcome import EarlierRun, Outcome
+from .replay import ActuatorSet, actuation_source, motor_limits, replay_times
+
+
+class Forward(ActuatedAnalysis):
+    """Motion under the loads of the scene, and under the `actuation` that an earlier inverse analysis found.
+
+    `apply` says as what it acts: moments of motors, with voltages of patches or without, forces along the
+    trajectories, or forces at the actuation points. `limits` keeps motors and patches within theirs.
+    """
+
+    kind: Literal["forward"]
+    apply: Literal["joints", "joints+pzt", "trajectory", "points"] | None = None
+    limits: bool = False
+
+    follows_trajectories = False
+    is_resumable = True
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.actuation is None) != (self.apply is None):
+            raise ValueError(
+                'expected the keys "actuation" and "apply" together, found only '
+                + ('"apply"' if self.actuation is None else '"actuation"')
+            )
+        if self.limits and self.apply not in ("joints", "joints+pzt"):
+            raise ValueError(
+                f'expected limits = true only beside apply = "joints" or "joints+pzt", found apply = "{self.apply}"'
+            )
+        return self
+
+    def needs(self) -> Iterator[Need]:
+        """Patches or points for what is applied by them."""
+        table = {"joints+pzt": "pzt", "points": "actuation_points"}.get(self.apply or "")
+        if self.apply is not None and table is not None:
+            yield Need("apply", self.apply, table)
+
+    def replay_problems(self, source: Analysis) -> Iterator[str]:
+        """Whether `source` found what is to be applied."""
+        if source.applicable and self.apply not in source.applicable:
+            more = f': "{source.name}" takes more than the forces on its trajectories'
+            why = more if self.apply == "trajectory" else ""
+            yield (
+                f'apply: expected {either(source.applicable)} with an analysis of kind "{source.kind}", found'
+                f' "{self.apply}"{why}'
+            )
+
+    def run(self, context: Context) -> Outcome:
+        """Motion alone: nothing is specified."""
+        source = context.source(self.actuation)
+        return run_forward(context.model, self, source, context.make_actuators(), context.progress, context.earlier)
+
+
+def run_forward(
+    model: Model,
+    analysis: Forward,
+    source: Outcome | None,
+    actuator_set: ActuatorSet,
+    progress: Progress,
+    earlier: EarlierRun | None = None,
+) -> Outcome:
+    """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one.
+
+    Motors turn elastic gears with the moments at the outputs of `source` and splines between these.
+    It goes on with an `earlier` run of the same analysis.
+    """
+    model = with_compliance(model)
+    if source is None:
+        assembly = MechanismSystem(model, model.joints, model.loads)
+        return drive(assembly, analysis, initial_state(assembly), progress, earlier=earlier)
+    loads = model.loads if source.details.loads is None else source.details.loads
+    rows, actuators = applied_actuators(model, analysis, source, actuator_set)
+    sizes, moved = [ZERO] * len(rows), with_rotors(source, model)
+    if model.gears:
+        _check_applied(model, analysis)
+        limits = motor_limits(model)
+        sizes = drive_sizes(source, limits if analysis.limits else np.full_like(limits, np.inf))
+        actuators = actuators[1:]  # without the motors
+    assembly = MechanismSystem(model, model.joints, [*zip(rows, sizes, strict=True), *loads])
+    steering = _core.Actuation(actuation_source(source), actuators) if actuators else None
+    start = State(moved.q[0].copy(), moved.v[0].copy())  # bodies and their order are the same
+    times = replay_times(source, analysis)
+    return drive(assembly, analysis, start, progress, times=times, steering=steering, earlier=earlier)
+
+
+def _check_applied(model: Model, analysis: Forward) -> None:
+    """Raise `InputError` for an actuation that leaves motors behind gears that give without their moments."""
+    if analysis.apply not in ("joints", "joints+pzt"):
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" beside joints'
+            f' with stiffness, found "{analysis.apply}"'
+        )
+
+
+def applied_actuators(
+    model: Model, analysis: Forward, source: Outcome, actuator_set: ActuatorSet
+) -> tuple[list[Measure], list[_core.Actuator]]:
+    """Rows along which forces act, and the actuators that set them, in the order in which the core numbers them.
+
+    Raises `InputError` where the motors do not fit the mechanism, or a body has no actuation points.
+    """
+    if analysis.apply == "trajectory":
+        return [c.measure for c in source.assembly.constraints if c.is_trajectory], [_core.TrajectoryForces(0)]
+    if analysis.apply == "points":
+        return _point_actuators(model, analysis, source, actuator_set)
+    if source.tau is None:
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected motors that fit the mechanism'
+            f" ({model.degrees_of_freedom} of them) for {analysis.apply!r}, found {len(model.motors)}; name them with"
+            ' motor = true, or use apply = "trajectory"'
+        )
+    limits = motor_limits(model)
+    motors = _core.Motors(0, limits if analysis.limits else np.full_like(limits, np.inf))
+    patches = actuator_set.limited_patches if analysis.limits else actuator_set.patches
+    index = {body.name: i for i, body in enumerate(model.bodies)}
+    bent = [_core.Patches(index[name], allocation) for name, allocation in patches.items()]
+    return list(model.motors.values()), [motors, *(bent if analysis.apply == "joints+pzt" else [])]
+
+
+def _point_actuators(
+    model: Model, analysis: Forward, source: Outcome, actuator_set: ActuatorSet
+) -> tuple[list[Measure], list[_core.Actuator]]:
+    driven = [body.name for body in model.bodies if is_driven(source, body.name)]
+    missing = [name for name in driven if name not in actuator_set.points]
+    if missing:
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected [[actuation_points]] on every body that'
+            f' "{source.analysis.name}" drives ({quoted(driven)}), found none on {quoted(missing)}'
+        )
+    rows: list[Measure] = []
+    actuators: list[_core.Actuator] = []
+    for i, body in enumerate(model.bodies):
+        if body.name not in actuator_set.points:
+            continue
+        points = actuator_set.points[body.name]
+        actuators.append(_core.PointForces(len(rows), i, points.equations))
+        for name in points.points:
+            for kind in (_core.MeasureKind.x, _core.MeasureKind.y):
+                rows.append(Measure(f'actuation point on "{body.name}"', kind, Marker(None), Marker(body.name, name)))
+    return rows, actuators
+
+
+def is_driven(source: Outcome, body: str) -> bool:
+    """Whether generalized driving forces Q_a can act on a body: a trajectory or prescribed modes are its own."""
+    trajectories = (c.measure for c in source.assembly.constraints if c.is_trajectory)
+    prescribed = source.details.shape_force is not None and source.assembly.model.body(body).n_modes > 0
+    return prescribed or any(body in (row.a.body, row.b.body) for row in trajectories)

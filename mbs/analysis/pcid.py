@@ -1,0 +1,58 @@
+"""Partially constrained inverse dynamics (Shaban 2022, sec. 5): joints and trajectories hold, p is free."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from .. import _core
+from ..model.model import Model
+from ..model.system import MechanismSystem
+from ..scene.analysis import IntegratedAnalysis, Need
+from ..solve.initial_state import undeformed_state
+from ..solve.path_checks import check_smooth
+from ..solve.reach import check_reach
+from .context import Context
+from .drive import Progress, drive, initial_state, resolver_of
+from .elastic_joints import add_transmission
+from .outcome import EarlierRun, Outcome
+
+
+class Pcid(IntegratedAnalysis):
+    """Forces that move the robot along its trajectories while the links vibrate as they do (Shaban 2022)."""
+
+    kind: Literal["pcid"]
+
+    is_resumable = True
+    allocates_patches = True
+    applicable = ("joints", "joints+pzt", "trajectory", "points")
+
+    def needs(self) -> Iterator[Need]:
+        """Something to follow."""
+        yield Need("kind", self.kind, "trajectory")
+
+    def run(self, context: Context) -> Outcome:
+        """Motion and forces."""
+        found = run_pcid(context.model, self, context.is_replayed, context.progress, context.earlier)
+        return add_transmission(found)
+
+
+def run_pcid(
+    model: Model,
+    analysis: IntegratedAnalysis,
+    keep_recording: bool,
+    progress: Progress,
+    earlier: EarlierRun | None = None,
+) -> Outcome:
+    """C_m and C_s hold, p is free. It goes on with an `earlier` run of the same analysis.
+
+    Raises `InputError` where the trajectories cannot be followed.
+    """
+    assembly = MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+    start = initial_state(assembly)
+    check_smooth(assembly, analysis.end)
+    check_reach(assembly, undeformed_state(assembly), analysis.times)
+    recording = _core.Recording() if keep_recording else None
+    return drive(
+        assembly, analysis, start, progress, resolver=resolver_of(assembly), recording=recording, earlier=earlier
+    )

@@ -1,0 +1,87 @@
+"""Masses: what point masses do to a body, and mass matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.plane import perpendicular, rotation
+from .planar_body import PlanarBody, PlanarPoint, diagonalised
+from .system import MechanismSystem
+
+
+def with_payload(body: PlanarBody, point: str, mass: float, inertia: float) -> PlanarBody:
+    """The body with a point mass (kg) and moment of inertia (kg·m²) on one of its points, modes made anew."""
+    at = body.points[point]
+    stiffening = body.stiffening and body.stiffening.with_payload(point, at.position, mass, inertia)
+    return with_masses(replace(body, stiffening=stiffening), [at], np.array([mass]), np.array([inertia]))
+
+
+def with_masses(
+    body: PlanarBody, points: Sequence[PlanarPoint], masses: Array, inertias: Array, stiffness: Array | None = None
+) -> PlanarBody:
+    """The body with point masses (kg) and moments of inertia (kg·m²) at points of it, and more stiffness (n, n).
+
+    Masses are summed into every invariant as more material points (integrals become sums); the modal mass
+    I + Σ m ΦᵀΦ + I_p φᵀφ is brought back to the identity by a small eigenproblem. Geometric stiffening is left to the
+    caller: what it has to be depends on how the body takes the loads of their inertia.
+    """
+    x, y = np.array([at.position for at in points]).T
+    Phi_x, Phi_y = np.array([at.translation for at in points]).transpose(1, 0, 2)
+    phi = np.array([at.rotation for at in points])
+    xy = (Phi_x.T * masses) @ Phi_y
+    loaded = replace(
+        body,
+        mass=body.mass + float(masses.sum()),
+        inertia=body.inertia + float(masses @ (x * x + y * y) + inertias.sum()),
+        first_moment=body.first_moment + np.array([masses @ x, masses @ y]),
+        S_bar=body.S_bar + np.array([masses @ Phi_x, masses @ Phi_y]),
+        h=body.h + (masses * x) @ Phi_y - (masses * y) @ Phi_x + inertias @ phi,
+        j=body.j + (masses * x) @ Phi_x + (masses * y) @ Phi_y,
+        S_tilde=body.S_tilde + xy - xy.T,
+        m_xy=body.m_xy + (Phi_x.T * masses) @ Phi_x + (Phi_y.T * masses) @ Phi_y,
+    )
+    m_ff = np.eye(body.n_modes) + loaded.m_xy - body.m_xy + (phi.T * inertias) @ phi
+    K_ff = np.diag(body.stiffness)
+    return diagonalised(loaded, K_ff if stiffness is None else K_ff + stiffness, m_ff)
+
+
+def mass_matrix(body: PlanarBody, q: Array) -> Array:
+    """M (3 + n, 3 + n) of one body at its coordinates q = (R, θ, p), R in global axes: kg, kg·m, kg·m², √kg, √kg·m, 1.
+
+    docs/theory.md, Equations of motion of a planar body (Shabana, Dynamics of Multibody Systems, ch. 5).
+    """
+    theta, p = q[2], q[3:]
+    A = rotation(theta)
+    s, s_p, inertia, h = body.first_moment + body.S_bar @ p, body.S_bar, body.m_xy, body.h + p @ body.S_tilde
+    if (K := body.stiffening) is not None:
+        s, s_p, inertia, h = s - 0.5 * p @ K.K_s @ p, s_p - K.K_s @ p, inertia - K.K_omega, h - K.K_h @ p
+    M = np.eye(len(q))
+    M[:2, :2] = body.mass * np.eye(2)
+    M[:2, 2] = M[2, :2] = perpendicular(A @ s)
+    M[:2, 3:] = A @ s_p
+    M[3:, :2] = M[:2, 3:].T
+    M[2, 2] = body.inertia + 2 * body.j @ p + p @ inertia @ p
+    M[2, 3:] = M[3:, 2] = h
+    return M
+
+
+def system_mass_matrix(system: MechanismSystem, q: Array) -> Array:
+    """M (coordinates, coordinates) of all bodies and of the rotors in joints, at q (coordinates,)."""
+    blocks = zip(system.model.bodies, system.first, strict=True)
+    M = block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
+    gradient, inertia = system.system.rotor_rows(q)
+    return M + gradient.T @ (inertia[:, None] * gradient)
+
+
+def block_diagonal(blocks: Sequence[Array]) -> Array:
+    """Square blocks (n_i, n_i) along the diagonal of a matrix that is 0 elsewhere."""
+    size = sum(len(block) for block in blocks)
+    matrix, first = np.zeros((size, size)), 0
+    for block in blocks:
+        matrix[first : first + len(block), first : first + len(block)] = block
+        first += len(block)
+    return matrix

@@ -1,0 +1,168 @@
+"""The equations of motion of a model under some of its constraints and drives, as the core evaluates them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...common.arrays import Array, Indices
+from .. import _core
+from .._core import TimeFunction
+from ..joints.measure import FRAME, Marker, Measure
+from .model import Constraint, Model
+from .planar_body import PlanarBody, PlanarPoint, core_arguments
+
+
+class MechanismSystem:
+    """A core `System` with the numbering that leads back from its measures to the scene.
+
+    q, v and a are (…, coordinates): (R, θ, p) of each body, one body after the other, from `first` on; m, rad, √kg·m.
+    `constraints` are in the core's order: joints and trajectories sorted for a small envelope of C M⁻¹ Cᵀ. Rotors of
+    joints come after them in the core, where they are measures, too, and friction after the drives.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        constraints: Sequence[Constraint],
+        drives: Sequence[tuple[Measure, TimeFunction]] = (),
+        motors: Sequence[Measure] = (),
+    ) -> None:
+        self.model = model
+        self.index = {body.name: i for i, body in enumerate(model.bodies)}
+        self._markers: list[list[str]] = [[] for _ in model.bodies]
+        self.constraints = tuple(constraints[i] for i in envelope_order([c.measure for c in constraints]))
+        core = self._core_measure
+        self.constraint_measures = [core(c.measure) for c in self.constraints]
+        driven = [(core(measure), magnitude) for measure, magnitude in drives]
+        rotors = [(core(measure), inertia) for measure, inertia in model.rotors]
+        frictions = [(core(measure), friction) for measure, friction in model.frictions]
+        state_forces = [(self._marker(marker), function) for marker, function in model.state_forces]
+        self.motor_measures = [core(measure) for measure in motors]
+        springs = [(core(gear.motor), core(gear.coordinate)) for gear in model.gears]
+        self.system = _core.System(np.array(model.scene.gravity))
+        for body, markers in zip(model.bodies, self._markers, strict=True):
+            self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))
+        for constraint, measure in zip(self.constraints, self.constraint_measures, strict=True):
+            self.system.add_constraint(measure, constraint.target)
+        for measure, inertia in rotors:
+            self.system.add_rotor(measure, inertia)
+        for measure, magnitude in driven:
+            self.system.add_drive(measure, magnitude)
+        for measure, friction in frictions:
+            self.system.add_friction(measure, friction.viscous, friction.coulomb, friction.speed)
+        for marker, function in state_forces:
+            self.system.add_state_force(marker, function)
+        for gear, (motor, joint) in zip(model.gears, springs, strict=True):
+            self.system.add_spring(motor, joint, gear.stiffness, gear.damping)
+        for load in model.modal_loads:
+            self.system.add_modal_drive(self.index[load.body], load.vector, load.magnitude)
+        self.system.finish()
+        self.first = np.array(self.system.first_coordinate, dtype=int)
+
+    @property
+    def frame_coordinates(self) -> Indices:
+        """Indices of (R, θ) of all bodies in q (3 bodies,)."""
+        indices: Indices = (self.first[:, None] + np.arange(3)).ravel()
+        return indices
+
+    @property
+    def scales(self) -> Array:
+        """Natural size of each coordinate (coordinates,): a length for R, 1 rad for θ, √I for p.
+
+        √I is the size of p where a link is bent by about its length.
+
+        What is small, or a step that is long, is judged by them: units of length and mass are the user's.
+        """
+        scales = np.empty(self.system.coordinates)
+        for first, body in zip(self.first, self.model.bodies, strict=True):
+            scales[first : first + 3] = self.system.length, self.system.length, 1.0
+            scales[first + 3 : first + 3 + body.n_modes] = np.sqrt(body.inertia)
+        return scales
+
+    @property
+    def measure_scales(self) -> Array:
+        """Natural size of each constraint's value (constraints,): a length, or 1 rad."""
+        return np.where(self.moments, 1.0, self.system.length)
+
+    @property
+    def is_trajectory(self) -> list[bool]:
+        """For each constraint, whether it belongs to C_s."""
+        return [c.is_trajectory for c in self.constraints]
+
+    @property
+    def moments(self) -> list[bool]:
+        """For each constraint, whether its multiplier is a moment."""
+        return [c.measure.carries_moment for c in self.constraints]
+
+    @property
+    def groups(self) -> list[int]:
+        """For each constraint, the number of the force or moment it is a component of."""
+        keys = [(c.is_trajectory, c.owner, c.measure.carries_moment) for c in self.constraints]
+        numbers = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+        return [numbers[key] for key in keys]
+
+    def section_angle(self, marker: Marker, x: Array) -> Array:
+        """Angle (…) of the section at a marker for coordinates x = q (…, coordinates), rad; its rate for x = v."""
+        if marker.body is None:
+            return np.zeros(x.shape[:-1])
+        i = self.index[marker.body]
+        body, first = self.model.bodies[i], int(self.first[i])
+        angle: Array = x[..., first + 2]
+        if marker.point == FRAME:
+            return angle
+        return angle + x[..., first + 3 : first + 3 + body.n_modes] @ body.points[marker.point].rotation
+
+    def force_direction(self, measure: Measure, q: Array) -> Array:
+        """Unit force on the second marker along a measure, in global axes (T, 2); q (T, coordinates)."""
+        return measure.force_direction(self.section_angle(measure.a, q))
+
+    def constraint_wrenches(self, q: Array, lambda_: Array) -> dict[str, dict[str, Array]]:
+        """Force (N, global axes) and moment (N·m) of the constraints, (T, 3), on every point of every body.
+
+        For q (T, coordinates) and multipliers (T, constraints). Moments of slides about their markers are left out.
+        """
+        wrenches: dict[str, dict[str, Array]] = {}
+        for constraint, multiplier in zip(self.constraints, lambda_.T, strict=True):
+            measure = constraint.measure
+            for marker, sign in ((measure.b, -1.0), (measure.a, 1.0)):
+                if marker.body is None or marker.point == FRAME:
+                    continue
+                wrench = wrenches.setdefault(marker.body, {}).setdefault(marker.point, np.zeros((len(lambda_), 3)))
+                if measure.carries_moment:
+                    wrench[:, 2] += sign * multiplier
+                else:
+                    wrench[:, :2] += (sign * multiplier)[:, None] * self.force_direction(measure, q)
+        return wrenches
+
+    def _core_measure(self, measure: Measure) -> _core.Measure:
+        a, b = self._marker(measure.a), self._marker(measure.b)
+        return _core.Measure(measure.kind, a, b, np.array(measure.direction), measure.offset)
+
+    def _marker(self, marker: Marker) -> _core.Marker:
+        if marker.body is None:
+            return _core.Marker(-1, 0, np.array(marker.position))
+        body = self.index[marker.body]
+        markers = self._markers[body]
+        if marker.point not in markers:
+            markers.append(marker.point)
+        return _core.Marker(body, markers.index(marker.point), np.zeros(2))
+
+
+def _point(body: PlanarBody, name: str) -> PlanarPoint:
+    if name != FRAME:
+        return body.points[name]
+    return PlanarPoint(np.zeros(2), np.zeros((2, body.n_modes)), np.zeros(body.n_modes))
+
+
+def envelope_order(measures: Sequence[Measure]) -> list[int]:
+    """Order of constraints that keeps the envelope of C M⁻¹ Cᵀ small: reverse Cuthill–McKee on shared bodies."""
+    touched = [{marker.body for marker in (measure.a, measure.b)} - {None} for measure in measures]
+    if len({body for bodies in touched for body in bodies}) <= 2:
+        return list(range(len(measures)))
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    graph = np.array([[not a.isdisjoint(b) for b in touched] for a in touched], dtype=float)
+    return [int(i) for i in reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True)]

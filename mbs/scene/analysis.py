@@ -1,0 +1,235 @@
+"""What all analyses of a scene file have in common; each kind is a record of its own, in the file that runs it.
+
+THE list of kinds is `ffrobot.scene.kinds`. Times in s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ...common.arrays import Array
+from ...common.validation import Record, did_you_mean, either, quoted
+from .._core import TimeFunction
+from ..fields.field_types import Name, Positive
+from ..fields.references import Reference
+
+MAX_OUTPUTS = 10_000_000
+TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
+
+
+class Need(NamedTuple):
+    """A table that the scene has to have at least once, because of the `value` of a key of an analysis."""
+
+    key: str
+    value: str
+    table: str
+
+
+class Surroundings(NamedTuple):
+    """Where an analysis stands: those before it, itself and those after it, and all kinds that there are."""
+
+    earlier: Sequence[Analysis]
+    later: Sequence[Analysis]
+    kinds: Sequence[type[Analysis]]
+
+    def replayable(self, way: str | None = None) -> str:
+        """The kinds whose findings forward runs can apply, in this `way` or in any: `"pcid" or "fcid"`."""
+        found = [kind for kind in self.kinds if (way in kind.applicable if way else kind.applicable)]
+        return either(kind.kind_name() for kind in found)
+
+
+class Analysis(Record):
+    """One run. `tolerance`: the error aimed at, relative to the peak of each quantity.
+
+    Class attributes say what the rest of the program has to know of a kind.
+    """
+
+    name: Name
+    kind: str
+    tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
+
+    follows_trajectories: ClassVar[bool] = True  # whether targets have to have values at all its `times`
+    is_motion: ClassVar[bool] = True  # whether it finds a motion, at whose instants other analyses may look
+    is_integrated: ClassVar[bool] = False  # whether that comes from an integration over time
+    is_algebraic: ClassVar[bool] = False  # whether each output is solved for by itself
+    is_resumable: ClassVar[bool] = False  # whether a run that was stopped can be gone on with, under one tolerance
+    allocates_patches: ClassVar[bool] = False  # whether patches and actuation points have to carry the forces it finds
+    needs_actuators: ClassVar[bool] = False  # whether it makes sense only with motors or patches
+    takes_actuation: ClassVar[bool] = False  # whether it replays the actuation of its `source`
+    applicable: ClassVar[tuple[str, ...]] = ()  # values of `apply` by which forward runs can replay what it finds
+    findings: ClassVar[tuple[str, ...]] = ()  # ends before the last time that are results, not failures
+
+    @classmethod
+    def kind_name(cls) -> str:
+        """The value of `kind` of all analyses of this record."""
+        name: str = get_args(cls.model_fields["kind"].annotation)[0]
+        return name
+
+    @classmethod
+    def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
+        """Which kinds have the key."""
+        kinds = either(other.kind_name() for other in others if issubclass(other, Analysis))
+        return f'expected the key "{key}" only in kind = {kinds}, found kind = "{cls.kind_name()}"'
+
+    @classmethod
+    def demand_key(cls, key: str) -> str:
+        """With the kind that has to have the key."""
+        return f'expected the key "{key}" in kind = "{cls.kind_name()}", found none'
+
+    @property
+    def times(self) -> Array:
+        """Output times (T,), in s: 0 alone unless a kind says otherwise."""
+        return np.zeros(1)
+
+    @property
+    def last_time(self) -> float:
+        """The time (s) at which the run is over as far as the scene says."""
+        return float(self.times[-1])
+
+    @property
+    def source(self) -> str | None:
+        """Name of the earlier analysis that this one rests on; None where there is none."""
+        return None
+
+    def needs(self) -> Iterator[Need]:
+        """Tables without which the scene makes no sense."""
+        yield from ()
+
+    def references(self) -> Iterator[Reference]:
+        """Bodies, points and joints that the analysis names."""
+        yield from ()
+
+    def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
+        """Keys and functions of time that have to exist at all `times`, with so many derivatives."""
+        yield from ()
+
+    def problems(self, among: Surroundings) -> Iterator[str]:
+        """What does not fit the analyses that it stands among, a line each."""
+        yield from ()
+
+
+class TimedAnalysis(Analysis):
+    """Outputs at 0, output_step, …, end (s)."""
+
+    end: Positive
+    output_step: Positive
+
+    @model_validator(mode="after")
+    def _divides(self) -> Self:
+        if self.end and self.output_step:
+            check_steps(self.end, self.output_step)
+        return self
+
+    @property
+    def times(self) -> Array:
+        """Output times (T,), in s: exact multiples of the output step; `end` is one of them, exactly."""
+        return output_times(self.end, self.output_step)
+
+    @property
+    def last_time(self) -> float:
+        """`end`."""
+        return self.end
+
+
+class IntegratedAnalysis(TimedAnalysis):
+    """`integrator`: see `mbs.solve.integrators` for "auto".
+
+    `spectral_radius` is what a step of generalized-alpha leaves of vibrations far above one over its size.
+    """
+
+    integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
+    spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8  # of generalized-alpha at infinite frequency
+    max_steps: Annotated[int, Field(gt=0)] = 5_000_000
+
+    is_integrated = True
+
+    @model_validator(mode="after")
+    def _integrator_fits(self) -> Self:
+        if "spectral_radius" in self.model_fields_set and self.integrator != "generalized-alpha":
+            raise ValueError(
+                'expected the key "spectral_radius" only with integrator = "generalized-alpha", found integrator ='
+                f' "{self.integrator}"'
+            )
+        return self
+
+
+class ActuatedAnalysis(IntegratedAnalysis):
+    """A run forward in time, under what the earlier analysis `actuation` found.
+
+    Where `end` and `output_step` are not given they are those of that analysis, which `load_scene` fills in.
+    """
+
+    end: Positive = 0.0
+    output_step: Positive = 0.0
+    actuation: str | None = None
+
+    takes_actuation = True
+
+    @model_validator(mode="after")
+    def _timed(self) -> Self:
+        for key in ("end", "output_step"):
+            if self.actuation is None and key not in self.model_fields_set:
+                raise ValueError(f'expected the key "{key}" in kind = "{self.kind}", found none')
+        return self
+
+    @property
+    def source(self) -> str | None:
+        """The analysis whose actuation it takes."""
+        return self.actuation
+
+    def problems(self, among: Surroundings) -> Iterator[str]:
+        """Whether there is such an analysis, and whether it can be replayed."""
+        if self.actuation is None:
+            return
+        sources = {source.name: source for source in among.earlier}
+        source = sources.get(self.actuation)
+        if source is None:
+            comes_later = any(self.actuation == other.name for other in among.later)
+            why = ", which does not come before this one" if comes_later else did_you_mean(self.actuation, sources)
+            yield f'actuation: expected an earlier analysis, {quoted(sources)}, found "{self.actuation}"{why}'
+            return
+        if not source.applicable:
+            yield (
+                f'actuation: expected an analysis of kind {among.replayable()}, found "{source.name}" of kind'
+                f' "{source.kind}"'
+            )
+        elif isinstance(source, IntegratedAnalysis) and source.integrator == "generalized-alpha":
+            yield (
+                f"actuation: expected an analysis whose steps can be made again to replay it (any integrator but"
+                f' "generalized-alpha"), found "{source.name}" with that'
+            )
+        elif self.end > source.last_time:
+            yield f'end: expected at most {source.last_time:g}, where "{source.name}" ends, found {self.end:g}'
+        yield from self.replay_problems(source)
+
+    def replay_problems(self, source: Analysis) -> Iterator[str]:
+        """What of `source` cannot be replayed in the way that is asked for."""
+        yield from ()
+
+
+def output_times(end: float, step: float, before: float = 0.0, after: float = 0.0) -> Array:
+    """(T,) s: multiples of `step` from −`before` to `end` + `after`, whole steps; `end` is one of them, exactly."""
+    if not (end and step):
+        return np.zeros(1)
+    early, late, count = (round(x / step) for x in (before, after, end))
+    times = np.arange(-early, count + late + 1) * step
+    times[early + count] = end
+    return times
+
+
+def check_steps(end: float, step: float) -> None:
+    """Raise `ValueError` unless the outputs 0, step, 2 step, … end exactly at `end`."""
+    ratio = end / step
+    if ratio > MAX_OUTPUTS:
+        raise ValueError(f"expected at most {MAX_OUTPUTS} outputs, found output_step = {step:g} up to end = {end:g}")
+    count = round(ratio)
+    # 0.1/0.001 is not whole in binary; anything beyond rounding is meant otherwise.
+    if count < 1 or abs(ratio - count) > 1e-9 * ratio:
+        near = end / max(1, count)
+        raise ValueError(
+            f"expected an output_step that divides end = {end:g} into equal steps, found {step:g} (such as {near:.9g})"
+        )

@@ -1,0 +1,81 @@
+"""Bodies and payloads of a scene file, key by key. SI units; planar (x, y)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
+
+from ...common.validation import InputFile, Record, existing_file
+from ...fe_models.link_file import LinkSource, LinkTable
+from ...fe_models.link_records import BeamLink, SolidLink
+from ..fields.field_types import Name, PointReference, Positive, Vector2, one_of
+from ..fields.references import Reference
+
+
+class RigidBody(Record):
+    """Mass (kg), moment of inertia about the center (kg·m²), center and named points (m) in the body frame."""
+
+    mass: Positive
+    inertia: float
+    center: Vector2
+    points: dict[Name, Vector2] = Field(default_factory=dict)
+
+    @field_validator("inertia")
+    @classmethod
+    def _inertia_is_positive(cls, inertia: float) -> float:
+        if not inertia > 0.0:
+            raise ValueError(
+                f"expected a moment of inertia greater than 0, found {inertia:g}: without it the body's rotation has no"
+                " equation of motion (a point mass is a [[payload]])"
+            )
+        return inertia
+
+
+def _link(value: object, info: ValidationInfo) -> LinkSource:
+    if isinstance(value, str):
+        return existing_file(Path(value), info)
+    if not isinstance(value, dict):
+        raise ValueError(f"expected the name of a link file in quotes or a table of its keys, found {value!r}")
+    name, path = info.data.get("name", "?"), info.context["path"] if info.context else Path("scene")
+    return LinkTable({"name": name, **value}, path.with_name(f'{path.name}: body "{name}": link'))
+
+
+LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | BeamLink | SolidLink)]
+
+
+class Body(Record):
+    """A link file or a table of its keys (stage 1 runs when needed), a modal body file, or a rigid body.
+
+    The `name` in a table of a link's keys is the body's where it is left out.
+
+    `modes` of a flexible body: how many of the lowest that move in the plane; the others are represented by their
+    static flexibility. "auto" takes as many as the tolerances of the analyses need; the default is all.
+    """
+
+    name: Name
+    link: LinkInput | None = None
+    modal: InputFile | None = None
+    rigid: RigidBody | None = None
+    modes: Literal["auto"] | Annotated[int, Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Body:
+        one_of(self, ("link", "modal", "rigid"))
+        if self.rigid is not None and self.modes is not None:
+            raise ValueError(f'expected the key "modes" only in flexible bodies, found it in a rigid one: {self.modes}')
+        return self
+
+
+class Payload(Record):
+    """A mass (kg) on a point, with its moment of inertia about that point (kg·m²)."""
+
+    point: PointReference
+    mass: Positive
+    inertia: Annotated[float, Field(ge=0.0)] = 0.0
+
+    def references(self) -> Iterator[Reference]:
+        """The point that carries it."""
+        yield Reference("point", self.point)

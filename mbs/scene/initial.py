@@ -1,0 +1,25 @@
+"""The initial state in a scene file, key by key."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from ...common.validation import Record
+from ..fields.references import Reference
+
+
+class Initial(Record):
+    """State at t = 0; `angles` (rad) and `rates` (rad/s) of body frames are guesses that the constraints correct."""
+
+    state: Literal["undeformed", "static"] = "undeformed"
+    angles: dict[str, float] = Field(default_factory=dict)
+    rates: dict[str, float] = Field(default_factory=dict)
+
+    def references(self) -> Iterator[Reference]:
+        """The bodies with guesses."""
+        for table, guesses in (("angles", self.angles), ("rates", self.rates)):
+            for body in guesses:
+                yield Reference(table, body)

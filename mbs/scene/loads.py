@@ -1,0 +1,81 @@
+"""Given loads of a scene file, key by key. SI units; planar (x, y)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Annotated
+
+from pydantic import PlainValidator, ValidationInfo, model_validator
+
+from ...common.validation import Record, quoted
+from .. import _core
+from .._core import StateFunction, TimeFunction
+from ..fields.field_types import Expression, PointReference, one_of, only, present
+from ..fields.references import Reference, marker_reference
+from ..fields.state_forces import state_function
+from ..joints.measure import GROUND_FRAME, Measure, marker_at
+
+_ALONG = {"x": _core.MeasureKind.x, "y": _core.MeasureKind.y, "moment": _core.MeasureKind.angle}
+
+
+def _state_force(value: object, info: ValidationInfo) -> StateFunction:
+    if isinstance(value, StateFunction):
+        return value
+    objects = (info.context or {}).get("objects", {})
+    if not isinstance(value, str) or value not in objects:
+        raise ValueError(f"expected a function of t, position and velocity, in scenes made in Python, found {value!r}")
+    return state_function(objects[value])
+
+
+StateForce = Annotated[StateFunction, PlainValidator(_state_force, json_schema_input_type=str)]
+
+
+class Load(Record):
+    """A given load: force (N, global axes) and moment (N·m) at a point, moment of a joint, or voltages (V).
+
+    `force` on a point, in scenes made in Python: a function of its motion, see `state_forces.state_function`.
+    """
+
+    point: PointReference | None = None
+    joint: str | None = None
+    pzt: str | None = None
+    x: Expression | None = None
+    y: Expression | None = None
+    moment: Expression | None = None
+    force: StateForce | None = None
+    voltage: tuple[Expression, ...] | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Load:
+        subject = one_of(self, ("point", "joint", "pzt"))
+        allowed = {"point": ("x", "y", "moment", "force"), "joint": ("moment",), "pzt": ("voltage",)}[subject]
+        found = only(self, subject, allowed, ("x", "y", "moment", "force", "voltage"))
+        if self.force is not None and len(found) > 1:
+            raise ValueError(f'expected "force" alone beside "point", found {quoted(found)}')
+        return self
+
+    def references(self) -> Iterator[Reference]:
+        """Where it acts."""
+        yield from marker_reference("point", self.point, loaded=True)
+        if self.joint is not None:
+            yield Reference("joint", self.joint, "joint")
+        if self.pzt is not None:
+            yield Reference("pzt", self.pzt, "patches")
+
+    def measures(self, coordinate_of: Callable[[str], Measure]) -> Iterator[tuple[Measure, TimeFunction]]:
+        """Along what it acts, and its magnitude (N or N·m) over time; nothing of voltages and forces of the state.
+
+        `coordinate_of` gives the coordinate of a joint by its name.
+        """
+        if self.joint is not None:
+            yield coordinate_of(self.joint), self.components["moment"]
+        elif self.point is not None:
+            label, marker = f'load on "{self.point}"', marker_at(self.point)
+            for component, magnitude in self.components.items():
+                yield Measure(label, _ALONG[component], GROUND_FRAME, marker), magnitude
+
+    @property
+    def components(self) -> dict[str, TimeFunction]:
+        """The given functions of time by component: "x", "y", "moment", or "voltage[k]"."""
+        voltages = {f"voltage[{k}]": function for k, function in enumerate(self.voltage or ())}
+        return present(x=self.x, y=self.y, moment=self.moment) | voltages

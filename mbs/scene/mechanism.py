@@ -1,0 +1,82 @@
+"""What a scene says of a mechanism: bodies, joints, trajectories, loads, and the state it starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ...common.validation import Record
+from ..fields.field_types import NotEmpty, Vector2
+from ..fields.references import Reference, under
+from ..joints.joints import Joint
+from ..joints.measure import Measure
+from .bodies import Body, Payload
+from .initial import Initial
+from .loads import Load
+from .topology import Edge, Topology, spanning_forest
+from .trajectories import Trajectory
+
+
+class MechanismKeys(Record):
+    """The keys of a scene file that concern the mechanism; lists of tables keep the singular name they have there.
+
+    `geometric_stiffening` "auto": where the loads of a run change the stiffness of a mode by more than 1 %.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    space: Literal["planar", "spatial"] = "planar"
+    gravity: Vector2
+    motors: Literal["section", "frame"] = "section"
+    geometric_stiffening: bool | Literal["auto"] = False
+    body: Annotated[tuple[Body, ...], NotEmpty]
+    joint: tuple[Joint, ...] = ()
+    trajectory: tuple[Trajectory, ...] = ()
+    load: tuple[Load, ...] = ()
+    payload: tuple[Payload, ...] = ()
+    initial: Initial = Initial()
+
+    @property
+    def topology(self) -> Topology:
+        """Which joint carries which body, by numbers of `joint`."""
+        edges = [Edge(joint.between, joint.locates) for joint in self.joint]
+        return spanning_forest([body.name for body in self.body], edges)
+
+    @property
+    def motor_joints(self) -> tuple[Joint, ...]:
+        """Joints with a motor: by default all that move in an open chain, and none in a closed loop."""
+        default = self.topology.is_open_chain
+        return tuple(joint for joint in self.joint if joint.has_motor(default))
+
+    def coordinate(self, joint: str) -> Measure:
+        """The coordinate of a joint by its name, as `motors` defines it. Raises `KeyError` where it has none."""
+        measures = {each.name: each.coordinate(self.motors) for each in self.joint}
+        measure = measures[joint]
+        if measure is None:
+            raise KeyError(joint)
+        return measure
+
+    def constraints(self, joint: Joint) -> tuple[Measure, ...]:
+        """The constraints C_m of a joint; the angle that some of them keep is that of the initial guess."""
+        first, second = (self.initial.angles.get(body, 0.0) for body in joint.bodies)
+        return joint.constraints(second - first)
+
+    def references(self) -> Iterator[Reference]:
+        """All that records of the scene refer to, with their full keys."""
+        records: list[tuple[str, Joint | Trajectory | Load | Payload]] = [(joint.label, joint) for joint in self.joint]
+        records += [(f'trajectory "{trajectory.name}"', trajectory) for trajectory in self.trajectory]
+        records += [(f"load no. {k}", load) for k, load in enumerate(self.load, 1)]
+        records += [(f"payload no. {k}", payload) for k, payload in enumerate(self.payload, 1)]
+        for label, record in records:
+            yield from under(label, record.references())
+        yield from (replace(found, key=f"initial.{found.key}") for found in self.initial.references())
+
+
+class MechanismScene(MechanismKeys):
+    """A validated scene, with the absolute `path` of its file and the raw `text` that results files carry."""
+
+    path: Path
+    text: str

@@ -1,0 +1,92 @@
+"""Which joint carries which body: a spanning forest of the joints, and the joints that close loops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import NamedTuple
+
+from ..fields.field_types import GROUND
+from ..fields.references import body_of
+
+
+class Edge(NamedTuple):
+    """A joint `between` two sides ("BODY.POINT" or "ground"), and whether it `locates` one body on the other."""
+
+    between: tuple[str, str]
+    locates: bool = True
+
+
+class Carrier(NamedTuple):
+    """What carries a body: the number of the joint, the body's `own` side of it and the `other`."""
+
+    joint: int
+    own: str
+    other: str
+
+    @property
+    def parent(self) -> str:
+        """The body, or the ground, on the other side."""
+        return body_of(self.other)
+
+
+@dataclass(frozen=True)
+class Topology:
+    """The spanning forest of a mechanism, and what is beside it.
+
+    Attributes:
+        carriers: of each body the joint on the way to the root of its tree, None of a root; bodies stand in an order in
+            which each comes after its parent, those that hang from the ground first.
+        loop_joints: numbers of the joints that are in no tree: each closes a loop.
+    """
+
+    carriers: dict[str, Carrier | None]
+    loop_joints: tuple[int, ...]
+
+    @property
+    def is_open_chain(self) -> bool:
+        """Whether the joints form trees."""
+        return not self.loop_joints
+
+    @property
+    def grounded(self) -> dict[str, Carrier]:
+        """The carriers of bodies that hang from the ground, nearest first."""
+        found: dict[str, Carrier] = {}
+        for body, carrier in self.carriers.items():
+            if carrier is not None and (carrier.parent == GROUND or carrier.parent in found):
+                found[body] = carrier
+        return found
+
+
+def spanning_forest(bodies: Sequence[str], joints: Sequence[Edge]) -> Topology:
+    """The topology of `joints` between `bodies`: trees grow from the ground, then from each body left, in their order.
+
+    A tree takes the joint that locates, and stands first among such, of all between it and the rest (Prim, Bell Syst.
+    Tech. J. 36, 1957).
+    """
+    touching: dict[str, list[int]] = {name: [] for name in (GROUND, *bodies)}
+    for number, joint in enumerate(joints):
+        for side in joint.between:
+            touching.setdefault(body_of(side), []).append(number)
+    carriers: dict[str, Carrier | None] = {}
+    for root in (GROUND, *bodies):
+        if root in carriers:
+            continue
+        carriers[root] = None
+        candidates: list[tuple[bool, int]] = []
+        _add(candidates, touching[root], joints)
+        while candidates:
+            _, number = heappop(candidates)
+            own, other = sorted(joints[number].between, key=lambda side: body_of(side) in carriers)
+            if body_of(own) not in carriers:
+                carriers[body_of(own)] = Carrier(number, own, other)
+                _add(candidates, touching[body_of(own)], joints)
+    del carriers[GROUND]
+    carrying = {carrier.joint for carrier in carriers.values() if carrier is not None}
+    return Topology(carriers, tuple(number for number in range(len(joints)) if number not in carrying))
+
+
+def _add(candidates: list[tuple[bool, int]], numbers: Sequence[int], joints: Sequence[Edge]) -> None:
+    for number in numbers:
+        heappush(candidates, (not joints[number].locates, number))

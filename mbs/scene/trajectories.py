@@ -1,0 +1,74 @@
+"""Trajectories of a scene file, key by key: motion that is specified. SI units; angles in rad; planar (x, y)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from pydantic import model_validator
+
+from ...common.validation import Record, quoted
+from .. import _core
+from .._core import TimeFunction
+from ..fields.field_types import Expression, Name, PointReference, WaypointTable, one_of, only, present
+from ..fields.references import Reference, marker_reference
+from ..joints.measure import GROUND_FRAME, Marker, Measure, coincident, marker_at
+
+
+class Trajectory(Record):
+    """Motion that is specified (C_s): of a point (m, global axes), a joint coordinate, or an angle (rad).
+
+    `angle` is a body (its frame) or BODY.POINT (the section there).
+    """
+
+    name: Name
+    point: PointReference | None = None
+    joint: str | None = None
+    angle: str | None = None
+    x: Expression | None = None
+    y: Expression | None = None
+    value: Expression | None = None
+    waypoints: WaypointTable | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Trajectory:
+        subject = one_of(self, ("point", "joint", "angle"))
+        allowed = ("x", "y") if subject == "point" else ("value",)
+        found = only(self, subject, (*allowed, "waypoints"), ("x", "y", "value", "waypoints"))
+        if self.waypoints is None:
+            return self
+        if len(found) > 1:
+            raise ValueError(f"expected either waypoints or expressions, found {quoted(found)}")
+        if not set(self.components) <= set(allowed):
+            columns = ",".join(("t", *self.components))
+            raise ValueError(f'expected waypoints with the header t,{",".join(allowed)}, found "{columns}"')
+        return self
+
+    def references(self) -> Iterator[Reference]:
+        """What follows it."""
+        yield from marker_reference("point", self.point, loaded=True)
+        yield from marker_reference("angle", self.angle, loaded=True)
+        if self.joint is not None:
+            yield Reference("joint", self.joint, "joint")
+
+    def measures(self, coordinate_of: Callable[[str], Measure]) -> dict[str, Measure]:
+        """The constraints C_s by component ("x", "y" or "value"): their values equal those specified.
+
+        `coordinate_of` gives the coordinate of a joint by its name.
+        """
+        label = f'trajectory "{self.name}"'
+        if self.joint is not None:
+            return {"value": replace(coordinate_of(self.joint), label=label)}
+        if self.angle is not None:
+            body, _, point = self.angle.partition(".")
+            return {"value": Measure(label, _core.MeasureKind.angle, GROUND_FRAME, Marker(body, point))}
+        assert self.point is not None
+        x, y = coincident(label, GROUND_FRAME, marker_at(self.point))
+        return {component: {"x": x, "y": y}[component] for component in self.components}
+
+    @property
+    def components(self) -> dict[str, TimeFunction]:
+        """The specified functions of time by component: "x" and/or "y", or "value"."""
+        if self.waypoints is not None:
+            return self.waypoints.components
+        return present(x=self.x, y=self.y, value=self.value)

@@ -1,0 +1,96 @@
+"""Whether the undeformed robot can follow its trajectories, and what to say where it cannot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ..model.model import Constraint
+from ..model.system import MechanismSystem
+from .position import SINGULAR, rank_ratio, solve_positions
+from .state import State
+
+REACH_CHECKS = 200
+GOLDEN_SECTIONS = 35  # between two of them: a kink is found to 1e-7 of their distance
+
+
+class _Passed(NamedTuple):
+    """A configuration on the way: time (s), q (coordinates,) and its ratio of singular values."""
+
+    t: float
+    q: Array
+    ratio: float
+
+
+def check_reach(assembly: MechanismSystem, start: State, times: Array) -> None:
+    """Raise `InputError` with the first of `times` (T,), s, at which the undeformed robot cannot follow.
+
+    A flexible arm would stretch its small-deformation modes beyond all sense instead of failing; better to say so.
+    Configurations are looked at `REACH_CHECKS` times, and between them where they come close to a singular one.
+    """
+    if not any(assembly.is_trajectory) or len(assembly.constraints) > len(assembly.frame_coordinates):
+        return
+    q, passed = start.q, list[_Passed]()
+    for t in map(float, times[:: max(1, len(times) // REACH_CHECKS)]):
+        following = solve_positions(assembly, t, q)
+        if following is None:
+            raise InputError(unreachable(assembly, t, q))
+        passed = [*passed[-2:], _Passed(t, following, rank_ratio(assembly, t, following))]
+        least, at = _least_ratio(assembly, passed)
+        if least < SINGULAR:
+            raise InputError(unreachable(assembly, at, q))
+        q = following
+
+
+def _least_ratio(assembly: MechanismSystem, passed: Sequence[_Passed]) -> tuple[float, float]:
+    """The ratio at the last of up to three configurations, or the least about the middle one; and when.
+
+    Where it turns zero it is a kink |t − t*|, which three samples give away: beside a smooth minimum they are alike.
+    """
+    t, _, ratio = passed[-1]
+    if len(passed) < 3:
+        return ratio, t
+    (a, q, before), (_, _, least), (b, _, _) = passed
+    if not (before > least < ratio and least < 2 * max(before, ratio) - 2 * least):
+        return ratio, t
+    inner = 0.5 * (3.0 - 5.0**0.5)  # golden section
+    for _ in range(GOLDEN_SECTIONS):
+        values = []
+        for s in (a + inner * (b - a), b - inner * (b - a)):
+            between = solve_positions(assembly, s, q)
+            values.append(0.0 if between is None else rank_ratio(assembly, s, between))
+            if values[-1] < SINGULAR:
+                return values[-1], s
+        a, b = (a, b - inner * (b - a)) if values[0] < values[1] else (a + inner * (b - a), b)
+    return min(values), 0.5 * (a + b)
+
+
+def unreachable(assembly: MechanismSystem, t: float, q: Array) -> str:
+    """Which trajectory (or joints) the links cannot meet at time t (s), from q (coordinates,) on."""
+    trajectories = [c for c in assembly.constraints if c.is_trajectory]
+    how = (
+        "cannot reach"
+        if solve_positions(assembly, t, q) is None
+        else "reach only in a singular configuration (stretched, folded, at a dead centre), from which no force on it"
+        " says which way they go on: keep clear of it, or drive a joint instead"
+    )
+    only_joints = MechanismSystem(assembly.model, assembly.model.joints)
+    if trajectories and solve_positions(only_joints, t, q) is not None:
+        return (
+            f"{assembly.model.scene.path}: {owners(trajectories)}: expected a target within reach, found one at"
+            f" t = {t:.6g} s that the undeformed links {how}"
+        )
+    return (
+        f"{assembly.model.scene.path}: expected joints that can be closed, found that"
+        f" {owners([c for c in assembly.constraints if not c.is_trajectory])}"
+        f" cannot be met at t = {t:g} s from the initial angles"
+    )
+
+
+def owners(constraints: Sequence[Constraint]) -> str:
+    """The trajectories among the owners of constraints, else the joints, as messages call them."""
+    trajectories = [c for c in constraints if c.is_trajectory] or constraints
+    kind = "trajectory" if trajectories and trajectories[0].is_trajectory else "joint"
+    return ", ".join(dict.fromkeys(f'{kind} "{c.owner}"' for c in trajectories))
