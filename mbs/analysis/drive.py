@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from .. import _core
 from ..model.system import MechanismSystem
@@ -86,14 +86,14 @@ def drive(
     method, tolerance, most = METHODS[integrator.name], analysis.tolerance, analysis.max_steps
     if control is None:
         run = _core.run(
-            assembly.system, assembly.groups, assembly.moments, steering, times.tolist(), start.q, start.v, tolerance,
+            assembly.system, assembly.groups, assembly.moments, steering, as_list(times), start.q, start.v, tolerance,
             most, method, analysis.spectral_radius, resolver, progress, continuation.recording, continuation.checkpoint,
         )  # fmt: skip
     else:
         run = _core.run_sampled(
-            assembly.system, assembly.groups, assembly.moments, times.tolist(), start.q, start.v, tolerance,
+            assembly.system, assembly.groups, assembly.moments, as_list(times), start.q, start.v, tolerance,
             most, method, analysis.spectral_radius, control.motors, control.voltages, control.first, control.sensing,
-            control.times.tolist(), control.delay, control.controller, progress,
+            as_list(control.times), control.delay, control.controller, progress,
         )  # fmt: skip
     seconds = time.perf_counter() - began
     statistics = statistics_of(assembly, run, integrator, seconds)
