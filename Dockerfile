@@ -6,7 +6,7 @@ FROM debian:12-slim
 
 COPY . /opt/ffrobot
 # A portable core: the image may run on another processor than the one that built it.
-ENV SKBUILD_CMAKE_DEFINE=FFROBOT_NATIVE=OFF
+ENV FFROBOT_NATIVE=OFF
 RUN bash -c 'source /opt/ffrobot/scripts/setup.sh' && rm -rf /var/lib/apt/lists/* /root/.cache
 
 # Compiled forms and modal bodies are kept here; mount a volume to keep them between runs.

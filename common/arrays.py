@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,3 +12,13 @@ ComplexArray = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 Indices = NDArray[np.intp]
 Booleans = NDArray[np.bool_]
+
+
+def as_floats(values: NDArray[np.floating[Any]]) -> Array:
+    """`values`, which are float64: the types of NumPy 2 do not say so of what linspace, inv or a quotient returns."""
+    return values.astype(np.float64, copy=False)
+
+
+def as_list(values: Array) -> list[float]:
+    """Of a vector (n,), Python's own numbers."""
+    return cast(list[float], values.tolist())

@@ -16,6 +16,7 @@ from platformdirs import user_cache_path
 
 from ..common.errors import FfrobotError, SolveError
 from ..common.files import check_output
+from ..common.interrupts import deferred_interrupts
 from ..common.parallel import on_first, processes
 from ..mesh.kept_parts import kept_path
 from .link_file import LinkSource, link_path, read_link
@@ -168,13 +169,14 @@ def _has_mesh(link: Link) -> bool:
 
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
     try:
-        if isinstance(link, BeamLink):
-            from .beam.link import beam_modal_body
+        with deferred_interrupts():
+            if isinstance(link, BeamLink):
+                from .beam.link import beam_modal_body
 
-            return beam_modal_body
-        from .solid.link import solid_modal_body
+                return beam_modal_body
+            from .solid.link import solid_modal_body
 
-        return partial(solid_modal_body, remesh=remesh)
+            return partial(solid_modal_body, remesh=remesh)
     except ModuleNotFoundError as error:
         raise SolveError(
             f"{source_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from ..common.arrays import Array
+from ..common.arrays import Array, as_floats
 from .cells import CELLS, CellName
 
 # Quality below which a cell is flat.
@@ -63,7 +63,7 @@ def cell_quality(corners: Array, cell: CellName) -> Array:
 
 
 def _coefficients(cell: CellName, degree: int) -> Array:
-    return np.linalg.inv(_monomials(cell, degree, reference_nodes(cell, degree)))
+    return as_floats(np.linalg.inv(_monomials(cell, degree, reference_nodes(cell, degree))))
 
 
 def _monomials(cell: CellName, degree: int, X: Array) -> Array:

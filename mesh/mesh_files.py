@@ -24,7 +24,7 @@ _SURFACES = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
 _VTK_HEXAHEDRON_EDGES = [
     (0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7),
 ]  # fmt: skip
-_HEXAHEDRON20 = [*range(8), *(8 + _VTK_HEXAHEDRON_EDGES.index((a, b)) for a, b in np.sort(HEXAHEDRON.edges).tolist())]
+_HEXAHEDRON20 = [*range(8), *(8 + _VTK_HEXAHEDRON_EDGES.index((int(a), int(b))) for a, b in np.sort(HEXAHEDRON.edges))]
 _TO_GMSH = {
     "tetra10": [0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
     "hexahedron20": _HEXAHEDRON20,
@@ -79,7 +79,7 @@ def _by_label(labels: Labels) -> Iterator[tuple[str | None, Booleans]]:
 
 def _names_of_cells(mesh: meshio.Mesh, path: Path) -> list[Labels]:
     """For each block, the name of the set that each of its cells belongs to, the smallest where there are several."""
-    names = [np.full(len(block.data), None, dtype=object) for block in mesh.cells]
+    names: list[Labels] = [np.full(len(block.data), None, dtype=object) for block in mesh.cells]
     for key, values in mesh.cell_data.items():
         if all(np.issubdtype(np.asarray(value).dtype, np.integer) for value in values):
             titles = {int(tag): name for name, (tag, *_) in mesh.field_data.items()} if "physical" in key else {}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import gmsh
 
+from ..common.arrays import as_floats
 from ..common.errors import InputError
 from .defaults import default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
@@ -53,7 +54,7 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
         _check_count(size, size * scale / declared, where)
         mesh_model(size, where)
         source = source_from(extract_mesh(), where)
-    return replace(source, part=source.part.moved(source.part.points / declared))
+    return replace(source, part=source.part.moved(as_floats(source.part.points / declared)))
 
 
 def _declared_unit(file: Path) -> float:

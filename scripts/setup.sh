@@ -11,6 +11,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # that slow these small systems down.
 unset PYTHONPATH PYTHONHOME PYTHONSTARTUP VIRTUAL_ENV PIP_TARGET PIP_PREFIX PIP_CONSTRAINT
 export PYTHONNOUSERSITE=1 PIP_USER=0 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1
+# The core is for this machine only, unless told otherwise: as fast as it gets, and compiled once, not per processor.
+export FFROBOT_NATIVE="${FFROBOT_NATIVE:-ON}"
 export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"
 
 # python3-dolfinx is known by no pip, and only Debian's own Python sees it, whichever python3 stands first on PATH.
@@ -161,7 +163,7 @@ PYTHON
 # What the compiled core and the installed file list depend on.
 build_key() {
   {
-    printf '%s\n' "${CXX:-}" "${CXXFLAGS:-}"
+    printf '%s\n' "${CXX:-}" "${CXXFLAGS:-}" "$FFROBOT_NATIVE"
     find ffrobot common mesh fe_models mbs actuation -name '*.py' -o -name '*.pyi' | LC_ALL=C sort
     find mbs CMakeLists.txt pyproject.toml '(' -name '*.h' -o -name '*.cpp' -o -name 'CMakeLists.txt' \
       -o -name pyproject.toml ')' -print0 | LC_ALL=C sort -z | xargs -0 sha256sum

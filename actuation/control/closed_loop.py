@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
 from ...mbs._core import TimeFunction
 from ...mbs.analysis.drive import Progress, SampledControl, drive, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
@@ -252,8 +252,8 @@ def _feed_forward(
     model: Model, analysis: ClosedLoop, source: Outcome, patches: Mapping[str, PatchArray], times: Array
 ) -> Array:
     """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
-    voltages = [np.zeros((len(times), len(array.edges))) for array in patches.values()]
-    moments = np.zeros((len(times), len(model.motors)))
+    voltages: list[Array] = [np.zeros((len(times), len(array.edges))) for array in patches.values()]
+    moments: Array = np.zeros((len(times), len(model.motors)))
     middle = np.minimum(times + analysis.delay + analysis.sample_time / 2, source.time[-1])
     if analysis.feed_forward != "none" and source.tau is not None:
         moments, F_p = _found(source, middle)
@@ -274,7 +274,7 @@ def _found(source: Outcome, times: Array) -> tuple[Array, Array | None]:
     anytime = source.details.actuation_source(source) if F_p is not None else None
     if anytime is None:
         return _at(times, source.time, moments), None if F_p is None else _at(times, source.time, F_p)
-    tau, F_p = anytime.sample(times.tolist())
+    tau, F_p = anytime.sample(as_list(times))
     if source.continuation is not None and source.continuation.assembly is not None and F_p is not None:
         F_p = F_p * modal_factors(source.assembly.model)
     return _at(times, source.time, moments) if source.gears else tau, F_p

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
 from ...common.validation import quoted
 from ...mbs.analysis.outcome import Outcome
@@ -153,5 +153,5 @@ def modal_estimate(sensor: str, setup: Setup, body: str, m: int) -> Array:
     if sensor != "pzt":
         return np.eye(m)
     volts = volts_per_modal_coordinate(setup.patches[body])
-    estimate: Array = np.linalg.pinv(volts[:, : min(volts.shape)])[:m]
+    estimate = as_floats(np.linalg.pinv(volts[:, : min(volts.shape)]))[:m]
     return estimate

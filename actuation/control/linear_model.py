@@ -125,7 +125,8 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
 
     content = BytesIO()
     if path.suffix == ".npz":
-        np.savez_compressed(content, **{key: np.asarray(value) for key, value in arrays.items()})
+        converted: dict[str, Any] = {key: np.asarray(value) for key, value in arrays.items()}
+        np.savez_compressed(content, **converted)
     elif path.suffix == ".mat":
         from scipy.io import savemat
 

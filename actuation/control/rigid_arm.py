@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...mbs import _core
 from ...mbs.analysis.outcome import Outcome
@@ -78,7 +78,7 @@ class RigidArm:
         q, C_q = self.place(gamma)
         rates = np.zeros(len(C_q))
         rates[self._motors] = gamma_dot
-        v = np.linalg.solve(C_q, rates)
+        v = as_floats(np.linalg.solve(C_q, rates))
         h = -self._at_rest.system.evaluate(0.0, q, v)[1][self._motors]
         M = np.column_stack([-system.evaluate(0.0, q, v)[1][self._motors] - h for system in self._moved])
         return M, h

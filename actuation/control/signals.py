@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...mbs import _core
 from ...mbs.joints.measure import Marker, Measure
 from ...mbs.model.model import Model
@@ -75,8 +75,7 @@ def volts_per_modal_coordinate(patches: PatchArray, capacitance: float | None = 
     layout = patches.layout
     faces = 2 if layout.face == "both" else 1
     own = faces * layout.layers * PERMITTIVITY * layout.width * layout.length / layout.thickness
-    volts: Array = (patches.moment_per_volt * patches.turn).T / (own if capacitance is None else capacitance)
-    return volts
+    return as_floats((patches.moment_per_volt * patches.turn).T / (own if capacitance is None else capacitance))
 
 
 def merged(given: Sequence[Signal], needed: Sequence[Signal]) -> tuple[Signal, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray
+from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import InputError
 from .linear_model import LinearModel, Names
 
@@ -55,7 +55,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     scale = max(float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0))), 1.0)
     N, N_B = _null_space(c), _null_space(b.T)
     mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2
-    values = _eigenvalues(mass, damping, stiffness)
+    values = _eigenvalues(mass, as_floats(damping), as_floats(stiffness))
     values = scale * values[np.argsort(np.abs(values))]
     positive = values.real > np.maximum(MARGIN * np.abs(values), MARGIN * scale)
     return Zeros(values, values[positive])

@@ -16,6 +16,7 @@ from .records import PztLayout
 
 STEP = 0.1  # of the height, from one station to the next; less is a taper
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
+MOST_CONDITION = 1e16  # what more is found of a condition number is rounding itself
 LEAST_WEIGHT = 1e-6  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
 ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
 
@@ -199,7 +200,8 @@ def check_reach(scene_path: Path, patches: PatchArray) -> None:
         modes = ", ".join(f"{j + 1} ({patches.frequency[j]:.4g} Hz)" for j in unreached)
         raise InputError(
             f"{key}: expected patches that reach every mode, found a singular Φ_V (condition number"
-            f" {patches.condition_number:.1g}): no voltages serve mode {modes}; move patches, {advice}"
+            f" {min(patches.condition_number, MOST_CONDITION):.1g}): no voltages serve mode {modes};"
+            f" move patches, {advice}"
         )
 
 

@@ -83,7 +83,7 @@ def _section(layout: PztLayout, t_b: float) -> tuple[float, float, float]:
 
 def _gauss_points(layout: PztLayout, body: ModalBody) -> Iterator[tuple[float, float, tuple[float, float, float]]]:
     """Gauss points along all patches: x, weight, (A, S, I). No interval crosses a station: shapes have kinks there."""
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)  # type: ignore[no-untyped-call]
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
     stations = body.stations.position[:, 0]
     for start, end in patch_edges(layout, body.length).clip(0.0, body.length):
         section = _section(layout, section_height(body, start, end))

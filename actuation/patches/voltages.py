@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...mbs import _core
 from .patches import PatchArray
 
@@ -55,7 +55,7 @@ def voltage_gain(patches: PatchArray) -> Array:
         return np.asarray(voltage_gain(on_all) @ lift)
     (n, k), served = patches.Phi_V.shape, patches.served
     if k == served and not patches.unreached_modes.size:
-        return np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n)
+        return as_floats(np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n))
     W_sqrt = patches.W_sqrt if k < served or patches.unreached_modes.size else np.eye(served, n)
     scale = voltage_scale(patches)
     gain: Array = scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt

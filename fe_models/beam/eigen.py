@@ -8,7 +8,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
 
 # Multipliers amplify relative errors of the model data some 400 times within 0.2 s of the two-link case.
@@ -59,7 +59,7 @@ def orthonormalised(M: sp.csr_matrix, X: Array) -> Array:
     """X (m, n), lowest mode first, made orthonormal in M (m, m) to rounding, the lowest changed least."""
     for _ in range(2):  # twice is enough (Kahan; Parlett, The Symmetric Eigenvalue Problem, §6.9)
         gram = X.T @ (M @ X)
-        X = np.linalg.solve(np.linalg.cholesky(0.5 * (gram + gram.T)), X.T).T
+        X = as_floats(np.linalg.solve(np.linalg.cholesky(0.5 * (gram + gram.T)), X.T)).T
     return X
 
 

@@ -137,7 +137,7 @@ def geometric_stiffness(
     names = [f"{kind}_{axis}" for kind in "tr" for axis in "xyz"]
     names += [f"omega_{pair}" for pair in ("xx", "yy", "zz", "xy", "xz", "yz")]
     names += [f"{kind}/{name}/{axis}" for name in interfaces for kind in ("force", "moment") for axis in "xyz"]
-    matrices = {name: np.zeros((n, n)) for name in names}
+    matrices: dict[str, Array] = {name: np.zeros((n, n)) for name in names}
     # D'Alembert: a frame that accelerates along x pushes the link together; spinning about y or z pulls it apart.
     matrices["t_x"] = _stiffness_of(stations, fields, lambda x, _: -_mass_beyond(link, x, 0))
     matrices["omega_yy"] = _stiffness_of(stations, fields, lambda x, _: _mass_beyond(link, x, 1))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.version import program_version
 
@@ -87,7 +87,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         reference_condition=link.reference.condition,
         length=length,
         **vars(integrals),
-        frequency=omega / (2 * np.pi),
+        frequency=as_floats(omega / (2 * np.pi)),
         stiffness=np.diag(omega**2),
         modal_mass=modal_mass(models, modes),
         damping_ratio=damping_ratio(link, omega),

@@ -59,7 +59,7 @@ def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Re
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
     needed, available = (int(numbers[-1]) + 1 if numbers.size else _default_count(link)), flexibility.rank
     batch = needed + 2 if family == "all" else 2 * needed + 2
-    X = np.empty((3 * model.owned, 0))
+    X: Array = np.empty((3 * model.owned, 0))
     while True:
         if (family == "all" and needed > available) or X.shape[1] == available:
             key = "count" if link.modes.indices is None else "indices"

@@ -103,7 +103,7 @@ def stresses(model: SolidModel, piece: Gradients, strains: Array) -> Array:
 def strain_energy(model: SolidModel, modes: Array) -> Array:
     """(n, n) K_ff = ∫ ε(Φ_i) : C : ε(Φ_j) dV of `modes` (3 (owned + ghosts), n); collective."""
     n = modes.shape[1]
-    total = np.zeros((n, n))
+    total: Array = np.zeros((n, n))
     for piece in gradients(model, modes):
         strain = piece.strains()
         stress = stresses(model, piece, strain) * piece.weights[:, None, :, None]

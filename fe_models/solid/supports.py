@@ -23,7 +23,7 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ...common.arrays import Array, Integers
+from ...common.arrays import Array, Integers, as_floats
 from ...common.errors import SolveError
 from .elasticity import SolidModel, stiffness_matrix
 
@@ -62,10 +62,10 @@ class Flexibility:
         self.model = model
         self.R = rigid_motions(model.x)
         self.B = B
-        self.clamped = np.zeros((model.owned, 3), dtype=bool)
+        clamped = np.zeros((model.owned, 3), dtype=bool)
         for face in faces:
-            self.clamped[face.nodes] = True
-        self.clamped = self.clamped.reshape(-1)
+            clamped[face.nodes] = True
+        self.clamped = clamped.reshape(-1)
         T = _plate_motions(model, faces)
         KT = _times_stiffness(model, T) if T.shape[1] else T
         self._factored = _factorised(self._supported(faces))
@@ -93,7 +93,8 @@ class Flexibility:
 
     def _condense(self, T: Array, KT: Array) -> None:
         """W and S⁻¹; where only mean supports hold the body, springs on the first face make S positive definite."""
-        self.W, self._S_inverse = T, np.empty((0, 0))
+        self.W = T
+        self._S_inverse: Array = np.empty((0, 0))
         if not T.shape[1]:
             return
         inside = np.where(self.clamped[:, None], 0.0, KT)
@@ -102,7 +103,7 @@ class Flexibility:
         S = 0.5 * (S + S.T)
         if self.B is not None:
             S[:6, :6] += np.diag(np.diag(S)[:6])
-        self._S_inverse = np.linalg.inv(S)
+        self._S_inverse = as_floats(np.linalg.inv(S))
 
     def __matmul__(self, loads: Array) -> Array:
         """F f of loads (3 owned, k); collective."""

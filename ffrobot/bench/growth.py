@@ -70,7 +70,7 @@ def chain(links: int, modes: int, closed: bool) -> State:
     q, at = np.zeros(assembly.system.coordinates), np.zeros(2)
     for first, angle in zip(assembly.first, angles.values(), strict=True):
         q[first : first + 3] = *at, angle
-        at = at + LENGTH * np.array([np.cos(angle), np.sin(angle)])
+        at += LENGTH * np.array([np.cos(angle), np.sin(angle)])
     return assembly, q, np.zeros_like(q)
 
 

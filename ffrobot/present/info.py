@@ -12,7 +12,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..common.arrays import Array
+from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.hdf5 import open_checked
 from ..fe_models.modal_body import ModalBody
@@ -41,7 +41,7 @@ def describe(path: Path) -> str:
 
 
 def _modal_body(body: ModalBody) -> str:
-    center = _place(body, body.first_moment / body.mass)
+    center = _place(body, as_floats(body.first_moment / body.mass))
     lines = [
         f"modal body {body.name!r}: {body.kind}, {body.reference_condition} reference condition, {body.length:g} m",
         f"made by ffrobot {body.ffrobot_version} from input {body.input_hash[:12]}",

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from .. import _core
 from ..model.system import MechanismSystem
@@ -126,7 +126,7 @@ def _integrated(
     progress: Progress,
 ) -> _core.Run:
     common: dict[str, Any] = {
-        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments, "times": times.tolist(),
+        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments, "times": as_list(times),
         "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
     }  # fmt: skip
     if control is None:
@@ -136,7 +136,7 @@ def _integrated(
         )  # fmt: skip
     return _core.run_sampled(
         **common, motors=control.motors, patches=control.voltages, first_command=control.first,
-        sensing=control.sensing, samples=control.times.tolist(), delay=control.delay, controller=control.controller,
+        sensing=control.sensing, samples=as_list(control.times), delay=control.delay, controller=control.controller,
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
@@ -117,7 +117,7 @@ def run_fcid(model: Model, analysis: Fcid) -> Outcome:
         import scipy.interpolate  # noqa: F401, loading takes longer than solving
     began = time.perf_counter()
     shape = prescribed_shape(assembly, analysis, start.q, resolver)
-    run = _core.fully_constrained(assembly.system, analysis.times.tolist(), shape, start.q, resolver)
+    run = _core.fully_constrained(assembly.system, as_list(analysis.times), shape, start.q, resolver)
     seconds = time.perf_counter() - began
     if not run.completed:
         t = analysis.times[run.reached]
@@ -150,7 +150,7 @@ def prescribed_shape(
 def _static(assembly: MechanismSystem, analysis: Fcid, guess: Array, resolver: _core.ActuatorForces | None) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
     nodes = _nodes(analysis)
-    p = _core.static_shape(assembly.system, nodes.tolist(), guess, resolver)
+    p = _core.static_shape(assembly.system, as_list(nodes), guess, resolver)
     if len(p) < len(nodes):
         raise SolveError(
             f'{assembly.model.scene.path}: analysis "{analysis.name}": no static shape was found at'
@@ -160,7 +160,7 @@ def _static(assembly: MechanismSystem, analysis: Fcid, guess: Array, resolver: _
 
 
 def _nodes(analysis: Fcid) -> Array:
-    return np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1))
+    return as_floats(np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1)))
 
 
 def _given(scene_path: Path, bodies: Sequence[PlanarBody], analysis: Fcid) -> Shape:

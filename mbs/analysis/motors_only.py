@@ -16,7 +16,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from .. import _core
 from .._core import TimeFunction
@@ -185,7 +185,7 @@ def _check_rest(servo: Servo, analysis: MotorsOnly, needs_future: bool) -> None:
     """Raise `InputError` for a path that moves where the robot has to be at rest."""
     ends = [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
     for constraint in servo.path.model.trajectories:
-        values = constraint.target.sample(np.linspace(0.0, analysis.end, 101))[0]
+        values = constraint.target.sample(as_floats(np.linspace(0.0, analysis.end, 101)))[0]
         mean = float(np.ptp(values)) / analysis.end
         for t in ends:
             rate = constraint.target(t)[1]

@@ -35,7 +35,7 @@ def _time_function(value: object, info: ValidationInfo) -> TimeFunction:
     if isinstance(value, str):
         return parse_expression(value)
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return parse_expression(repr(value))
+        return parse_expression(repr(float(value)))
     raise ValueError(f"expected an expression in t, found {value!r}")
 
 

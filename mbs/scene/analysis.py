@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.validation import Record, did_you_mean, either, quoted
 from .._core import TimeFunction
 from ..fields.field_types import Name, Positive
@@ -216,7 +216,7 @@ def output_times(end: float, step: float, before: float = 0.0, after: float = 0.
     if not (end and step):
         return np.zeros(1)
     early, late, count = (round(x / step) for x in (before, after, end))
-    times = np.arange(-early, count + late + 1) * step
+    times = as_floats(np.arange(-early, count + late + 1) * step)
     times[early + count] = end
     return times
 

@@ -62,7 +62,7 @@ class Scheme(NamedTuple):
 
 def gauss(stages: int = STAGES) -> Scheme:
     """Collocation at the zeros of the Legendre polynomial (Hairer, Nørsett and Wanner, II.7)."""
-    c = (np.polynomial.legendre.leggauss(stages)[0] + 1) / 2  # type: ignore[no-untyped-call]
+    c = (np.polynomial.legendre.leggauss(stages)[0] + 1) / 2  # type: ignore[no-untyped-call, unused-ignore]
     m = np.arange(stages)
     to_powers = np.linalg.inv(c[:, None] ** m)
     once, twice = 1 / (m + 1), 1 / ((m + 1) * (m + 2))

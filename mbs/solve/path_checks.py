@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from .._core import TimeFunction
 from ..model.system import MechanismSystem
@@ -38,7 +38,7 @@ def check_smooth(assembly: MechanismSystem, end: float) -> None:
 
 def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float, float] | None:
     """Time, value before and after of the first jump that is found in a derivative of that order; None without one."""
-    times = np.linspace(0.0, end, SAMPLES)
+    times = as_floats(np.linspace(0.0, end, SAMPLES))
     values, *_ = derivatives = function.sample(times)
     samples, still = derivatives[order], RESTING * float(np.abs(values).max())
     size = max(float(np.ptp(samples)), still) if order == 0 else max(float(np.abs(samples).max()), still / end)

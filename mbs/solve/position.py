@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ..model.system import MechanismSystem
 from .state import State
 
@@ -77,5 +77,5 @@ def rank_ratio(assembly: MechanismSystem, t: float, q: Array) -> float:
 def _least_step(assembly: MechanismSystem, t: float, q: Array, residual: Array) -> Array:
     """The smallest change of (R, θ), (3 bodies,), that takes `residual` off C (or, as a rate, off Ċ)."""
     J = frame_gradients(assembly, t, q)
-    step: Array = np.linalg.lstsq(J, residual / assembly.measure_scales, rcond=None)[0]
+    step = as_floats(np.linalg.lstsq(J, residual / assembly.measure_scales, rcond=None)[0])
     return step * assembly.scales[assembly.frame_coordinates]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, ComplexArray
+from ...common.arrays import Array, Booleans, ComplexArray, as_list
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
@@ -116,14 +116,14 @@ class LinearDynamics:
 def linear_dynamics(core: _core.ServoConstraint, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
     """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n)."""
     n = p.shape[1]
-    found = core.derivatives(times.tolist(), p, v, a)
+    found = core.derivatives(as_list(times), p, v, a)
     M, D, K = (x.reshape(-1, n, n) for x in (found.M, found.D, found.K))
     return LinearDynamics(times, M, D, K)
 
 
 def equilibrium(servo: Servo, core: _core.ServoConstraint, t: float) -> Array:
     """Shape p (n,) at rest under path and loads as at time t. Raises `SolveError` where there is none."""
-    p = np.zeros((1, len(servo.scale)))
+    p: Array = np.zeros((1, len(servo.scale)))
     rest = np.zeros_like(p)
     for _ in range(MOST_ITERATIONS):
         r = core.residuals([t], p, rest, rest)[0]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray
+from ...common.arrays import Array, ComplexArray, as_floats, as_list
 from ...common.errors import SolveError
 from .. import _core
 from .collocation import GAUSS, Boundary, Found, Problem, collocate
@@ -87,11 +87,12 @@ def linearise(servo: Servo, end: float) -> Linearisation:
 
     Raises `SolveError` where they are too soft for that.
     """
-    core, times = servo.core(), np.linspace(0.0, end, SAMPLES)
-    p = rest = np.zeros((SAMPLES, len(servo.scale)))
+    core, times = servo.core(), as_floats(np.linspace(0.0, end, SAMPLES))
+    rest: Array = np.zeros((SAMPLES, len(servo.scale)))
+    p = rest
     K = linear_dynamics(core, times, rest, rest, rest).K
     for _ in range(SHAPE_ITERATIONS):
-        p = p - np.linalg.solve(K, core.residuals(times.tolist(), p, rest, rest)[:, :, None])[:, :, 0]
+        p = p - np.linalg.solve(K, core.residuals(as_list(times), p, rest, rest)[:, :, None])[:, :, 0]
     dynamics = linear_dynamics(core, times, p, rest, rest)
     lost = ~np.isfinite(dynamics.M.sum(axis=(1, 2)) + dynamics.D.sum(axis=(1, 2)) + dynamics.K.sum(axis=(1, 2)))
     if lost.any():
@@ -117,7 +118,7 @@ def invert(
             f" path as after it, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}"
         )
     problem = Problem(
-        lambda t, p, v, a: core.residuals(t.tolist(), p, v, a), linear.dynamics, servo.scale,
+        lambda t, p, v, a: core.residuals(as_list(t), p, v, a), linear.dynamics, servo.scale,
         max(TINY, float(np.abs(servo.scale * linear.shape).max())), start, finish,
     )  # fmt: skip
     force = max(TINY, float(np.abs(servo.scale**2 * linear.shape).max()))
@@ -156,7 +157,7 @@ class _Solver:
             if unmet.max() <= self.most:
                 self.status, self.unmet = "completed", max(self.unmet, float(unmet.max()))
                 return found
-            finer = _refined(breaks, unmet / self.most) if found.converged else _halved(breaks)
+            finer = _refined(breaks, as_floats(unmet / self.most)) if found.converged else _halved(breaks)
             if len(finer) > MOST_INTERVALS + 1:
                 break
             if not self.progress(float(breaks[0] + (breaks[-1] - breaks[0]) * refinement / MOST_REFINEMENTS)):

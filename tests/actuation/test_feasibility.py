@@ -186,7 +186,7 @@ def test_predicted_shift_of_the_tip_is_what_happens(arm):
     voltages = straight.analyses["motion"].voltages["link"]
     tips = []
     for volts in (voltages.required[0], voltages.within_limit[0]):
-        load = '\n[[load]]\npzt = "link"\nvoltage = [' + ", ".join(f'"{v!r}"' for v in volts) + "]\n"
+        load = '\n[[load]]\npzt = "link"\nvoltage = [' + ", ".join(f'"{v!r}"' for v in volts.tolist()) + "]\n"
         held = arm(kind="static", times="", trajectory='joint = "O"\nvalue = "0"', load=load)
         outcome = held.outcomes["motion"]
         tips.append(outcome.q[0, 3:] @ outcome.assembly.model.body("link").points["tip"].translation[1])

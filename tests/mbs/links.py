@@ -74,7 +74,7 @@ def ritz_link(name, condition, length=1.0, mass=1.0, EI=30.0, modes=3, damping_r
 
 
 ANGLES = {"link1": 0.4, "link2": 1.3}
-TIP = np.cos(list(ANGLES.values())).sum(), np.sin(list(ANGLES.values())).sum()
+TIP = float(np.cos(list(ANGLES.values())).sum()), float(np.sin(list(ANGLES.values())).sum())
 
 
 def quintic(start, end, duration=1.0):

@@ -103,8 +103,9 @@ def _jets(model, assembly, q, v, a):
     """p + ṗ t + p̈ t²/2 for every body."""
     shape = []
     for body, first in zip(model.bodies, assembly.first, strict=True):
-        modal = range(first + 3, first + 3 + body.n_modes)
-        shape.append([parse_expression(f"{q[i]!r}+{v[i]!r}*t+{a[i] / 2!r}*t**2") for i in modal])
+        modal = slice(first + 3, first + 3 + body.n_modes)
+        jets = zip(q[modal].tolist(), v[modal].tolist(), a[modal].tolist(), strict=True)
+        shape.append([parse_expression(f"{x!r}+{x_dot!r}*t+{x_ddot / 2!r}*t**2") for x, x_dot, x_ddot in jets])
     return shape
 
 

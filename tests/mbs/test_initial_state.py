@@ -14,7 +14,7 @@ from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
-HOLD = {"name": "tip", "point": "link2.tip", "x": repr(float(TIP[0])), "y": repr(float(TIP[1]))}
+HOLD = {"name": "tip", "point": "link2.tip", "x": repr(TIP[0]), "y": repr(TIP[1])}
 
 
 def refused(model, match):
@@ -92,7 +92,7 @@ def test_loop_that_cannot_be_closed_is_named():
 
 
 def test_repeated_trajectories_are_named():
-    again = {"name": "again", "point": "link2.tip", "x": repr(float(TIP[0]))}
+    again = {"name": "again", "point": "link2.tip", "x": repr(TIP[0])}
     refused(arm(trajectory=[HOLD, again]), r'1 too many among .*trajectory "again".*repeat or contradict')
 
 

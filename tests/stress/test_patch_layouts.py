@@ -55,7 +55,7 @@ def test_nearly_the_same_place(link, apart, record):
     array = patches(link, centers=(0.33, 0.33 + apart, 0.5, 0.7, 0.9), length=length)
     voltages = solve_voltages(array, wanted(link))
     left = np.abs(voltages.unmet).max() / np.abs(wanted(link)).max()
-    assert left < 1e-16 * array.condition_number + 1e-13
+    assert left < np.finfo(float).eps * array.condition_number + 1e-13
     condition, measured = "{condition}", {"condition": array.condition_number}
     if apart < 1e-8:  # the columns differ by rounding alone, and so does their condition
         assert array.condition_number > 1e8

@@ -1,0 +1,23 @@
+#!/usr/bin/env bash
+# Runs tests of the core on one that is built with AddressSanitizer, UBSan and Eigen's own checks: by hand, for some ten
+# minutes. The first finding ends the run.
+#
+#   scripts/sanitizers.sh [ARGUMENT…]     arguments go to pytest; tests/mbs where none is given
+source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
+
+readonly CHECKED=build/sanitizers # the folder of an environment with that core, and its build
+readonly FLAGS="-O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined"
+
+# The packages of .venv, but not its ffrobot: path files of added folders are not read.
+.venv/bin/python -m venv --without-pip "$CHECKED/env"
+for packages in "$PWD"/.venv/lib/python3*/site-packages; do
+  printf '%s\n' "$packages" /usr/lib/python3/dist-packages >"$CHECKED/env/lib/${packages#*/.venv/lib/}/ffrobot.pth"
+done
+CXXFLAGS=$FLAGS .venv/bin/python -m pip --python "$CHECKED/env/bin/python" install -q --no-deps --no-build-isolation --force-reinstall . \
+  --config-settings=cmake.build-type=Debug --config-settings=build-dir="$CHECKED/build"
+
+# Python is built without sanitizers: their library has to come first, and libstdc++ with it, whose exceptions it watches.
+preloaded="$(g++ -print-file-name=libasan.so) $(g++ -print-file-name=libstdc++.so)"
+(($#)) || set -- tests/mbs
+env LD_PRELOAD="$preloaded" ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 \
+  "$CHECKED/env/bin/python" -m pytest -q "$@"
