@@ -1,7 +1,6 @@
 // What motors and modal forces must do in place of the forces that hold a trajectory.
 #pragma once
 
-#include "core/integrate/integrate.h"
 #include "core/system/frame_system.h"
 #include "core/system/motion.h"
 
