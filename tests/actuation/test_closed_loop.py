@@ -11,6 +11,7 @@ from ffrobot.actuation.control.lqr import gains, sampled
 from ffrobot.actuation.control.rigid_arm import RigidArm
 from ffrobot.actuation.control.signals import volts_per_modal_coordinate
 from ffrobot.common.errors import InputError, SolveError
+from ffrobot.common.python_files import python_allowed
 from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.results.file import Results
@@ -183,7 +184,8 @@ def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_p
         loop("theirs", controller=[PID], sensor=sensor, disturbance=blow()),
         loop("mine", controller=[mine], sensor=sensor, disturbance=blow()),
     ]
-    solution = solve(wheel(*loops))
+    with python_allowed([tmp_path]):
+        solution = solve(wheel(*loops))
     theirs, own = solution.outcomes["theirs"].details, solution.outcomes["mine"].details
     np.testing.assert_allclose(own.commands, theirs.commands, atol=1e-12)
     np.testing.assert_array_equal(solution.outcomes["itself"].details.commands, own.commands)
@@ -201,7 +203,7 @@ def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_p
 def test_what_a_users_function_does_wrong_is_said(tmp_path, body, error, expected):
     file = tmp_path / "mine.py"
     file.write_text(f"import numpy as np\ndef controller(setup):\n    def act(k, y):\n        {body}\n    return act\n")
-    with pytest.raises(error, match=expected):
+    with python_allowed([tmp_path]), pytest.raises(error, match=expected):
         solve(wheel(loop(controller=[{"kind": "python", "python": f"{file}:controller"}])))
 
 

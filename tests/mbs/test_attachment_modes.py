@@ -230,7 +230,7 @@ def test_integration_goes_on_from_where_it_stopped():
     short = analysis.model_copy(update={"max_steps": 200})
     stopped = run_pcid(solution.model, short, True, lambda _: True)
     assert stopped.status == "too many steps"
-    earlier = EarlierRun(stopped.motion, stopped.forces, stopped.statistics, stopped.continuation)
+    earlier = EarlierRun(stopped.motion, stopped.forces, stopped.statistics, stopped.continuation, "run")
     whole = run_pcid(solution.model, analysis, True, lambda _: True)
     again = run_pcid(solution.model, analysis, True, lambda _: True, earlier)
     assert np.array_equal(again.q, whole.q)
