@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
+from ffrobot.common import checksum
 from ffrobot.common.errors import InputError
 from ffrobot.present.summary import print_summary, summary_console
 from ffrobot.results.file import Results
@@ -66,9 +67,9 @@ def test_the_estimate_is_honest_on_paths_it_was_not_made_with(seed):
     """Other ways of the tip, drawn by seed: as the paper's arm on its own."""
     x, y = np.random.default_rng(seed).uniform([-1.0, -0.5], [0.0, 0.5])
     path = {"x": f"1.5+{x!r}*{S}", "y": f"sqrt(3)/2+{y!r}*{S}"}
-    exact = reported(solve(scene("static", path, tolerance=1e-5)), "inverse")
+    exact = reported_of(solve(scene("static", path, tolerance=1e-5)), "inverse")
     solution = solve(scene("static", path, "auto", tolerance=1e-2))
-    worst = max(difference(reported(solution, "inverse"), exact).values())
+    worst = max(difference(reported_of(solution, "inverse"), exact).values())
     estimated = max(solution.mode_choice.errors["inverse"].values())
     assert worst <= 1e-2
     assert worst / 3 < estimated < 6 * worst  # up to 4 times on the safe side, where the arm above has less than 3
@@ -113,6 +114,7 @@ def reduced():
 def test_results_say_what_their_modal_coordinates_are(reduced, tmp_path):
     path = tmp_path / "reduced.h5"
     path.write_bytes(results_image(reduced))
+    checksum.seal(path)
     with h5py.File(path) as file:
         body = file["inverse/bodies/link2"]
         assert body["modal"].shape == (1001, 5)
