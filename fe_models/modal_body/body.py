@@ -325,9 +325,10 @@ def _check(body: ModalBody) -> None:
 
 def _check_inertia(body: ModalBody) -> None:
     """Kinetic energy is positive in every motion: about the center of mass, and with what the modes carry along."""
-    about_center = body.second_moment - np.outer(body.first_moment, body.first_moment) / body.mass
+    second = body.second_moment - np.outer(body.first_moment, body.first_moment) / body.mass
+    about_center = np.trace(second) * np.eye(3) - second  # inertia of a mass on an interface may be about z alone
     relative = body.modal_mass - body.S_bar.T @ body.S_bar / body.mass
-    matrices = {"second_moment, about the center of mass": about_center, "modal_mass, less S_bar": relative}
+    matrices = {"second_moment, as inertia about the center of mass": about_center, "modal_mass, less S_bar": relative}
     for name, matrix in matrices.items():
         lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
         if lowest < -POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0):

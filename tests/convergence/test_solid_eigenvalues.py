@@ -143,7 +143,7 @@ def test_bending_of_the_paper_s_links_is_timoshenko_s(tmp_path, condition, coupl
     text = text.replace('cell = "tetrahedron"\norder = 3\n', "") + '\n[model]\ntheory = "timoshenko"\n'
     beam_file = tmp_path / "beam.toml"
     beam_file.write_text(text)
-    beam = beam_modal_body(read_link(beam_file), beam_file, "", lambda _: None)
+    beam = beam_modal_body(read_link(beam_file), beam_file, lambda _: None)
     np.testing.assert_allclose(solid.frequency[:5], beam.frequency[:5], rtol=difference)
     np.testing.assert_allclose(solid.S_bar[1], beam.S_bar[1], rtol=0, atol=0.002 * np.abs(beam.S_bar).max())
     shapes = [body.interpolate(0.3).translation[1, :5] for body in (solid, beam)]

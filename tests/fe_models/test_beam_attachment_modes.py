@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
+from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body_file import read_modal_body
@@ -184,6 +185,7 @@ def test_file_keeps_the_marks_and_old_files_have_none(link_file):
     assert read_modal_body(outcome.path).residual.tolist() == [0] * 10 + [1] * 2
     with h5py.File(outcome.path, "r+") as file:
         del file["modes/residual"]
+    seal(outcome.path)
     assert not read_modal_body(outcome.path).residual.any()
 
 

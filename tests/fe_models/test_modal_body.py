@@ -50,7 +50,7 @@ def body(coefficients):
         modal_mass=np.eye(2),
         damping_ratio=np.zeros(2),
         family=("in-plane-bending",) * 2,
-        S_bar=np.ones((3, 2)),
+        S_bar=np.full((3, 2), 0.5),
         I_bar=np.ones((3, 3, 2)),
         S_bar_kl=S_bar_kl,
         interfaces={

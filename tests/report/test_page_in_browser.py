@@ -2,6 +2,7 @@
 
 import io
 import shutil
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -144,7 +145,7 @@ def test_histories_show_what_the_file_holds(paused, two_link):
 
 def test_names_are_shown_as_they_are(browser, page, two_link, tmp_path):
     """A browser would take <b> for bold, and so would Plotly."""
-    path = shutil.copy(two_link.folder / "scene.results.h5", tmp_path)
+    path = Path(shutil.copy(two_link.folder / "scene.results.h5", tmp_path))
     with h5py.File(path, "r+") as file:
         file.attrs["name"] = "<b>A & B</b>"
     seal(path)

@@ -160,7 +160,7 @@ def test_modal_body_has_its_modes_as_vectors(read, solid_arm, tmp_path):
 
 
 def test_body_without_its_file_is_drawn_through_its_points(read, two_link, tmp_path):
-    path = shutil.copy(two_link.folder / "scene.results.h5", tmp_path)
+    path = Path(shutil.copy(two_link.folder / "scene.results.h5", tmp_path))
     with h5py.File(path, "r+") as file:
         file.attrs["modal_bodies"] = file.attrs["modal_bodies"].replace('.h5"', '.gone.h5"')
     seal(path)
