@@ -13,7 +13,7 @@ readonly FOLDERS=(ffrobot common mesh fe_models mbs actuation)
 (($#)) || set -- tests --ignore=tests/benchmarks --ignore=tests/packaging
 .venv/bin/python -m pip install -q 'coverage>=7.6' 'gcovr>=8' -c .venv/constraints.txt
 
-cmake -S . -B "$OUT/core" -GNinja -DCMAKE_BUILD_TYPE=Debug -DFFROBOT_NATIVE=OFF -DCMAKE_CXX_FLAGS="--coverage -O1" \
+cmake -S . -B "$OUT/core" -GNinja -DCMAKE_BUILD_TYPE=Debug -DFFROBOT_NATIVE=ON -DCMAKE_CXX_FLAGS="--coverage -O1" \
   -DPython_EXECUTABLE="$PWD/.venv/bin/python" -Dnanobind_DIR="$(.venv/bin/python -m nanobind --cmake_dir)" >/dev/null
 cmake --build "$OUT/core" --target _core >/dev/null
 find "$OUT/core" -name '*.gcda' -delete
@@ -39,7 +39,7 @@ import coverage
 class Core:
     @staticmethod
     def find_spec(name, path=None, target=None):
-        return spec_from_file_location(name, os.environ["FFROBOT_CORE"]) if name == "ffrobot.mbs._core" else None
+        return spec_from_file_location(name, os.environ["COVERED_CORE"]) if name == "ffrobot.mbs._core" else None
 
 
 sys.meta_path.insert(0, Core)
@@ -47,7 +47,7 @@ coverage.process_startup()
 END
 
 status=0
-FFROBOT_CORE=$(find "$OUT/core" -name '_core*.so') PYTHONPATH=$OUT/site COVERAGE_PROCESS_START=$OUT/coveragerc \
+COVERED_CORE=$(find "$OUT/core" -name '_core*.so') PYTHONPATH=$OUT/site COVERAGE_PROCESS_START=$OUT/coveragerc \
   .venv/bin/python -m pytest "$@" || status=$?
 
 coverage() { .venv/bin/python -m coverage "$@" --rcfile="$OUT/coveragerc"; }
