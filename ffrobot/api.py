@@ -41,12 +41,12 @@ def solve(
     from .results.resume import how_to_go_on
     from .results.resume import resume as run_on
     from .results.write import results_image, write_results
-    from .run.inputs import files_of_scene, files_of_tables
+    from .run.inputs import files_of, files_of_tables
     from .run.solve import solve as run
     from .scene.scene import Scene
 
     path = None if output is None else Path(output)
-    inputs = files_of_scene(Path(scene)) if not isinstance(scene, Scene) else files_of_tables(scene.path, scene.text)
+    inputs = files_of(Path(scene)) if not isinstance(scene, Scene) else files_of_tables(scene.path, scene.text)
     if path is not None:
         with protected(inputs):
             check_output(path, FORMAT)

@@ -49,9 +49,9 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     """
     from .fe_models.link import make_link
     from .present.progress import Display
-    from .run.inputs import files_of_link
+    from .run.inputs import files_of
 
-    _protect(files_of_link(link_file))
+    _protect(files_of(link_file))
     with Display() as display:
         outcome = make_link(link_file, output, force, display.stage)
     if not is_first():
@@ -91,11 +91,11 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
     from .results.resume import how_to_go_on, left_out
     from .results.resume import resume as resume_scene
     from .results.write import write_results
-    from .run.inputs import files_of_scene
+    from .run.inputs import files_of
     from .run.solve import solve as solve_scene
 
     path = output or scene_file.with_suffix(".results.h5")
-    _protect(files_of_scene(scene_file))
+    _protect(files_of(scene_file))
     check_output(path, FORMAT)
     writing = 0.0
 
@@ -257,11 +257,11 @@ def sweep(
     """  # noqa: D301 (click wants the backspace itself)
     from .present.progress import Display
     from .present.summary import summary_console
-    from .run.inputs import files_of_scene
+    from .run.inputs import files_of
     from .sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
 
     folder = output or scene_file.with_suffix(".sweep")
-    _protect(files_of_scene(scene_file))
+    _protect(files_of(scene_file))
     plan = on_first(lambda: plan_sweep(scene_file, vary, folder, sample, seed, collect))
     if retry and is_first():
         forget_failures(plan)

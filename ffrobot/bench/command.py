@@ -76,7 +76,7 @@ def bench(
     from ..common.outputs import protected
     from ..present.progress import Display
     from ..present.summary import summary_console
-    from ..run.inputs import files_of_scene
+    from ..run.inputs import files_of
     from .campaign import Campaign, Settings
     from .precision import INTEGRATORS, TOLERANCES
 
@@ -86,7 +86,7 @@ def bench(
         raise click.UsageError("--analysis goes with a scene")
     if scene_file is not None:
         context = click.get_current_context()
-        context.with_resource(protected(files_of_scene(scene_file)))
+        context.with_resource(protected(files_of(scene_file)))
     settings = Settings(integrators or INTEGRATORS, tolerances or TOLERANCES, repeat, budget)
     folder = output or (scene_file.with_suffix(".bench") if scene_file else Path("bench"))
     with Display() as display:

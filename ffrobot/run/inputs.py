@@ -39,19 +39,14 @@ def read_tables(path: Path) -> dict[str, Any]:
         return {}
 
 
-def files_of_scene(path: Path) -> list[Path]:
-    """The scene file at `path` and all files that it is made from, as far as they can be found."""
+def files_of(path: Path) -> list[Path]:
+    """The scene or link file at `path` and all files that it is made from, as far as they can be found."""
     return [path, *named_files(read_tables(path), path.parent)]
 
 
 def files_of_tables(path: Path, text: str) -> list[Path]:
     """Likewise, of a scene with the TOML `text` that was made in Python."""
     return [path, *named_files(tomllib.loads(text), path.parent)]
-
-
-def files_of_link(path: Path) -> list[Path]:
-    """Likewise, of a link file."""
-    return [path, *named_files(read_tables(path), path.parent)]
 
 
 def fingerprints(scene: Mapping[str, Any], path: Path) -> dict[str, str]:

@@ -16,7 +16,7 @@ from ..actuation.patches.voltages import allocation, solve_voltages
 from ..actuation.points import with_factors as points_with
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import ActuatorSet
-from ..mbs.model.raised_mass import mass_factors
+from ..mbs.model.raised_mass import by_body
 from ..mbs.quantities.stiffening import NOTABLE, estimated_effect
 from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
@@ -146,7 +146,7 @@ def _context(
 
 def _actuator_set(solution: Solution, *, raised: bool) -> ActuatorSet:
     """The actuators of the scene, fresh for one run."""
-    factors = {body.name: np.sqrt(mass_factors(body)) if raised else np.ones(1) for body in solution.model.bodies}
+    factors = by_body(solution.model) if raised else {body.name: np.ones(1) for body in solution.model.bodies}
     patches = {name: patches_with(array, factors[name]) for name, array in solution.patches.items()}
     points = {name: points_with(one, factors[name]) for name, one in solution.points.items()}
     return ActuatorSet(

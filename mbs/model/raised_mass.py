@@ -12,15 +12,12 @@ Statics, linear models and results keep p: motion goes to p' before an integrati
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...common.arrays import Array
+from .model import Model
 from .planar_body import PlanarBody, transformed
-
-if TYPE_CHECKING:
-    from .model import Model
 
 LIMIT = 2.0  # times the frequency of the highest eigenmode: above it masses are raised
 
@@ -68,9 +65,9 @@ def by_body(model: Model) -> dict[str, Array]:
 
 def coordinate_factors(model: Model) -> Array:
     """√μ of all coordinates (R, θ, p) of all bodies, side by side: q' = factors · q."""
-    return np.concatenate([np.append(np.ones(3), np.sqrt(mass_factors(body))) for body in model.bodies])
+    return np.concatenate([np.append(np.ones(3), root) for root in by_body(model).values()])
 
 
 def modal_factors(model: Model) -> Array:
     """√μ of the modal coordinates of all bodies, side by side: p' = factors · p, F_p' = F_p / factors."""
-    return np.concatenate([np.sqrt(mass_factors(body)) for body in model.bodies])
+    return np.concatenate(list(by_body(model).values()))
