@@ -17,7 +17,8 @@ from ..actuation.points import with_factors as points_with
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import ActuatorSet
 from ..mbs.model.raised_mass import by_body
-from ..mbs.quantities.stiffening import NOTABLE, estimated_effect
+from ..mbs.quantities.stiffening import NOTABLE, stiffness_changes
+from ..mbs.quantities.validity import bending
 from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
 from .evaluation import evaluated
@@ -105,15 +106,16 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             if not results:
                 raise
             return replace(solution, analyses=results, failure=error)
-        effect = estimated_effect(outcome, stiffening)
+        changes = stiffness_changes(outcome, stiffening)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
-        if automatic and effect > NOTABLE and outcome.status != "interrupted":
+        if automatic and max(changes.values(), default=0.0) > NOTABLE and outcome.status != "interrupted":
             return None
         voltages = {} if outcome.F_p is None else {
             body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
             for body, array in solution.patches.items()
         }  # fmt: skip
-        results[analysis.name] = AnalysisResult(outcome, effect, time.perf_counter() - began, voltages)
+        bent = bending(outcome, solution.links, changes, solution.stiffened)
+        results[analysis.name] = AnalysisResult(outcome, bent, time.perf_counter() - began, voltages)
         _log(outcome)
         if outcome.failed:
             break
@@ -140,7 +142,7 @@ def _context(
         is_replayed=any(other.takes_actuation and other.source == analysis.name for other in later),
         earlier=solution.earlier.get(analysis.name),
         patches=solution.patches,
-        links={name: body.modal for name, body in solution.bodies.items() if body.modal is not None},
+        links=solution.links,
     )
 
 
