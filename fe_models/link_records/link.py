@@ -101,10 +101,14 @@ class Modes(Record):
 
 
 class Damping(Record):
-    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK."""
+    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK.
+
+    `of` "robot": one ratio, wanted of the vibrations of the assembled robot at its initial posture, motors free.
+    """
 
     ratio: NotNegative | tuple[NotNegative, ...] | None = None
     rayleigh: tuple[NotNegative, NotNegative] | None = None
+    of: Literal["link", "robot"] = "link"
 
 
 class StressRecovery(Record):
