@@ -18,6 +18,11 @@ def error_budget(solution: Solution) -> Iterator[str]:
         yield f"time integration: {asked} of peaks, asked for"
     yield f"modes: {_modes(solution)}"
     yield f"deflection: {_deflection(solution)}"
+    for name, result in solution.analyses.items():
+        if (check := result.check) is not None:
+            ended = "" if check.status == "completed" else f", which ended early ({check.status})"
+            modes = ", ".join(map(str, dict.fromkeys(check.modes.values())))
+            yield f"{name}, replayed on {modes} modes{ended}: {check.point} is off by {1e3 * check.error:.2g} mm"
     if solution.patches:
         yield f"stiffness of patches: {NOT_ESTIMATED}"
 

@@ -81,6 +81,9 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     if solution.mode_choice is not None and name in solution.mode_choice.errors:
         for kind, error in solution.mode_choice.errors[name].items():
             group.attrs[f"mode_error_{kind}"] = error
+    if result.check is not None:
+        check = vars(result.check) | {"modes": json.dumps(dict(result.check.modes))}
+        group.attrs.update({f"check_{key}": value for key, value in check.items()})
     write_motion(group, outcome)
     write_bending(group, result.bending)
     write_forces(group, outcome)

@@ -44,6 +44,23 @@ class ModeChoice:
 
 
 @dataclass(frozen=True)
+class FinerCheck:
+    """What a replay on twice the modes found.
+
+    Attributes:
+        modes: eigenmodes of each flexible body in it.
+        point: that is farthest from where the inverse analysis has it, of those on trajectories where there are any.
+        error: by how much, m, at worst.
+        status: how the replay ended.
+    """
+
+    modes: Mapping[str, int]
+    point: str
+    error: float
+    status: str
+
+
+@dataclass(frozen=True)
 class AnalysisResult:
     """What was computed of one analysis.
 
@@ -57,6 +74,7 @@ class AnalysisResult:
         feasibility: whether motors and patches can do it; None where nothing is asked of them.
         stresses: by body, where modal body files hold modal stresses.
         mode_error: estimated for too few modes, of peaks; None where it is not known.
+        check: what a replay on finer links found, where that is asked for.
         warnings: why results may be wrong, or not mean what they seem to, a text each.
     """
 
@@ -69,6 +87,7 @@ class AnalysisResult:
     feasibility: Feasibility | None = None
     stresses: Mapping[str, BodyStress] = field(default_factory=dict)
     mode_error: float | None = None
+    check: FinerCheck | None = None
     warnings: tuple[str, ...] = ()
 
     @property

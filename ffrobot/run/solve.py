@@ -22,6 +22,7 @@ from ..mbs.quantities.validity import bending
 from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
 from .evaluation import evaluated
+from .finer import check_on, finer_scene
 from .mode_choice import ModeSearch
 from .prepare import prepare, stiffened, with_bodies
 from .solution import AnalysisResult, Solution
@@ -54,7 +55,7 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
             solution = _with_enough_modes(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
-        solution = _evaluated(solution)
+        solution = _checked(_evaluated(solution), watcher)
         if keep is not None and solution.analyses:
             keep(solution)
     if solution.failure is not None:
@@ -70,6 +71,27 @@ def _evaluated(solution: Solution) -> Solution:
             results[name] = evaluated(solution, result)
         except Exception as error:
             failure = failure or error
+    return replace(solution, analyses=results, failure=failure)
+
+
+def _checked(solution: Solution, watcher: Watcher) -> Solution:
+    """The solution with completed analyses replayed on finer links where the scene asks for that."""
+    wanted = [
+        name for name, result in solution.analyses.items()
+        if result.outcome.analysis.is_checked and result.outcome.status == "completed"
+    ]  # fmt: skip
+    if not wanted:
+        return solution
+    results, failure = dict(solution.analyses), solution.failure
+    try:
+        finer = prepare(finer_scene(solution.scene, solution.bodies), watcher)
+        finer = stiffened(finer) if solution.stiffened else finer
+        for name in wanted:
+            watcher.stage(f'check of "{name}" on finer links')
+            check = check_on(results[name].outcome, solution, finer, watcher)
+            results[name] = replace(results[name], check=check)
+    except Exception as error:
+        failure = failure or error
     return replace(solution, analyses=results, failure=failure)
 
 
@@ -139,7 +161,8 @@ def _context(
         outcomes={name: result.outcome for name, result in results.items()},
         make_actuators=lambda raised: _actuator_set(solution, raised=raised),
         progress=progress,
-        is_replayed=any(other.takes_actuation and other.source == analysis.name for other in later),
+        is_replayed=analysis.is_checked
+        or any(other.takes_actuation and other.source == analysis.name for other in later),
         earlier=solution.earlier.get(analysis.name),
         patches=solution.patches,
         links=solution.links,
