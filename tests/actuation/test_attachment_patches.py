@@ -27,7 +27,7 @@ def bodies(link_file):
     """The modal body with ten eigenmodes and two attachment modes, and the one without these."""
     path = link_file("attached")
     plain = cached_modal_body(path).body
-    path.write_text(path.read_text().replace("count = 10", "count = 10\nattachment_modes = true"))
+    path.write_text(path.read_text().replace("attachment_modes = false\n", ""))
     return cached_modal_body(path).body, plain
 
 

@@ -26,6 +26,7 @@ elements = 40
 [reference]
 condition = "cantilever"
 [modes]
+attachment_modes = false
 count = 10
 family = "in-plane-bending"
 """

@@ -23,6 +23,7 @@ KIND
 [reference]
 condition = "simply-supported"
 [modes]
+attachment_modes = false
 count = 6
 family = "in-plane-bending"
 """
