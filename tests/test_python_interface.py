@@ -163,7 +163,9 @@ def test_run_that_stops_early_keeps_its_file(folder, tmp_path):
 def test_objects_print_what_they_are(folder, results):
     # 2700 kg/m³ · π/4 (0.02² − 0.016²) m² · 0.6 m = 0.18322 kg
     body = ffrobot.read_modal_body(folder / "arm.h5")
-    assert repr(body).startswith("ModalBody('arm'): beam, cantilever, 0.6 m, 0.18322 kg, 3 modes and 2 attachment modes of ")
+    assert repr(body).startswith(
+        "ModalBody('arm'): beam, cantilever, 0.6 m, 0.18322 kg, 3 modes and 2 attachment modes of "
+    )
     assert repr(swing(folder)) == ("Scene('swing'): bodies arm; joints shoulder; trajectories turn; analyses inverse")
     assert repr(results).splitlines()[1] == "  inverse: pcid, 21 outputs up to 0.02 s, completed"
     closed = ffrobot.solve(swing(folder))

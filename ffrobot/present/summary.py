@@ -75,6 +75,7 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
         yield "modes", _modes(solution, solution.mode_choice)
     if (raised := raised_in_words(solution.model)) and any(one.analysis.is_integrated for one in outcomes.values()):
         yield "modes", raised
+    yield from (("patches", patches.stiffness_in_words) for patches in solution.patches.values())
     loops = {name: outcome.details for name, outcome in outcomes.items() if isinstance(outcome.details, LoopRecord)}
     warnings = [(name, line) for name, loop in loops.items() for line in loop.warnings]
     warnings += [(name, line) for name, outcome in outcomes.items() for line in unresolved_gears(outcome.gears)]

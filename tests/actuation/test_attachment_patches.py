@@ -19,7 +19,7 @@ PATH = Path("scene.toml")
 
 def layout(count=10, **keys):
     given = {"body": "b", "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12}
-    return PztLayout(count=count, **given, **keys)
+    return PztLayout(count=count, **given, **({"structural": False} | keys))
 
 
 @pytest.fixture
