@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import Interface, ModalBody
 from .layers import as_array, layer_section, moment_per_volt, pull_per_volt, side
 from .records import PztLayout
@@ -68,7 +68,7 @@ def composite(layout: PztLayout, body: ModalBody, edges: Array) -> Composite:
     rows = 2 if one_face else 1
     B = strains[:, :rows].reshape(-1, body.mode_count)
     C, f = np.zeros((len(B), len(B))), np.zeros((len(B), len(edges)))
-    straight, exact = np.zeros_like(f), np.zeros(len(B))
+    straight, exact = np.zeros_like(f), as_floats(np.zeros(len(B)))
     for i, (at, (C_i, f_i)) in enumerate(zip(points, loads, strict=True)):
         block = slice(rows * i, rows * (i + 1))
         C[block, block], f[block, at.patch] = at.weight * C_i[:rows, :rows], at.weight * f_i[:rows]
@@ -142,7 +142,7 @@ def _slopes(body: ModalBody, x: float) -> tuple[Array, Array]:
     """φ' and u' (n,) of the modes at x: differences inside an element, exact for its quadratics."""
     stations = body.stations.position[:, 0]
     h = min(1e-3 * body.length, 0.5 * float(np.abs(stations - x).min()))
-    return _differences(*(body.interpolate(x + step) for step in (-h, h)), h)
+    return _differences(body.interpolate(x - h), body.interpolate(x + h), h)
 
 
 def _differences(behind: Interface, ahead: Interface, h: float) -> tuple[Array, Array]:

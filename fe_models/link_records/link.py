@@ -91,7 +91,7 @@ class Modes(Record):
     """The lowest `count` eigenmodes of one or several families, or those numbered `indices` (1 is the lowest).
 
     `attachment_modes` adds the static shapes of loads at interfaces, as far as the eigenmodes do not have them; false:
-    eigenmodes alone. With them `count` may be left out: six eigenmodes of each bending family, one axial, one of torsion.
+    eigenmodes alone. With them `count` may be left out: six of each bending family, one axial, one of torsion.
     """
 
     count: Annotated[int, Field(ge=1)] | None = None
