@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...fe_models.modal_body import Interface, ModalBody
 from .layers import as_array, layer_section, moment_per_volt, pull_per_volt, side
 from .records import PztLayout
@@ -66,9 +66,9 @@ def composite(layout: PztLayout, body: ModalBody, edges: Array) -> Composite:
     loads = [_layers(layout, at) for at in points]
     strains = np.array([np.stack(_slopes(body, at.x)) for at in points])  # (g, 2, n)
     rows = 2 if one_face else 1
-    B = strains[:, :rows].reshape(-1, body.mode_count)
+    B: Array = strains[:, :rows].reshape(-1, body.mode_count)
     C, f = np.zeros((len(B), len(B))), np.zeros((len(B), len(edges)))
-    straight, exact = np.zeros_like(f), as_floats(np.zeros(len(B)))
+    straight, exact = np.zeros_like(f), np.zeros(len(B))
     for i, (at, (C_i, f_i)) in enumerate(zip(points, loads, strict=True)):
         block = slice(rows * i, rows * (i + 1))
         C[block, block], f[block, at.patch] = at.weight * C_i[:rows, :rows], at.weight * f_i[:rows]

@@ -141,7 +141,7 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
     for layout in scene.pzt:
         if layout.adds_mass:
             yield (
-                "geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link"
+                'geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link'
                 f' between its interfaces, found those of "{layout.body}"'
             )
 
