@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -37,6 +38,18 @@ def _time_function(value: object, info: ValidationInfo) -> TimeFunction:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return parse_expression(repr(float(value)))
     raise ValueError(f"expected an expression in t, found {value!r}")
+
+
+def _quantity(value: object) -> float:
+    """A number, or an expression without t, such as "30*deg"."""
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    if not isinstance(value, str):
+        raise ValueError(f'expected a finite number, or an expression such as "30*deg", found {value!r}')
+    function = parse_expression(value)
+    if function(0.0)[0] != function(1.0)[0]:
+        raise ValueError(f'expected a number or an expression without t, such as "30*deg", found "{value}"')
+    return function(0.0)[0]
 
 
 def _name(value: str) -> str:
@@ -99,6 +112,7 @@ Side = Annotated[str, AfterValidator(_side)]
 Vector2 = tuple[float, float]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
+Quantity = Annotated[float, PlainValidator(_quantity, json_schema_input_type=str | float)]
 Expression = Annotated[TimeFunction, PlainValidator(_time_function, json_schema_input_type=str | float)]
 WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints, json_schema_input_type=str)]
 NotEmpty = AfterValidator(_not_empty)

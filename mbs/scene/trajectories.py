@@ -22,13 +22,21 @@ class Trajectory(Record):
     """
 
     name: Name
+    """Of the trajectory, unique in the scene."""
     point: PointReference | None = None
+    """What moves along it, "BODY.POINT"."""
     joint: str | None = None
+    """The joint whose coordinate follows it: relative, of the second side on the first."""
     angle: str | None = None
+    """The body, or the section "BODY.POINT", whose angle follows it: absolute, against the ground's x axis."""
     x: Expression | None = None
+    """Along the ground's x axis, m; expression in t (s)."""
     y: Expression | None = None
+    """Along the ground's y axis, m; expression in t (s)."""
     value: Expression | None = None
+    """Of the joint's coordinate (rad, or m where prismatic) or the angle (rad); expression in t (s)."""
     waypoints: WaypointTable | None = None
+    """CSV file with the columns t (s) and x, y (m) or value (rad, m)."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Trajectory:

@@ -123,6 +123,11 @@ def test_values_outside_the_domain_are_nan_by_component():
     assert math.isnan(acceleration)
 
 
+def test_units_are_factors():
+    assert parse_expression("30*deg")(0.0)[0] == pytest.approx(math.radians(30), rel=1e-15)
+    assert parse_expression("750*mm*t")(2.0)[:2] == pytest.approx((1.5, 0.75), rel=1e-15)
+
+
 def test_sample_is_the_call_at_each_time():
     function = parse_expression("exp(sin(t))")
     times = np.linspace(0, 2, 7)
