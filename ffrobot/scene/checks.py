@@ -37,7 +37,7 @@ def check_functions(scene: SceneKeys, path: Path) -> None:
     """Raise `InputError` for a function of time without a value at an output time at which it is needed."""
     for trajectory in scene.trajectory:
         for component, function in trajectory.components.items():
-            key = component if trajectory.waypoints is None else "waypoints"
+            key = component if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
             for analysis in scene.analysis:
                 if analysis.follows_trajectories:
                     times = np.clip(analysis.times, 0.0, analysis.last_time)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cached_property
 
 from pydantic import model_validator
 
-from ...common.validation import Record, quoted
+from ...common.validation import quoted
 from .. import _core
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name, PointReference, WaypointTable, one_of, only, present
+from ..fields.piecewise import Piecewise
 from ..fields.references import Reference, marker_reference
 from ..joints.measure import GROUND_FRAME, Marker, Measure, coincident, marker_at
+from .motion_keys import MotionKeys
 
 
-class Trajectory(Record):
+class Trajectory(MotionKeys):
     """Motion that is specified (C_s): of a point (m, global axes), a joint coordinate, or an angle (rad).
 
     `angle` is a body (its frame) or BODY.POINT (the section there).
@@ -42,14 +45,13 @@ class Trajectory(Record):
     def _consistent(self) -> Trajectory:
         subject = one_of(self, ("point", "joint", "angle"))
         allowed = ("x", "y") if subject == "point" else ("value",)
-        found = only(self, subject, (*allowed, "waypoints"), ("x", "y", "value", "waypoints"))
-        if self.waypoints is None:
-            return self
-        if len(found) > 1:
-            raise ValueError(f"expected either waypoints or expressions, found {quoted(found)}")
-        if not set(self.components) <= set(allowed):
-            columns = ",".join(("t", *self.components))
+        found = only(self, subject, (*allowed, "waypoints", "via"), ("x", "y", "value", "waypoints", "via"))
+        if len(found) > 1 and {"waypoints", "via"} & set(found):
+            raise ValueError(f"expected either waypoints, via or expressions, found {quoted(found)}")
+        if self.waypoints is not None and not set(self.waypoints.columns) <= set(allowed):
+            columns = ",".join(("t", *self.waypoints.columns))
             raise ValueError(f'expected waypoints with the header t,{",".join(allowed)}, found "{columns}"')
+        self.check_motion(len(allowed), self.waypoints)
         return self
 
     def references(self) -> Iterator[Reference]:
@@ -74,9 +76,16 @@ class Trajectory(Record):
         x, y = coincident(label, GROUND_FRAME, marker_at(self.point))
         return {component: {"x": x, "y": y}[component] for component in self.components}
 
-    @property
+    @cached_property
+    def path(self) -> Piecewise | None:
+        """The motion where it is made of polynomials; None where expressions give it."""
+        return self.motion(self.waypoints)
+
+    @cached_property
     def components(self) -> dict[str, TimeFunction]:
         """The specified functions of time by component: "x" and/or "y", or "value"."""
-        if self.waypoints is not None:
-            return self.waypoints.components
-        return present(x=self.x, y=self.y, value=self.value)
+        if self.path is None:
+            return present(x=self.x, y=self.y, value=self.value)
+        columns = ("x", "y") if self.point is not None else ("value",)
+        names = columns if self.waypoints is None else self.waypoints.columns
+        return dict(zip(names, self.path.functions(), strict=True))
