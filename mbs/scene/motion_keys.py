@@ -121,6 +121,8 @@ class MotionKeys(Record):
                 raise ValueError(f'expected {count} numbers in "{key}", found {len(value)}')
 
     def _check_limits(self) -> None:
+        if self.fastest and "stretch" in self.model_fields_set:
+            raise ValueError('expected one of the keys "fastest" and "stretch", found both')
         limits = [key for key in LIMITS if getattr(self, key) is not None]
         if bool(limits) == (self.duration is not None):
             found = "both" if limits else "neither"

@@ -76,6 +76,10 @@ class Trajectory(MotionKeys):
         x, y = coincident(label, GROUND_FRAME, marker_at(self.point))
         return {component: {"x": x, "y": y}[component] for component in self.components}
 
+    def changed(self, **keys: object) -> Trajectory:
+        """The same with some keys replaced."""
+        return Trajectory(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
+
     @cached_property
     def path(self) -> Piecewise | None:
         """The motion where it is made of polynomials; None where expressions give it."""

@@ -326,6 +326,7 @@ MOTION_MISTAKES = [
     (f'{VIA}\nx = "t"\nduration = 1.0', 'expected either waypoints, via or expressions, found "x", "via"'),
     ('x = "t"\nspeed = 1.0', 'expected "speed" only beside "via" or "waypoints"'),
     ('waypoints = "path.csv"\nhold = 1.0', 'expected "hold" only beside "via"'),
+    (f"{VIA}\nduration = 1.0\nfastest = true\nstretch = 2.0", 'expected one of the keys "fastest" and "stretch"'),
     (f'{VIA}\nduration = 1.0\nshaper = {{ kind = "zv", frequency = 0.0 }}', "shaper.frequency"),
     (f'{VIA}\nduration = 1.0\nshaper = {{ kind = "zv", frequency = 1.0, modes = 2 }}', '"frequency" and "modes"'),
 ]
