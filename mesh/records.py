@@ -14,12 +14,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ..common.names import Name, Title
+from ..common.numbers import NotNegative, Positive, Vector3
 from ..common.validation import InputFile, Record
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Vector = tuple[float, float, float]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
+MOST_ELEMENTS = 100_000  # of a beam
+MOST_DIVISIONS = 10_000  # of a solid along an axis
+Division = Annotated[int, Field(ge=1, le=MOST_DIVISIONS)]
 
 
 class RectangleSection(Record):
@@ -86,7 +87,7 @@ class BeamGeometry(Record):
 class BeamMesh(Record):
     """Element boundaries: `elements` of them as equal as the steps of the section allow, or the list of `nodes`."""
 
-    elements: Annotated[int, Field(ge=1, le=100_000)] | None = None
+    elements: Annotated[int, Field(ge=1, le=MOST_ELEMENTS)] | None = None
     """Number of elements, as equal as the steps of the section allow; or give `nodes`."""
     nodes: Annotated[tuple[float, ...], Field(min_length=2)] | None = None
     """Element boundaries, m from the root: 0 first, `length` last."""
@@ -120,11 +121,11 @@ class SolidGeometry(Record):
     unit: Literal["m", "mm", "in"] = "m"
     """Unit of the coordinates in `file`."""
     # Where the link's frame stands in the file's axes: origin in the file's unit, directions of any length.
-    origin: Vector = (0.0, 0.0, 0.0)
+    origin: Vector3 = (0.0, 0.0, 0.0)
     """Root of the link in the axes of `file`, in its unit."""
-    x_axis: Vector = (1.0, 0.0, 0.0)
+    x_axis: Vector3 = (1.0, 0.0, 0.0)
     """Direction of the link's x axis in the axes of `file`, of any length."""
-    y_axis: Vector = (0.0, 1.0, 0.0)
+    y_axis: Vector3 = (0.0, 1.0, 0.0)
     """Direction of the link's y axis in the axes of `file`, of any length."""
 
 
@@ -141,9 +142,7 @@ class SolidMeshRecord(Record):
     """Polynomial order of the displacements."""
     size: Positive | None = None
     """Wanted edge length of cells, m; by default what fits the part."""
-    divisions: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = (
-        None
-    )
+    divisions: tuple[Division, Division, Division] | None = None
     """Number of cells along x, y, z: a structured mesh, of boxes only."""
 
 
@@ -158,12 +157,12 @@ class PlaceRecord(Record):
 
     name: Name
     """What joints and loads call it, as "BODY.NAME"."""
-    position: NotNegative | Vector | None = None
+    position: NotNegative | Vector3 | None = None
     """m from the root (on solids the cross section there), or a point (m, link axes) of which the nearest face is
     taken."""
-    normal: Vector | None = None
+    normal: Vector3 | None = None
     """Outward direction of the face nearest to `position`, link axes (solids)."""
-    group: Annotated[str, Field(min_length=1)] | None = None
+    group: Title | None = None
     """Physical surface group of the mesh file that is the face (solids)."""
 
 

@@ -10,7 +10,16 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from ...common.python_files import check_python_file
 from ...common.validation import Record, existing_file, quoted
-from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PointReference, Positive, one_of
+from ...mbs.fields.field_types import (
+    ModeCount,
+    Name,
+    NotEmpty,
+    NotNegative,
+    PatchCount,
+    PointReference,
+    Positive,
+    one_of,
+)
 from ...mbs.fields.references import Reference
 
 PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
@@ -128,7 +137,7 @@ class ModalVelocity(ControllerRecord):
     kind: Literal["modal-velocity"]
     bodies: Annotated[tuple[str, ...], NotEmpty]
     """Links whose patches act."""
-    modes: Annotated[int, Field(gt=0)] = 1
+    modes: ModeCount = 1
     """How many of the lowest modes of each link."""
     damping_ratio: Positive
     """ζ that is added to each of these modes."""
@@ -153,7 +162,7 @@ class Lqr(ControllerRecord):
     kind: Literal["lqr"]
     inputs: Literal["all", "motors", "patches"] = "all"
     """What acts: motors and patches, or one of them."""
-    modes: Annotated[int, Field(gt=0)] = 1
+    modes: ModeCount = 1
     """How many of the lowest modes of each link the design knows."""
     time: NotNegative = 0.0
     """Instant of the reference about which it is linear, s."""
@@ -209,17 +218,17 @@ class Placement(Record):
 
     body: str
     """Link with patches."""
-    count: Annotated[int, Field(gt=0)] | None = None
+    count: PatchCount | None = None
     """Number of patches; by default that of its [[pzt]]."""
     criterion: Literal["controllability", "voltage"] = "controllability"
     """Reach of the robot's lowest modes, or the largest voltage over its limit along the path."""
     measure: Literal["worst", "mean", "product"] = "worst"
     """Which reach counts: that of the worst mode, their mean, or their product."""
-    modes: Annotated[int, Field(gt=0)] | None = None
+    modes: ModeCount | None = None
     """How many of the lowest modes count."""
     spacing: Positive | None = None
     """Between the centres that are tried, m; by default half the length of a patch."""
-    most_sets: Annotated[int, Field(gt=0)] = 100_000
+    most_sets: Annotated[int, Field(gt=0, le=10_000_000)] = 100_000
     """So many sets are tried one by one; with more, evolution seeks."""
 
     def references(self) -> Iterator[Reference]:

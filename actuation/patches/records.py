@@ -7,9 +7,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from ...common.numbers import MOST_PATCHES, SMALLEST
 from ...common.validation import Record
-from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, Positive, one_of
+from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, one_of
 from ...mbs.fields.references import Reference
+
+MOST_LAYERS = 1000
 
 
 class PztLayout(Record):
@@ -28,9 +31,9 @@ class PztLayout(Record):
 
     body: str
     """Link that they sit on."""
-    count: Annotated[int, Field(gt=0)] | None = None
+    count: PatchCount | None = None
     """Number of patches, centres at (k − ½)·length of link / count; or give `centers`."""
-    centers: Annotated[tuple[float, ...], NotEmpty] | None = None
+    centers: Annotated[tuple[float, ...], NotEmpty, Field(max_length=MOST_PATCHES)] | None = None
     """Their centres, m from the root."""
     length: Positive
     """Of each along the link, m."""
@@ -46,7 +49,7 @@ class PztLayout(Record):
     """Density, kg/m³; for their mass."""
     limit: Positive | Annotated[tuple[Positive, ...], NotEmpty] | None = None
     """Largest voltage, V: of all, or of each."""
-    layers: Annotated[int, Field(gt=0)] = 1
+    layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
     """Layers on each other."""
     face: Literal["+y", "-y", "both"] | None = None
     """Which face they sit on; without it they bend the link and do nothing else."""
@@ -68,8 +71,8 @@ class PztLayout(Record):
     @model_validator(mode="after")
     def _consistent(self) -> PztLayout:
         one_of(self, ("count", "centers"))
-        if self.d31 == 0.0:
-            raise ValueError("expected a d31 other than 0, found 0: such patches do nothing")
+        if abs(self.d31) < SMALLEST:
+            raise ValueError(f"expected a d31 other than 0, found {self.d31:g}: such patches do nothing")
         if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
             raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
         if "mass" in self.structural and self.density is None:

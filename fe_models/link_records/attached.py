@@ -6,8 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ...common.numbers import MOST_PATCHES, NotNegative, PatchCount, Positive
 from ...common.validation import Record
-from ...mesh.records import NotNegative, Outlines, PlaceRecord, Positive
+from ...mesh.records import Outlines, PlaceRecord
 
 Coupling = Literal["mean", "rigid"]
 
@@ -30,9 +31,10 @@ class SurfacePatches(Record):
     Same meaning of the keys as in a scene's `[[pzt]]`: centres at (k − ½)·length of link / count, or `centers`.
     """
 
-    count: Annotated[int, Field(ge=1)] | None = None
+    count: PatchCount | None = None
     """Number of patches, evenly spread; or give `centers`."""
-    centers: Annotated[tuple[Positive, ...], Field(min_length=1)] | None = None
+    # m from the root
+    centers: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PATCHES)] | None = None
     """Their centres, m from the root."""
     length: Positive
     """Of each along x, m."""

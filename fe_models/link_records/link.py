@@ -7,20 +7,18 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from ...common.names import Name, Title
+from ...common.numbers import MOST_MODES, ModeCount, NotNegative, Positive, Vector3
 from ...common.validation import Record
 from ...mesh.records import (
     BeamGeometry,
     BeamMesh,
     CircleSection,
-    Name,
-    NotNegative,
-    Positive,
     RectangleSection,
     SectionRecord,
     SolidGeometry,
     SolidMeshRecord,
     TubeSection,
-    Vector,
 )
 from .attached import Coupling, InterfaceRecord, SurfacePatches
 from .section import Section, rectangle, tube
@@ -49,7 +47,7 @@ class OrthotropicMaterial(Record):
 
     youngs_modulus: tuple[Positive, Positive, Positive]
     """E_x, E_y, E_z, Pa."""
-    poissons_ratio: Vector
+    poissons_ratio: Vector3
     """ν_xy, ν_yz, ν_xz: contraction along the second axis under a pull along the first."""
     shear_modulus: tuple[Positive, Positive, Positive]
     """G_xy, G_yz, G_xz, Pa."""
@@ -73,7 +71,7 @@ SolidMaterial = Annotated[
 class Region(Record):
     """The part of a solid inside a physical volume `group` of its mesh file, of another material."""
 
-    group: Annotated[str, Field(min_length=1)]
+    group: Title
     """Name of the physical volume in the mesh file."""
     material: SolidMaterial
     """What it is made of."""
@@ -106,9 +104,9 @@ class Modes(Record):
     may then be left out.
     """
 
-    count: Annotated[int, Field(ge=1)] | None = None
+    count: ModeCount | None = None
     """Number of the lowest eigenmodes; or give `indices`."""
-    indices: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
+    indices: Annotated[tuple[ModeCount, ...], Field(min_length=1, max_length=MOST_MODES)] | None = None
     """Numbers of the eigenmodes, 1 the lowest."""
     family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"
     """Family or families that they are taken from."""
@@ -128,7 +126,7 @@ class Damping(Record):
 class StressRecovery(Record):
     """Where modal stresses are kept: named `points` (m, link frame), and on the whole `surface` of a solid."""
 
-    points: dict[Name, Vector] = Field(default_factory=dict)
+    points: dict[Name, Vector3] = Field(default_factory=dict)
     """Places (m, link axes) by name where stresses are kept."""
     surface: bool = False
     """Keep stresses on the whole surface of a solid."""
@@ -137,7 +135,7 @@ class StressRecovery(Record):
 class _Link(Record):
     """What all link files have."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Title
     """Of the link; in a scene that of its body where it is left out."""
     reference: Reference
     """What the link's frame is fixed to."""

@@ -8,6 +8,7 @@ h/T₁, acceleration h/(T₁T₂), jerk h/(T₁T₂T₃)).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import factorial, inf, sqrt
 from typing import Literal
@@ -21,6 +22,7 @@ Profile = Literal["rest-to-rest", "s-curve", "trapezoid"]
 
 SMOOTHNESS: dict[Profile, int] = {"rest-to-rest": 4, "s-curve": 2, "trapezoid": 1}
 """Number of continuous derivatives where the scene gives none."""
+SHORTEST = 1e-9  # of a motion's duration: what is shorter would be lost by rounding
 HALF = 0.5  # of each time of averaging to the one before, where no limit says otherwise
 
 
@@ -47,7 +49,10 @@ def law_in(duration: float, profile: Profile, smoothness: int) -> Piecewise:
 
 
 def law_within(distance: float, limits: Limits, profile: Profile, smoothness: int) -> Piecewise:
-    """The fastest law over `distance` (m or rad) that keeps the `limits`, of one component."""
+    """The fastest law over `distance` (m or rad) that keeps the `limits`, of one component.
+
+    Raises `ValueError` where parts of it are too short beside others.
+    """
     if profile == "rest-to-rest":
         peaks = [distance * law_peak(smoothness, order) for order in (1, 2, 3)]
         times = [
@@ -57,7 +62,17 @@ def law_within(distance: float, limits: Limits, profile: Profile, smoothness: in
     averaged = [T for T in averaging_times(distance, limits) if T > 0.0]
     while len(averaged) < smoothness + 1:
         averaged.append(HALF * averaged[-1])
+    check_durations(averaged, sum(averaged))
     return averaged_step(np.array(averaged))
+
+
+def check_durations(durations: Sequence[float], total: float) -> None:
+    """Raise `ValueError` for parts of a motion (s) some of which vanish beside its `total`, s."""
+    if not SHORTEST * total < min(durations) <= max(durations) < inf:
+        raise ValueError(
+            f"expected limits and times that fit each other in size, found a motion of {total:.3g} s with parts of"
+            f" {min(durations):.3g} s"
+        )
 
 
 def averaging_times(distance: float, limits: Limits) -> tuple[float, float, float]:

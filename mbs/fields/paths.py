@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...common.arrays import Array
-from .motion_laws import Limits, Profile, law_in, law_within
+from .motion_laws import Limits, Profile, check_durations, law_in, law_within
 from .piecewise import Piecewise, superposed
 
 SAMPLES = 64  # of each polynomial, to find where a rounded path is fastest
@@ -63,6 +63,7 @@ def _joined(legs: Legs) -> Piecewise:
             begin -= legs.blend * min(laws[k - 1].end, law.end)
         moving.append(law.moved(delay=begin).along(change))
         begin += law.end
+    check_durations([law.end for law in laws], begin)
     rest = Piecewise(moving[0].breaks[:2], legs.places[None, :1])
     return superposed([rest, *moving])
 

@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
+from ...common.numbers import MOST_MODES, SMALLEST
 from ...common.validation import InputFile, Record, existing_file
 from ...fe_models.link_file import LinkSource, LinkTable
 from ...fe_models.link_records import BeamLink, SolidLink
-from ..fields.field_types import Name, PointReference, Positive, Vector2, one_of
+from ..fields.field_types import Name, NotNegative, PointReference, Positive, Vector2, one_of
 from ..fields.references import Reference
 
 
@@ -30,7 +31,7 @@ class RigidBody(Record):
     @field_validator("inertia")
     @classmethod
     def _inertia_is_positive(cls, inertia: float) -> float:
-        if not inertia > 0.0:
+        if not inertia >= SMALLEST:
             raise ValueError(
                 f"expected a moment of inertia greater than 0, found {inertia:g}: without it the body's rotation has no"
                 " equation of motion (a point mass is a [[payload]])"
@@ -67,7 +68,7 @@ class Body(Record):
     """Modal body file, as stage 1 writes it."""
     rigid: RigidBody | None = None
     """A body that does not deform."""
-    modes: Literal["auto"] | Annotated[int, Field(ge=0)] | None = None
+    modes: Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)] | None = None
     """How many of the lowest in-plane modes; "auto": as many as the tolerances need; all where it is left out."""
 
     @model_validator(mode="after")
@@ -83,9 +84,9 @@ class Payload(Record):
 
     point: PointReference
     """Where it sits, "BODY.POINT"."""
-    mass: Positive
+    mass: NotNegative
     """Mass, kg."""
-    inertia: Annotated[float, Field(ge=0.0)] = 0.0
+    inertia: NotNegative = 0.0
     """Moment of inertia about that point, kg·m²."""
 
     def references(self) -> Iterator[Reference]:

@@ -18,6 +18,7 @@ from ..fields.shapers import impulses, shaped
 from ..fields.waypoints import Waypoints
 
 Place = Quantity | tuple[Quantity, Quantity]
+MOST_PLACES = 1000
 LIMITS = ("speed", "acceleration", "jerk")
 OF_LEGS = ("hold", "blend", "duration", *LIMITS, "start", "stretch", "fastest")  # a table of waypoints has its times
 
@@ -60,7 +61,7 @@ class Shaper(Record):
 class MotionKeys(Record):
     """What a trajectory has beside what follows it."""
 
-    via: Annotated[tuple[Place, ...], Field(min_length=2)] | None = None
+    via: Annotated[tuple[Place, ...], Field(min_length=2, max_length=MOST_PLACES)] | None = None
     """Places to go through from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle."""
     profile: Literal["rest-to-rest", "s-curve", "trapezoid", "spline"] | None = None
     """Law of motion between places: a polynomial (default of `via`), limited jerk, limited acceleration, or a spline
@@ -81,7 +82,7 @@ class MotionKeys(Record):
     """Rest at each place between, s: one for all, or one for each."""
     blend: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
     """Places without a hold are passed beside: legs overlap by this share of the shorter one. 0: a stop at each."""
-    stretch: Positive = 1.0
+    stretch: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
     """Factor of the times of all legs."""
     fastest: bool = False
     """Seek the smallest `stretch` at which motors and patches keep their limits in the first inverse analysis."""

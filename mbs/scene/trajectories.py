@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
 
+import numpy as np
 from pydantic import model_validator
 
 from ...common.validation import quoted
@@ -52,6 +53,10 @@ class Trajectory(MotionKeys):
             columns = ",".join(("t", *self.waypoints.columns))
             raise ValueError(f'expected waypoints with the header t,{",".join(allowed)}, found "{columns}"')
         self.check_motion(len(allowed), self.waypoints)
+        with np.errstate(all="ignore"):
+            path = self.path
+        if path is not None and not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()):
+            raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
         return self
 
     def references(self) -> Iterator[Reference]:

@@ -279,7 +279,7 @@ def test_rows_that_repeat_are_a_hold(tmp_path):
         ("x,y\n0,0\n1,1\n", "header"),
         ("t,x,x\n0,0,0\n1,1,1\n", "header"),
         ("t,x\n0,0\n", "at least 2"),
-        ("t,x\n0,0\n1,one\n", "line 3: expected 2 finite numbers"),
+        ("t,x\n0,0\n1,one\n", "line 3: expected 2 numbers"),
         ("t,x\n0,0\n1,nan\n", "line 3"),
         ("t,x\n0,0\n1,1,1\n", "line 3"),
         ("t,x\n0,0\n\n1,1\n1,2\n", "line 5: expected times that increase, found t = 1 after 1"),
