@@ -8,13 +8,13 @@ import time
 import traceback
 from collections.abc import Iterable
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .bench.command import bench
 from .common.errors import FfrobotError
+from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first, on_first
 from .present.logs import LOGGER, logging_options, python_option
 
@@ -307,15 +307,9 @@ def main() -> None:
 
     Exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C, 143 after SIGTERM.
     """
-    stopped = 0
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        nonlocal stopped
-        stopped = number
-        signal.default_int_handler(number, frame)
-
+    stop = EndOfCommand()
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         signal.signal(number, stop)
     try:
         cli(standalone_mode=False)
@@ -323,9 +317,9 @@ def main() -> None:
         error.show()
         sys.exit(error.exit_code)
     except Exception as error:
-        if stopped:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
+        if stop.number:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
             click.echo("ffrobot: stopped", err=True)
-            sys.exit(128 + stopped)
+            sys.exit(128 + stop.number)
         if not isinstance(error, FfrobotError):
             LOGGER.error("failed", exc_info=True)
             traceback.print_exc()
@@ -336,5 +330,5 @@ def main() -> None:
             click.echo(f"ffrobot: {error}", err=True)
         sys.exit(error.exit_code)
     finally:  # nothing is left to keep: at the interpreter's end an interrupt would be a traceback
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in SIGNALS:
             signal.signal(number, signal.SIG_DFL)
