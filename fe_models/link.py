@@ -17,7 +17,7 @@ from platformdirs import user_cache_path
 from ..common.errors import FfrobotError, SolveError
 from ..common.files import check_output
 from ..common.interrupts import deferred_interrupts, ending_at_once
-from ..common.parallel import on_first, processes
+from ..common.parallel import on_first, processes, without_daemon
 from ..mesh.kept_parts import kept_path
 from .link_file import LinkSource, link_path, read_link
 from .link_records import BeamLink, Link, SolidLink
@@ -170,6 +170,7 @@ def _has_mesh(link: Link) -> bool:
 
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
     try:
+        without_daemon()
         with ending_at_once(), deferred_interrupts():
             if isinstance(link, BeamLink):
                 from .beam.link import beam_modal_body

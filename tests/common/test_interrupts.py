@@ -11,6 +11,14 @@ import pytest
 from ffrobot.common.interrupts import deferred_interrupts, ending_at_once
 
 
+@pytest.fixture(autouse=True)
+def usual_answer():
+    """Python's own: a test run in the background of a shell ignores Ctrl-C."""
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, previous)
+
+
 def test_ctrl_c_waits_for_the_end():
     done = []
 
