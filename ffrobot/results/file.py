@@ -40,6 +40,17 @@ class ModalFile:
     input_hash: str
 
 
+class _Attributes(dict[str, Any]):
+    """The attributes of a group, which messages call `where`; one that is not there is wrong input."""
+
+    def __init__(self, attributes: Mapping[str, Any], where: str) -> None:
+        super().__init__(attributes)
+        self._where = where
+
+    def __missing__(self, key: str) -> Any:  # noqa: ANN401 (as h5py)
+        raise InputError(f'{self._where}: expected an attribute "{key}", found none')
+
+
 class Results:
     """An open results file. Datasets are named as in the file: `inverse/points/link2.tip/position`.
 
@@ -169,7 +180,7 @@ class Results:
 
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`."""
-        return dict(self._file[group].attrs)
+        return _Attributes(self._file[group].attrs, f"{self.path}: {group}")
 
     def names(self, group: str) -> list[str]:
         """Names inside a group such as `inverse/points`; none when the file does not have it."""
