@@ -14,7 +14,7 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from ..common.errors import FfrobotError, SolveError
+from ..common.errors import FfrobotError, SolveError, of_file
 from ..common.files import check_output
 from ..common.interrupts import deferred_interrupts, ending_at_once
 from ..common.parallel import on_first, processes, without_daemon
@@ -136,7 +136,7 @@ def _compute(
     compute = _computation(link, source_path, force)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
-        with ending_at_once():
+        with of_file(source_path), ending_at_once():
             body = compute(link, source_path, progress or _silent)
         return replace(body, input_hash=digest, modes_hash=modes_hash(link))
 

@@ -208,6 +208,6 @@ def test_attributes_that_are_missing(results, group, attribute):
     checksum.seal(results)
     with (
         Results(results) as file,
-        pytest.raises(InputError, match=f'r.h5: {group}: expected an attribute "{attribute}", found none'),
+        pytest.raises(InputError, match=f'r.h5: {group}: expected the attribute "{attribute}", found none'),
     ):
         file.attributes(group)[attribute]
