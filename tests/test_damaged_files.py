@@ -26,19 +26,22 @@ def results(two_link, tmp_path):
 
 
 def damaged(content, kind, chance):
-    """One or four bits flipped, 64 bytes zero, or cut off."""
+    """One or four bits flipped, 64 bytes zero, all zero from some byte on, or cut off there."""
     content = bytearray(content)
     if kind == "truncated":
         return bytes(content[: chance.randrange(len(content) - 1)])
     if kind == "zeros":
         first = chance.randrange(len(content) - 64)
         content[first : first + 64] = bytes(64)
+    if kind == "lost end":  # as after a loss of power
+        last = int(len(content) ** chance.random())
+        content[-last:] = bytes(last)
     for _ in range({"bit": 1, "bits": 4}.get(kind, 0)):
         content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
     return bytes(content)
 
 
-@pytest.mark.parametrize("kind", ["bit", "bits", "zeros", "truncated"])
+@pytest.mark.parametrize("kind", ["bit", "bits", "zeros", "lost end", "truncated"])
 @pytest.mark.parametrize("file", ["modal", "results"])
 def test_random_damage(request, file, kind):
     path = request.getfixturevalue(file)
@@ -196,3 +199,15 @@ def test_resume_checks_where_it_goes_on(stopped, attribute):
     checksum.seal(path)
     with pytest.raises(ffrobot.InputError, match=r"r\.h5: inverse"):
         ffrobot.solve(scene, path, resume=True)
+
+
+@pytest.mark.parametrize(("group", "attribute"), [("inverse", "status"), ("inverse", "integrator_reason")])
+def test_attributes_that_are_missing(results, group, attribute):
+    with h5py.File(results, "r+") as file:
+        del file[group].attrs[attribute]
+    checksum.seal(results)
+    with (
+        Results(results) as file,
+        pytest.raises(InputError, match=f'r.h5: {group}: expected the attribute "{attribute}", found none'),
+    ):
+        file.attributes(group)[attribute]
