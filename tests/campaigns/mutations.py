@@ -47,6 +47,12 @@ LOADED_ONCE = (
     "scipy.interpolate",
     "ffrobot.run.solve",
     "ffrobot.results.write",
+    "ffrobot.results.resume",
+    "matplotlib.backends.backend_agg",
+    "ffrobot.cli",
+    "ffrobot.pictures.figures.plot",
+    "ffrobot.pictures.report",
+    "ffrobot.present.summary",
 )
 
 NAMES = [
