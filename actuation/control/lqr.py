@@ -102,8 +102,8 @@ class LqrControl:
         waiting = int(np.ceil(setup.delay / setup.sample_time)) * len(names)
         if len(model.A) + waiting > MOST_STATES:
             raise InputError(
-                f"{setup.model.scene.path}: controller lqr: expected at most {MOST_STATES} states, found {len(model.A)} of"
-                f" the model and {waiting} commands on their way: a shorter delay, longer sample_time or fewer inputs"
+                f"{setup.model.scene.path}: controller lqr: expected at most {MOST_STATES} states, found {len(model.A)}"
+                f" of the model and {waiting} commands on their way: a shorter delay or fewer inputs"
             )
         discrete = sampled(model.A, model.B[:, model.inputs(names)], setup.sample_time, setup.delay)
         try:
