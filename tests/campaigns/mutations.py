@@ -6,7 +6,7 @@ Run by hand, about half a second each. Every case is cut short, and its scene, l
 values of other types, huge, tiny, not finite, empty, nested, with markup and line breaks, keys removed, added, doubled,
 damage to the text. Keys take turns, values are drawn. The command runs in a process forked from this one, with limits
 of time and memory, and after `solve` the commands that read its results. Exit code 1 where anything fell over:
-a traceback, a crash, no end within a minute, a message that names no file, words on stderr beside the message.
+a traceback, a crash, no end within a minute of CPU time, a message that names no file, words on stderr beside the message.
 """
 
 import argparse
@@ -35,7 +35,8 @@ from record import record
 
 ROOT = Path(__file__).parents[2]
 CASES = ROOT / "cases"
-PATIENCE = 60  # s for one command
+CPU_TIME = 60  # s for one command
+PATIENCE = 600  # s of wall time: something waits for ever
 MEMORY = 8 << 30  # bytes of address space
 OUTPUTS = 10  # of each analysis
 GOOD = ("solved", "refused", "stopped")
@@ -263,6 +264,7 @@ def run(arguments: list[str], folder: Path, patience: float = PATIENCE) -> tuple
             os.setsid()
             resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            resource.setrlimit(resource.RLIMIT_CPU, (CPU_TIME, CPU_TIME))
             os.dup2(os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             sys.argv = ["ffrobot", *arguments]
@@ -295,7 +297,7 @@ def outcome(code: int, told: str, files: list[str]) -> str:
     lines = [line for line in told.splitlines() if line.strip()]
     if "Traceback" in told:
         return "traceback"
-    if told == "no end":
+    if told == "no end" or code == -signal.SIGXCPU or (code == -signal.SIGKILL and not told):
         return "hang"
     if code < 0 or code not in (0, 1, 2):
         return "crash"
