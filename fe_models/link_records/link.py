@@ -89,21 +89,25 @@ class Reference(Record):
 class Modes(Record):
     """The lowest `count` eigenmodes of one or several families, or those numbered `indices` (1 is the lowest).
 
-    `attachment_modes` adds the static shapes of loads at interfaces, as far as the eigenmodes do not have them; `count`
-    may then be left out.
+    `attachment_modes` adds the static shapes of loads at interfaces, as far as the eigenmodes do not have them; false:
+    eigenmodes alone. With them `count` may be left out: six of each bending family, one axial, one of torsion.
     """
 
     count: ModeCount | None = None
     indices: Annotated[tuple[ModeCount, ...], Field(min_length=1, max_length=MOST_MODES)] | None = None
     family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"
-    attachment_modes: bool = False
+    attachment_modes: bool = True
 
 
 class Damping(Record):
-    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK."""
+    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK.
+
+    `of` "robot": one ratio, wanted of the vibrations of the assembled robot at its initial posture, motors free.
+    """
 
     ratio: NotNegative | tuple[NotNegative, ...] | None = None
     rayleigh: tuple[NotNegative, NotNegative] | None = None
+    of: Literal["link", "robot"] = "link"
 
 
 class StressRecovery(Record):
