@@ -13,6 +13,7 @@ from ..mbs.joints.joint import JointRecord
 from ..mbs.quantities.joint_space import motor_rates
 from .patches.patches import PatchArray
 from .patches.voltages import Voltages, voltage_gain
+from .prediction import Unsupplied
 
 MOST_PATCHES = 200  # that are tried on one link
 
@@ -93,10 +94,23 @@ class MotorFeasibility:
 
 @dataclass(frozen=True)
 class Feasibility:
-    """Everything that one analysis asks of the actuators: motors by joint, patches by body."""
+    """Everything that one analysis asks of the actuators: motors by joint, patches by body.
+
+    `unsupplied` where it asks for modal forces that no actuator is there for: then motors and patches cannot do it,
+    whatever their limits.
+    """
 
     motors: dict[str, MotorFeasibility]
     patches: dict[str, PatchFeasibility]
+    unsupplied: Unsupplied | None = None
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether any motor or patch has a limit."""
+        limits = [(of.moment_limit, of.speed_limit, of.power_limit) for of in self.motors.values()]
+        return bool(np.isfinite(limits).any()) or any(
+            np.isfinite(of.available_moment).any() for of in self.patches.values()
+        )
 
     @property
     def judged(self) -> dict[str, MotorFeasibility | PatchFeasibility]:

@@ -74,9 +74,10 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     help="Where to write [SCENE.results.h5 beside the input].",
 )
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped, from its results file.")
+@click.option("--strict", is_flag=True, help="Exit with 1 where there is a warning; results are written all the same.")
 @python_option
 @logging_options
-def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
+def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) -> None:
     """Run the analyses of a scene (stage 2).
 
     Links given as .toml are taken through stage 1 first where they are not up to date. Prints a summary: time per
@@ -122,6 +123,9 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
     if display.signal:
         done = "before all analyses" if left_out(solution) else "when all was computed and written"
         raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
+    for name, result in solution.analyses.items() if strict else ():
+        for text in result.warnings:
+            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
 @cli.command()

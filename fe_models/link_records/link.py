@@ -100,8 +100,8 @@ class Reference(Record):
 class Modes(Record):
     """The lowest `count` eigenmodes of one or several families, or those numbered `indices` (1 is the lowest).
 
-    `attachment_modes` adds the static shapes of loads at interfaces, as far as the eigenmodes do not have them; `count`
-    may then be left out.
+    `attachment_modes` adds the static shapes of loads at interfaces, as far as the eigenmodes do not have them; false:
+    eigenmodes alone. With them `count` may be left out: six of each bending family, one axial, one of torsion.
     """
 
     count: ModeCount | None = None
@@ -110,17 +110,22 @@ class Modes(Record):
     """Numbers of the eigenmodes, 1 the lowest."""
     family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"
     """Family or families that they are taken from."""
-    attachment_modes: bool = False
+    attachment_modes: bool = True
     """Add static shapes of loads at the interfaces."""
 
 
 class Damping(Record):
-    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK."""
+    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK.
+
+    `of` "robot": one ratio, wanted of the vibrations of the assembled robot at its initial posture, motors free.
+    """
 
     ratio: NotNegative | tuple[NotNegative, ...] | None = None
     """Damping ratio ζ of all modes, or of each."""
     rayleigh: tuple[NotNegative, NotNegative] | None = None
     """a (1/s) and b (s) of D = aM + bK, in place of `ratio`."""
+    of: Literal["link", "robot"] = "link"
+    """Whose vibrations `ratio` is of: the link's under its reference condition, or the assembled robot's."""
 
 
 class StressRecovery(Record):

@@ -139,7 +139,7 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
     for points in scene.actuation_points:
         yield f'geometric_stiffening: expected false beside [[actuation_points]], found those of "{points.body}"'
     for layout in scene.pzt:
-        if "mass" in layout.structural:
+        if layout.adds_mass:
             yield (
                 'geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link'
                 f' between its interfaces, found those of "{layout.body}"'

@@ -117,7 +117,10 @@ def run_forward(
 
 
 def has_raised_masses(source: Outcome | None) -> bool:
-    """Whether a run under the actuation of `source` raises masses: not where that prescribes the shape."""
+    """Whether a run under the actuation of `source` raises masses: not where that prescribes the shape.
+
+    Its forces, known at any time, hold the masses as they are to the shape, and would not hold others.
+    """
     return source is None or source.details.shape_force is None
 
 

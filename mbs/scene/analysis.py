@@ -98,6 +98,11 @@ class Analysis(Record):
         """Name of the earlier analysis that this one rests on; None where there is none."""
         return None
 
+    @property
+    def is_checked(self) -> bool:
+        """Whether what it finds is to be replayed on links with more modes."""
+        return getattr(self, "check", None) is not None
+
     def needs(self) -> Iterator[Need]:
         """Tables without which the scene makes no sense."""
         yield from ()
@@ -113,6 +118,10 @@ class Analysis(Record):
     def problems(self, among: Surroundings) -> Iterator[str]:
         """What does not fit the analyses that it stands among, a line each."""
         yield from ()
+
+
+Check = Literal["finer"] | None
+"""Of an inverse analysis: whether it is replayed on links with twice the modes."""
 
 
 class TimedAnalysis(Analysis):
