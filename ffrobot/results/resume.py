@@ -70,7 +70,7 @@ def write_state(file: h5py.File, solution: Solution) -> None:
         return
     for name, outcome in solution.outcomes.items():
         if _goes_on(solution, outcome):
-            _write_outcome(file[name].create_group(GROUP), outcome)
+            _write_outcome(file[name].create_group(GROUP), outcome.computed)
 
 
 def how_to_go_on(solution: Solution, command: str) -> str:

@@ -14,6 +14,7 @@ from ..common.errors import InputError
 from ..mbs.model.model import ModalLoad, build_model
 from ..mbs.model.planar_body import PlanarBody
 from ..scene.load import load_scene
+from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody, add_patches, load_bodies
 from .mode_choice import truncation_levels, whole_bodies
@@ -36,7 +37,24 @@ def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     structure = add_patches(scene, bodies)
     first = truncation_levels(scene, whole_bodies(bodies))[0]
     bodies = {name: replace(body, planar=first.get(name, body.planar)) for name, body in bodies.items()}
-    return _assembled(scene, bodies, structure, seconds, stiffened=scene.geometric_stiffening is True)
+    divided = bodies_in_pieces(scene)
+    is_stiffened = bool(divided) or scene.geometric_stiffening is True
+    solution = _assembled(scene, bodies, structure, seconds, stiffened=is_stiffened)
+    return _in_pieces(solution, divided, watcher) if divided else solution
+
+
+def _in_pieces(solution: Solution, divided: Mapping[str, BodyInPieces], watcher: Watcher) -> Solution:
+    """The solution with the equations of the pieces in place of those of their links."""
+    scene = scene_of_pieces(solution.scene, divided)
+    loaded = load_bodies(scene, watcher.stage)
+    parts = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
+    planar = [_equations_of(part, solution.stiffened) for part in parts.values()]
+    model = build_model(scene, planar)
+    return replace(solution, model=model, whole=solution.model, divided=divided, parts=parts)
+
+
+def _equations_of(body: LoadedBody, stiffened: bool) -> PlanarBody:
+    return body.planar if stiffened else replace(body.planar, stiffening=None)
 
 
 def with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Solution:
@@ -47,7 +65,12 @@ def with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Solutio
 
 def stiffened(solution: Solution) -> Solution:
     """The scene with geometric stiffening, nothing solved yet."""
-    return _assembled(solution.scene, solution.bodies, solution.structure, solution.preparation, stiffened=True)
+    whole = _assembled(solution.scene, solution.bodies, solution.structure, solution.preparation, stiffened=True)
+    if solution.whole is None:
+        return whole
+    planar = [_equations_of(part, True) for part in solution.parts.values()]
+    model = build_model(solution.model.scene, planar)
+    return replace(whole, model=model, whole=whole.model, divided=solution.divided, parts=solution.parts)
 
 
 def _assembled(
@@ -75,7 +98,7 @@ def _assembled(
         name: replace(body, planar=with_points(body.planar, points[name])) if name in points else body
         for name, body in bodies.items()
     }
-    planar = [body.planar if stiffened else replace(body.planar, stiffening=None) for body in bodies.values()]
+    planar = [_equations_of(body, stiffened) for body in bodies.values()]
     return Solution(
         scene=scene,
         model=build_model(scene, planar, list(_voltage_loads(scene, patches))),

@@ -22,6 +22,7 @@ from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
 from .evaluation import evaluated
 from .mode_choice import ModeSearch
+from .pieces import as_one_link
 from .prepare import prepare, stiffened, with_bodies
 from .solution import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
@@ -66,10 +67,18 @@ def _evaluated(solution: Solution) -> Solution:
     results, failure = dict(solution.analyses), solution.failure
     for name, result in results.items():
         try:
-            results[name] = evaluated(solution, result)
+            results[name] = evaluated(solution, told_of_links(solution, result))
         except Exception as error:
             failure = failure or error
     return replace(solution, analyses=results, failure=failure)
+
+
+def told_of_links(solution: Solution, result: AnalysisResult) -> AnalysisResult:
+    """The result of links in pieces as that of the one link each."""
+    if solution.whole is None:
+        return result
+    links, pieces = solution.bodies, solution.parts
+    return replace(result, outcome=as_one_link(result.outcome, solution.whole, links, solution.divided, pieces))
 
 
 def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
@@ -92,7 +101,7 @@ def _completed(solution: Solution, watcher: Watcher, interruption: Interruption)
 
 def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution | None:
     """The analyses up to the first that fails; None where `geometric_stiffening = "auto"` asks for them all again."""
-    stiffening = {name: body.planar.stiffening for name, body in solution.bodies.items()}
+    stiffening = {name: body.planar.stiffening for name, body in (solution.parts or solution.bodies).items()}
     results: dict[str, AnalysisResult] = {}
     for analysis in solution.scene.analysis:
         if interruption.requested and results:

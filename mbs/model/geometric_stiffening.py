@@ -86,9 +86,10 @@ def from_modal_body(body: ModalBody, in_plane: Indices) -> GeometricStiffening |
 
 
 def core_arguments(stiffening: GeometricStiffening | None, markers: list[str]) -> dict[str, list[Array]]:
-    """`second_order` (by rows of markers) and `geometric_stiffness` of `_core.System.add_body`; empty where they vanish.
+    """Arguments of `_core.System.add_body`, with empty matrices for those that vanish.
 
-    The latter is K of mbs/core/body/affine_inertia.h: x, y, stretch and turn.
+    `second_order` is by rows of markers; `geometric_stiffness` is K of mbs/core/body/affine_inertia.h: of x, y, stretch
+    and turn.
     """
     none = np.zeros((0, 0))
     if stiffening is None:

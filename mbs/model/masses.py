@@ -70,7 +70,10 @@ def mass_matrix(body: PlanarBody, q: Array) -> Array:
 
 
 def _stiffened_mass_matrix(body: PlanarBody, stiffening: GeometricStiffening, p: Array) -> Array:
-    """M (3 + n, 3 + n) in body axes: XᵀN⁻¹X of the affine part, and that of the rest (mbs/core/body/affine_inertia.h)."""
+    """M (3 + n, 3 + n) in body axes: XᵀN⁻¹X of the affine part, and that of the rest.
+
+    Symbols: mbs/core/body/affine_inertia.h.
+    """
     m, (s_x, s_y), J = body.mass, body.first_moment, body.inertia
     N = np.array([[m, 0, s_x, -s_y], [0, m, s_y, s_x], [s_x, s_y, J, 0], [-s_y, s_x, 0, J]])
     i = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, -1], [0, 0, 1, 0]])
@@ -83,8 +86,9 @@ def _stiffened_mass_matrix(body: PlanarBody, stiffening: GeometricStiffening, p:
     M[2, 2] += p @ (body.m_xy + stiffening.rotary - F.T @ N_F) @ p
     M[2, 3:] += p @ (body.S_tilde - (i @ F).T @ N_F)
     M[3:, 2] = M[2, 3:]
-    M[3:, 3:] += np.eye(len(p)) - F.T @ N_F
-    return np.asarray(M)
+    rest = np.zeros_like(M)
+    rest[3:, 3:] = np.eye(len(p)) - F.T @ N_F
+    return np.asarray(M + rest)
 
 
 def system_mass_matrix(system: MechanismSystem, q: Array) -> Array:

@@ -56,12 +56,14 @@ def shortenings(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening |
 
 
 def shortening(body: PlanarBody, stiffening: GeometricStiffening, p: Array) -> Array:
-    """b (T,) of modal coordinates p (T, n).
+    """B (T,) of modal coordinates p (T, n).
 
     −½pᵀα_k p + … are the coefficients of the affine fields nearest to the second-order displacement −½pᵀGp
     (mbs/core/body/affine_inertia.h); b is the size of that of (x, y) and its turn.
     """
     m, s, J = body.mass, complex(*body.first_moment), body.inertia
-    K = np.array([stiffening.K_s[0] + 1j * stiffening.K_s[1], stiffening.K_omega + stiffening.rotary + 1j * stiffening.K_h])
+    K = np.array(
+        [stiffening.K_s[0] + 1j * stiffening.K_s[1], stiffening.K_omega + stiffening.rotary + 1j * stiffening.K_h]
+    )
     beta = (m * K[1] - s.conjugate() * K[0]) / (m * J - abs(s) ** 2)
     return np.asarray(0.5 * np.abs(np.einsum("ti,ij,tj->t", p, beta, p)))

@@ -22,8 +22,8 @@ def rotation_derivative(theta):
 class Fields:
     """Positions in the body frame, x + iy = u · (1, x + iy, Φ_x + iΦ_y) with u = (−½pᵀαp, 1 − ½pᵀβp, p).
 
-    H (2 + n, 2 + n): products of the fields; u and its Jacobian u_p (2 + n, n); curvature (2 + n, n, n) of u; m_ff − m_xy
-    of what moves otherwise than in the plane.
+    H (2 + n, 2 + n): products of the fields; u and its Jacobian u_p (2 + n, n); curvature (2 + n, n, n) of u;
+    m_out = m_ff − m_xy: of what moves otherwise than in the plane.
     """
 
     H: np.ndarray

@@ -29,8 +29,7 @@ void add_body(System &system, double mass, double inertia, const Vector2d &first
        {std::pair("damping", damping.rows()), {"j", j.size()}, {"S_tilde", S_tilde.rows()}, {"m_xy", m_xy.rows()}})
     if (size)
       check_size(name, size, n);
-  PlanarBody body{mass,    inertia, first_moment,     stiffness, damping, W,      j,
-                  S_tilde, m_xy,    marker_positions, {},        {},      {}};
+  PlanarBody body{mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions, {}, {}, {}};
   for (std::size_t row = 0; row < second_order.size(); ++row)
     if (second_order[row].size()) {
       check_size("second_order", second_order[row].rows(), n);

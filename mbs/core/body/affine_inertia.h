@@ -3,9 +3,9 @@
 //     r(x) = x + Phi(x) p - 1/2 p^T G(x) p
 //
 // In the inertia (not at markers) the second-order field is replaced by its mass-weighted projection on the four affine
-// fields (1, 0), (0, 1), (x, y) and (-y, x). What Phi p has beside these stays as in the linear body. The kinetic energy
-// is then that of an affinely deforming body plus that of the rest: a sum of squares, so that M is positive definite
-// however far the body is bent. In the order of the fields:
+// fields (1, 0), (0, 1), (x, y) and (-y, x). What Phi p has beside these stays as in the linear body. The kinetic
+// energy is then that of an affinely deforming body plus that of the rest: a sum of squares, so that M is positive
+// definite however far the body is bent. In the order of the fields:
 //
 //     N       (4, 4)  their mass matrix, of m, s0 and J
 //     F       (4, n)  (S_bar_x, S_bar_y, j, h): their products with the modes
@@ -40,8 +40,8 @@ struct AffineInertia {
   std::array<Eigen::MatrixXd, 4> K;
   Eigen::MatrixXd m_xy_rest, S_tilde_rest, m_ff_rest; // of what the modes have beside affine fields
 
-  // m_ff = I - F^T N^-1 F + F(p)^T N^-1 F(p) = I + U^T C U, U: the rows of F(p) that move, then the same of F where they
-  // are not zero. `rows` are these, and behind them those of F that do not move.
+  // m_ff = I - F^T N^-1 F + F(p)^T N^-1 F(p) = I + U^T C U, U: the rows of F(p) that move, then the same of F where
+  // they are not zero. `rows` are these, and behind them those of F that do not move.
   Eigen::Index moving = 0, constant = 0;
   Eigen::MatrixXd C, C_inverse;
   Eigen::Index rank() const { return moving + constant; }

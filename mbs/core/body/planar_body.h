@@ -38,8 +38,8 @@ struct PlanarBody {
   Eigen::MatrixXd m_xy;                          // (n, n) S_bar_11 + S_bar_22; empty where it is the identity
   std::vector<Eigen::Vector2d> marker_positions; // m, undeformed, body frame
   std::vector<int> marker_rows; // that constraints use: 0, 2 (translation) or 3 (rotation too); set by System::finish
-  // Geometric stiffening: W(p) = W - (K p)^T in place of W at markers; the inertia, whose rows W has behind those of the
-  // markers. Both empty where it is left out.
+  // Geometric stiffening: W(p) = W - (K p)^T in place of W at markers; the inertia, whose rows W has behind those of
+  // the markers. Both empty where it is left out.
   std::vector<SecondOrder> second_order;
   AffineInertia affine;
 

@@ -1,8 +1,8 @@
 // The matrix of Newton's method in implicit integrators, N = M + damping_factor D + stiffness_factor K under C_q.
 //
 // Its p-blocks are diagonal, e = 1 + damping_factor d + stiffness_factor k, so it is eliminated as the mass matrix is
-// in planar_body.h and system.h, with W e^-1 W^T in place of W W^T. Off-diagonal damping is left to the iteration. Where
-// geometric stiffening adds U^T C U to m_ff, (e + U^T C U)^-1 stands for e^-1.
+// in planar_body.h and system.h, with W e^-1 W^T in place of W W^T. Off-diagonal damping is left to the iteration.
+// Where geometric stiffening adds U^T C U to m_ff, (e + U^T C U)^-1 stands for e^-1.
 #pragma once
 
 #include "core/constraint/envelope.h"
@@ -37,8 +37,8 @@ public:
 
 private:
   struct Body {
-    Eigen::MatrixXd W; // rows of the body as at the last factorisation
-    Eigen::MatrixXd C; // of U, the rows behind those of markers; empty without geometric stiffening
+    Eigen::MatrixXd W;             // rows of the body as at the last factorisation
+    Eigen::MatrixXd C;             // of U, the rows behind those of markers; empty without geometric stiffening
     Eigen::PartialPivLU<Matrix> S; // C^-1 + U e^-1 U^T
     double cosine = 1, sine = 0;
     std::vector<Eigen::Vector2d> arm; // of each marker, global
