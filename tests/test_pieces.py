@@ -74,6 +74,15 @@ def test_soft_double_pendulum(pieces, bound, truth, tmp_path):
     assert np.abs(deflection[:, 1]).max() == pytest.approx(0.136, abs=0.002)
 
 
+def test_auto_takes_as_many_as_the_deflection_needs(truth, tmp_path):
+    """Four for 14 % of the length, none for a stiff link."""
+    with solved(pendulum("auto"), tmp_path) as file:
+        assert {file[f"fall/bodies/{name}"].attrs["pieces"] for name in ("link1", "link2")} <= {3, 4, 5}
+        assert np.linalg.norm(file["fall/points/link2.tip/position"] - truth, axis=1).max() < 1e-3
+    with solved(pendulum("auto", link(STIFF)), tmp_path) as file:
+        assert "pieces" not in file["fall/bodies/link1"].attrs
+
+
 def shapes_of(group):
     found = {}
     group.visititems(lambda key, entry: found.update({key: getattr(entry, "shape", None)}))
@@ -117,7 +126,7 @@ def test_frame_and_modal_coordinates_tell_where_points_are(condition, tmp_path):
 def test_a_path_is_followed_with_a_payload_and_named_interfaces(tmp_path):
     """PCID: the moments of four pieces are those of the one link where that is stiff; reactions of its joints too."""
     modes = {"count": 8, "family": "in-plane-bending", "attachment_modes": True}
-    named = link(STIFF, modes=modes, interface=[{"name": "hook", "position": 0.4, "mass": 0.2}])
+    named = link(3 * STIFF, modes=modes, interface=[{"name": "hook", "position": 0.4, "mass": 0.2}])
     keys = {
         "joint": DRIVEN,
         "payload": [{"point": "link2.tip", "mass": 0.3}],
@@ -173,7 +182,7 @@ def test_pieces_make_up_the_link():
                    "d31": 1e-10}]}, "no .*pzt.* beside bodies in pieces"),
         ({"motors": "frame"}, 'motors: expected "section" beside bodies in pieces'),
         ({"trajectory": [{"name": "turn", "angle": "link1", "value": "t"}]}, "expected a point or a joint"),
-        ({"joint": DRIVEN, "analysis": [{"name": "modes", "kind": "linear"}]}, "kind: expected one of pcid, forward, static"),
+        ({"joint": DRIVEN, "analysis": [{"name": "modes", "kind": "linear"}]}, "kind: expected one of pcid, forward"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_had_is_refused(keys, says):

@@ -95,8 +95,8 @@ def _stopped(solution: Solution) -> Outcome | None:
 
 
 def _goes_on(solution: Solution, outcome: Outcome) -> bool:
-    """Whether `outcome` is of use to `resume`; a search for modes has bodies of its own and starts again."""
-    searched = any(body.modes == "auto" for body in solution.scene.body)
+    """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
+    searched = any("auto" in (body.modes, body.pieces) for body in solution.scene.body)
     return not searched and outcome.analysis.is_resumable
 
 

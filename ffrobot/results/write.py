@@ -79,6 +79,8 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
         for kind, error in solution.mode_choice.errors[name].items():
             group.attrs[f"mode_error_{kind}"] = error
     write_motion(group, outcome)
+    for body, divided in solution.divided.items():
+        group[f"bodies/{body}"].attrs["pieces"] = len(divided.names)
     write_forces(group, outcome)
     write_actuators(group, solution, result)
     for body, stress in result.stresses.items():

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import ceil, sqrt
 
 import numpy as np
 
@@ -19,8 +20,36 @@ from ..mbs.analysis.outcome import Forces, Motion, Outcome
 from ..mbs.model.model import Constraint, Model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.system import MechanismSystem
+from ..mbs.quantities.stiffening import shortenings
 from ..scene.pieces import BodyInPieces
 from .bodies import LoadedBody
+from .solution import Solution
+
+ENOUGH = 1e-3  # shortening of a piece by bending, b: tips are then right to some 1e-4 of the length (docs/theory.md)
+MOST = 64
+
+
+def wanted_pieces(solution: Solution) -> dict[str, int]:
+    """How many pieces bodies with `pieces = "auto"` want after a solve, where that is more than they have.
+
+    b of a piece goes down with the square of their number. A run that failed has bent links farther than they are.
+    """
+    bodies = solution.parts or solution.bodies
+    stiffening = {name: body.planar.stiffening for name, body in bodies.items()}
+    largest: dict[str, float] = {}
+    for outcome in solution.outcomes.values():
+        for name, b in shortenings(outcome, stiffening).items():
+            largest[name] = max(largest.get(name, 0.0), float(b.max(initial=0.0)))
+    wanted = {}
+    for body in solution.scene.body:
+        if body.pieces == "auto":
+            divided = solution.divided.get(body.name)
+            names = divided.names if divided else (body.name,)
+            worst = max(largest.get(name, 0.0) for name in names)
+            count = min(MOST, ceil(len(names) * sqrt(worst / ENOUGH)))
+            wanted[body.name] = max(count, len(names))
+    now = {name: len(solution.divided[name].names) if name in solution.divided else 1 for name in wanted}
+    return {} if wanted == now else wanted
 
 
 def as_one_link(

@@ -14,7 +14,7 @@ from ..common.errors import InputError
 from ..mbs.model.model import ModalLoad, build_model
 from ..mbs.model.planar_body import PlanarBody
 from ..scene.load import load_scene
-from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
+from ..scene.pieces import bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody, add_patches, load_bodies
 from .mode_choice import truncation_levels, whole_bodies
@@ -37,20 +37,24 @@ def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     structure = add_patches(scene, bodies)
     first = truncation_levels(scene, whole_bodies(bodies))[0]
     bodies = {name: replace(body, planar=first.get(name, body.planar)) for name, body in bodies.items()}
-    divided = bodies_in_pieces(scene)
-    is_stiffened = bool(divided) or scene.geometric_stiffening is True
+    counts = {body.name: 1 if body.pieces == "auto" else body.pieces for body in scene.body if body.pieces is not None}
+    is_stiffened = bool(counts) or scene.geometric_stiffening is True
     solution = _assembled(scene, bodies, structure, seconds, stiffened=is_stiffened)
-    return _in_pieces(solution, divided, watcher) if divided else solution
+    return with_pieces(solution, counts, watcher)
 
 
-def _in_pieces(solution: Solution, divided: Mapping[str, BodyInPieces], watcher: Watcher) -> Solution:
-    """The solution with the equations of the pieces in place of those of their links."""
+def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher) -> Solution:
+    """The scene with the bodies named in so many pieces each, nothing solved yet: equations are those of the pieces."""
+    divided = bodies_in_pieces(solution.scene, counts)
+    whole = solution if solution.whole is None else replace(solution, model=solution.whole)
+    if not divided:
+        return replace(whole, analyses={}, divided={}, parts={}, whole=None)
     scene = scene_of_pieces(solution.scene, divided)
     loaded = load_bodies(scene, watcher.stage)
     parts = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
     planar = [_equations_of(part, solution.stiffened) for part in parts.values()]
     model = build_model(scene, planar)
-    return replace(solution, model=model, whole=solution.model, divided=divided, parts=parts)
+    return replace(whole, analyses={}, model=model, whole=whole.model, divided=divided, parts=parts)
 
 
 def _equations_of(body: LoadedBody, stiffened: bool) -> PlanarBody:

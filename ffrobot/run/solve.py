@@ -22,8 +22,8 @@ from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
 from .evaluation import evaluated
 from .mode_choice import ModeSearch
-from .pieces import as_one_link
-from .prepare import prepare, stiffened, with_bodies
+from .pieces import as_one_link, wanted_pieces
+from .prepare import prepare, stiffened, with_bodies, with_pieces
 from .solution import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
 
@@ -52,6 +52,8 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
     with Interruption(watcher.stopping) as interruption:
         if any(body.modes == "auto" for body in solution.scene.body):
             solution = _with_enough_modes(solution, watcher, interruption)
+        elif any(body.pieces == "auto" for body in solution.scene.body):
+            solution = _with_enough_pieces(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
         solution = _evaluated(solution)
@@ -90,6 +92,15 @@ def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Inter
             return solution
         search.add(solution, last=interruption.requested)
     return replace(solution, mode_choice=search.choice())
+
+
+def _with_enough_pieces(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+    """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
+    solution = _completed(solution, watcher, interruption)
+    given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
+    while solution.failure is None and not interruption.requested and (wanted := wanted_pieces(solution)):
+        solution = _completed(with_pieces(solution, given | wanted, watcher), watcher, interruption)
+    return solution
 
 
 def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:

@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 
 from ..common.errors import InputError
 from ..common.validation import Record
-from ..fe_models.link_file import LinkSource
 from ..fe_models.pieces import CutLink, cut
 from ..mbs.joints.weld import WeldJoint
 from ..mbs.scene.bodies import Body
@@ -35,22 +34,20 @@ class BodyInPieces:
         return f"{self.names[piece]}.{name}"
 
 
-def bodies_in_pieces(scene: Scene) -> dict[str, BodyInPieces]:
-    """The bodies of a scene that are divided, by name.
+def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyInPieces]:
+    """The bodies of a scene with the key `pieces` that are cut in more than one, by name; `counts` of all of them.
 
     Raises `InputError` where a link or the scene allows no pieces.
     """
     found = {}
     for body in scene.body:
-        if body.pieces is not None and body.pieces > 1:
-            source: LinkSource | None = body.link
-            assert source is not None
-            names = tuple(f"{body.name}, piece {k}" for k in range(1, body.pieces + 1))
-            found[body.name] = BodyInPieces(cut(source, body.pieces), names)
+        if body.link is not None and body.name in counts:
+            names = tuple(f"{body.name}, piece {k}" for k in range(1, counts[body.name] + 1))
+            found[body.name] = BodyInPieces(cut(body.link, counts[body.name]), names)
     problems = [f"{scene.path}: {problem}" for problem in _problems(scene, found)]
     if problems:
         raise InputError("\n".join(problems))
-    return found
+    return {name: body for name, body in found.items() if len(body.names) > 1}
 
 
 def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:

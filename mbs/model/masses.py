@@ -82,13 +82,11 @@ def _stiffened_mass_matrix(body: PlanarBody, stiffening: GeometricStiffening, p:
     g = N[:, 2] + F @ p - 0.5 * p @ K @ p
     X = np.column_stack([N[:, :2], i @ g, F - K @ p])
     N_F = np.linalg.solve(N, F)
-    M = X.T @ np.linalg.solve(N, X)
-    M[2, 2] += p @ (body.m_xy + stiffening.rotary - F.T @ N_F) @ p
-    M[2, 3:] += p @ (body.S_tilde - (i @ F).T @ N_F)
-    M[3:, 2] = M[2, 3:]
-    rest = np.zeros_like(M)
+    rest = np.zeros((3 + len(p), 3 + len(p)))
+    rest[2, 2] = p @ (body.m_xy + stiffening.rotary - F.T @ N_F) @ p
+    rest[2, 3:] = rest[3:, 2] = p @ (body.S_tilde - (i @ F).T @ N_F)
     rest[3:, 3:] = np.eye(len(p)) - F.T @ N_F
-    return np.asarray(M + rest)
+    return np.asarray(X.T @ np.linalg.solve(N, X) + rest)
 
 
 def system_mass_matrix(system: MechanismSystem, q: Array) -> Array:

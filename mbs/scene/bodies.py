@@ -54,7 +54,8 @@ class Body(Record):
     `modes` of a flexible body: how many of the lowest that move in the plane; the others are represented by their
     static flexibility. "auto" takes as many as the tolerances of the analyses need; the default is all.
 
-    `pieces` of a beam link: into how many it is divided for large deflections; results are those of the one link.
+    `pieces` of a beam link: into how many it is divided for large deflections, "auto": as many as these need. Results
+    are those of the one link, and geometric stiffening is on.
     """
 
     name: Name
@@ -62,7 +63,7 @@ class Body(Record):
     modal: InputFile | None = None
     rigid: RigidBody | None = None
     modes: Literal["auto"] | Annotated[int, Field(ge=0)] | None = None
-    pieces: Annotated[int, Field(ge=1, le=100)] | None = None
+    pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Body:
