@@ -47,6 +47,21 @@ template <int Count> void project_rows(const double *p, const double *p_dot, Ind
   }
 }
 
+// Rows of W W^T
+template <int Count> void multiply_rows(Index first, PackedRows &s) {
+  constexpr int groups = Count / lane_count;
+  const Index n = s.W.cols(), stride = s.rows();
+  for (Index j = 0; j < stride; ++j) {
+    Lanes sum[groups] = {};
+    const double *W = s.W.data();
+    for (Index i = 0; i < n; ++i, W += stride)
+      for (int group = 0; group < groups; ++group)
+        sum[group] += load(W + first + group * lane_count) * W[j];
+    for (int group = 0; group < groups; ++group)
+      store(s.gram.data() + j * stride + first + group * lane_count, sum[group]);
+  }
+}
+
 template <int Count> void combine_rows(const double *z, Index first, PackedRows &s) {
   const Index n = s.W_transposed.rows();
   const double *W_transposed = s.W_transposed.data() + first * n;
@@ -150,7 +165,7 @@ void PackedRows::replace(Index row, const Eigen::Ref<const Eigen::RowVectorXd> &
 
 void PackedRows::reduce(const Eigen::MatrixXd &C_inverse) {
   const Index rank = C_inverse.rows();
-  gram.noalias() = W.lazyProduct(W.transpose());
+  in_pieces(rows(), [&]<int Count>(Index first) { multiply_rows<Count>(first, *this); });
   with_U = gram.middleCols(affine, rank);
   const LowRank S = C_inverse + with_U.middleRows(affine, rank);
   const LowRank S_inverse = S.partialPivLu().inverse();
