@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...common.arrays import Array, as_list
+from ...common.numbers import MOST_OUTPUTS
 from ...mbs._core import TimeFunction
 from ...mbs.analysis.drive import Progress, SampledControl, drive, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
@@ -47,15 +48,25 @@ class ClosedLoop(ActuatedAnalysis):
 
     kind: Literal["closed-loop"]
     sample_time: Positive
+    """Time between samples, s."""
     delay: NotNegative = 0.0
+    """From a sample to its command, s."""
     start: Literal["actuation", "scene"] = "actuation"
+    """Where the run starts: as `actuation` does, or as [initial] says."""
     feed_forward: Literal["none", "joints", "joints+pzt"] = "joints"
+    """What of `actuation` is added to the commands: moments, with voltages, or nothing."""
     unlimited: bool = False
+    """Moments and voltages beyond the limits of the scene are allowed."""
     seed: Annotated[int, Field(ge=0)] = 0
+    """Of the noise of sensors."""
     tip: PointReference | None = None
+    """Point "BODY.POINT" whose error is reported."""
     controller: tuple[ControllerKeys, ...] = ()
+    """Controllers; their commands add up."""
     sensor: tuple[Sensor, ...] = ()
+    """What is measured beside what the controllers need."""
     disturbance: tuple[Load, ...] = ()
+    """Loads at points that `actuation` does not know."""
 
     findings = ("diverged", "step underflow")  # what a controller does is what is to be found out
 
@@ -74,6 +85,8 @@ class ClosedLoop(ActuatedAnalysis):
         end = self.end
         if end and self.delay >= end:
             raise ValueError(f"expected a delay shorter than the run ({end:g} s), found {self.delay:g} s")
+        if end and end / self.sample_time > MOST_OUTPUTS:
+            raise ValueError(f"expected at most {MOST_OUTPUTS} samples, found sample_time = {self.sample_time:g} s")
         if end and self.sample_time > end:
             raise ValueError(f"expected a sample_time of at most the run ({end:g} s), found {self.sample_time:g} s")
         return self

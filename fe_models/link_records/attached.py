@@ -6,8 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ...common.numbers import MOST_PATCHES, NotNegative, PatchCount, Positive
 from ...common.validation import Record
-from ...mesh.records import NotNegative, Outlines, PlaceRecord, Positive
+from ...mesh.records import Outlines, PlaceRecord
 
 Coupling = Literal["mean", "rigid"]
 
@@ -16,8 +17,12 @@ class InterfaceRecord(PlaceRecord):
     """A place where joints and loads attach, and what is fixed to it there: a hub, a gripper."""
 
     coupling: Coupling | None = None
-    mass: NotNegative = 0.0  # kg, rigidly attached, its center at the interface
-    inertia: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)  # about x, y, z through there, kg·m²
+    """How a solid's face is held to the interface: its mean moves with it, or all of it; by default that of
+    [reference]."""
+    mass: NotNegative = 0.0
+    """Mass that sits on the interface, its center there, kg."""
+    inertia: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
+    """Its moments of inertia about x, y, z through the interface, kg·m²."""
 
 
 class SurfacePatches(Record):
@@ -26,11 +31,17 @@ class SurfacePatches(Record):
     Same meaning of the keys as in a scene's `[[pzt]]`: centres at (k − ½)·length of link / count, or `centers`.
     """
 
-    count: Annotated[int, Field(ge=1)] | None = None
-    centers: Annotated[tuple[Positive, ...], Field(min_length=1)] | None = None  # m from the root
-    length: Positive  # m
-    width: Positive  # m
+    count: PatchCount | None = None
+    """Number of patches, evenly spread; or give `centers`."""
+    # m from the root
+    centers: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PATCHES)] | None = None
+    """Their centres, m from the root."""
+    length: Positive
+    """Of each along x, m."""
+    width: Positive
+    """Of each along z, m."""
     faces: Literal["top", "bottom", "both"] = "both"
+    """On the face at the largest y, the smallest y, or on both."""
 
     def edges(self, length: float) -> list[tuple[float, float]]:
         """Begin and end of each patch on a link of `length`, m from the root."""

@@ -21,6 +21,7 @@ from ..mbs.model.model import Constraint, Model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.system import MechanismSystem
 from ..mbs.quantities.stiffening import shortenings
+from ..mbs.quantities.validity import Bending
 from ..scene.pieces import BodyInPieces
 from .bodies import LoadedBody
 from .solution import Solution
@@ -50,6 +51,17 @@ def wanted_pieces(solution: Solution) -> dict[str, int]:
             wanted[body.name] = max(count, len(names))
     now = {name: len(solution.divided[name].names) if name in solution.divided else 1 for name in wanted}
     return {} if wanted == now else wanted
+
+
+def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyInPieces]) -> dict[str, Bending]:
+    """How far links bend, each divided one as its piece whose results are worst."""
+    link_of = {piece: name for name, body in divided.items() for piece in body.names}
+    worst: dict[str, Bending] = {}
+    for piece, found in bending.items():
+        name = link_of.get(piece, piece)
+        if name not in worst or found.position_error > worst[name].position_error:
+            worst[name] = found
+    return worst
 
 
 def as_one_link(

@@ -10,11 +10,12 @@ from pathlib import Path
 from ..actuation.patches.patches import PatchArray, check_reach, patch_array
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.points import point_set, with_points
-from ..common.errors import InputError
-from ..mbs.model.model import ModalLoad, build_model
+from ..common.errors import InputError, of_file
+from ..mbs.model.model import ModalLoad, Model, build_model
 from ..mbs.model.planar_body import PlanarBody
+from ..mbs.solve.robot_damping import with_robot_damping
 from ..scene.load import load_scene
-from ..scene.pieces import bodies_in_pieces, scene_of_pieces
+from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody, add_patches, load_bodies
 from .mode_choice import truncation_levels, whole_bodies
@@ -32,6 +33,11 @@ def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     began = time.perf_counter()
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
+    with of_file(scene.path):
+        return _prepared(scene, watcher, began)
+
+
+def _prepared(scene: Scene, watcher: Watcher, began: float) -> Solution:
     bodies = {body.name: loaded for body, loaded in zip(scene.body, load_bodies(scene, watcher.stage), strict=True)}
     seconds = {"links and files": time.perf_counter() - began}
     structure = add_patches(scene, bodies)
@@ -52,9 +58,16 @@ def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher)
     scene = scene_of_pieces(solution.scene, divided)
     loaded = load_bodies(scene, watcher.stage)
     parts = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
-    planar = [_equations_of(part, solution.stiffened) for part in parts.values()]
-    model = build_model(scene, planar)
-    return replace(whole, analyses={}, model=model, whole=whole.model, divided=divided, parts=parts)
+    return _in_pieces(replace(whole, analyses={}), divided, parts)
+
+
+def _in_pieces(whole: Solution, divided: Mapping[str, BodyInPieces], parts: Mapping[str, LoadedBody]) -> Solution:
+    """The solution with the equations of the pieces in place of those of their links."""
+    if not divided:
+        return whole
+    planar = [_equations_of(part, whole.stiffened) for part in parts.values()]
+    model = _damped(build_model(scene_of_pieces(whole.scene, divided), planar), parts)
+    return replace(whole, model=model, whole=whole.model, divided=divided, parts=parts)
 
 
 def _equations_of(body: LoadedBody, stiffened: bool) -> PlanarBody:
@@ -67,14 +80,16 @@ def with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Solutio
     return _assembled(solution.scene, bodies, solution.structure, solution.preparation, solution.stiffened)
 
 
+def with_scene(solution: Solution, scene: Scene) -> Solution:
+    """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
+    found = _assembled(scene, solution.bodies, solution.structure, solution.preparation, solution.stiffened)
+    return _in_pieces(found, solution.divided, solution.parts)
+
+
 def stiffened(solution: Solution) -> Solution:
     """The scene with geometric stiffening, nothing solved yet."""
     whole = _assembled(solution.scene, solution.bodies, solution.structure, solution.preparation, stiffened=True)
-    if solution.whole is None:
-        return whole
-    planar = [_equations_of(part, True) for part in solution.parts.values()]
-    model = build_model(solution.model.scene, planar)
-    return replace(whole, model=model, whole=whole.model, divided=solution.divided, parts=solution.parts)
+    return _in_pieces(whole, solution.divided, solution.parts)
 
 
 def _assembled(
@@ -105,7 +120,7 @@ def _assembled(
     planar = [_equations_of(body, stiffened) for body in bodies.values()]
     return Solution(
         scene=scene,
-        model=build_model(scene, planar, list(_voltage_loads(scene, patches))),
+        model=_damped(build_model(scene, planar, list(_voltage_loads(scene, patches))), bodies),
         bodies=bodies,
         patches=patches,
         points=points,
@@ -114,6 +129,16 @@ def _assembled(
         omissions=tuple(omissions(scene, bodies)),
         stiffened=stiffened,
     )
+
+
+def _damped(model: Model, bodies: Mapping[str, LoadedBody]) -> Model:
+    """The model with the damping that links want of the robot's vibrations."""
+    ratios = {
+        name: float(modal.damping_ratio[0])
+        for name, body in bodies.items()
+        if (modal := body.modal) is not None and modal.damping_of == "robot"
+    }
+    return with_robot_damping(model, ratios)
 
 
 def _check_stiffening(scene: Scene, bodies: Mapping[str, LoadedBody], stiffened: bool) -> None:

@@ -14,15 +14,19 @@ from ..actuation.context import ActuatedContext
 from ..actuation.patches.patches import with_factors as patches_with
 from ..actuation.patches.voltages import allocation, solve_voltages
 from ..actuation.points import with_factors as points_with
+from ..common.errors import of_file
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import ActuatorSet
 from ..mbs.model.raised_mass import by_body
-from ..mbs.quantities.stiffening import NOTABLE, estimated_effect
+from ..mbs.quantities.stiffening import NOTABLE, stiffness_changes
+from ..mbs.quantities.validity import bending
 from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
 from .evaluation import evaluated
+from .finer import check_on, finer_scene
 from .mode_choice import ModeSearch
-from .pieces import as_one_link, wanted_pieces
+from .paths import with_paths
+from .pieces import as_one_link, wanted_pieces, worst_of_pieces
 from .prepare import prepare, stiffened, with_bodies, with_pieces
 from .solution import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
@@ -36,6 +40,7 @@ Keep = Callable[[Solution], None]
 def solve(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None = None) -> Solution:
     """Run every analysis of a scene or a scene file; stage 1 runs first for links that are not up to date.
 
+    Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
@@ -50,13 +55,16 @@ def solve(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """What `solve` does with everything prepared; analyses go on from where `solution.earlier` has them."""
     with Interruption(watcher.stopping) as interruption:
+        solution, path_notes = with_paths(
+            solution, lambda trial: _evaluated(_completed(trial, watcher, interruption)), watcher.stage
+        )
         if any(body.modes == "auto" for body in solution.scene.body):
             solution = _with_enough_modes(solution, watcher, interruption)
         elif any(body.pieces == "auto" for body in solution.scene.body):
             solution = _with_enough_pieces(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
-        solution = _evaluated(solution)
+        solution = replace(_checked(_evaluated(solution), watcher), path_notes=path_notes)
         if keep is not None and solution.analyses:
             keep(solution)
     if solution.failure is not None:
@@ -69,7 +77,8 @@ def _evaluated(solution: Solution) -> Solution:
     results, failure = dict(solution.analyses), solution.failure
     for name, result in results.items():
         try:
-            results[name] = evaluated(solution, told_of_links(solution, result))
+            with of_file(solution.scene.path):
+                results[name] = evaluated(solution, told_of_links(solution, result))
         except Exception as error:
             failure = failure or error
     return replace(solution, analyses=results, failure=failure)
@@ -80,7 +89,29 @@ def told_of_links(solution: Solution, result: AnalysisResult) -> AnalysisResult:
     if solution.whole is None:
         return result
     links, pieces = solution.bodies, solution.parts
-    return replace(result, outcome=as_one_link(result.outcome, solution.whole, links, solution.divided, pieces))
+    outcome = as_one_link(result.outcome, solution.whole, links, solution.divided, pieces)
+    return replace(result, outcome=outcome, bending=worst_of_pieces(result.bending, solution.divided))
+
+
+def _checked(solution: Solution, watcher: Watcher) -> Solution:
+    """The solution with completed analyses replayed on finer links where the scene asks for that."""
+    wanted = [
+        name for name, result in solution.analyses.items()
+        if result.outcome.analysis.is_checked and result.outcome.status == "completed"
+    ]  # fmt: skip
+    if not wanted:
+        return solution
+    results, failure = dict(solution.analyses), solution.failure
+    try:
+        finer = prepare(finer_scene(solution.scene, solution.bodies), watcher)
+        finer = stiffened(finer) if solution.stiffened else finer
+        for name in wanted:
+            watcher.stage(f'check of "{name}" on finer links')
+            check = check_on(results[name].outcome, solution, finer, watcher)
+            results[name] = replace(results[name], check=check)
+    except Exception as error:
+        failure = failure or error
+    return replace(solution, analyses=results, failure=failure)
 
 
 def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
@@ -112,7 +143,9 @@ def _completed(solution: Solution, watcher: Watcher, interruption: Interruption)
 
 def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution | None:
     """The analyses up to the first that fails; None where `geometric_stiffening = "auto"` asks for them all again."""
-    stiffening = {name: body.planar.stiffening for name, body in (solution.parts or solution.bodies).items()}
+    bodies = solution.parts or solution.bodies
+    stiffening = {name: body.planar.stiffening for name, body in bodies.items()}
+    links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
     results: dict[str, AnalysisResult] = {}
     for analysis in solution.scene.analysis:
         if interruption.requested and results:
@@ -120,20 +153,22 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         began = time.perf_counter()
         watcher.stage(f'analysis "{analysis.name}"')
         try:
-            outcome = analysis.run(_context(solution, analysis, results, watcher, interruption))
+            with of_file(solution.scene.path):
+                outcome = analysis.run(_context(solution, analysis, results, watcher, interruption))
         except Exception as error:  # raised once the analyses before it are kept
             if not results:
                 raise
             return replace(solution, analyses=results, failure=error)
-        effect = estimated_effect(outcome, stiffening)
+        changes = stiffness_changes(outcome, stiffening)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
-        if automatic and effect > NOTABLE and outcome.status != "interrupted":
+        if automatic and max(changes.values(), default=0.0) > NOTABLE and outcome.status != "interrupted":
             return None
         voltages = {} if outcome.F_p is None else {
             body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
             for body, array in solution.patches.items()
         }  # fmt: skip
-        results[analysis.name] = AnalysisResult(outcome, effect, time.perf_counter() - began, voltages)
+        bent = bending(outcome, links, changes, solution.stiffened)
+        results[analysis.name] = AnalysisResult(outcome, bent, time.perf_counter() - began, voltages)
         _log(outcome)
         if outcome.failed:
             break
@@ -157,10 +192,11 @@ def _context(
         outcomes={name: result.outcome for name, result in results.items()},
         make_actuators=lambda raised: _actuator_set(solution, raised=raised),
         progress=progress,
-        is_replayed=any(other.takes_actuation and other.source == analysis.name for other in later),
+        is_replayed=analysis.is_checked
+        or any(other.takes_actuation and other.source == analysis.name for other in later),
         earlier=solution.earlier.get(analysis.name),
         patches=solution.patches,
-        links={name: body.modal for name, body in solution.bodies.items() if body.modal is not None},
+        links=solution.links,
     )
 
 

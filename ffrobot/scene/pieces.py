@@ -116,6 +116,8 @@ def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str
                 f'analysis "{analysis.name}": kind: expected one of {", ".join(KINDS)} beside bodies in pieces'
                 f' ("{first}"), found "{analysis.kind}"'
             )
+        if analysis.is_checked:
+            yield f'analysis "{analysis.name}": check: expected none beside bodies in pieces ("{first}"), found one'
     for joint in scene.joint:
         if joint.elastic_gear("section") is not None:
             yield f'joint "{joint.name}": stiffness: expected none beside bodies in pieces ("{first}"), found one'

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
+from pydantic import AfterValidator, PlainValidator, ValidationInfo
 
+from ...common.names import Name as Name  # offered here, with the other types of keys
+from ...common.numbers import ModeCount as ModeCount
+from ...common.numbers import NotNegative as NotNegative
+from ...common.numbers import PatchCount as PatchCount
+from ...common.numbers import Positive as Positive
+from ...common.numbers import Vector2 as Vector2
+from ...common.tables import LARGEST, shown
 from ...common.validation import Record, existing_file, quoted
 from .._core import TimeFunction
 from .expressions import parse_expression
@@ -22,7 +30,7 @@ def split_point(reference: str) -> tuple[str, str]:
     """`"link1.tip"` → `("link1", "tip")`. Raises `ValueError` when it is not of the form BODY.POINT."""
     body, dot, point = reference.partition(".")
     if not (body and dot and point) or "." in point:
-        raise ValueError(f'expected a point as "BODY.POINT", found "{reference}"')
+        raise ValueError(f'expected a point as "BODY.POINT", found "{shown(reference)}"')
     return body, point
 
 
@@ -39,11 +47,17 @@ def _time_function(value: object, info: ValidationInfo) -> TimeFunction:
     raise ValueError(f"expected an expression in t, found {value!r}")
 
 
-def _name(value: str) -> str:
-    """Names become groups of the results file and parts of "BODY.POINT"."""
-    if not value or value != value.strip() or "/" in value or "." in value:
-        raise ValueError(f'expected a name without "/", "." and blanks around it, found "{value}"')
-    return value
+def _quantity(value: object) -> float:
+    """A number, or an expression without t, such as "30*deg"."""
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    if not isinstance(value, str):
+        raise ValueError(f'expected a finite number, or an expression such as "30*deg", found {value!r}')
+    function = parse_expression(value)
+    number = function(0.0)[0]
+    if number != function(1.0)[0] or abs(number) > LARGEST:
+        raise ValueError(f'expected a number or an expression without t, such as "30*deg", found "{shown(value)}"')
+    return number
 
 
 def _point(value: str) -> str:
@@ -93,12 +107,9 @@ def present(**functions: TimeFunction | None) -> dict[str, TimeFunction]:
     return {name: function for name, function in functions.items() if function is not None}
 
 
-Name = Annotated[str, AfterValidator(_name)]
 PointReference = Annotated[str, AfterValidator(_point)]
 Side = Annotated[str, AfterValidator(_side)]
-Vector2 = tuple[float, float]
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
+Quantity = Annotated[float, PlainValidator(_quantity, json_schema_input_type=str | float)]
 Expression = Annotated[TimeFunction, PlainValidator(_time_function, json_schema_input_type=str | float)]
 WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints, json_schema_input_type=str)]
 NotEmpty = AfterValidator(_not_empty)

@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
+from ...common.numbers import MOST_MODES, SMALLEST
 from ...common.validation import InputFile, Record, existing_file
 from ...fe_models.link_file import LinkSource, LinkTable
 from ...fe_models.link_records import BeamLink, SolidLink
-from ..fields.field_types import Name, PointReference, Positive, Vector2, one_of
+from ..fields.field_types import Name, NotNegative, PointReference, Positive, Vector2, one_of
 from ..fields.references import Reference
 
 
@@ -19,14 +20,18 @@ class RigidBody(Record):
     """Mass (kg), moment of inertia about the center (kg·m²), center and named points (m) in the body frame."""
 
     mass: Positive
+    """Mass, kg."""
     inertia: float
+    """Moment of inertia about the center of mass, kg·m²."""
     center: Vector2
+    """Center of mass, m, axes of the body."""
     points: dict[Name, Vector2] = Field(default_factory=dict)
+    """Places for joints, loads and trajectories by name: m, axes of the body."""
 
     @field_validator("inertia")
     @classmethod
     def _inertia_is_positive(cls, inertia: float) -> float:
-        if not inertia > 0.0:
+        if not inertia >= SMALLEST:
             raise ValueError(
                 f"expected a moment of inertia greater than 0, found {inertia:g}: without it the body's rotation has no"
                 " equation of motion (a point mass is a [[payload]])"
@@ -59,11 +64,17 @@ class Body(Record):
     """
 
     name: Name
+    """Of the body, unique in the scene."""
     link: LinkInput | None = None
+    """Link file, or a table with its keys; stage 1 runs where needed."""
     modal: InputFile | None = None
+    """Modal body file, as stage 1 writes it."""
     rigid: RigidBody | None = None
-    modes: Literal["auto"] | Annotated[int, Field(ge=0)] | None = None
+    """A body that does not deform."""
+    modes: Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)] | None = None
+    """How many of the lowest in-plane modes; "auto": as many as the tolerances need; all where it is left out."""
     pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
+    """Of a beam link that bends far: how many welded pieces stand for it; "auto": as many as it needs."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Body:
@@ -80,8 +91,11 @@ class Payload(Record):
     """A mass (kg) on a point, with its moment of inertia about that point (kg·m²)."""
 
     point: PointReference
-    mass: Positive
-    inertia: Annotated[float, Field(ge=0.0)] = 0.0
+    """Where it sits, "BODY.POINT"."""
+    mass: NotNegative
+    """Mass, kg."""
+    inertia: NotNegative = 0.0
+    """Moment of inertia about that point, kg·m²."""
 
     def references(self) -> Iterator[Reference]:
         """The point that carries it."""
