@@ -58,4 +58,5 @@ copy=$SYSTEM/root/ffrobot
 git -C "$copy" fetch -q "$PWD" HEAD
 git -C "$copy" checkout -q --force --detach FETCH_HEAD
 git -C "$copy" clean -qfd
+unset "${!CMAKE_@}" CC CXX CFLAGS CXXFLAGS LDFLAGS # they name programs of this machine
 chroot "$SYSTEM" env -C /root/ffrobot HOME=/root LANG=C.UTF-8 ./test.sh "$@"
