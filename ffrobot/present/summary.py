@@ -193,7 +193,8 @@ def _enough(feasibility: Feasibility) -> str:
     )
     within = "within the limits that are given" if motors or patches else "no limits are given"
     if feasibility.unsupplied is not None:
-        return f"not by motors alone: see the warning ({within})"
+        means = "motors and patches" if feasibility.unsupplied.with_patches else "motors alone"
+        return f"{means} cannot do it: see the warning ({within})"
     return f"motors{' and patches' if feasibility.patches else ''} can do it, {within}"
 
 
