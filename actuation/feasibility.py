@@ -118,15 +118,23 @@ class Feasibility:
         )
 
     @property
+    def judged(self) -> dict[str, MotorFeasibility | PatchFeasibility]:
+        """Every actuator by the name that messages have for it."""
+        motors = {f"motor {name}": motor for name, motor in self.motors.items()}
+        return {**motors, **{f"patches of {name}": patches for name, patches in self.patches.items()}}
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """The largest ratio of what is required of each actuator to its limit."""
+        return {name: float(np.max(judged.factor)) for name, judged in self.judged.items()}
+
+    @property
     def short(self) -> dict[str, tuple[float, float]]:
         """Actuators that cannot do it: the factor they lack, and from what time on (s)."""
-        judged: dict[str, MotorFeasibility | PatchFeasibility] = {}
-        judged.update({f"motor {name}": motor for name, motor in self.motors.items()})
-        judged.update({f"patches of {name}": patches for name, patches in self.patches.items()})
         return {
-            name: (float(np.max(j.factor)), float(np.nanmin(j.saturation_time)))
-            for name, j in judged.items()
-            if np.max(j.factor) > 1.0
+            name: (factor, float(np.nanmin(self.judged[name].saturation_time)))
+            for name, factor in self.factors.items()
+            if factor > 1.0
         }
 
 

@@ -27,7 +27,7 @@ from .modal_body.lumped_masses import lumps
 from .modal_body_file import FORMAT_VERSION
 
 # To be raised whenever the same link file gives other numbers than before.
-ALGORITHM_VERSION = 2
+ALGORITHM_VERSION = 3
 
 _AFTER_THE_MODES = ("name", "damping", "stress")
 

@@ -286,9 +286,9 @@ def sweep(
 
 
 @cli.command()
-@click.argument("kind", type=click.Choice(["link", "scene"]))
+@click.argument("kind", type=click.Choice(["link", "scene", "figures"]))
 def schema(kind: str) -> None:
-    """Print the JSON schema of link or scene files, for editors.
+    """Print the JSON schema of link, scene or figures files, for editors.
 
     \b
     ffrobot schema scene > scene.schema.json

@@ -72,7 +72,7 @@ def test_results_in_memory_are_those_of_a_file(folder, results, tmp_path):
         np.testing.assert_array_equal(holder["inverse/joints/shoulder/moment"], moment)
         np.testing.assert_array_equal(holder.data("inverse/joints/shoulder/moment")[:, 0], moment)
     assert results.time("inverse")[-1] == 0.02
-    assert results.modal_body("arm").mode_count == 3
+    assert results.modal_body("arm").mode_count == 3 + 2
     ffrobot.write_report([tmp_path / "r.h5"], tmp_path / "r.html")
     assert (tmp_path / "r.html").is_file()
 
@@ -163,7 +163,9 @@ def test_run_that_stops_early_keeps_its_file(folder, tmp_path):
 def test_objects_print_what_they_are(folder, results):
     # 2700 kg/m³ · π/4 (0.02² − 0.016²) m² · 0.6 m = 0.18322 kg
     body = ffrobot.read_modal_body(folder / "arm.h5")
-    assert repr(body).startswith("ModalBody('arm'): beam, cantilever, 0.6 m, 0.18322 kg, 3 modes of ")
+    assert repr(body).startswith(
+        "ModalBody('arm'): beam, cantilever, 0.6 m, 0.18322 kg, 3 modes and 2 attachment modes of "
+    )
     assert repr(swing(folder)) == ("Scene('swing'): bodies arm; joints shoulder; trajectories turn; analyses inverse")
     assert repr(results).splitlines()[1] == "  inverse: pcid, 21 outputs up to 0.02 s, completed"
     closed = ffrobot.solve(swing(folder))

@@ -62,6 +62,7 @@ def _tables(solution: Solution) -> Iterator[Table]:
 
 def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     outcomes = solution.outcomes
+    yield from (("path", note) for note in solution.path_notes)
     chosen = {
         name: f"{chosen.name}; {chosen.reason}"
         for name, outcome in outcomes.items()

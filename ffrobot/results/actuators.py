@@ -36,6 +36,8 @@ def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) 
     group["residual"] = voltages.residual
     group["edges"] = patches.edges
     group["moment_per_volt"] = patches.moment_per_volt
+    group["stiffness_ratio"] = patches.stiffness_ratio
+    group["authority"] = patches.authority
     group.attrs["condition_number"] = patches.condition_number
     group["residual_force"] = voltages.unmet
     group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]

@@ -51,6 +51,11 @@ def with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Solutio
     return _assembled(solution.scene, bodies, solution.structure, solution.preparation, solution.stiffened)
 
 
+def with_scene(solution: Solution, scene: Scene) -> Solution:
+    """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
+    return _assembled(scene, solution.bodies, solution.structure, solution.preparation, solution.stiffened)
+
+
 def stiffened(solution: Solution) -> Solution:
     """The scene with geometric stiffening, nothing solved yet."""
     return _assembled(solution.scene, solution.bodies, solution.structure, solution.preparation, stiffened=True)

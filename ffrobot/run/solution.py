@@ -114,6 +114,7 @@ class Solution:
         mode_choice: where `modes = "auto"`.
         stiffened: whether geometric stiffening is in the equations.
         earlier: runs of analyses to go on with, from a results file: see `results.resume`.
+        path_notes: what was found of paths before the analyses, one line each.
         failure: what ended the run, where that was an error after analyses that are worth keeping.
     """
 
@@ -129,6 +130,7 @@ class Solution:
     mode_choice: ModeChoice | None = None
     stiffened: bool = False
     earlier: Mapping[str, EarlierRun] = field(default_factory=dict)
+    path_notes: tuple[str, ...] = ()
     failure: Exception | None = None
 
     @property

@@ -25,6 +25,7 @@ from ..scene.scene import Scene
 from .evaluation import evaluated
 from .finer import check_on, finer_scene
 from .mode_choice import ModeSearch
+from .paths import with_paths
 from .prepare import prepare, stiffened, with_bodies
 from .solution import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
@@ -38,6 +39,7 @@ Keep = Callable[[Solution], None]
 def solve(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None = None) -> Solution:
     """Run every analysis of a scene or a scene file; stage 1 runs first for links that are not up to date.
 
+    Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
@@ -52,11 +54,14 @@ def solve(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """What `solve` does with everything prepared; analyses go on from where `solution.earlier` has them."""
     with Interruption(watcher.stopping) as interruption:
+        solution, path_notes = with_paths(
+            solution, lambda trial: _evaluated(_completed(trial, watcher, interruption)), watcher.stage
+        )
         if any(body.modes == "auto" for body in solution.scene.body):
             solution = _with_enough_modes(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
-        solution = _checked(_evaluated(solution), watcher)
+        solution = replace(_checked(_evaluated(solution), watcher), path_notes=path_notes)
         if keep is not None and solution.analyses:
             keep(solution)
     if solution.failure is not None:

@@ -45,8 +45,11 @@ class Fcid(TimedAnalysis):
 
     kind: Literal["fcid"]
     shape: Literal["zero", "static", "given"]
+    """No deflection, that of the static equilibrium at every instant, or that in `modal`."""
     modal: dict[Name, tuple[Expression, ...]] | None = None
+    """By body, expressions in t for its first modal coordinates (m·√kg); the others are 0."""
     check: Check = None
+    """Replay the result on links with twice the modes ("finer")."""
 
     is_algebraic = True
     allocates_patches = True

@@ -54,10 +54,15 @@ class MotorsOnly(TimedAnalysis):
 
     kind: Literal["motors-only"]
     output: Literal["tip", "redefined"] = "tip"
+    """The points of the trajectories themselves, or where they would be with `factor` times the vibration."""
     factor: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    """Share of the vibration in the "redefined" output; by default nine tenths of the largest that is minimum phase."""
     pre_actuation: NotNegative | None = None
+    """How long motors act before the path begins, s; by default as long as the zero dynamics asks for."""
     post_actuation: NotNegative | None = None
+    """How long they act after it, s; by default likewise."""
     check: Check = None
+    """Replay the result on links with twice the modes ("finer")."""
 
     is_integrated = True
     applicable = ("joints",)

@@ -27,6 +27,7 @@ class Pcid(IntegratedAnalysis):
 
     kind: Literal["pcid"]
     check: Check = None
+    """Replay the result on links with twice the modes ("finer")."""
 
     is_resumable = True
     allocates_patches = True

@@ -164,7 +164,7 @@ MISTAKES = {
     ),
     "mass of patches without density": (
         "scene.toml",
-        {"density = 7600.0": 'structural = ["mass"]'},
+        {"density = 7600.0\n": "", "structural = false": 'structural = ["mass"]'},
         ['pzt "link1"', 'expected the key "density" beside structural = ["mass"], found none'],
     ),
     "weights of modes and of points": (
