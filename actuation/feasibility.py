@@ -105,6 +105,11 @@ class Feasibility:
     unsupplied: Unsupplied | None = None
 
     @property
+    def is_feasible(self) -> bool:
+        """Whether there are actuators for all that is needed, within their limits."""
+        return self.unsupplied is None and not self.short
+
+    @property
     def has_limits(self) -> bool:
         """Whether any motor or patch has a limit."""
         limits = [(of.moment_limit, of.speed_limit, of.power_limit) for of in self.motors.values()]

@@ -190,13 +190,10 @@ def _verdict(feasibility: Feasibility) -> str:
 
 def _enough(feasibility: Feasibility) -> str:
     """Of actuators none of which is beyond its limits."""
-    patches = any(np.isfinite(of.available_moment).any() for of in feasibility.patches.values())
-    motors = any(
-        np.isfinite([of.moment_limit, of.speed_limit, of.power_limit]).any() for of in feasibility.motors.values()
-    )
-    within = "within the limits that are given" if motors or patches else "no limits are given"
+    within = "within the limits that are given" if feasibility.has_limits else "no limits are given"
     if feasibility.unsupplied is not None:
-        return f"not by motors alone: see the warning ({within})"
+        means = "motors and patches" if feasibility.unsupplied.with_patches else "motors alone"
+        return f"{means} cannot do it: see the warning ({within})"
     return f"motors{' and patches' if feasibility.patches else ''} can do it, {within}"
 
 

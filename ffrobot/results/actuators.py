@@ -44,6 +44,7 @@ def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) 
 
 
 def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
+    group.attrs["feasible"] = judged.is_feasible
     if judged.unsupplied is not None:
         group.create_group("unsupplied").attrs.update(vars(judged.unsupplied))
     for joint, motor in judged.motors.items():

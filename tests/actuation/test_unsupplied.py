@@ -139,6 +139,7 @@ def test_what_is_said(tmp_path):
         results = library.solve(scene, tmp_path / "one.h5")
     about = results.attributes("inverse/feasibility/unsupplied")
     assert list(about["bodies"]) == ["link1"]
+    assert not results.attributes("inverse/feasibility")["feasible"]
     shift = np.linalg.norm(results["inverse/points/link1.tip/predicted_shift"], axis=1)
     assert about["angles_kept"] == shift.max()
     assert about["at_start"] == shift[0]
@@ -148,4 +149,5 @@ def test_a_joint_path_needs_nothing_besides_motors():
     trajectory = [{"name": "turn", "joint": "J1", "value": "0.3*(1-cos(3*t))"}]
     result = solve(chain((0.8,), (0.012,), (0.0,), 0.5, {}, trajectory, [run_for(0.5)])).analyses["inverse"]
     assert result.feasibility.unsupplied is None
+    assert result.feasibility.is_feasible
     assert not result.predicted_shift
