@@ -8,13 +8,13 @@ import time
 import traceback
 from collections.abc import Iterable
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .bench.command import bench
 from .common.errors import FfrobotError
+from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first, on_first
 from .present.failures import describe, ready_streams, without_output
 from .present.logs import FILE, LOGGER, logging_options, python_option
@@ -316,16 +316,10 @@ def main() -> None:
 
     Exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C, 143 after SIGTERM.
     """
-    stopped = 0
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        nonlocal stopped
-        stopped = number
-        signal.default_int_handler(number, frame)
-
+    stop = EndOfCommand()
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
     ready_streams()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         signal.signal(number, stop)
     try:
         cli(standalone_mode=False)
@@ -334,9 +328,9 @@ def main() -> None:
         error.show()
         sys.exit(error.exit_code)
     except Exception as error:
-        if stopped:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
+        if stop.number:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
             click.echo("ffrobot: stopped", err=True)
-            sys.exit(128 + stopped)
+            sys.exit(128 + stop.number)
         message = describe(error)
         if message is None:
             LOGGER.error("failed", exc_info=True)
@@ -349,5 +343,5 @@ def main() -> None:
         without_output()
         sys.exit(error.exit_code if isinstance(error, FfrobotError) else 1)
     finally:  # nothing is left to keep: at the interpreter's end an interrupt would be a traceback
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in SIGNALS:
             signal.signal(number, signal.SIG_DFL)

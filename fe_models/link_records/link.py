@@ -57,8 +57,9 @@ class OrthotropicMaterial(Record):
 
 def _symmetry(material: object) -> str:
     """Which record a material table is: three Young's moduli make it orthotropic."""
-    table = material if isinstance(material, Mapping) else vars(material)
-    moduli = table.get("youngs_modulus")
+    moduli = (
+        material.get("youngs_modulus") if isinstance(material, Mapping) else getattr(material, "youngs_modulus", None)
+    )
     return "orthotropic" if isinstance(moduli, list | tuple) else "isotropic"
 
 

@@ -23,7 +23,7 @@ def error_budget(solution: Solution) -> Iterator[str]:
             ended = "" if check.status == "completed" else f", which ended early ({check.status})"
             modes = ", ".join(map(str, dict.fromkeys(check.modes.values())))
             yield f"{name}, replayed on {modes} modes{ended}: {check.point} is off by {1e3 * check.error:.2g} mm"
-    yield from (f"patches: {patches.stiffness_in_words}" for patches in solution.patches.values())
+    yield from (f"patches of {patches.stiffness_in_words}" for patches in solution.patches.values())
 
 
 def integrated(solution: Solution) -> list[AnalysisResult]:

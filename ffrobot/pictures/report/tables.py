@@ -94,10 +94,11 @@ def voltages_table(runs: Sequence[Run]) -> Table:
     for run in runs:
         for body in run.results.names(f"{run.analysis}/pzt"):
             group = f"{run.analysis}/pzt/{body}"
-            about, largest = run.results.attributes(group), np.abs(run.results[f"{group}/required_voltage"]).max()
-            limited = np.isfinite(about["limit"])
-            limit = (f"{about['limit']:g}", f"{largest / about['limit']:.3g}") if limited else ("none", "")
-            rows.append((run.label, body, f"{largest:.6g}", *limit, f"{about['condition_number']:.3g}"))
+            about, required = run.results.attributes(group), np.abs(run.results[f"{group}/required_voltage"])
+            limits = np.atleast_1d(about["limit"])  # one for all patches, or one each
+            times = np.max(required / limits)
+            limit = (f"{limits.min():g}", f"{times:.3g}") if np.isfinite(limits).any() else ("none", "")
+            rows.append((run.label, body, f"{required.max():.6g}", *limit, f"{about['condition_number']:.3g}"))
     return Table(heading, rows)
 
 
