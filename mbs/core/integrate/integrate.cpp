@@ -25,6 +25,10 @@ constexpr double hopeless = 100;
 // step there is, and may take from the reserve until these are gone.
 constexpr double much_shorter = 1e-3, part_of_reserve = 0.25;
 
+// Part of the tolerance that the iterations of a step are measured by at least. The share of very short steps is below
+// the noise of forces, which no iteration gets through: they would stay as short as they are.
+constexpr double least_to_iterate = 1e-4;
+
 constexpr double rounding = 2e-14; // what error estimates see of it: shorter steps would not help
 
 // Length of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
@@ -161,12 +165,13 @@ private:
 
   // Size of the step's error relative to the largest one allowed; NaN where it could not be made.
   double try_step(const Attempt &attempt, const Allowance &allowance) {
-    const double tolerance = steps_.in_transient ? allowance.regular_error : allowance.error;
-    if (!method_->step(t_, z_.data(), attempt.step, tolerance) || !method_->correct(attempt.end))
+    const double allowed = steps_.in_transient ? allowance.regular_error : allowance.error;
+    const double to_iterate = std::max(allowed, least_to_iterate * controls_.tolerance);
+    if (!method_->step(t_, z_.data(), attempt.step, to_iterate) || !method_->correct(attempt.end))
       return NAN;
     system_.slope(attempt.end, method_->end(), method_->last_slope());
-    const double damping = method_->estimate(attempt.step, error_);
-    return system_.error_size(attempt.end, method_->end(), error_.data()) * damping / allowance.error;
+    method_->estimate(attempt.step, error_);
+    return system_.error_size(attempt.end, method_->end(), error_.data()) / allowance.error;
   }
 
   void accept(const Attempt &attempt, const Allowance &allowance, double size) {
