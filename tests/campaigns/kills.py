@@ -1,12 +1,13 @@
 """Signals at random times to all commands: what is left half-written, fails the next time, or is lost.
 
-    python tests/campaigns/kills.py [TRIES] [SEED]
+    python tests/campaigns/kills.py [--tries 100] [--seed 0] [--record]
 
 Run by hand, some minutes. Each try starts a command in a folder of its own, sends SIGINT, SIGTERM or SIGKILL after a
 random part of the time that it takes, looks at every file, and runs the same command again, with the same cache. Exit
 code 1 where anything was found.
 """
 
+import argparse
 import os
 import random
 import shutil
@@ -19,6 +20,7 @@ from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
 
 import numpy as np
+from record import record
 
 from ffrobot.fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ffrobot.results.file import Results
@@ -61,6 +63,7 @@ COMMANDS = {
     "schema": ["schema", "scene"],
 }
 OFTEN = {"link": 4, "solve": 4, "sweep": 2}
+KINDS = ("half-written file", "next run fails", "lost analysis", "traceback", "slow to stop")
 PATIENCE = 300.0  # s for any command
 
 
@@ -163,14 +166,25 @@ def _is_whole(path: Path) -> bool:
 
 def main() -> None:
     """Prints what was found."""
-    tries, seed = (int(text) for text in [*sys.argv[1:], *("100", "0")[len(sys.argv) - 1 :]])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tries", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--record", action="store_true", help="write what was found, for docs/stability.md")
+    asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        campaign = Campaign(Path(folder), seed)
+        campaign = Campaign(Path(folder), asked.seed)
         print({name: round(seconds, 1) for name, seconds in campaign.seconds.items()}, flush=True)
-        for number in range(tries):
+        for number in range(asked.tries):
             campaign.one(number)
-        print(f"{tries} kills, exit codes {dict(campaign.codes)}; found {dict(campaign.found) or 'nothing'}")
-    sys.exit(bool(campaign.found))
+    codes = ", ".join(f"{count} × {code}" for code, count in sorted(campaign.codes.items()))
+    found = ", ".join(f"{campaign.found[kind]} × {kind}" for kind in KINDS)
+    print(f"{asked.tries} signals, exit codes: {codes}; found: {found}")
+    if asked.record:
+        tried = (
+            f"{asked.tries} signals (INT, TERM, KILL) at random times to {', '.join(COMMANDS)}; the same command again"
+        )
+        record("kills", tried=tried, found=found)
+    sys.exit(bool(campaign.found.total()))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,15 @@
-"""The table of what was tried, the limit found and how failure is reported: rows in a file, and the page of them."""
+"""The table of what was tried, the limit found and how failure is reported: rows in a file, and the page of them.
 
+    python tests/stress/table.py     writes the page once more, from table.json and what campaigns have recorded
+
+A campaign of tests/campaigns has a row once it has written `records/NAME.json` there: `record.py` beside it says how.
+"""
+
+import json
 from pathlib import Path
 
 ROWS = Path(__file__).with_name("table.json")
+RECORDS = Path(__file__).parents[1] / "campaigns" / "records"
 PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
 
 SAME = 0.1  # relative difference within which numbers of another machine count as the same
@@ -21,6 +28,15 @@ Units of length, mass and time are the user's: nothing is compared with a meter,
 not reach its end keeps its results up to there; the attributes `status` and `cause` of the results file say how and
 why it ended, as does the message.
 """
+
+CAMPAIGNS = """
+## Campaigns
+
+Random inputs, damage and signals, by hand, with other seeds each time; no test repeats them. The last run of each, with
+its commit:
+
+| tried | found | command | when |
+|---|---|---|---|"""
 
 
 class Table:
@@ -75,4 +91,12 @@ def render(rows):
             if row["group"] == group:
                 found = row["found"].format(**{key: number(value) for key, value in row["measured"].items()})
                 page.append(f"| {tried}{' *' if row['long'] else ''} | {found} | {row['reported']} |")
+    page.append(CAMPAIGNS)
+    for path in sorted(RECORDS.glob("*.json")):
+        campaign = json.loads(path.read_text(encoding="utf-8"))
+        page.append("| {tried} | {found} | `{command}` | {when} |".format(**campaign))
     return "\n".join(page) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(render(json.loads(ROWS.read_text(encoding="utf-8"))), encoding="utf-8")

@@ -1,0 +1,36 @@
+"""What a campaign has found, for the page docs/stability.md: one file each in `records/`, written where asked for.
+
+A campaign (a script in this folder, run by hand with seeds of its own) takes an option `--record` and ends with
+
+    record("kills", tried="100 signals at random times …", found="0 half-written files, …")
+
+Counts belong into both texts. The table of the page then takes it in with `python tests/stress/table.py`, which
+reads all files in `records/`; both are committed. A campaign of several parts has a name for each: "tolerance-radau".
+"""
+
+import json
+import shlex
+import subprocess
+import sys
+from datetime import date
+from pathlib import Path
+
+HERE = Path(__file__).parent
+RECORDS = HERE / "records"
+
+
+def record(name: str, *, tried: str, found: str) -> None:
+    """Write `records/NAME.json`: what was tried, what was found, and the command, date and commit of this run."""
+    script = Path(sys.argv[0]).resolve().relative_to(HERE.parents[1])
+    arguments = [text for text in sys.argv[1:] if text != "--record"]
+    commit = subprocess.run(
+        ["git", "describe", "--always", "--dirty=, changed"], cwd=HERE, capture_output=True, text=True, check=True
+    )
+    entry = {
+        "command": shlex.join(["python", str(script), *arguments]),
+        "tried": tried,
+        "found": found,
+        "when": f"{date.today()}, {commit.stdout.strip()}",
+    }
+    RECORDS.mkdir(exist_ok=True)
+    (RECORDS / f"{name}.json").write_text(json.dumps(entry, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
