@@ -16,7 +16,7 @@ from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause, lost_inertia
 from ..solve.initial_state import undeformed_state
-from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls
+from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls, unmet
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
 from .earlier_check import check_earlier
@@ -91,16 +91,16 @@ def drive(
     if len(times) > 1 and (cause := lost_inertia(assembly, start.q)):
         raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
-    if earlier is None:
-        integrator = choose_integrator(assembly, analysis, start, steering, len(times))
-        continuation = Continuation(_core.Checkpoint(), recording)
-    else:
-        integrator, continuation = earlier.statistics.integrator, earlier.continuation
+    integrator = choose_integrator(assembly, analysis, start, steering, len(times))
+    continuation = Continuation(_core.Checkpoint(), recording)
+    if earlier is not None:  # with the same candidates, and what they have become since
+        known, continuation = earlier.statistics.integrator, earlier.continuation
+        integrator = replace(integrator, name=known.name, reason=known.reason)
     run = _integrated(assembly, analysis, start, times, integrator, steering, control, resolver, continuation, progress)
-    seconds = time.perf_counter() - began
+    seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)
     if statistics.status == "step underflow" and not statistics.cause:
-        statistics = replace(statistics, cause=beyond_order(integrator, analysis))
+        statistics = replace(statistics, cause=beyond_order(integrator, analysis) or unmet(integrator, run))
     outcome = Outcome(
         analysis=analysis,
         assembly=assembly,

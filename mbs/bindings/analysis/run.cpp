@@ -3,6 +3,7 @@
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/function.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "bindings/analysis/analysis.h"
@@ -52,15 +53,24 @@ void bind_checkpoint(nb::module_ &m) {
       .def(nb::init<>())
       .def(
           "__init__",
-          [](Checkpoint *c, double time, VectorXd state, const StepHistory &steps, Peaks peaks, std::size_t outputs) {
-            new (c) Checkpoint{{time, std::move(state), steps, outputs}, std::move(peaks)};
+          [](Checkpoint *c, double time, VectorXd state, const StepHistory &steps, Peaks peaks, std::size_t outputs,
+             const MethodHistory &methods) {
+            new (c) Checkpoint{{time, std::move(state), steps, outputs, methods}, std::move(peaks)};
           },
-          nb::kw_only(), "time"_a, "state"_a, "steps"_a, "peaks"_a, "outputs"_a, "state (n_q + n_v,).")
+          nb::kw_only(), "time"_a, "state"_a, "steps"_a, "peaks"_a, "outputs"_a, "methods"_a, "state (n_q + n_v,).")
       .def_prop_ro("time", [](const Checkpoint &c) { return c.integration.time; })
       .def_prop_ro("state", [](const Checkpoint &c) { return c.integration.state; })
       .def_prop_ro("steps", [](const Checkpoint &c) { return c.integration.steps; })
       .def_prop_ro("outputs", [](const Checkpoint &c) { return c.integration.outputs; })
+      .def_prop_ro("methods", [](const Checkpoint &c) { return c.integration.methods; })
       .def_ro("peaks", &Checkpoint::peaks);
+}
+
+auto changes_of(const Run &r) {
+  std::vector<std::tuple<double, MethodKind, MethodKind, double>> changes;
+  for (const MethodChange &change : r.report.changes)
+    changes.emplace_back(change.time, change.from, change.to, change.mean_step);
+  return changes;
 }
 
 void bind_outputs(nb::module_ &m) {
@@ -71,6 +81,9 @@ void bind_outputs(nb::module_ &m) {
       .def_prop_ro("steps", [](const Run &r) { return r.report.steps; })
       .def_prop_ro("rejected", [](const Run &r) { return r.report.rejected; })
       .def_prop_ro("evaluations", [](const Run &r) { return r.report.evaluations; })
+      .def_prop_ro("last_step", [](const Run &r) { return r.report.last_step; })
+      .def_prop_ro("last_error", [](const Run &r) { return r.report.last_error; })
+      .def_prop_ro("changes", &changes_of, "Of integrators: (time, from, to, mean step before) of each.")
       // references: the arrays are views that keep their Run alive
       .def_prop_ro("q", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.q; })
       .def_prop_ro("v", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.v; })

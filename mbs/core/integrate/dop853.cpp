@@ -50,6 +50,15 @@ void Dop853::prepare_dense(double t, const double *y, double h) {
   }
 }
 
+// The last term of the interpolation is at most (4/7)^4 (3/7)^3 of its coefficient. On a vibration of 0.3 to 7 radians
+// a step it is 6 to 7 times the largest error, which is 3 times the estimate of the step as long as that is stable and
+// 8 times where it is not.
+bool Dop853::estimate_dense(Eigen::VectorXd &error) const {
+  constexpr double largest_of_last = 0.0084, of_error = 6;
+  error = largest_of_last / of_error * F_.col(Tableau::dense_order - 1);
+  return true;
+}
+
 void Dop853::interpolate(double t, double *y) const {
   const double x = (t - t0_) / h_;
   Eigen::Map<Eigen::VectorXd> out(y, n_);

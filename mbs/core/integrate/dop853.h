@@ -23,6 +23,7 @@ public:
 
   bool lands_on_outputs() const override { return false; }
   void prepare_dense(double t, const double *y, double h) override; // three more slopes
+  bool estimate_dense(Eigen::VectorXd &error) const override;
   void interpolate(double t, double *y) const override;
 
   double *end() override { return end_.data(); }

@@ -50,6 +50,10 @@ public:
 
   // Coefficients for interpolate() within the step just made.
   virtual void prepare_dense(double t, const double *y, double h) = 0;
+
+  // Largest error of interpolate() within the step, once prepared; false where it is never much more than that of the
+  // step's end.
+  virtual bool estimate_dense(Eigen::VectorXd &) const { return false; }
   virtual void interpolate(double t, double *y) const = 0;
 
   virtual double *end() = 0;
