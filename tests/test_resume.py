@@ -71,15 +71,19 @@ def differences(results, expected):
 @pytest.mark.parametrize(
     ("stopped", "keys"),
     [
-        ("inverse", "tolerance = 1e-7"),
-        ("forward", "tolerance = 1e-7"),
+        ("inverse", "tolerance = 1e-5"),
+        ("forward", "tolerance = 1e-5"),
         ("inverse", 'tolerance = 1e-4\nintegrator = "dopri5"'),
     ],
 )
 def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped, keys):
-    """To the last bit: the explicit methods go on with the same step."""
+    """To the last bit: the explicit methods go on with the same step.
+
+    "auto" has tried Radau before: what it found, and steps by two methods to be replayed, go on as well.
+    """
     scene = arm(**{"tolerance = 1e-7": keys})
     expected = ffrobot.solve(scene)
+    assert (expected.attributes("inverse")["integrator"] == "dop853 after radau") == ("integrator" not in keys)
     message = stop(scene, stopped, 0.03)
     with h5py.File(scene.with_suffix(".h5")) as file:
         reached = file[stopped]["resume/checkpoint"].attrs["time"]

@@ -126,7 +126,8 @@ def _integrated(
     progress: Progress,
 ) -> _core.Run:
     common: dict[str, Any] = {
-        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments, "times": as_list(times),
+        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments,
+        "joints": assembly.joint_measures, "times": as_list(times),
         "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
     }  # fmt: skip
     if control is None:

@@ -88,7 +88,7 @@ class Statistics:
 STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error", "in_transient")
 """Of the core's `StepHistory`, all."""
 
-METHOD_HISTORY = ("second", "pace_of_other", "since", "measured", "tries", "trial")
+METHOD_HISTORY = ("second", "pace_of_other", "since", "measured", "tries", "window", "trial")
 """Of the core's `MethodHistory`, all."""
 
 BODY_PEAKS = (

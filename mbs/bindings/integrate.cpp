@@ -82,13 +82,16 @@ void bind_histories(nb::module_ &m) {
       .def(
           "__init__",
           [](MethodHistory *h, bool second, double pace_of_other, double since, double measured, unsigned long tries,
-             unsigned long trial) { new (h) MethodHistory{second, pace_of_other, since, measured, tries, trial}; },
-          nb::kw_only(), "second"_a, "pace_of_other"_a, "since"_a, "measured"_a, "tries"_a, "trial"_a)
+             unsigned long window, unsigned long trial) {
+            new (h) MethodHistory{second, pace_of_other, since, measured, tries, window, trial};
+          },
+          nb::kw_only(), "second"_a, "pace_of_other"_a, "since"_a, "measured"_a, "tries"_a, "window"_a, "trial"_a)
       .def_ro("second", &MethodHistory::second)
       .def_ro("pace_of_other", &MethodHistory::pace_of_other)
       .def_ro("since", &MethodHistory::since)
       .def_ro("measured", &MethodHistory::measured)
       .def_ro("tries", &MethodHistory::tries)
+      .def_ro("window", &MethodHistory::window)
       .def_ro("trial", &MethodHistory::trial);
 }
 

@@ -214,6 +214,16 @@ def test_generalized_alpha_says_that_a_tolerance_is_beyond_it():
         run_pcid(model, analysis, False, always).check_completed()
 
 
+def test_where_steps_collapse_does_not_depend_on_max_steps():
+    path = {"name": "tip", "point": "link2.tip", "x": f"{TIP[0]!r}-0.12*sin(100*t)", "y": f"{TIP[1]!r}"}
+    model = arm(gravity=(0.0, 0.0), trajectory=[path])
+    keys = {"end": 0.2, "tolerance": 1e-8, "integrator": "generalized-alpha"}
+    runs = [run_pcid(model, pcid(max_steps=most, **keys), False, always) for most in (50_000, 1_000_000)]
+    assert [run.status for run in runs] == ["step underflow"] * 2
+    assert runs[0].statistics.steps == runs[1].statistics.steps
+    assert runs[0].statistics.time_reached == runs[1].statistics.time_reached
+
+
 def test_a_run_stops_when_asked_to():
     asked = []
     outcome = run_pcid(arm(), pcid(tolerance=1e-10), False, lambda t: asked.append(t) or t < 0.2)

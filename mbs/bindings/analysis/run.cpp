@@ -94,7 +94,7 @@ void bind_outputs(nb::module_ &m) {
       .def_prop_ro("residual", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.residual; });
 }
 
-Run run_system(const System &system, std::vector<int> groups, const std::vector<bool> &moments,
+Run run_system(const System &system, std::vector<int> groups, std::vector<bool> moments, std::vector<Measure> joints,
                const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
                const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
                ExternalLoads *external_loads, ActuatorForces *actuator_forces, Recording *recording,
@@ -103,7 +103,8 @@ Run run_system(const System &system, std::vector<int> groups, const std::vector<
   check_size("v", v.size(), system.n_v());
   check_size("moments", static_cast<Index>(moments.size()), static_cast<Index>(groups.size()));
   const nb::gil_scoped_release unlocked;
-  ConstrainedMotion motion(system, {system, std::move(groups), moments}, external_loads);
+  ConstrainedMotion motion(
+      system, {system, {std::move(groups), std::move(moments), std::move(joints), actuator_forces}}, external_loads);
   const auto ask = [&](double t) {
     const nb::gil_scoped_acquire locked;
     return carry_on(t);
@@ -117,8 +118,8 @@ Run run_system(const System &system, std::vector<int> groups, const std::vector<
 void bind_run(nb::module_ &m) {
   bind_checkpoint(m);
   bind_outputs(m);
-  m.def("run", &run_system, nb::kw_only(), "system"_a, "groups"_a, "moments"_a, "times"_a, "q"_a, "v"_a, "controls"_a,
-        "carry_on"_a, "external_loads"_a = nb::none(), "actuator_forces"_a = nb::none(), "recording"_a = nb::none(),
-        "checkpoint"_a = nb::none(),
+  m.def("run", &run_system, nb::kw_only(), "system"_a, "groups"_a, "moments"_a, "joints"_a, "times"_a, "q"_a, "v"_a,
+        "controls"_a, "carry_on"_a, "external_loads"_a = nb::none(), "actuator_forces"_a = nb::none(),
+        "recording"_a = nb::none(), "checkpoint"_a = nb::none(),
         "Integrates the motion from (q, v), or on from a checkpoint, which it moves, and reports it at `times`.");
 }

@@ -19,7 +19,7 @@ public:
   // Estimate of order 5, times a factor that the estimate of order 3 brings it down by: together they shrink as h^8.
   void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 8; }
-  double error_share(double fraction) const override { return std::min(std::sqrt(fraction) / 10, 12 * fraction); }
+  double error_share(double fraction) const override { return std::min(std::sqrt(fraction) / 10, 16 * fraction); }
 
   bool lands_on_outputs() const override { return false; }
   void prepare_dense(double t, const double *y, double h) override; // three more slopes

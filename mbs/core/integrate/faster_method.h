@@ -21,6 +21,7 @@ struct MethodHistory {
   double since = 0;         // s: where the one at work began, or was last compared
   double measured = 0;      // s: where its pace was measured last
   unsigned long tries = 0;  // steps that it has tried from `since` on
+  unsigned long window = 0; // of them, between measurements
   unsigned long trial = 0;  // of them, before the other is tried
 };
 
