@@ -15,27 +15,32 @@ from .errors import InputError
 
 MARK = "checksum"  # attribute at / of a file that has one, so that a missing line is noticed
 METHOD = "crc32"
-State = Literal["sound", "damaged", "none"]
+State = Literal["sound", "changed", "damaged", "none"]
 
 _LINE = "\nffrobot checksum crc32 {:08x} of {:016d} bytes\n"
+_RENEWED = _LINE.replace("checksum", "resealed")
 _LENGTH = len(_LINE.format(0, 0))
-_PATTERN = re.compile(rb"\nffrobot checksum crc32 ([0-9a-f]{8}) of (\d{16}) bytes\n")
+_PATTERN = re.compile(rb"\nffrobot (checksum|resealed) crc32 ([0-9a-f]{8}) of (\d{16}) bytes\n")
 _PIECE = 1 << 20
 
 
-def sealed(content: bytes) -> bytes:
+def sealed(content: bytes, line: str = _LINE) -> bytes:
     """`content` with its checksum."""
-    return content + _LINE.format(zlib.crc32(content), len(content)).encode()
+    return content + line.format(zlib.crc32(content), len(content)).encode()
 
 
 def seal(path: Path) -> None:
     """Renew the checksum of a file that was changed on purpose."""
     content = path.read_bytes()
-    path.write_bytes(sealed(content[:-_LENGTH] if _PATTERN.fullmatch(content[-_LENGTH:]) else content))
+    content = content[:-_LENGTH] if _PATTERN.fullmatch(content[-_LENGTH:]) else content
+    path.write_bytes(sealed(content, _RENEWED))
 
 
 def state(path: Path) -> State:
-    """Whether the file at `path` is as it was written; "none" where it does not say. Raises `OSError`."""
+    """Whether the file at `path` is as ffrobot wrote it, or as somebody who has changed it on purpose has sealed it.
+
+    "none" where it does not say. Raises `OSError`.
+    """
     with path.open("rb") as stream:
         size = stream.seek(0, 2) - _LENGTH
         if size < 0:
@@ -44,13 +49,15 @@ def state(path: Path) -> State:
         line = _PATTERN.fullmatch(stream.read(_LENGTH))
         if line is None:
             return "none"
-        if int(line[2]) != size:
+        if int(line[3]) != size:
             return "damaged"
         stream.seek(0)
         checksum, left = 0, size
         while left > 0 and (piece := stream.read(min(left, _PIECE))):
             checksum, left = zlib.crc32(piece, checksum), left - len(piece)
-    return "sound" if checksum == int(line[1], 16) else "damaged"
+    if checksum != int(line[2], 16):
+        return "damaged"
+    return "sound" if line[1] == b"checksum" else "changed"
 
 
 def refuse(path: Path) -> InputError:

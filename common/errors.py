@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 
 class FfrobotError(Exception):
     """Base of all errors whose message is meant for the user: shown without a traceback."""
@@ -30,3 +34,23 @@ class StoppedError(SolveError):
     def __init__(self, message: str, number: int) -> None:
         super().__init__(message)
         self.exit_code = 128 + number  # as shells tell it
+
+
+@contextmanager
+def of_file(name: object) -> Iterator[None]:
+    """Have errors that name no file say that they are about `name`; what fails numerically within becomes `SolveError`.
+
+    NumPy and SciPy raise `LinAlgError` where matrices are singular or not finite, which valid but extreme numbers make.
+    """
+    from numpy.linalg import LinAlgError
+
+    try:
+        yield
+    except StoppedError:
+        raise
+    except (InputError, SolveError) as error:
+        if str(error).startswith(str(name)) or Path(str(error).partition(":")[0]).suffix:  # of another file
+            raise
+        raise type(error)(f"{name}: {error}") from None
+    except (LinAlgError, FloatingPointError) as error:
+        raise SolveError(f"{name}: {error}: numbers that differ too much in size, or are too large or small") from error

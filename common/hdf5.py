@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -87,8 +88,9 @@ def blaming(*paths: Path) -> Iterator[None]:
         doubtful = [path for path in paths if _is_doubtful(path)]
         if not doubtful:
             raise
-        about = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise InputError(f"{doubtful[0]}: damaged file, or one that ffrobot did not write: {about}") from error
+        raise InputError(
+            f"{doubtful[0]}: damaged file, or one that ffrobot did not write: {_in_words(error)}"
+        ) from error
 
 
 @contextmanager
@@ -96,6 +98,15 @@ def reading(*paths: Path) -> Iterator[None]:
     """For a command that reads these files: none of them is lost to an output, errors are put down to damage."""
     with protected(paths), blaming(*paths):
         yield
+
+
+def _in_words(error: Exception) -> str:
+    """What h5py and others say of what they do not find, or find otherwise."""
+    lacking = re.search(r"(object|attribute:) '(.+)'", str(error)) if isinstance(error, KeyError) else None
+    if lacking is not None:
+        kind = "attribute" if lacking[1] == "attribute:" else "dataset or group"
+        return f'expected the {kind} "{lacking[2]}", found none'
+    return f"{type(error).__name__}: {error}".splitlines()[0]
 
 
 def _is_doubtful(path: Path) -> bool:

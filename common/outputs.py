@@ -12,6 +12,7 @@ from pathlib import Path
 
 from . import checksum
 from .errors import InputError
+from .tables import shown
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _KINDS = {HDF5_SIGNATURE: "HDF5", b"\x89PNG": "PNG", b"%PDF": "PDF", b"PK\x03\x04": "zip", b"MATLAB": "MATLAB"}
@@ -39,15 +40,31 @@ def check_not_an_input(path: Path) -> None:
             os.stat(path)
     except FileNotFoundError:
         pass
-    except (OSError, RuntimeError) as error:
-        reason = "links that lead in a circle" if "loop" in str(error).lower() or "symbolic" in str(error) else error
-        raise InputError(f"{path}: output: expected a file name, found {reason}") from None
+    except (OSError, RuntimeError, ValueError) as error:
+        raise InputError(f"{shown(str(path))}: output: expected a file name, found {why_no_file(error)}") from None
     for source in _inputs.get():
         same = target == source.absolute() or target == _resolved(source)
-        with suppress(OSError):
+        with suppress(OSError, ValueError):
             same = same or path.samefile(source)
         if same:
             raise InputError(f"{path}: output: expected another file than the input {source}, which would be lost")
+
+
+def check_file_name(text: str) -> Path:
+    """`text` as a path. Raises `InputError` where it can be the name of no file, whether there or not."""
+    path = Path(text)
+    try:
+        path.resolve()
+        path.exists()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise InputError(f"{shown(text)}: expected the name of a file, found {why_no_file(error)}") from None
+    return path
+
+
+def why_no_file(error: Exception) -> str:
+    """What is wrong with a path whose use has raised `error`: too long, a circle of links, no name of a file."""
+    about = getattr(error, "strerror", None) or str(error)
+    return "links that lead in a circle" if "loop" in about.lower() or "symbolic" in about else about
 
 
 def check_same_kind(path: Path, content: bytes) -> None:
@@ -101,6 +118,6 @@ def _hdf5_format(source: Path | BytesIO) -> str:
 
 
 def _resolved(path: Path) -> Path:
-    with suppress(OSError, RuntimeError):
+    with suppress(OSError, RuntimeError, ValueError):
         return path.resolve()
     return path.absolute()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from os import PathLike
@@ -16,6 +15,8 @@ from pydantic_core import ErrorDetails
 
 from .errors import InputError
 from .function_content import digest_of_function
+from .tables import key_path, shown
+from .toml_files import check_limits
 
 
 class Record(BaseModel):
@@ -46,38 +47,21 @@ R = TypeVar("R", bound=Record)
 def existing_file(path: Path, info: ValidationInfo) -> Path:
     """Resolve `path` against the folder of the input file it is written in, and make sure that it is there."""
     folder: Path = (info.context or {}).get("folder", Path())
-    resolved = folder / path
-    if not resolved.is_file():
+    resolved, name = folder / path, shown(str(path))
+    try:
+        if resolved.is_file():
+            return resolved
         present = [entry.name for entry in resolved.parent.iterdir()] if resolved.parent.is_dir() else []
-        hint = did_you_mean(path.name, present)
-        raise ValueError(f'expected an existing file, found "{path}", which is not in {folder.absolute()}{hint}')
-    return resolved
+    except (OSError, ValueError) as error:  # too long, in a folder that may not be read, no name of a file
+        raise ValueError(f'expected an existing file, found "{name}": {getattr(error, "strerror", error)}') from None
+    if resolved.exists():
+        raise ValueError(f'expected a file, found "{name}", which is {"a folder" if resolved.is_dir() else "a device"}')
+    hint = did_you_mean(path.name, present)
+    raise ValueError(f'expected an existing file, found "{name}", which is not in {folder.absolute()}{hint}')
 
 
 InputFile = Annotated[Path, AfterValidator(existing_file)]
 """A file named by an input file, relative to it; it exists."""
-
-
-# The key that makes a file one of its kind, and the command for it.
-_KINDS = {"link file": ("geometry", "ffrobot link"), "scene file": ("analysis", "ffrobot solve")}
-
-
-def load_toml(path: Path, kind: str) -> dict[str, Any]:
-    """Parse the TOML file at `path`; `kind` ("link file", "scene file") is how the error message calls it."""
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: {kind} not found") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot read the {kind}: {error.strerror or error}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: cannot read the {kind}: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not a valid TOML {kind}: {error}") from None
-    for other, (key, command) in _KINDS.items():
-        if kind in _KINDS and key in data and _KINDS[kind][0] not in data:
-            raise InputError(f"{path}: expected a {kind}, found a {other} (is it for {command}?)")
-    return data
 
 
 def validate(record: type[R], data: dict[str, Any], path: Path, objects: Mapping[str, object] | None = None) -> R:
@@ -86,6 +70,7 @@ def validate(record: type[R], data: dict[str, Any], path: Path, objects: Mapping
     `objects` are what TOML cannot hold, by the text that stands for them in `data`; validators find them in their
     context.
     """
+    check_limits(data, path)
     context = {"path": path, "folder": path.parent, "objects": objects or {}}
     try:
         # By way of JSON, whose strict mode reads lists as tuples and text as paths; TOML has no types for these either.
@@ -219,30 +204,6 @@ def _show(value: object) -> str:
     """`value` as TOML writes it, shortened."""
     text = json.dumps(value, default=str, ensure_ascii=False)
     return text if len(text) <= 60 else text[:57] + "…"
-
-
-def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
-    """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass").
-
-    Parts that name the alternative of a union rather than a key of the file are left out.
-    """
-    path = ""
-    here: Any = data
-    for k, part in enumerate(loc):
-        is_missing_key = kind == "missing" and k == len(loc) - 1
-        if isinstance(here, list) and isinstance(part, int) and part < len(here):
-            here = here[part]
-            path += f" {_label(here, part)}: " if isinstance(here, dict) else f"[{part}]"
-        elif isinstance(here, dict) and (part in here or is_missing_key):
-            here = here.get(part)
-            path += ("." if path and not path.endswith(" ") else "") + str(part)
-    return path.removesuffix(": ")
-
-
-def _label(table: dict[str, Any], index: int) -> str:
-    """What an entry of an array of tables is called: by its name, its body, or its place in the file."""
-    name = table.get("name", table.get("body"))
-    return f'"{name}"' if isinstance(name, str) else f"no. {index + 1}"
 
 
 def _alternatives(

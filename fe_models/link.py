@@ -14,7 +14,7 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from ..common.errors import FfrobotError, SolveError
+from ..common.errors import FfrobotError, SolveError, of_file
 from ..common.files import check_output
 from ..common.interrupts import deferred_interrupts
 from ..common.parallel import on_first, processes
@@ -136,7 +136,8 @@ def _compute(
     compute = _computation(link, source_path, force)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
-        body = compute(link, source_path, progress or _silent)
+        with of_file(source_path):
+            body = compute(link, source_path, progress or _silent)
         return replace(body, input_hash=digest, modes_hash=modes_hash(link))
 
     if processes() > 1 and isinstance(link, BeamLink):  # too small to share out

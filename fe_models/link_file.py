@@ -16,7 +16,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ..common.errors import InputError
-from ..common.validation import load_toml, validate
+from ..common.toml_files import load_toml
+from ..common.validation import validate
 from ..mesh.records import RectangleSection, SectionRecord, TubeSection
 from .beam.section_stress import contains
 from .link_records import BeamLink, Link, Material, OrthotropicMaterial, SolidLink

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -100,30 +101,33 @@ def read_modal_body(path: AnyPath) -> ModalBody:
     return read_modal_body(Path(path))
 
 
-def plot_results(results: AnyPath, folder: AnyPath, formats: Sequence[str] = ("png", "pdf")) -> list[Path]:
-    """Draw the figures of a results file into `folder`: `ffrobot plot`. Returns the files written.
+def plot_results(results: AnyPath | Results, folder: AnyPath, formats: Sequence[str] = ("png", "pdf")) -> list[Path]:
+    """Draw the figures of results into `folder`: `ffrobot plot`. Returns the files written.
 
     `formats` are "png", "pdf", "svg".
     """
-    from .common.hdf5 import reading
-    from .pictures.figures.plot import plot_results
+    from .common.extras import extras
 
-    with reading(Path(results)):
-        return plot_results(Path(results), Path(folder), formats)
+    with extras(), _files(results) as (path,):
+        from .pictures.figures.plot import plot_results
+
+        return plot_results(path, Path(folder), formats)
 
 
-def write_report(results: Sequence[AnyPath], path: AnyPath) -> None:
-    """Write one HTML page about results files: `ffrobot report`."""
-    from .common.hdf5 import reading
-    from .pictures.report import write_report
+def write_report(results: AnyPath | Results | Sequence[AnyPath | Results], path: AnyPath) -> None:
+    """Write one HTML page about results, or several side by side: `ffrobot report`."""
+    from .common.extras import extras
+    from .results.file import Results
 
-    paths = [Path(file) for file in results]
-    with reading(*paths):
+    several = [results] if isinstance(results, str | PathLike | Results) else results
+    with extras(), _files(*several) as paths:
+        from .pictures.report import write_report
+
         write_report(paths, Path(path))
 
 
 def view_file(
-    file: AnyPath,
+    file: AnyPath | Results,
     folder: AnyPath,
     *,
     analysis: str | None = None,
@@ -132,13 +136,24 @@ def view_file(
     scale: float | None = None,
     pictures: bool | None = None,
 ) -> list[Path]:
-    """Write grids for ParaView, and pictures, of a results file or modal body file: `ffrobot view`.
+    """Write grids for ParaView, and pictures, of results or of a modal body file: `ffrobot view`.
 
     `frames` outputs at most of one `analysis`, or of all; the picture at `time` (s) with deflections `scale` times as
     large. `pictures`: whether to draw them; None: where PyVista can. Returns the files written.
     """
-    from .common.hdf5 import reading
     from .pictures.view.view import FRAMES, Options, view_file
 
-    with reading(Path(file)):
-        return view_file(Path(file), Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths
+    with _files(file) as (path,):
+        return view_file(path, Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths
+
+
+@contextmanager
+def _files(*results: AnyPath | Results) -> Iterator[list[Path]]:
+    """The files of results, to be read; of those in memory, temporary ones."""
+    from .common.hdf5 import reading
+    from .results.file import Results
+
+    with ExitStack() as stack:
+        paths = [stack.enter_context(r.on_disk()) if isinstance(r, Results) else Path(r) for r in results]
+        stack.enter_context(reading(*paths))
+        yield paths

@@ -16,12 +16,13 @@ import click
 from .bench.command import bench
 from .common.errors import FfrobotError
 from .common.parallel import end_all, is_first, on_first
-from .present.logs import LOGGER, logging_options, python_option
+from .present.failures import describe, ready_streams, without_output
+from .present.logs import FILE, LOGGER, logging_options, python_option
+
+MOST = 100_000  # runs of a sweep, frames of a view
 
 if TYPE_CHECKING:
     from .run.solution import Solution
-
-FILE = click.Path(path_type=Path)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -169,7 +170,7 @@ def plot(file: Path, output: Path | None, formats: str) -> None:
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the files; FILE.view if absent.")
 @click.option("--analysis", metavar="NAME", help="Of this analysis only.")
-@click.option("--frames", metavar="N", type=click.IntRange(1), default=201, help="Time steps at most [201].")
+@click.option("--frames", metavar="N", type=click.IntRange(1, MOST), default=201, help="Time steps at most [201].")
 @click.option("--time", metavar="SECONDS", type=float, help="Of the picture [where deflections are largest].")
 @click.option("--scale", metavar="S", type=float, help="Of deflections in the picture [as large as can be seen].")
 @click.option("--pictures/--no-pictures", default=None, help="PNG pictures too [where PyVista can draw].")
@@ -224,10 +225,14 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
 @cli.command()
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
 @click.option("--vary", metavar="KEY=VALUES", multiple=True, required=True, help="What takes which values; repeatable.")
-@click.option("--sample", metavar="N", type=click.IntRange(1), help="N points of a Latin hypercube, not the full grid.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the sample.")
+@click.option(
+    "--sample", metavar="N", type=click.IntRange(1, MOST), help="N points of a Latin hypercube, not the full grid."
+)
+@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Of the sample.")
 @click.option("--collect", metavar="DATASET[:max|rms|first|last]", multiple=True, help="Further columns; repeatable.")
-@click.option("-j", "--processes", type=click.IntRange(1), default=1, show_default=True, help="Runs side by side.")
+@click.option(
+    "-j", "--processes", type=click.IntRange(1, 1000), default=1, show_default=True, help="Runs side by side."
+)
 @click.option("--retry", is_flag=True, help="Run again what failed before.")
 @click.option("--keep/--no-keep", default=True, show_default=True, help="Whether results files of the runs stay.")
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder of the sweep [SCENE.sweep beside the input].")
@@ -315,10 +320,12 @@ def main() -> None:
         signal.default_int_handler(number, frame)
 
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
+    ready_streams()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, stop)
     try:
         cli(standalone_mode=False)
+        sys.stdout.flush()
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
@@ -326,15 +333,17 @@ def main() -> None:
         if stopped:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
             click.echo("ffrobot: stopped", err=True)
             sys.exit(128 + stopped)
-        if not isinstance(error, FfrobotError):
+        message = describe(error)
+        if message is None:
             LOGGER.error("failed", exc_info=True)
             traceback.print_exc()
             end_all()
             sys.exit(1)
         if is_first():
-            LOGGER.error("%s", error)
-            click.echo(f"ffrobot: {error}", err=True)
-        sys.exit(error.exit_code)
+            LOGGER.error("%s", message)
+            click.echo(f"ffrobot: {message}", err=True)
+        without_output()
+        sys.exit(error.exit_code if isinstance(error, FfrobotError) else 1)
     finally:  # nothing is left to keep: at the interpreter's end an interrupt would be a traceback
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)

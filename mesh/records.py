@@ -14,12 +14,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ..common.names import Name, Title
+from ..common.numbers import NotNegative, Positive, Vector3
 from ..common.validation import InputFile, Record
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Vector = tuple[float, float, float]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
+MOST_ELEMENTS = 100_000  # of a beam
+MOST_DIVISIONS = 10_000  # of a solid along an axis
+Division = Annotated[int, Field(ge=1, le=MOST_DIVISIONS)]
 
 
 class RectangleSection(Record):
@@ -75,7 +76,7 @@ class BeamGeometry(Record):
 class BeamMesh(Record):
     """Element boundaries: `elements` of them as equal as the steps of the section allow, or the list of `nodes`."""
 
-    elements: Annotated[int, Field(ge=1, le=100_000)] | None = None
+    elements: Annotated[int, Field(ge=1, le=MOST_ELEMENTS)] | None = None
     nodes: Annotated[tuple[float, ...], Field(min_length=2)] | None = None  # m from the root
 
 
@@ -98,9 +99,9 @@ class SolidGeometry(Record):
     file: InputFile | None = None
     unit: Literal["m", "mm", "in"] = "m"  # of the file's coordinates
     # Where the link's frame stands in the file's axes: origin in the file's unit, directions of any length.
-    origin: Vector = (0.0, 0.0, 0.0)
-    x_axis: Vector = (1.0, 0.0, 0.0)
-    y_axis: Vector = (0.0, 1.0, 0.0)
+    origin: Vector3 = (0.0, 0.0, 0.0)
+    x_axis: Vector3 = (1.0, 0.0, 0.0)
+    y_axis: Vector3 = (0.0, 1.0, 0.0)
 
 
 class SolidMeshRecord(Record):
@@ -113,9 +114,7 @@ class SolidMeshRecord(Record):
     cell: Literal["tetrahedron", "hexahedron"] | None = None
     order: Annotated[int, Field(ge=1, le=3)] | None = None
     size: Positive | None = None  # m
-    divisions: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = (
-        None
-    )
+    divisions: tuple[Division, Division, Division] | None = None
 
 
 class PlaceRecord(Record):
@@ -128,9 +127,9 @@ class PlaceRecord(Record):
     """
 
     name: Name
-    position: NotNegative | Vector | None = None
-    normal: Vector | None = None  # outward
-    group: Annotated[str, Field(min_length=1)] | None = None
+    position: NotNegative | Vector3 | None = None
+    normal: Vector3 | None = None  # outward
+    group: Title | None = None
 
 
 @dataclass(frozen=True)

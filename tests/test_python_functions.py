@@ -61,7 +61,8 @@ def test_text_of_the_scene_names_the_function():
 @pytest.mark.parametrize(
     ("value", "complaint"),
     [
-        (lambda t: 0.5 * t, "expected a finite velocity"),
+        (lambda t: 0.5 * t, "expected a function of t that returns (value, rate, acceleration)"),
+        (lambda t: {}, "expected numbers, found {} at t = 0 s"),
         (lambda t: (0.0, 1.0), "expected (value, rate, acceleration)"),
         (SimpleNamespace(address="here"), "expected a function of t"),
     ],

@@ -7,7 +7,8 @@ import pytest
 from pydantic import Field
 
 from ffrobot.common.errors import InputError
-from ffrobot.common.validation import InputFile, Record, load_toml, validate
+from ffrobot.common.toml_files import load_toml
+from ffrobot.common.validation import InputFile, Record, validate
 
 
 class Circle(Record):

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...common.arrays import Array, as_list
+from ...common.numbers import MOST_OUTPUTS
 from ...mbs._core import TimeFunction
 from ...mbs.analysis.drive import Progress, SampledControl, drive, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
@@ -74,6 +75,8 @@ class ClosedLoop(ActuatedAnalysis):
         end = self.end
         if end and self.delay >= end:
             raise ValueError(f"expected a delay shorter than the run ({end:g} s), found {self.delay:g} s")
+        if end and end / self.sample_time > MOST_OUTPUTS:
+            raise ValueError(f"expected at most {MOST_OUTPUTS} samples, found sample_time = {self.sample_time:g} s")
         if end and self.sample_time > end:
             raise ValueError(f"expected a sample_time of at most the run ({end:g} s), found {self.sample_time:g} s")
         return self

@@ -17,7 +17,9 @@ It reads the sensors that the scene gives.
 from __future__ import annotations
 
 import runpy
+import traceback
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -32,20 +34,32 @@ class PythonControl:
     bandwidth = 0.0
 
     def __init__(self, factory: Callable[[Setup], Callable[[int, Array], Array]], setup: Setup, label: str) -> None:
-        self.label, self.size = label, len(setup.inputs)
-        self.act = factory(setup)
+        self.label, self.size, self.times = label, len(setup.inputs), setup.times
+        try:
+            self.act = factory(setup)
+        except (Exception, SystemExit) as error:  # the user's code may raise anything
+            raise SolveError(f"{label}: {_in_words(error)}") from error
+        if not callable(self.act):
+            raise SolveError(f"{label}: expected it to return a function (k, y) → u, found {self.act!r}")
 
     def __call__(self, k: int, y: Array) -> Array:
         """What the user's function commands at sample k."""
         try:
             u = np.asarray(self.act(k, y), dtype=float)
-        except Exception as error:  # the user's code may raise anything
-            raise SolveError(f"{self.label}: sample {k}: {type(error).__name__}: {error}") from error
+        except (Exception, SystemExit) as error:  # the user's code may raise anything
+            raise SolveError(f"{self._at(k)}: {_in_words(error)}") from error
         if u.shape != (self.size,) or not np.isfinite(u).all():
-            raise SolveError(
-                f"{self.label}: sample {k}: expected {self.size} finite commands, found shape {u.shape}: {u}"
-            )
+            raise SolveError(f"{self._at(k)}: expected {self.size} finite commands, found shape {u.shape}: {u}")
         return u
+
+    def _at(self, k: int) -> str:
+        return f"{self.label}: sample {k}, t = {self.times[k]:g} s"
+
+
+def _in_words(error: BaseException) -> str:
+    """What the user's code has raised, and in which line."""
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} (line {last.lineno} of {Path(last.filename).name}, in {last.name})"
 
 
 def load_function(reference: str) -> Callable[[Setup], Callable[[int, Array], Array]]:
@@ -53,8 +67,8 @@ def load_function(reference: str) -> Callable[[Setup], Callable[[int, Array], Ar
     path, _, name = reference.rpartition(":")
     try:
         found = runpy.run_path(path)
-    except Exception as error:
-        raise InputError(f"{path}: controller: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{path}: controller: {_in_words(error)}") from error
     if not callable(found.get(name)):
         raise InputError(f'{path}: controller: expected the function "{name}", found none')
     function: Callable[[Setup], Callable[[int, Array], Array]] = found[name]

@@ -10,7 +10,16 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from ...common.python_files import check_python_file
 from ...common.validation import Record, existing_file, quoted
-from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PointReference, Positive, one_of
+from ...mbs.fields.field_types import (
+    ModeCount,
+    Name,
+    NotEmpty,
+    NotNegative,
+    PatchCount,
+    PointReference,
+    Positive,
+    one_of,
+)
 from ...mbs.fields.references import Reference
 
 PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
@@ -111,7 +120,7 @@ class ModalVelocity(ControllerRecord):
 
     kind: Literal["modal-velocity"]
     bodies: Annotated[tuple[str, ...], NotEmpty]
-    modes: Annotated[int, Field(gt=0)] = 1
+    modes: ModeCount = 1
     damping_ratio: Positive
     sensor: Literal["pzt", "ideal"] = "pzt"
 
@@ -132,7 +141,7 @@ class Lqr(ControllerRecord):
 
     kind: Literal["lqr"]
     inputs: Literal["all", "motors", "patches"] = "all"
-    modes: Annotated[int, Field(gt=0)] = 1
+    modes: ModeCount = 1
     time: NotNegative = 0.0
     angle: Positive = 0.01
     rate: Positive = 0.1
@@ -178,12 +187,12 @@ class Placement(Record):
     """
 
     body: str
-    count: Annotated[int, Field(gt=0)] | None = None
+    count: PatchCount | None = None
     criterion: Literal["controllability", "voltage"] = "controllability"
     measure: Literal["worst", "mean", "product"] = "worst"
-    modes: Annotated[int, Field(gt=0)] | None = None
+    modes: ModeCount | None = None
     spacing: Positive | None = None
-    most_sets: Annotated[int, Field(gt=0)] = 100_000
+    most_sets: Annotated[int, Field(gt=0, le=10_000_000)] = 100_000
 
     def references(self) -> Iterator[Reference]:
         """The link and its patches."""

@@ -7,9 +7,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from ...common.numbers import MOST_PATCHES, SMALLEST
 from ...common.validation import Record
-from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, Positive, one_of
+from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, one_of
 from ...mbs.fields.references import Reference
+
+MOST_LAYERS = 1000
 
 
 class PztLayout(Record):
@@ -27,8 +30,8 @@ class PztLayout(Record):
     """
 
     body: str
-    count: Annotated[int, Field(gt=0)] | None = None
-    centers: Annotated[tuple[float, ...], NotEmpty] | None = None
+    count: PatchCount | None = None
+    centers: Annotated[tuple[float, ...], NotEmpty, Field(max_length=MOST_PATCHES)] | None = None
     length: Positive
     width: Positive
     thickness: Positive
@@ -36,7 +39,7 @@ class PztLayout(Record):
     d31: float
     density: Positive | None = None
     limit: Positive | Annotated[tuple[Positive, ...], NotEmpty] | None = None
-    layers: Annotated[int, Field(gt=0)] = 1
+    layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
     face: Literal["+y", "-y", "both"] | None = None
     allocation: Literal["exact", "least-squares"] = "exact"
     mode_weights: Annotated[tuple[NotNegative, ...], NotEmpty] | None = None
@@ -49,8 +52,8 @@ class PztLayout(Record):
     @model_validator(mode="after")
     def _consistent(self) -> PztLayout:
         one_of(self, ("count", "centers"))
-        if self.d31 == 0.0:
-            raise ValueError("expected a d31 other than 0, found 0: such patches do nothing")
+        if abs(self.d31) < SMALLEST:
+            raise ValueError(f"expected a d31 other than 0, found {self.d31:g}: such patches do nothing")
         if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
             raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
         if "mass" in self.structural and self.density is None:

@@ -6,8 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ...common.numbers import MOST_PATCHES, NotNegative, PatchCount, Positive
 from ...common.validation import Record
-from ...mesh.records import NotNegative, Outlines, PlaceRecord, Positive
+from ...mesh.records import Outlines, PlaceRecord
 
 Coupling = Literal["mean", "rigid"]
 
@@ -26,8 +27,9 @@ class SurfacePatches(Record):
     Same meaning of the keys as in a scene's `[[pzt]]`: centres at (k − ½)·length of link / count, or `centers`.
     """
 
-    count: Annotated[int, Field(ge=1)] | None = None
-    centers: Annotated[tuple[Positive, ...], Field(min_length=1)] | None = None  # m from the root
+    count: PatchCount | None = None
+    # m from the root
+    centers: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PATCHES)] | None = None
     length: Positive  # m
     width: Positive  # m
     faces: Literal["top", "bottom", "both"] = "both"

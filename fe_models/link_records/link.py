@@ -7,20 +7,18 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from ...common.names import Name, Title
+from ...common.numbers import MOST_MODES, ModeCount, NotNegative, Positive, Vector3
 from ...common.validation import Record
 from ...mesh.records import (
     BeamGeometry,
     BeamMesh,
     CircleSection,
-    Name,
-    NotNegative,
-    Positive,
     RectangleSection,
     SectionRecord,
     SolidGeometry,
     SolidMeshRecord,
     TubeSection,
-    Vector,
 )
 from .attached import Coupling, InterfaceRecord, SurfacePatches
 from .section import Section, rectangle, tube
@@ -45,7 +43,7 @@ class OrthotropicMaterial(Record):
     """Linear elastic, with three planes of symmetry along the axes of the link (solids only)."""
 
     youngs_modulus: tuple[Positive, Positive, Positive]  # E_x, E_y, E_z in Pa
-    poissons_ratio: Vector  # ν_xy, ν_yz, ν_xz: contraction along the second under a pull along the first
+    poissons_ratio: Vector3  # ν_xy, ν_yz, ν_xz: contraction along the second under a pull along the first
     shear_modulus: tuple[Positive, Positive, Positive]  # G_xy, G_yz, G_xz in Pa
     density: Positive  # kg/m³
 
@@ -66,7 +64,7 @@ SolidMaterial = Annotated[
 class Region(Record):
     """The part of a solid inside a physical volume `group` of its mesh file, of another material."""
 
-    group: Annotated[str, Field(min_length=1)]
+    group: Title
     material: SolidMaterial
 
 
@@ -94,8 +92,8 @@ class Modes(Record):
     may then be left out.
     """
 
-    count: Annotated[int, Field(ge=1)] | None = None
-    indices: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
+    count: ModeCount | None = None
+    indices: Annotated[tuple[ModeCount, ...], Field(min_length=1, max_length=MOST_MODES)] | None = None
     family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"
     attachment_modes: bool = False
 
@@ -110,14 +108,14 @@ class Damping(Record):
 class StressRecovery(Record):
     """Where modal stresses are kept: named `points` (m, link frame), and on the whole `surface` of a solid."""
 
-    points: dict[Name, Vector] = Field(default_factory=dict)
+    points: dict[Name, Vector3] = Field(default_factory=dict)
     surface: bool = False
 
 
 class _Link(Record):
     """What all link files have."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Title
     reference: Reference
     modes: Modes
     damping: Damping = Damping()

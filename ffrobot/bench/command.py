@@ -7,10 +7,8 @@ from pathlib import Path
 
 import click
 
-from ..present.logs import logging_options, python_option
+from ..present.logs import FILE, logging_options, python_option
 from . import OF_A_SCENE, PARTS, PEER
-
-FILE = click.Path(path_type=Path)
 
 
 def _texts(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:

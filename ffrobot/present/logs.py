@@ -6,14 +6,30 @@ The library logs to loggers named as its modules, below "ffrobot", and leaves it
 from __future__ import annotations
 
 import logging
+import os
 import platform
 import re
 import sys
 from collections.abc import Callable
+from os import PathLike
 from pathlib import Path
 from typing import TypeVar
 
 import click
+
+from ..common.outputs import check_file_name
+
+
+class _FileName(click.Path):
+    """The name of a file, there or not; what can be none is refused."""
+
+    def convert(self, value: str | PathLike[str], param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """As a path."""
+        return check_file_name(os.fspath(value))
+
+
+FILE = _FileName(path_type=Path)
+"""The type of arguments that are files."""
 
 F = TypeVar("F", bound=Callable[..., object])
 

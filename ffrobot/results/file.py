@@ -6,17 +6,22 @@ import hashlib
 import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import h5py
 
 from ..common.arrays import Array
+from ..common.checksum import sealed
 from ..common.errors import InputError
+from ..common.extras import extras
+from ..common.files import write_atomically
 from ..common.hdf5 import blaming, numbers, open_checked
 from ..common.validation import did_you_mean, quoted
 from ..fe_models.modal_body import ModalBody
@@ -40,6 +45,17 @@ class ModalFile:
     input_hash: str
 
 
+class _Attributes(dict[str, Any]):
+    """Attributes of a group, which messages call `where`; `InputError` for one that it does not have."""
+
+    def __init__(self, where: str, values: Mapping[str, Any]) -> None:
+        super().__init__(values)
+        self._where = where
+
+    def __missing__(self, name: str) -> Any:  # noqa: ANN401
+        raise InputError(f'{self._where}: expected the attribute "{name}", found none')
+
+
 class Results:
     """An open results file. Datasets are named as in the file: `inverse/points/link2.tip/position`.
 
@@ -58,7 +74,7 @@ class Results:
         return results
 
     def _open(self, path: Path, content: PathLike[str] | str | h5py.h5f.FileID) -> None:
-        self.path = path
+        self.path, self._in_memory = path, isinstance(content, h5py.h5f.FileID)
         try:
             self._file = h5py.File(content, "r") if isinstance(content, h5py.h5f.FileID) else open_checked(path)
         except OSError as error:
@@ -88,6 +104,25 @@ class Results:
             lines.append(f"  {name}: {about['kind']}, {len(time)} outputs up to {time[-1]:g} s, {about['status']}")
         return "\n".join(lines)
 
+    def save(self, path: PathLike[str] | str) -> Path:
+        """Write results that are in memory only to the file `path`, or a copy of those that are in one.
+
+        Raises `InputError` where that would cost a file of another kind, `SolveError` where it cannot be written.
+        """
+        self._file.flush()
+        content: bytes = self._file.id.get_file_image()
+        write_atomically(Path(path), sealed(content), "results file")
+        return Path(path)
+
+    @contextmanager
+    def on_disk(self) -> Iterator[Path]:
+        """The file of the results; of those in memory a temporary one."""
+        if not self._in_memory:
+            yield self.path
+            return
+        with TemporaryDirectory() as folder:
+            yield self.save(Path(folder) / f"{Path(self.path).stem.strip('<>').replace(' ', '_')}.results.h5")
+
     def close(self) -> None:
         """Close the file; nothing can be read afterwards."""
         self._file.close()
@@ -95,17 +130,17 @@ class Results:
     @property
     def name(self) -> str:
         """Name of the scene."""
-        return str(self._file.attrs["name"])
+        return str(self.attributes("/")["name"])
 
     @property
     def ffrobot_version(self) -> str:
         """Version of the program that wrote the file."""
-        return str(self._file.attrs["ffrobot_version"])
+        return str(self.attributes("/")["ffrobot_version"])
 
     @property
     def skipped(self) -> list[str]:
         """What the solve left out, one line each."""
-        return [str(line) for line in self._file.attrs["skipped"]]
+        return [str(line) for line in self.attributes("/")["skipped"]]
 
     @property
     def analyses(self) -> list[str]:
@@ -115,7 +150,7 @@ class Results:
     @property
     def modal_files(self) -> dict[str, ModalFile]:
         """The file behind each flexible body of the scene."""
-        entries = json.loads(self._file.attrs["modal_bodies"]).items()
+        entries = json.loads(self.attributes("/")["modal_bodies"]).items()
         return {name: ModalFile(Path(e["path"]), e["sha256"], e["input_hash"]) for name, e in entries}
 
     def modal_body(self, name: str) -> ModalBody:
@@ -168,8 +203,13 @@ class Results:
         return [name for name in self.analyses if self.has(f"{name}/linear")]
 
     def attributes(self, group: str) -> Mapping[str, Any]:
-        """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`."""
-        return dict(self._file[group].attrs)
+        """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`.
+
+        Raises `InputError` where there is no such group, and when an attribute is asked for that it does not have.
+        """
+        if group not in self._file:
+            raise InputError(f'{self.path}: expected the group "{group}", found none{self._near(group)}')
+        return _Attributes(f"{self.path}: {group}", dict(self._file[group].attrs))
 
     def names(self, group: str) -> list[str]:
         """Names inside a group such as `inverse/points`; none when the file does not have it."""
@@ -190,6 +230,9 @@ class Results:
     def __getitem__(self, dataset: str) -> Array:
         """A dataset with the shape it has in the file. Raises `InputError` if absent."""
         item = self._file.get(dataset)
+        if isinstance(item, h5py.Group):
+            inside = quoted(f"{dataset}/{name}" for name in item)
+            raise InputError(f'{self.path}: expected the name of a dataset, found the group "{dataset}" of {inside}')
         if not isinstance(item, h5py.Dataset):
             raise InputError(f'{self.path}: expected the dataset "{dataset}", found none{self._near(dataset)}')
         return numbers(item, f"{self.path}: {dataset}")
@@ -228,7 +271,8 @@ class Results:
 
     def frame(self, analysis: str) -> DataFrame:
         """`columns` of an analysis as a table of pandas, by time (s)."""
-        from pandas import DataFrame
+        with extras():
+            from pandas import DataFrame
 
         return DataFrame(self.columns(analysis)).set_index("time")
 

@@ -19,7 +19,7 @@ import h5py
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.hdf5 import blaming
-from ..common.validation import key_path
+from ..common.tables import key_path
 from ..common.version import program_version
 from ..mbs import _core
 from ..mbs.analysis.outcome import (

@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from ..common.errors import InputError
+from ..common.toml_files import parse_toml, read_text
 from ..common.version import program_version
 
 FILE_KEYS = {"link", "modal", "waypoints", "file", "python"}
@@ -21,21 +23,26 @@ PROGRAM = "ffrobot"
 
 def named_files(data: Any, folder: Path) -> Iterator[Path]:  # noqa: ANN401 (whatever TOML may hold)
     """The files that tables read from a file in `folder` name, and those that link files among them name in turn."""
+    for key, file in _named(data, folder):
+        yield file
+        if key == "link":  # whose own links, which are none, are not followed: they might lead in a circle
+            yield from (part for _, part in _named(read_tables(file), file.parent))
+
+
+def _named(data: Any, folder: Path) -> Iterator[tuple[str, Path]]:  # noqa: ANN401
+    """The keys that name a file, with the file."""
     for key, value in data.items() if isinstance(data, dict) else enumerate(data):
         if isinstance(value, dict | list):
-            yield from named_files(value, folder)
+            yield from _named(value, folder)
         elif key in FILE_KEYS and isinstance(value, str):
-            name = value.rpartition(":")[0] if key == "python" else value
-            yield folder / name
-            if key == "link":
-                yield from named_files(read_tables(folder / name), (folder / name).parent)
+            yield key, folder / (value.rpartition(":")[0] if key == "python" else value)
 
 
 def read_tables(path: Path) -> dict[str, Any]:
     """The content of a TOML file; empty where it cannot be read, which others tell."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        return parse_toml(read_text(path, "file"), path, "file")
+    except InputError:
         return {}
 
 
@@ -70,7 +77,7 @@ def digest_of_file(path: Path) -> str:
         return digest_of_tables(tables)
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError:
+    except (OSError, ValueError):  # the latter where it is no name of a file
         return ""
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..actuation.patches.patches import PatchArray, check_reach, patch_array
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.points import point_set, with_points
-from ..common.errors import InputError
+from ..common.errors import InputError, of_file
 from ..mbs.model.model import ModalLoad, build_model
 from ..mbs.model.planar_body import PlanarBody
 from ..scene.load import load_scene
@@ -31,6 +31,11 @@ def prepare(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
     began = time.perf_counter()
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
+    with of_file(scene.path):
+        return _prepared(scene, watcher, began)
+
+
+def _prepared(scene: Scene, watcher: Watcher, began: float) -> Solution:
     bodies = {body.name: loaded for body, loaded in zip(scene.body, load_bodies(scene, watcher.stage), strict=True)}
     seconds = {"links and files": time.perf_counter() - began}
     structure = add_patches(scene, bodies)

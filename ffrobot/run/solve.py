@@ -14,6 +14,7 @@ from ..actuation.context import ActuatedContext
 from ..actuation.patches.patches import with_factors as patches_with
 from ..actuation.patches.voltages import allocation, solve_voltages
 from ..actuation.points import with_factors as points_with
+from ..common.errors import of_file
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import ActuatorSet
 from ..mbs.model.raised_mass import by_body
@@ -66,7 +67,8 @@ def _evaluated(solution: Solution) -> Solution:
     results, failure = dict(solution.analyses), solution.failure
     for name, result in results.items():
         try:
-            results[name] = evaluated(solution, result)
+            with of_file(solution.scene.path):
+                results[name] = evaluated(solution, result)
         except Exception as error:
             failure = failure or error
     return replace(solution, analyses=results, failure=failure)
@@ -100,7 +102,8 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         began = time.perf_counter()
         watcher.stage(f'analysis "{analysis.name}"')
         try:
-            outcome = analysis.run(_context(solution, analysis, results, watcher, interruption))
+            with of_file(solution.scene.path):
+                outcome = analysis.run(_context(solution, analysis, results, watcher, interruption))
         except Exception as error:  # raised once the analyses before it are kept
             if not results:
                 raise

@@ -8,7 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..common.arrays import Array
 from ..common.validation import did_you_mean, quoted
+from ..mbs._core import TimeFunction
+from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND
 from ..mbs.fields.functions import check_domain
 from ..mbs.scene.analysis import Surroundings
@@ -35,13 +38,13 @@ def problems(scene: SceneKeys) -> Iterator[str]:
 
 def check_functions(scene: SceneKeys, path: Path) -> None:
     """Raise `InputError` for a function of time without a value at an output time at which it is needed."""
+    following = [analysis for analysis in scene.analysis if analysis.follows_trajectories]
     for trajectory in scene.trajectory:
         for component, function in trajectory.components.items():
             key = component if trajectory.waypoints is None else "waypoints"
-            for analysis in scene.analysis:
-                if analysis.follows_trajectories:
-                    times = np.clip(analysis.times, 0.0, analysis.last_time)
-                    check_domain(function, times, f'{path}: trajectory "{trajectory.name}": {key}', 2)
+            for analysis in following:
+                times = np.clip(analysis.times, 0.0, analysis.last_time)
+                _check_path(function, times, f'{path}: trajectory "{trajectory.name}": {key}')
     for k, load in enumerate(scene.load, 1):
         for component, function in load.components.items():
             for analysis in scene.analysis:
@@ -49,7 +52,18 @@ def check_functions(scene: SceneKeys, path: Path) -> None:
                 check_domain(function, times, f"{path}: load no. {k}: {component}", 0)
     for analysis in scene.analysis:
         for key, function, derivatives in analysis.prescribed():
-            check_domain(function, analysis.times, f'{path}: analysis "{analysis.name}": {key}', derivatives)
+            label = f'{path}: analysis "{analysis.name}": {key}'
+            if derivatives == 2:
+                _check_path(function, analysis.times, label)
+            else:
+                check_domain(function, analysis.times, label, derivatives)
+
+
+def _check_path(function: TimeFunction, times: Array, label: str) -> None:
+    """Raise `InputError` for a function of time that no motion can follow, or whose derivatives are others."""
+    check_domain(function, times, label, 2)
+    if len(times) > 1:
+        check_derivatives(function, float(times[-1]), label)
 
 
 def _duplicates(kind: str, names: Iterable[str]) -> Iterator[str]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from ..common.errors import InputError
-from ..common.validation import load_toml, plain, validate
+from ..common.toml_files import load_toml, parse_toml, read_text
+from ..common.validation import plain, validate
 from ..fe_models.link_file import LinkTable, read_link
 from .checks import check_functions, problems
 from .scene import Scene, SceneKeys
@@ -23,8 +23,7 @@ def load_scene(path: Path) -> Scene:
     Raises `InputError` with one line for each wrong key: file, key, expected, found. What depends on modal bodies
     (their points, the length of a link) is checked when these are known.
     """
-    data = load_toml(path, "scene file")
-    return _scene(data, path, path.read_text(encoding="utf-8"))
+    return _scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
 
 
 def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)
@@ -40,9 +39,9 @@ def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # n
     functions: dict[str, object] = {}
     try:
         text = tomli_w.dumps(plain(keys, functions))
-    except TypeError as error:
+    except (TypeError, RecursionError) as error:
         raise InputError(f"{path}: expected numbers, text, lists and tables, found something else: {error}") from None
-    return _scene(tomllib.loads(text), path, text, functions)
+    return _scene(parse_toml(text, path, "scene"), path, text, functions)
 
 
 def _scene(data: dict[str, Any], path: Path, text: str, objects: Mapping[str, object] | None = None) -> Scene:

@@ -11,7 +11,8 @@ import tomli_w
 
 from ..common.errors import InputError
 from ..common.files import write_atomically
-from ..common.validation import did_you_mean, load_toml, quoted
+from ..common.toml_files import load_toml
+from ..common.validation import did_you_mean, quoted
 from ..run.inputs import FILE_KEYS, digest_of_file, fingerprints, named_files
 from .variation import Value
 
@@ -69,7 +70,7 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
 
 def _link_of(scene_path: Path, scene: Table, key: tuple[str, ...], links: dict[str, Table]) -> Table:
     """The content of the link file that `links.BODY.…` means, read once, or the table in the scene itself."""
-    with_links = [body["name"] for body in scene.get("body", []) if "link" in body]
+    with_links = [body["name"] for body in _bodies(scene) if "link" in body]
     if len(key) < 3 or key[1] not in with_links:
         found = ".".join(key)
         raise InputError(
@@ -80,14 +81,22 @@ def _link_of(scene_path: Path, scene: Table, key: tuple[str, ...], links: dict[s
         link = _body(scene, key[1])["link"]
         if isinstance(link, dict):
             return link
-        path = Path(link)
+        path = Path(str(link))
         links[key[1]] = load_toml(path, "link file")
         _resolve(links[key[1]], path.parent)
     return links[key[1]]
 
 
 def _body(scene: Table, name: str) -> Table:
-    return next(body for body in scene["body"] if body["name"] == name)
+    return next(body for body in _bodies(scene) if body["name"] == name)
+
+
+def _bodies(scene: Table) -> list[Table]:
+    """The bodies with a name: that the scene is right otherwise is seen later."""
+    bodies = scene.get("body")
+    return (
+        [body for _, body in _tables(bodies) if isinstance(body.get("name"), str)] if isinstance(bodies, list) else []
+    )
 
 
 def _resolve(data: Node, folder: Path) -> None:
@@ -119,7 +128,7 @@ def _index(data: Node, part: str, whole: tuple[str, ...]) -> str | int:
     names = [str(entry.get("name", entry.get("body", k))) for k, entry in _tables(data)]
     if part in names:
         return names.index(part)
-    if part.isdigit() and int(part) < len(data):
+    if part.isdecimal() and int(part) < len(data):
         return int(part)
     known = names or [str(k) for k in range(len(data))]
     raise InputError(

@@ -17,7 +17,7 @@ from ..common.parallel import is_first, processes
 from ..common.python_files import allowed_python, python_allowed
 from ..run.inputs import PROGRAM, changed
 from ..run.watcher import Watcher
-from .files import RunFiles, run_files
+from .files import SCENE, RunFiles, run_files
 from .runs import RESULTS, ROW, Row, Run, collected, finished_row, keep_row, perform, stop_runs
 from .table import write_table
 from .variation import Value, Variation, grid, latin_hypercube, parse_variation
@@ -187,7 +187,8 @@ def _check_first(sweep: Sweep) -> None:
                 if body.link is not None:
                     read_link(body.link)
         except InputError as error:
-            raise InputError(f"with {_describe(sweep, run)}:\n{str(error).replace(folder + os.sep, '')}") from None
+            message = str(error).replace(str(Path(folder) / SCENE), str(sweep.scene)).replace(folder + os.sep, "")
+            raise InputError(f"with {_describe(sweep, run)}:\n{message}") from None
 
 
 def _describe(sweep: Sweep, run: Run) -> str:

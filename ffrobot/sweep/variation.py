@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +12,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..common.errors import InputError
+from ..common.numbers import MOST_RUNS
+from ..common.tables import DEEPEST, shown
 
 Value: TypeAlias = Any
 """What TOML may hold: a number, a text, a list …"""
@@ -52,14 +55,15 @@ def parse_variation(text: str) -> Variation:
     """
     key, equals, values = text.partition("=")
     parts = tuple(key.strip().split("."))
-    if not equals or not all(parts):
+    text = shown(text)
+    if not equals or not all(parts) or len(parts) > DEEPEST:
         raise InputError(f'--vary: expected KEY=VALUES, such as gravity.1=-9.81:0:5, found "{text}"')
     pieces = values.split(":")
     if len(pieces) in (3, 4) and '"' not in values:
         return _range(parts, pieces, text)
     try:
         listed = tomllib.loads(f"values = [{values}]")["values"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # no TOML, a number of thousands of digits, lists in lists without end
         listed = []
     if not listed:
         raise InputError(
@@ -77,14 +81,18 @@ def _range(key: tuple[str, ...], pieces: Sequence[str], text: str) -> Variation:
         raise InputError(f'--vary: expected two numbers and a count, FIRST:LAST:COUNT, found "{text}"') from None
     if count < 1 or not np.isfinite([first, last]).all() or (logarithmic and pieces[3] != "log"):
         raise InputError(f'--vary: expected FIRST:LAST:COUNT with a count of at least 1, or …:log, found "{text}"')
-    if logarithmic and not first * last > 0:
+    if count > MOST_RUNS:
+        raise InputError(f'--vary: expected at most {MOST_RUNS} values, found "{text}"')
+    if logarithmic and not np.sign(first) * np.sign(last) > 0:
         raise InputError(f'--vary: expected two ends of one sign for a logarithmic range, found "{text}"')
     spaced = np.geomspace(first, last, count) if logarithmic else np.linspace(first, last, count)
     return Variation(key, tuple(float(value) for value in spaced), (first, last), logarithmic)
 
 
 def grid(variations: Sequence[Variation]) -> list[tuple[Value, ...]]:
-    """Every combination of the values; the last key varies fastest."""
+    """Every combination of the values; the last key varies fastest. Raises `InputError` where these are too many."""
+    if (count := math.prod(len(variation.values) for variation in variations)) > MOST_RUNS:
+        raise InputError(f"--vary: expected at most {MOST_RUNS} runs, found {count}: --sample takes some of them")
     return list(product(*(variation.values for variation in variations)))
 
 

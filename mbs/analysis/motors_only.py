@@ -18,6 +18,7 @@ from pydantic import Field, model_validator
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
+from ...common.numbers import MOST_OUTPUTS
 from .. import _core
 from .._core import TimeFunction
 from ..fields.field_types import NotNegative
@@ -64,6 +65,9 @@ class MotorsOnly(TimedAnalysis):
     def _consistent(self) -> Self:
         if self.factor is not None and self.output != "redefined":
             raise ValueError(f'expected the key "factor" only with output = "redefined", found "{self.output}"')
+        more = (self.pre_actuation or 0.0) + (self.post_actuation or 0.0)
+        if self.output_step and (self.end + more) / self.output_step > MOST_OUTPUTS:
+            raise ValueError(f"expected at most {MOST_OUTPUTS} outputs, found {more:g} s of pre- and post-actuation")
         return self
 
     @property

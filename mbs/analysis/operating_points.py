@@ -63,8 +63,8 @@ class InstantAnalysis(Analysis):
         if self.instants is None and self.needs_times:
             yield f'times: expected the times of "{source.name}" about which to be linear, found none'
         for t in self.instants or ():
-            if t > source.last_time:
-                yield f'times: expected at most {source.last_time:g}, where "{source.name}" ends, found {t:g}'
+            if t - source.last_time > NEAR * max(1.0, source.last_time):
+                yield f'times: expected at most {source.last_time!r}, where "{source.name}" ends, found {t!r}'
 
 
 def operating_points(model: Model, analysis: Analysis, source: Outcome | None) -> Outcome:

@@ -5,8 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
+from pydantic import AfterValidator, PlainValidator, ValidationInfo
 
+from ...common.names import Name as Name  # offered here, with the other types of keys
+from ...common.numbers import ModeCount as ModeCount
+from ...common.numbers import NotNegative as NotNegative
+from ...common.numbers import PatchCount as PatchCount
+from ...common.numbers import Positive as Positive
+from ...common.numbers import Vector2 as Vector2
+from ...common.tables import shown
 from ...common.validation import Record, existing_file, quoted
 from .._core import TimeFunction
 from .expressions import parse_expression
@@ -22,7 +29,7 @@ def split_point(reference: str) -> tuple[str, str]:
     """`"link1.tip"` → `("link1", "tip")`. Raises `ValueError` when it is not of the form BODY.POINT."""
     body, dot, point = reference.partition(".")
     if not (body and dot and point) or "." in point:
-        raise ValueError(f'expected a point as "BODY.POINT", found "{reference}"')
+        raise ValueError(f'expected a point as "BODY.POINT", found "{shown(reference)}"')
     return body, point
 
 
@@ -37,13 +44,6 @@ def _time_function(value: object, info: ValidationInfo) -> TimeFunction:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return parse_expression(repr(float(value)))
     raise ValueError(f"expected an expression in t, found {value!r}")
-
-
-def _name(value: str) -> str:
-    """Names become groups of the results file and parts of "BODY.POINT"."""
-    if not value or value != value.strip() or "/" in value or "." in value:
-        raise ValueError(f'expected a name without "/", "." and blanks around it, found "{value}"')
-    return value
 
 
 def _point(value: str) -> str:
@@ -93,12 +93,8 @@ def present(**functions: TimeFunction | None) -> dict[str, TimeFunction]:
     return {name: function for name, function in functions.items() if function is not None}
 
 
-Name = Annotated[str, AfterValidator(_name)]
 PointReference = Annotated[str, AfterValidator(_point)]
 Side = Annotated[str, AfterValidator(_side)]
-Vector2 = tuple[float, float]
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 Expression = Annotated[TimeFunction, PlainValidator(_time_function, json_schema_input_type=str | float)]
 WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints, json_schema_input_type=str)]
 NotEmpty = AfterValidator(_not_empty)

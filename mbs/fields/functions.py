@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.tables import shown
 from .._core import TimeFunction
 
 
@@ -22,7 +25,7 @@ def user_function(function: object) -> TimeFunction:
         raise ValueError(f"expected a function of t, found {function!r}")
 
     def three(t: float) -> tuple[float, float, float]:
-        values = np.asarray(function(t), dtype=float)
+        values = called(function, t, t)
         if values.shape not in ((), (3,)):
             raise InputError(
                 f"{name_of(function)}: expected (value, rate, acceleration), or the value of a load, found an array of"
@@ -32,6 +35,24 @@ def user_function(function: object) -> TimeFunction:
         return value, rate, acceleration
 
     return TimeFunction.python(three)
+
+
+def called(function: Callable[..., object], t: float, *arguments: object) -> Array:
+    """What a user's function returns, as numbers; errors that it raises carry a note with its name and the time t.
+
+    Raises `InputError` where it returns something else than numbers.
+    """
+    try:
+        returned = function(*arguments)
+    except Exception as error:
+        error.add_note(f"raised by {name_of(function)}, a function of the scene, at t = {t:g} s")
+        raise
+    try:
+        return np.asarray(returned, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{name_of(function)}: expected numbers, found {shown(repr(returned))} at t = {t:g} s"
+        ) from None
 
 
 def name_of(function: object) -> str:
@@ -47,6 +68,11 @@ def check_domain(function: TimeFunction, times: Array, describe: str, derivative
     """
     samples = function.sample(np.ascontiguousarray(times, dtype=np.float64))[: derivatives + 1]
     bad = np.flatnonzero(~np.isfinite(samples).all(axis=0))
+    if bad.size == len(times) and np.isfinite(samples[0]).all() and np.isnan(samples[1:]).all():
+        raise InputError(
+            f"{describe}: expected a function of t that returns (value, rate, acceleration), found one that returns the"
+            " value alone"
+        )
     if bad.size:
         first = bad[0]
         order = int(np.flatnonzero(~np.isfinite(samples[:, first]))[0])

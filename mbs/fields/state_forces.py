@@ -8,7 +8,7 @@ import numpy as np
 
 from ...common.errors import InputError
 from .._core import StateFunction
-from .functions import name_of
+from .functions import called, name_of
 
 
 def state_function(function: object) -> StateFunction:
@@ -28,7 +28,7 @@ def state_function(function: object) -> StateFunction:
 
 def _checked(function: Callable[..., object]) -> Callable[..., tuple[float, float, float]]:
     def force(t: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float, float]:
-        values = np.asarray(function(t, np.array([x, y]), np.array([v_x, v_y])), dtype=float)
+        values = called(function, t, t, np.array([x, y]), np.array([v_x, v_y]))
         if values.shape not in ((2,), (3,)):
             raise InputError(
                 f"{name_of(function)}: expected a force (x, y), or (x, y, moment), found an array of shape"

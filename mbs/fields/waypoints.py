@@ -11,6 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.tables import LARGEST, shown
 from .._core import TimeFunction
 
 
@@ -49,17 +50,19 @@ def _read_table(path: Path) -> tuple[list[str], Array]:
     """Column names and the numbers (rows, columns) of the CSV table at `path`."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [(line, row) for line, row in enumerate(csv.reader(file, skipinitialspace=True), 1) if any(row)]
+            reader = csv.reader(file, skipinitialspace=True)
+            rows = [(reader.line_num, row) for row in reader if any(row)]
     except FileNotFoundError:
         raise InputError(f"{path}: waypoint table not found") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot read the waypoint table: {error}") from None
+        about = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot read the waypoint table: {about}") from None
     header = [name.strip() for name in rows[0][1]] if rows else []
     if len(header) < 2 or header[0] != "t" or not all(header) or len(set(header)) < len(header):
         raise InputError(f"{path}: line 1: expected a header such as t,x,y or t,value, found {','.join(header)!r}")
+    table = np.array([_numbers(path, line, row, len(header)) for line, row in rows[1:]])
     if len(rows) < 3:
         raise InputError(f"{path}: expected at least 2 waypoints, found {len(rows) - 1}")
-    table = np.array([_numbers(path, line, row, len(header)) for line, row in rows[1:]])
     late = np.flatnonzero(np.diff(table[:, 0]) <= 0.0)
     if late.size:
         before, after = table[late[0], 0], table[late[0] + 1, 0]
@@ -73,8 +76,9 @@ def _numbers(path: Path, line: int, row: list[str], count: int) -> list[float]:
         numbers = [float(cell) for cell in row]
     except ValueError:
         numbers = []
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise InputError(f"{path}: line {line}: expected {count} finite numbers, found {','.join(row)!r}")
+    if len(numbers) != count or not all(abs(number) <= LARGEST for number in numbers):  # False of NaN
+        found = shown(",".join(row))
+        raise InputError(f"{path}: line {line}: expected {count} numbers of at most {LARGEST:g}, found {found!r}")
     return numbers
 
 

@@ -12,12 +12,12 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...common.arrays import Array, as_floats
+from ...common.numbers import MOST_OUTPUTS, MOST_STEPS
 from ...common.validation import Record, did_you_mean, either, quoted
 from .._core import TimeFunction
 from ..fields.field_types import Name, Positive
 from ..fields.references import Reference
 
-MAX_OUTPUTS = 10_000_000
 TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
 
 
@@ -143,7 +143,7 @@ class IntegratedAnalysis(TimedAnalysis):
 
     integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
     spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8  # of generalized-alpha at infinite frequency
-    max_steps: Annotated[int, Field(gt=0)] = 5_000_000
+    max_steps: Annotated[int, Field(gt=0, le=MOST_STEPS)] = 5_000_000
 
     is_integrated = True
 
@@ -203,7 +203,7 @@ class ActuatedAnalysis(IntegratedAnalysis):
                 f' "generalized-alpha"), found "{source.name}" with that'
             )
         elif self.end > source.last_time:
-            yield f'end: expected at most {source.last_time:g}, where "{source.name}" ends, found {self.end:g}'
+            yield f'end: expected at most {source.last_time!r}, where "{source.name}" ends, found {self.end!r}'
         yield from self.replay_problems(source)
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
@@ -224,8 +224,8 @@ def output_times(end: float, step: float, before: float = 0.0, after: float = 0.
 def check_steps(end: float, step: float) -> None:
     """Raise `ValueError` unless the outputs 0, step, 2 step, … end exactly at `end`."""
     ratio = end / step
-    if ratio > MAX_OUTPUTS:
-        raise ValueError(f"expected at most {MAX_OUTPUTS} outputs, found output_step = {step:g} up to end = {end:g}")
+    if ratio > MOST_OUTPUTS:
+        raise ValueError(f"expected at most {MOST_OUTPUTS} outputs, found output_step = {step:g} up to end = {end:g}")
     count = round(ratio)
     # 0.1/0.001 is not whole in binary; anything beyond rounding is meant otherwise.
     if count < 1 or abs(ratio - count) > 1e-9 * ratio:

@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
+from ...common.numbers import MOST_MODES, SMALLEST
 from ...common.validation import InputFile, Record, existing_file
 from ...fe_models.link_file import LinkSource, LinkTable
 from ...fe_models.link_records import BeamLink, SolidLink
-from ..fields.field_types import Name, PointReference, Positive, Vector2, one_of
+from ..fields.field_types import Name, NotNegative, PointReference, Positive, Vector2, one_of
 from ..fields.references import Reference
 
 
@@ -26,7 +27,7 @@ class RigidBody(Record):
     @field_validator("inertia")
     @classmethod
     def _inertia_is_positive(cls, inertia: float) -> float:
-        if not inertia > 0.0:
+        if not inertia >= SMALLEST:
             raise ValueError(
                 f"expected a moment of inertia greater than 0, found {inertia:g}: without it the body's rotation has no"
                 " equation of motion (a point mass is a [[payload]])"
@@ -59,7 +60,7 @@ class Body(Record):
     link: LinkInput | None = None
     modal: InputFile | None = None
     rigid: RigidBody | None = None
-    modes: Literal["auto"] | Annotated[int, Field(ge=0)] | None = None
+    modes: Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)] | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Body:
@@ -73,8 +74,8 @@ class Payload(Record):
     """A mass (kg) on a point, with its moment of inertia about that point (kg·m²)."""
 
     point: PointReference
-    mass: Positive
-    inertia: Annotated[float, Field(ge=0.0)] = 0.0
+    mass: NotNegative
+    inertia: NotNegative = 0.0
 
     def references(self) -> Iterator[Reference]:
         """The point that carries it."""

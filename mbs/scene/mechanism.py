@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
-
+from ...common.names import Title
 from ...common.validation import Record
 from ..fields.field_types import NotEmpty, Vector2
 from ..fields.references import Reference, under
@@ -27,7 +26,7 @@ class MechanismKeys(Record):
     `geometric_stiffening` "auto": where the loads of a run change the stiffness of a mode by more than 1 %.
     """
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Title
     space: Literal["planar", "spatial"] = "planar"
     gravity: Vector2
     motors: Literal["section", "frame"] = "section"

@@ -71,7 +71,7 @@ def unreachable(assembly: MechanismSystem, t: float, q: Array) -> str:
     """Which trajectory (or joints) the links cannot meet at time t (s), from q (coordinates,) on."""
     trajectories = [c for c in assembly.constraints if c.is_trajectory]
     how = (
-        "cannot reach"
+        "cannot reach from the guess in initial.angles (rad)"
         if solve_positions(assembly, t, q) is None
         else "reach only in a singular configuration (stretched, folded, at a dead centre), from which no force on it"
         " says which way they go on: keep clear of it, or drive a joint instead"

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from ...common.validation import InputFile, Record, load_toml, validate
+from ...common.toml_files import load_toml
+from ...common.validation import InputFile, Record, validate
 
 FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from ...common.errors import InputError
+from ...common.errors import InputError, of_file
 from ...common.files import check_folder, write_atomically
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from .body_shape import draw_mesh, draw_modes
 from .configurations import draw_configurations
-from .figure_file import FigureFile, FigureRecord, load_figures
+from .figure_file import FigureRecord, load_figures
 from .linear import draw_bode, draw_robot_modes
 from .path import draw_path
 from .placement import draw_placement
 from .standard import standard_figures
-from .style import new_axes, style
+from .style import literal, new_axes, style
 from .time_history import draw_time_history
 
 DRAW = {
@@ -57,8 +59,8 @@ def plot_modal_body(path: Path, folder: Path, formats: Sequence[str] = FORMATS) 
     body = read_modal_body(path)
     with style():
         return [
-            *write_figure(draw_mesh(body), folder, "mesh", formats),
-            *write_figure(draw_modes(body), folder, "modes", formats),
+            *write_figure(literal(draw_mesh(body)), folder, "mesh", formats),
+            *write_figure(literal(draw_modes(body)), folder, "modes", formats),
         ]
 
 
@@ -74,10 +76,24 @@ def plot_results(results_path: Path, folder: Path, formats: Sequence[str] = FORM
     figure_file = results_path.parent / "figures.toml"
     written: list[Path] = []
     with Results(results_path) as results, style():
-        figures = load_figures(figure_file) if figure_file.is_file() else FigureFile(figure=standard_figures(results))
-        for record in figures.figure:
-            written += write_figure(draw(record, results), folder, record.name, formats)
+        if figure_file.is_file():
+            for record in load_figures(figure_file).figure:
+                label = f'{figure_file}: figure "{record.name}"'
+                with of_file(label), _formulas(label):
+                    written += write_figure(draw(record, results), folder, record.name, formats)
+        else:
+            for record in standard_figures(results):
+                written += write_figure(literal(draw(record, results)), folder, record.name, formats)
     return written
+
+
+@contextmanager
+def _formulas(label: str) -> Iterator[None]:
+    """What matplotlib cannot draw of a figure that the user describes: a formula between `$` that is none, a range."""
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(f"{label}: {str(error).strip().splitlines()[0]}") from None
 
 
 def draw(record: FigureRecord, results: Results) -> Figure:
@@ -108,5 +124,8 @@ def write_figure(picture: Figure, folder: Path, name: str, formats: Sequence[str
 
 def _image(picture: Figure, extension: str) -> bytes:
     stream = BytesIO()
-    picture.savefig(stream, format=extension, metadata=METADATA[extension])
+    with warnings.catch_warnings():  # of characters that the font lacks: a box stands for them
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        warnings.filterwarnings("ignore", message="constrained_layout not applied")  # texts longer than the figure
+        picture.savefig(stream, format=extension, metadata=METADATA[extension])
     return stream.getvalue()

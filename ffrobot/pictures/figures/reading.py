@@ -13,8 +13,11 @@ from ...common.errors import InputError
 
 def read_points(path: Path, column: str) -> tuple[Array, Array]:
     """Times and values of one column of a CSV file whose first column is the time; lines with # are comments."""
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
-    rows = list(csv.reader(lines))
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        rows = list(csv.reader(line for line in text.splitlines() if line and not line.startswith("#")))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot read the points: {getattr(error, 'strerror', None) or error}") from None
     if not rows or column not in rows[0]:
         header = rows[0] if rows else []
         raise InputError(f'{path}: expected the column "{column}", found {header}')

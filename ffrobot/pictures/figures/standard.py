@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 
 import numpy as np
@@ -114,7 +115,7 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
                     title=f"{title}, patches of {body}, {analysis}",
                     curves=(Curve(data=f"{analysis}/pzt/{body}/{dataset}", label="patch"),),
                     y_label="voltage (V)",
-                    limits=() if limit is None else (-limit, limit),
+                    limits=() if limit is None else _both_ways(limit),
                 )
 
 
@@ -157,7 +158,17 @@ def _members(results: Results, group: str) -> list[str]:
     return list(dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/{group}")))
 
 
+def _both_ways(limit: float | list[float]) -> tuple[float, ...]:
+    """The limits of patches, one for all or one each, in both directions, each once."""
+    return tuple(sorted({sign * float(one) for one in np.atleast_1d(limit) for sign in (-1.0, 1.0)}))
+
+
 def file_name(*parts: str) -> str:
-    """A file name: everything but letters, digits, `.` and `-` becomes `_`."""
+    """A file name: everything but letters, digits, `.` and `-` becomes `_`.
+
+    Letters other than a to z and signs take a few digits of their own besides: names of other scripts stay apart.
+    """
     joined = "_".join(parts)
-    return "".join(c if c.isascii() and (c.isalnum() or c in ".-") else "_" for c in joined)
+    plain = "".join(c if c.isascii() and (c.isalnum() or c in ".-") else "_" for c in joined)
+    lost = any(c != p and c not in " /_" for c, p in zip(joined, plain, strict=True))
+    return f"{plain}-{hashlib.sha256(joined.encode()).hexdigest()[:6]}" if lost else plain

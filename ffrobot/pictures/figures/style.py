@@ -71,6 +71,19 @@ def shades(count: int) -> list[Any]:
     return [colormap(0.9 * k / max(1, count - 1)) for k in range(count)]
 
 
+def literal(figure: Figure) -> Figure:
+    """The figure with `$`, `_`, `^` and backslashes of its titles and labels drawn as they are: names are no formulas.
+
+    Figures that users describe themselves may have formulas; ticks always have.
+    """
+    for axes in figure.axes:
+        titles = (axes.title, axes._left_title, axes._right_title, axes.xaxis.label, axes.yaxis.label)  # type: ignore[attr-defined]
+        legends = [one for one in (axes.get_legend(), *figure.legends) if one is not None]
+        for text in (*titles, *axes.texts, *(text for one in legends for text in one.get_texts())):
+            text.set_parse_math(False)
+    return figure
+
+
 def legend(axes: Axes) -> None:
     """A legend below the axes, where it hides nothing, in as many columns as its texts leave room for."""
     labels = axes.get_legend_handles_labels()[1]

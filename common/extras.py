@@ -1,0 +1,37 @@
+"""Libraries that only some of the program needs: what to say where one is not installed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from .errors import SolveError
+
+EXTRAS: Mapping[str, str] = {
+    "matplotlib": "plot",
+    "plotly": "report",
+    "jinja2": "report",
+    "pyvista": "view",
+    "pandas": "pandas",
+    "control": "control",
+}
+"""The extra of this package that installs a library."""
+
+
+def missing(error: ModuleNotFoundError) -> str | None:
+    """What to install where one of these libraries is not there; None for any other."""
+    library = (error.name or "").partition(".")[0]
+    if library not in EXTRAS:
+        return None
+    return f"this needs {library}, which is not installed: pip install 'ffrobot[{EXTRAS[library]}]'"
+
+
+@contextmanager
+def extras() -> Iterator[None]:
+    """Turn the lack of one of these libraries into `SolveError`."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (message := missing(error)) is None:
+            raise
+        raise SolveError(message) from None

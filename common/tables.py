@@ -1,0 +1,64 @@
+"""Tables as TOML has them: where in a file a key is, and limits that hold for whatever a file may contain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+DEEPEST = 32  # tables and lists within each other
+LONGEST_TEXT = 20_000  # characters; expressions have a limit of their own below this
+LARGEST = 1e30  # of any number: products of a few of them are still finite
+SMALLEST = 1e-30  # of what has to be positive
+LARGEST_INTEGER = 2**63 - 1  # TOML promises no more
+
+
+def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
+    """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass").
+
+    Parts that name the alternative of a union rather than a key of the file are left out.
+    """
+    path = ""
+    here: Any = data
+    for k, part in enumerate(loc):
+        is_missing_key = kind == "missing" and k == len(loc) - 1
+        if isinstance(here, list) and isinstance(part, int) and part < len(here):
+            here = here[part]
+            path += f" {_label(here, part)}: " if isinstance(here, dict) else f"[{part}]"
+        elif isinstance(here, dict) and (part in here or is_missing_key):
+            here = here.get(part)
+            path += ("." if path and not path.endswith(" ") else "") + shown(str(part))
+    return path.removesuffix(": ")
+
+
+def shown(text: str) -> str:
+    """`text` in one line of a message, shortened: control characters and line breaks as Python writes them."""
+    text = text if len(text) <= 60 else text[:59] + "…"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def beyond_limits(data: dict[str, Any]) -> Iterator[str]:
+    """`KEY: expected …, found …` of everything in tables that no key of any file may hold."""
+    yield from (f"{key_path(loc, data)}: {problem}" for loc, problem in _beyond(data, ()))
+
+
+def _beyond(value: Any, loc: tuple[int | str, ...]) -> Iterator[tuple[tuple[int | str, ...], str]]:  # noqa: ANN401
+    if isinstance(value, dict | list):
+        if len(loc) >= DEEPEST:
+            yield loc[:2], f"expected at most {DEEPEST} tables and lists within each other, found more"
+            return
+        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+            if isinstance(key, str) and len(key) > LONGEST_TEXT:
+                yield loc, f"expected keys of at most {LONGEST_TEXT} characters, found one of {len(key)}"
+            yield from _beyond(item, (*loc, key))
+    elif isinstance(value, str) and len(value) > LONGEST_TEXT:
+        yield loc, f"expected at most {LONGEST_TEXT} characters, found {len(value)}"
+    elif isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+        yield loc, f"expected a whole number of at most {LARGEST_INTEGER:.3g}, found a larger one"
+    elif isinstance(value, float) and LARGEST < abs(value) < float("inf"):  # records say so of infinity and NaN
+        yield loc, f"expected a number between -{LARGEST:g} and {LARGEST:g}, found {value:g}"
+
+
+def _label(table: dict[str, Any], index: int) -> str:
+    """What an entry of an array of tables is called: by its name, its body, or its place in the file."""
+    name = table.get("name", table.get("body"))
+    return f'"{shown(name)}"' if isinstance(name, str) else f"no. {index + 1}"

@@ -1,0 +1,41 @@
+"""What the command line says of errors that are not the program's own, and streams that it can always write to."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from ..common.errors import FfrobotError
+from ..common.extras import missing
+
+
+def describe(error: Exception) -> str | None:
+    """The message of an error that comes from the user's input or the machine; None where it is a fault of ffrobot."""
+    if isinstance(error, FfrobotError):
+        return str(error)
+    if isinstance(error, ModuleNotFoundError):
+        return missing(error)
+    if isinstance(error, MemoryError):
+        return "not enough memory: fewer outputs, elements or modes take less"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'standard output'}: {error.strerror}"
+    return None
+
+
+def ready_streams() -> None:
+    """Have streams that take every character and are there: one that was closed is as good as none."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 (for good)
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def without_output() -> None:
+    """Forget what is still to be printed where it cannot be, so that Python does not try again at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
