@@ -13,9 +13,9 @@ import ffrobot
 from ffrobot.run.prepare import prepare
 from ffrobot.run.watcher import Watcher
 
-# Of tests/campaigns/tolerance.py, seed 101; what was outside before moments of motors, modal forces and rates of joints
+# Of tests/campaigns/tolerance.py, seed 101; what was outside before moments of motors and rates of joints
 # were judged by themselves: 2.2 (DOPRI5), 2.8 (DOP853), 1.4 (Radau).
-KEPT = {"moment of j2": 12, "moment behind a hand": 18, "joint rate of a four-bar": 47}
+KEPT = {"moments of an arm": 12, "moments of another arm": 18, "rates in a four-bar": 47}
 
 
 @pytest.mark.parametrize("number", KEPT.values(), ids=KEPT)

@@ -33,33 +33,28 @@ void resultant(const System &system, const Workspace &w, const std::vector<Eigen
 
 } // namespace
 
-void ActuatorForces::prepare(const Workspace &w) {
+const Eigen::VectorXd &ActuatorForces::tau_of(const Eigen::VectorXd &lambda, const Workspace &w) {
+  for (auto &wrench : wrench_)
+    wrench.setZero();
   Index column = 0;
   for (std::size_t r = 0; r < trajectory_.size(); ++r)
-    if (!trajectory_[r])
+    if (trajectory_[r])
+      add_wrench(system_.rows[r], w.rows[r], -lambda[static_cast<Index>(r)], wrench_);
+    else
       joint_system_.set_column(column++, system_.rows[r], w.rows[r], w.bodies);
   for (std::size_t i = 0; i < motors_.size(); ++i) {
     evaluate(motors_[i], w.bodies, motor_rows_[i]);
     joint_system_.set_column(column++, motors_[i], motor_rows_[i], w.bodies);
   }
-  joint_system_.factorise();
-}
-
-const Eigen::VectorXd &ActuatorForces::tau_of(const Eigen::VectorXd &lambda, const Workspace &w) {
-  for (auto &wrench : wrench_)
-    wrench.setZero();
-  for (std::size_t r = 0; r < trajectory_.size(); ++r)
-    if (trajectory_[r])
-      add_wrench(system_.rows[r], w.rows[r], -lambda[static_cast<Index>(r)], wrench_);
   rhs_.setZero();
   resultant(system_, w, wrench_, rhs_);
+  joint_system_.factorise();
   solution_ = joint_system_.solve(rhs_);
   tau_ = solution_.tail(tau_.size());
   return tau_;
 }
 
 void ActuatorForces::resolve(const Workspace &w) {
-  prepare(w);
   tau_of(w.lambda, w);
   Index column = 0;
   for (std::size_t r = 0; r < trajectory_.size(); ++r)

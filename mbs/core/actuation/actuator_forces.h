@@ -24,7 +24,6 @@ public:
   void resolve(const Workspace &w);
 
   const std::vector<Measure> &motors() const override { return motors_; }
-  void prepare(const Workspace &w) override;
   const Eigen::VectorXd &tau_of(const Eigen::VectorXd &lambda, const Workspace &w) override;
 
   const Eigen::VectorXd &tau() const { return tau_; }                      // (motors)

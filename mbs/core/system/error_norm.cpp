@@ -11,7 +11,7 @@ using VectorMap = Eigen::Map<const Eigen::VectorXd>;
 
 namespace {
 
-constexpr double of_vibration = 0.01; // that accelerations would start
+constexpr double small_moment = 0.1; // of what the largest force makes at a link's length
 constexpr double slowest = 0.01; // lengths (radians) in the time that counts: rates below are not worth comparing with
 
 } // namespace
@@ -82,14 +82,34 @@ double ErrorNorm::of_change(const double *z, const double *change, double rate) 
 }
 
 void ErrorNorm::observe(const Workspace &w, Eigen::VectorXd &values) {
-  values.resize(static_cast<Index>(group_.size()));
+  values.setZero(static_cast<Index>(group_.size()));
   values.head(multipliers_) = w.lambda.head(multipliers_);
   rates_of_joints(w, values);
+  if (has_small_moments()) {
+    const Eigen::VectorXd &tau = motors_->tau_of(w.lambda, w);
+    values.tail(tau.size()) = tau;
+  }
+}
+
+// Or what little would move the bodies, where nothing has happened yet.
+double ErrorNorm::largest_force() const {
+  double largest = 0;
+  for (std::size_t b = 0; b < system_.bodies.size(); ++b)
+    largest += system_.bodies[b].mass * peaks_.bodies[b].acceleration;
+  for (std::size_t g = 0; g < multiplier_groups_; ++g)
+    largest = std::max(largest, peaks_.groups[static_cast<Index>(g)] / per_force_[g]);
+  return largest;
+}
+
+// Others are about as good as the forces that they stand for, for less work.
+bool ErrorNorm::has_small_moments() const {
   if (!motors_)
-    return;
-  motors_->prepare(w);
-  const Eigen::VectorXd &tau = motors_->tau_of(w.lambda, w);
-  values.tail(tau.size()) = tau;
+    return false;
+  const double force = small_moment * largest_force();
+  for (std::size_t g = per_force_.size() - motors_->motors().size(); g < per_force_.size(); ++g)
+    if (peaks_.groups[static_cast<Index>(g)] <= force * per_force_[g])
+      return true;
+  return false;
 }
 
 void ErrorNorm::rates_of_joints(const Workspace &w, Eigen::VectorXd &values) const {
@@ -109,20 +129,10 @@ void ErrorNorm::measure_groups(const Eigen::VectorXd &values, Eigen::VectorXd &s
 }
 
 double ErrorNorm::of_observed(const Eigen::VectorXd &values, const Workspace &w) {
-  change_.resize(values.size());
-  change_.head(multipliers_) = w.lambda.head(multipliers_);
-  rates_of_joints(w, change_);
+  observe(w, change_);
   change_ -= values;
-  if (motors_) {
-    const Eigen::VectorXd &tau = motors_->tau_of(change_, w);
-    change_.tail(tau.size()) = tau;
-  }
   double size = 0;
-  double largest = 0; // or what little would move the bodies, where nothing has happened yet
-  for (std::size_t b = 0; b < system_.bodies.size(); ++b)
-    largest += system_.bodies[b].mass * peaks_.bodies[b].acceleration;
-  for (std::size_t g = 0; g < multiplier_groups_; ++g)
-    largest = std::max(largest, peaks_.groups[static_cast<Index>(g)] / per_force_[g]);
+  const double largest = largest_force();
   measure_groups(values, group_now_);
   measure_groups(change_, group_error_);
   for (std::size_t g = 0; g < per_force_.size(); ++g) {
@@ -167,12 +177,11 @@ void ErrorNorm::take(const double *z, const double *z_dot, const Eigen::VectorXd
       // where nothing has happened yet: a thousandth of what the acceleration would do to the softest mode
       const double force = std::sqrt(system_.bodies[b].mass) * peak.acceleration;
       applied_ = applied_modal_force(b, w).cwiseQuotient(omega); // may hold the links straight: p stays zero then
+      raise(peak.modal, std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
+                                  applied_.cwiseQuotient(omega).norm(), 1e-3 * force / std::pow(omega.minCoeff(), 2)}));
       // A coordinate that the constraints carry along faster than its own frequency has large accelerations: little of
       // what they are worth as vibration, enough for a start at rest.
-      vibration_ = of_vibration * p_ddot.cwiseQuotient(omega);
-      raise(peak.modal, std::max({p.norm(), vibration_.cwiseQuotient(omega).norm(),
-                                  applied_.cwiseQuotient(omega).norm(), 1e-3 * force / std::pow(omega.minCoeff(), 2)}));
-      raise(peak.modal_velocity, std::max({p_dot.norm(), vibration_.norm(), applied_.norm(),
+      raise(peak.modal_velocity, std::max({p_dot.norm(), 0.01 * p_ddot.cwiseQuotient(omega).norm(), applied_.norm(),
                                            std::sqrt(system_.bodies[b].mass) * peak.velocity}));
     }
   }

@@ -24,8 +24,7 @@ class ForcesOfMotors {
 public:
   virtual ~ForcesOfMotors() = default;
   virtual const std::vector<Measure> &motors() const = 0; // that they act along
-  virtual void prepare(const Workspace &w) = 0;           // for the coordinates of the last evaluation
-  // (motors) of multipliers lambda; rows are taken from w, of which a prepared one may differ by an error
+  // (motors) for multipliers lambda, at the coordinates of the last evaluation
   virtual const Eigen::VectorXd &tau_of(const Eigen::VectorXd &lambda, const Workspace &w) = 0;
 };
 
@@ -53,7 +52,7 @@ public:
   // of_state, and the accelerations that a change of velocity is worth at `rate` (1/s).
   double of_change(const double *z, const double *change, double rate) const;
 
-  // Multipliers, rates of joints and moments of motors at the last evaluation.
+  // Multipliers, rates of joints and, where they are small, moments of motors at the last evaluation.
   void observe(const Workspace &w, Eigen::VectorXd &values);
 
   // Of what the evaluation w, at a state that an error has shifted, changes of the values observed last; NaN where it
@@ -71,6 +70,8 @@ public:
 
 private:
   Eigen::VectorXd applied_modal_force(std::size_t b, const Workspace &w) const;
+  double largest_force() const;
+  bool has_small_moments() const;
   void rates_of_joints(const Workspace &w, Eigen::VectorXd &values) const;
   void measure_groups(const Eigen::VectorXd &values, Eigen::VectorXd &size) const;
 
