@@ -27,7 +27,7 @@ from .modal_body.lumped_masses import lumps
 from .modal_body_file import FORMAT_VERSION
 
 # To be raised whenever the same link file gives other numbers than before.
-ALGORITHM_VERSION = 2
+ALGORITHM_VERSION = 3
 
 _AFTER_THE_MODES = ("name", "damping", "stress")
 
@@ -66,6 +66,7 @@ def restated(body: ModalBody, link: Link) -> ModalBody | None:
         body,
         name=link.name,
         damping_ratio=damping_ratio(link, np.sqrt(np.diag(body.stiffness))),
+        damping_of=link.damping.of,
         stress=stress,
         surface_stress=body.surface_stress if link.stress.surface else None,
         input_hash=input_hash(link),

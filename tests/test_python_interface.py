@@ -72,7 +72,7 @@ def test_results_in_memory_are_those_of_a_file(folder, results, tmp_path):
         np.testing.assert_array_equal(holder["inverse/joints/shoulder/moment"], moment)
         np.testing.assert_array_equal(holder.data("inverse/joints/shoulder/moment")[:, 0], moment)
     assert results.time("inverse")[-1] == 0.02
-    assert results.modal_body("arm").mode_count == 3
+    assert results.modal_body("arm").mode_count == 3 + 2
     ffrobot.write_report([tmp_path / "r.h5"], tmp_path / "r.html")
     assert (tmp_path / "r.html").is_file()
 
@@ -163,7 +163,9 @@ def test_run_that_stops_early_keeps_its_file(folder, tmp_path):
 def test_objects_print_what_they_are(folder, results):
     # 2700 kg/m³ · π/4 (0.02² − 0.016²) m² · 0.6 m = 0.18322 kg
     body = ffrobot.read_modal_body(folder / "arm.h5")
-    assert repr(body).startswith("ModalBody('arm'): beam, cantilever, 0.6 m, 0.18322 kg, 3 modes of ")
+    assert repr(body).startswith(
+        "ModalBody('arm'): beam, cantilever, 0.6 m, 0.18322 kg, 3 modes and 2 attachment modes of "
+    )
     assert repr(swing(folder)) == ("Scene('swing'): bodies arm; joints shoulder; trajectories turn; analyses inverse")
     assert repr(results).splitlines()[1] == "  inverse: pcid, 21 outputs up to 0.02 s, completed"
     closed = ffrobot.solve(swing(folder))
@@ -196,3 +198,48 @@ analysis = [{{ name = "fall", kind = "forward", end = 0.1, output_step = 0.1 }}]
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_results_in_memory_can_be_saved_and_drawn(folder, results, tmp_path):
+    """As those in a file: figures, page, view, the same numbers."""
+    saved = results.save(tmp_path / "saved.h5")
+    with ffrobot.Results(saved) as again:
+        np.testing.assert_array_equal(
+            again["inverse/joints/shoulder/moment"], results["inverse/joints/shoulder/moment"]
+        )
+    assert ffrobot.plot_results(results, tmp_path / "figures", ["svg"])
+    assert ffrobot.view_file(results, tmp_path / "view", pictures=False)
+    ffrobot.write_report(results, tmp_path / "one.html")
+    ffrobot.write_report([results, saved], tmp_path / "two.html")
+    assert (tmp_path / "one.html").stat().st_size < (tmp_path / "two.html").stat().st_size
+    with pytest.raises(ffrobot.InputError, match="found one of kind html"):
+        results.save(tmp_path / "one.html")
+
+
+def test_a_group_is_no_dataset(results):
+    with pytest.raises(ffrobot.InputError, match=r'found the group "inverse/joints/shoulder" of .*shoulder/moment"'):
+        results["inverse/joints/shoulder"]
+
+
+def test_library_that_is_not_installed(results, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(
+        ffrobot.SolveError, match=r"this needs pandas, which is not installed: pip install 'ffrobot\[pan"
+    ):
+        results.frame("inverse")
+
+
+def test_payload_without_mass(folder):
+    """The first point of a sweep over payloads."""
+    bare, zero = (
+        ffrobot.solve(swing(folder, payload=payload)) for payload in ([], [{"point": "arm.tip", "mass": 0.0}])
+    )
+    moment = "inverse/joints/shoulder/moment"
+    np.testing.assert_allclose(zero[moment], bare[moment], rtol=1e-6)  # the tolerance: modes are found anew
+
+
+def test_tables_without_end():
+    endless: dict[str, object] = {}
+    endless["a"] = endless
+    with pytest.raises(ffrobot.InputError, match="expected"):
+        ffrobot.make_scene(name="endless", initial=endless)

@@ -33,6 +33,7 @@ section = {{ shape = "rectangle", height = 0.01, width = 0.014 }}
 [reference]
 condition = "cantilever"
 [modes]
+attachment_modes = false
 count = {count}
 family = "{family}"
 """

@@ -12,6 +12,8 @@ from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.planar_body import PlanarBody
+from .composite import composite, stiffness_ratios
+from .layers import moment_per_volt, pull_per_volt
 from .records import PztLayout
 
 STEP = 0.1  # of the height, from one station to the next; less is a taper
@@ -36,6 +38,8 @@ class PatchArray:
         W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
         frequency: (n,) of the modes, Hz.
         served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
+        stiffness_ratio: (k,) ψ of link to patch, and `authority`, the part of c V that bends the link: see
+            `composite.stiffness_ratios`.
         of_all_modes: where the `PlanarBody` has not all modes, but the patches reach all: the same patches
             on all modes, and (n_all, n) the modal forces on these from those on the `PlanarBody`.
     """
@@ -50,6 +54,8 @@ class PatchArray:
     W_sqrt: Array
     frequency: Array
     served: int
+    stiffness_ratio: Array
+    authority: Array
     of_all_modes: tuple[PatchArray, Array] | None = None
 
     @property
@@ -70,20 +76,23 @@ class PatchArray:
         return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
 
     @property
+    def stiffness_in_words(self) -> str:
+        """ψ and the authority, and whether the link feels the stiffness of its patches."""
+        if not np.isfinite(self.authority).all():
+            return f"{self.body}: stiffness ratio ψ not known: the modal body has no rigidities"
+        psi, authority = (_span(values) for values in (self.stiffness_ratio, self.authority))
+        felt = "which counts" if self.layout.adds_stiffness else "left out: structural = false"
+        return f"{self.body}: stiffness ratio ψ {psi}: their own stiffness leaves {authority} of the curvature, {felt}"
+
+    @property
     def surface_distance(self) -> Array:
         """(k,) from the link's axis to the outer surface of each patch, m."""
         return self.height / 2 + self.layout.layers * self.layout.thickness
 
 
-def moment_per_volt(layout: PztLayout, height: Array) -> Array:
-    """Moment (k,) c = E_p d31 w_p N (t_b + N t_p)/2 of N layers on one face, N·m/V; twice that on both faces.
-
-    The layers' arms, t_b/2 + (i − ½) t_p, are summed. One layer on one face is Eq. 14 of Shaban
-    2022. The stiffness of the patches is left out, as there.
-    """
-    layers, faces = layout.layers, 2 if layout.face == "both" else 1
-    arms = layers * (height + layers * layout.thickness) / 2
-    return faces * layout.modulus * layout.d31 * layout.width * arms
+def _span(values: Array) -> str:
+    """One number, or from the smallest to the largest."""
+    return " … ".join(dict.fromkeys(f"{value:.3g}" for value in (values.min(), values.max())))
 
 
 def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: PlanarBody) -> PatchArray:
@@ -91,7 +100,8 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
 
     A patch works on the difference of the section rotations at its ends, piecewise where t_b changes gradually; on one
     named face also on its elongation, since it pulls there; with `coupling = "surface"`, on the strain of the faces on
-    which it is outlined in the mesh. Raises `InputError` for patches beyond the link, on each other or across a step of
+    which it is outlined in the mesh. Where the layout adds stiffness, the link has it too (`structure.with_patches`).
+    Raises `InputError` for patches beyond the link, on each other or across a step of
     its section, for outlines that are not those of the layout, and for weights that do not fit.
     """
     key = f'{scene_path}: pzt "{layout.body}"'
@@ -107,6 +117,8 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     else:
         per_volt = np.array([moment @ turn for moment, turn in zip(moments, turns, strict=True)])
         per_volt += _pull(layout, body, edges)
+    if layout.adds_stiffness:
+        per_volt -= composite(layout, body, edges).shortfall
     if planar.reduction is not None:
         whole = patch_array(scene_path, layout, body, planar.reduction.whole)
         return _on_fewer_modes(whole, planar)
@@ -114,7 +126,10 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     turn, Phi_V = (np.array([turn.sum(axis=0) for turn in turns]) @ T).T, (per_volt @ T).T
     limit = np.full(len(edges), np.inf if layout.limit is None else layout.limit)
     weights, frequency = _weights(key, layout, planar), np.sqrt(planar.stiffness) / (2 * np.pi)
-    return PatchArray(layout, edges, height, c, turn, Phi_V, limit, weights, frequency, planar.n_eigenmodes)
+    return PatchArray(
+        layout, edges, height, c, turn, Phi_V, limit, weights, frequency, planar.n_eigenmodes,
+        *stiffness_ratios(layout, body, edges),
+    )  # fmt: skip
 
 
 def with_factors(patches: PatchArray, factors: Array) -> PatchArray:
@@ -153,13 +168,13 @@ def _on_fewer_modes(whole: PatchArray, planar: PlanarBody) -> PatchArray:
 
 
 def _pull(layout: PztLayout, body: ModalBody, edges: Array) -> Array:
-    """(k, n) modal forces per volt along the link: bending forwards (M > 0) is a pull above the axis, a push below."""
-    side = {"+y": -1.0, "-y": 1.0}.get(layout.face or "", 0.0)
-    if not side:
+    """(k, n) modal forces per volt along the link, of patches on one named face."""
+    force = pull_per_volt(layout)
+    if not force:
         return np.zeros((len(edges), body.mode_count))
     ends = [[body.interpolate(x).translation[0] for x in pair] for pair in edges.clip(0.0, body.length)]
     stretch: Array = np.diff(ends, axis=1)[:, 0]
-    return side * layout.modulus * layout.d31 * layout.width * layout.layers * stretch
+    return force * stretch
 
 
 def patch_edges(layout: PztLayout, length: float) -> Array:
@@ -261,6 +276,8 @@ def _pieces(key: str, body: ModalBody, number: int, start: float, end: float) ->
     x = body.stations.position[:, 0]
     slack = min(1e-9 * body.length, 0.25 * (end - start))
     covered = np.flatnonzero((x[1:] > start + slack) & (x[:-1] < end - slack))
+    if not len(covered):  # rounding: it begins where it ends
+        raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m, found less")
     heights = body.stations.height[covered]
     jump = np.abs(np.diff(heights)) / np.maximum(heights[1:], heights[:-1])
     if jump.max(initial=0.0) > STEP:
@@ -296,9 +313,3 @@ def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Arr
 
 def _places(edges: Array) -> str:
     return ", ".join(f"{start:g} to {end:g}" for start, end in edges)
-
-
-def section_height(body: ModalBody, start: float, end: float) -> float:
-    """The mean height of the link along y between two places, m."""
-    x, heights = _pieces("patch", body, 1, start, end)
-    return float(np.average(heights, weights=np.diff(x)))

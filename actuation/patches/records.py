@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
@@ -24,30 +25,50 @@ class PztLayout(Record):
     `allocation = "least-squares"` is content with fewer patches than modes, or modes that no patch reaches.
     Where voltages cannot produce all modal forces, `mode_weights` (of the squares of what is left) or `point_weights`
     (of the squares of the deflections that this causes at points of the link) say what matters.
-    `structural` names what of the patches is added to the link: "mass", "stiffness".
+    `structural`: what the patches add to their link. Without it their stiffness, so that they bend it as the composite
+    section bends; true: mass besides; a list names "mass", "stiffness" or both; false, as in the paper: nothing.
     Only for the judgement: `depoling_field` (V/m) and `strain_limit` of the material.
     `coupling`: patches work on the section rotations at their ends, or on the faces of a solid that outlines them.
     """
 
     body: str
+    """Link that they sit on."""
     count: PatchCount | None = None
+    """Number of patches, centres at (k − ½)·length of link / count; or give `centers`."""
     centers: Annotated[tuple[float, ...], NotEmpty, Field(max_length=MOST_PATCHES)] | None = None
+    """Their centres, m from the root."""
     length: Positive
+    """Of each along the link, m."""
     width: Positive
+    """Of each across the link, m."""
     thickness: Positive
+    """Of one layer, m."""
     modulus: Positive
+    """Young's modulus, Pa."""
     d31: float
+    """Piezoelectric strain constant, m/V."""
     density: Positive | None = None
+    """Density, kg/m³; for their mass."""
     limit: Positive | Annotated[tuple[Positive, ...], NotEmpty] | None = None
+    """Largest voltage, V: of all, or of each."""
     layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
+    """Layers on each other."""
     face: Literal["+y", "-y", "both"] | None = None
+    """Which face they sit on; without it they bend the link and do nothing else."""
     allocation: Literal["exact", "least-squares"] = "exact"
+    """Voltages that produce all modal forces, or come nearest: then fewer patches than modes will do."""
     mode_weights: Annotated[tuple[NotNegative, ...], NotEmpty] | None = None
+    """What matters of modal forces that are left unmet: a weight of the square for each mode."""
     point_weights: dict[Name, NotNegative] | None = None
-    structural: tuple[Literal["mass", "stiffness"], ...] = ()
+    """What matters of the deflections left: a weight of the square by point of the link."""
+    structural: bool | tuple[Literal["mass", "stiffness"], ...] = ("stiffness",)
+    """What of the patches is added to the link: true for both; false for neither, and the bare link's authority."""
     depoling_field: Positive | None = None
+    """Of the material, V/m; for the judgement only."""
     strain_limit: Positive | None = None
+    """Of the material; for the judgement only."""
     coupling: Literal["rotation", "surface"] = "rotation"
+    """On what they work: section rotations at their ends, or faces outlined in the mesh of a solid."""
 
     @model_validator(mode="after")
     def _consistent(self) -> PztLayout:
@@ -56,14 +77,24 @@ class PztLayout(Record):
             raise ValueError(f"expected a d31 other than 0, found {self.d31:g}: such patches do nothing")
         if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
             raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
-        if "mass" in self.structural and self.density is None:
-            raise ValueError('expected the key "density" beside structural = ["mass"], found none')
+        if self.adds_mass and self.density is None:
+            raise ValueError(f'expected the key "density" beside structural = {_toml(self.structural)}, found none')
         if self.mode_weights is not None and self.point_weights is not None:
             raise ValueError('expected one of the keys "mode_weights" and "point_weights", found both')
         for weights in (self.mode_weights, self.point_weights and tuple(self.point_weights.values())):
             if weights is not None and not any(weights):
                 raise ValueError("expected weights that are not all 0, found only zeros")
         return self
+
+    @property
+    def adds_mass(self) -> bool:
+        """Whether the mass of the patches is part of the link."""
+        return self.structural is True or (not isinstance(self.structural, bool) and "mass" in self.structural)
+
+    @property
+    def adds_stiffness(self) -> bool:
+        """Whether their stiffness is."""
+        return self.structural is True or (not isinstance(self.structural, bool) and "stiffness" in self.structural)
 
     @property
     def patch_count(self) -> int:
@@ -76,3 +107,7 @@ class PztLayout(Record):
         yield Reference("body", self.body, "flexible body")
         for point in self.point_weights or ():
             yield Reference("point_weights", f"{self.body}.{point}")
+
+
+def _toml(value: bool | tuple[str, ...]) -> str:
+    return "true" if value is True else json.dumps(list(value or ()))

@@ -78,9 +78,11 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
     position = _on_axis(stations.x)
     segment = segments(link, stations.x)
     heights = np.array([section.height for section in link.sections])[segment]
+    E = link.material.youngs_modulus
+    rigidity = np.array([[E * section.area, E * section.I_yy] for section in link.sections])[segment]
     outlines = section_outlines(link.shapes)[segment]
     residual = np.repeat([0, 1], [count, omega.size - count])
-    kept = Stations(position, translation, rotation, heights, stations.element, outlines)
+    kept = Stations(position, translation, rotation, heights, stations.element, outlines, rigidity)
     return ModalBody(
         name=link.name,
         kind=link.geometry.kind,
@@ -91,6 +93,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         stiffness=np.diag(omega**2),
         modal_mass=modal_mass(models, modes),
         damping_ratio=damping_ratio(link, omega),
+        damping_of=link.damping.of,
         family=tuple(mode.family for mode in modes),
         residual=residual,
         geometric_stiffness=with_lumped_loads(geometric_stiffness(link, stations, fields, named), attached),

@@ -95,6 +95,8 @@ def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, inert
             shapes, loads = static[family]
             own = _energies(shapes, loads, inertia)
             moved = own > IMMOBILE * largest
+            if not moved.any():
+                continue
             found = _independent(shapes[:, moved] / np.sqrt(own[moved]), known, inertia)
             families += [family] * found.shape[1]
             known = np.concatenate([known, found], axis=1)

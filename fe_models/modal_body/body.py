@@ -53,6 +53,7 @@ class Stations:
         element: (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known.
         outline: (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not
             known.
+        rigidity: (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known.
     """
 
     position: Array
@@ -61,6 +62,7 @@ class Stations:
     height: Array
     element: Integers | None = None
     outline: Array | None = None
+    rigidity: Array | None = None
 
     def __post_init__(self) -> None:
         _freeze(self)
@@ -143,6 +145,7 @@ class ModalBody:
         stiffness: (n, n) K_ff = diag(ω²).
         modal_mass: (n, n) m_ff = I to 1e-8.
         damping_ratio: (n,) ζ.
+        damping_of: "link", or "robot" where ζ is wanted of the vibrations of the assembled robot.
         family: n names; of a residual attachment mode, that of the loads behind it.
         residual: (n,) 0 of eigenmodes, 1 of residual attachment modes, which come after them; all 0 where not given.
         S_bar: (3, n) ∫ρ Φ dV.
@@ -186,6 +189,7 @@ class ModalBody:
     surface_stress: Array | None = None
     surface_patches: OutlinedPatches | None = None
     residual: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    damping_of: str = "link"
     input_hash: str = ""
     modes_hash: str = ""
     ffrobot_version: str = ""
@@ -397,6 +401,8 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         shapes.append((f"stress/points/{name}/position", point.position, (3,)))
         shapes.append((f"stress/points/{name}/stress", point.stress, (6, n)))
         shapes.append((f"stress/points/{name}/strain", point.strain, (6, n)))
+    if body.stations.rigidity is not None:
+        shapes.append(("stations.rigidity", body.stations.rigidity, (k, 2)))
     if body.mesh.edges is not None:
         shapes.append(("mesh.edges", body.mesh.edges, (len(body.mesh.edges), 2)))
     if (outline := body.stations.outline) is not None:

@@ -124,11 +124,12 @@ def solid_modal_body(
         stiffness=np.diag(modes.omega2),
         modal_mass=model.total(X.T @ (mass @ X)),
         damping_ratio=damping_ratio(link, omega),
+        damping_of=link.damping.of,
         family=tuple(modes.families),
         residual=np.repeat([0, 1], [count, omega.size - count]),
         geometric_stiffness=with_lumped_loads(stresses, attached),
         interfaces=interfaces,
-        stations=_stations(sections, x, element, translation * signs, rotation * signs),
+        stations=_stations(link, sections, x, element, translation * signs, rotation * signs),
         mesh=mesh,
         stress=point_stresses(model.V, C, seen, link.stress.points, path) if link.stress.points else {},
         surface_stress=surface_stresses(model.V, C, seen, mesh.points) if link.stress.surface else None,
@@ -207,12 +208,19 @@ def _station_grid(link: SolidLink, solid: SolidMesh) -> tuple[Array, Integers]:
     return np.append(inner.ravel(), length), element
 
 
-def _stations(sections: Averages, x: Array, element: Integers, u: Array, turn: Array) -> Stations:
-    """Height from each station on: that in the middle of the way to the next, as the stations' two heights give it."""
-    height = np.append(0.5 * (sections.height[:-1] + sections.height[1:]), sections.height[-1])
+def _stations(link: SolidLink, sections: Averages, x: Array, element: Integers, u: Array, turn: Array) -> Stations:
+    """Height and rigidity from each station on: those in the middle of the way to the next, by the stations' two."""
     centroid = sections.centroid.copy()
     centroid[:, 0] = x
-    return Stations(centroid, u, turn, height, element)
+    height, area, I = (_onward(values) for values in (sections.height, sections.area, sections.inertia[:, 2, 2]))  # noqa: E741
+    modulus = np.ravel(link.material.youngs_modulus)[0]  # of an orthotropic one E_x
+    rigidity = None if link.region else modulus * np.stack([area, I], axis=1)
+    return Stations(centroid, u, turn, height, element, rigidity=rigidity)
+
+
+def _onward(values: Array) -> Array:
+    """Of each station and the next, the mean; of the last its own."""
+    return np.append(0.5 * (values[:-1] + values[1:]), values[-1])
 
 
 def _picture(solid: SolidMesh, model: SolidModel, modes: Array) -> PictureMesh:

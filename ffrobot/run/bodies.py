@@ -74,7 +74,7 @@ def add_patches(scene: Scene, bodies: dict[str, LoadedBody]) -> dict[str, Struct
     effects = {}
     for layout in scene.pzt:
         bare = bodies[layout.body]
-        if layout.structural and bare.modal is not None:
+        if (layout.adds_mass or layout.adds_stiffness) and bare.modal is not None:
             patch_array(scene.path, layout, bare.modal, bare.planar)  # refuses patches that do not fit
             bodies[layout.body] = replace(bare, planar=with_patches(bare.planar, bare.modal, layout))
             effects[layout.body] = structure_effect(bare.planar, bodies[layout.body].planar)

@@ -33,7 +33,10 @@ class Forward(ActuatedAnalysis):
 
     kind: Literal["forward"]
     apply: Literal["joints", "joints+pzt", "trajectory", "points"] | None = None
+    """As what the findings of `actuation` act: moments of motors, with voltages of patches, forces along the
+    trajectories, or at the actuation points."""
     limits: bool = False
+    """Whether motors and patches keep within their limits."""
 
     follows_trajectories = False
     is_resumable = True
@@ -114,7 +117,10 @@ def run_forward(
 
 
 def has_raised_masses(source: Outcome | None) -> bool:
-    """Whether a run under the actuation of `source` raises masses: not where that prescribes the shape."""
+    """Whether a run under the actuation of `source` raises masses: not where that prescribes the shape.
+
+    Its forces, known at any time, hold the masses as they are to the shape, and would not hold others.
+    """
     return source is None or source.details.shape_force is None
 
 

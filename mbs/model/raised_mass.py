@@ -6,6 +6,9 @@ their frequencies lie where the model has no eigenmodes to be right with, and ex
 all static loads as they are. With p' = √μ p the modal mass is the identity again: everything linear in the modes is
 divided by √μ, everything quadratic by μ, and the mass that was added is booked in S̄_22, so that m_ff = I holds there.
 
+Inversion with motors only keeps the masses: no step of its collocation is held down by high frequencies, and its
+zeros, which high modes move, stay those of the link. Forward runs behind it may raise them.
+
 Statics, linear models and results keep p: motion goes to p' before an integration and comes back after it.
 """
 

@@ -26,6 +26,7 @@ condition = "{condition}"
 [modes]
 count = {count}
 family = "{family}"
+attachment_modes = false
 """
 
 

@@ -19,7 +19,7 @@ PATH = Path("scene.toml")
 
 def layout(count=10, **keys):
     given = {"body": "b", "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12}
-    return PztLayout(count=count, **given, **keys)
+    return PztLayout(count=count, **given, **({"structural": False} | keys))
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def bodies(link_file):
     """The modal body with ten eigenmodes and two attachment modes, and the one without these."""
     path = link_file("attached")
     plain = cached_modal_body(path).body
-    path.write_text(path.read_text().replace("count = 10", "count = 10\nattachment_modes = true"))
+    path.write_text(path.read_text().replace("attachment_modes = false\n", ""))
     return cached_modal_body(path).body, plain
 
 

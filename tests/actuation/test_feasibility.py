@@ -39,6 +39,7 @@ width = 0.025
 thickness = 0.75e-3
 modulus = 63e9
 d31 = 110e-12
+structural = false
 limit = {limit}
 depoling_field = 5e5
 {own}

@@ -23,7 +23,7 @@ def patches(body, planar=None, **keys):
     tables = {"length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12} | keys
     if "centers" not in tables and "count" not in tables:
         tables["count"] = 10
-    layout = PztLayout(body="link", **tables)
+    layout = PztLayout(body="link", **({"structural": False} | tables))
     return patch_array(Path("scene.toml"), layout, body, planar or from_modal_body("link", body))
 
 

@@ -32,7 +32,9 @@ def arm(cantilever):
 
 
 def layout(**keys):
-    return PztLayout(body="arm", length=0.05, width=0.025, thickness=7.5e-4, modulus=63e9, d31=1.1e-10, **keys)
+    return PztLayout(
+        body="arm", length=0.05, width=0.025, thickness=7.5e-4, modulus=63e9, d31=1.1e-10, structural=False, **keys
+    )
 
 
 def placed(arm, count, F_p=None, **keys):

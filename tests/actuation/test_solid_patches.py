@@ -23,6 +23,7 @@ KIND
 [reference]
 condition = "simply-supported"
 [modes]
+attachment_modes = false
 count = 6
 family = "in-plane-bending"
 """
@@ -46,7 +47,15 @@ def arrays(tmp_path_factory):
                 patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
                 bodies[faces] = cached_modal_body(path).body
         body = bodies[faces]
-        keys = {"length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12, "count": 10}
+        keys = {
+            "length": 0.05,
+            "width": 0.025,
+            "thickness": 0.75e-3,
+            "modulus": 63e9,
+            "d31": 110e-12,
+            "count": 10,
+            "structural": False,
+        }
         layout = PztLayout(body="link", coupling=coupling, **keys)
         return patch_array(Path("scene.toml"), layout, body, from_modal_body("link", body)).Phi_V
 

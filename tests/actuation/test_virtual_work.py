@@ -81,6 +81,7 @@ width = 0.025
 thickness = 0.75e-3
 modulus = 63e9
 d31 = 110e-12
+structural = false
 {own}
 """
 

@@ -148,7 +148,7 @@ def test_straight_slew(slew):
     assert np.any(np.abs(group["voltage"][()]) == limits)
     predicted = peak(np.linalg.norm(slew.file["straight/points/arm.tip/predicted_shift"][()], axis=1))
     assert predicted == pytest.approx(measured["`limited`"][0], rel=0.1)
-    assert "beyond their limits: patches of arm (factor 3" in slew.stdout
+    assert "beyond their limits: patches of arm (factor 5.53" in slew.stdout
 
 
 def test_table_of_what_actuators_can_do(slew, ffrobot):

@@ -19,6 +19,7 @@ elements = 30
 [reference]
 condition = "cantilever"
 [modes]
+attachment_modes = false
 count = 25
 family = "in-plane-bending"
 [stress]

@@ -24,6 +24,7 @@ condition = "{condition}"
 [modes]
 count = {count}
 family = "{family}"
+attachment_modes = false
 {more}
 """
 

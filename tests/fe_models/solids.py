@@ -33,6 +33,7 @@ condition = "{condition}"
 [modes]
 count = {count}
 family = "{family}"
+attachment_modes = false
 {more}
 """
 

@@ -10,7 +10,7 @@ from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body_file import read_modal_body
 
 E, I_Z, L = 2.068427e11, 0.025 * 0.015**3 / 12, 1.0
-ATTACHED = {'family = "in-plane-bending"': 'family = "in-plane-bending"\nattachment_modes = true'}
+ATTACHED = {"attachment_modes = false\n": ""}  # as links are unless they say otherwise
 INTERFACES = "".join(f'[[interface]]\nname = "i{k}"\nposition = {0.45 + 0.005 * k}\n' for k in range(5))
 
 
@@ -106,7 +106,7 @@ def test_interface_twice_at_one_place(modal_body):
 
 def test_all_families(modal_body):
     """All six loads at the tip of a cantilever, each by its own closed form."""
-    body = modal_body({'"in-plane-bending"\nattachment': '"all"\nattachment'}, condition="cantilever", count=8)
+    body = modal_body(family="all", condition="cantilever", count=8)
     found = np.diag(flexibility(body, "tip"))
     I_y, area, G = 0.015 * 0.025**3 / 12, 0.015 * 0.025, E / 2.6
     assert found[0] == pytest.approx(L / (E * area), rel=1e-9)
@@ -120,7 +120,7 @@ def test_all_families(modal_body):
 
 
 def test_list_of_families_and_default_count(modal_body):
-    listed = {'"in-plane-bending"\nattachment': '["axial", "in-plane-bending"]\nattachment', "count = 10": ""}
+    listed = {'"in-plane-bending"': '["axial", "in-plane-bending"]', "count = 10": ""}
     body = modal_body(listed, condition="cantilever")
     eigenmodes = np.array(body.family)[body.residual == 0].tolist()
     assert (eigenmodes.count("in-plane-bending"), eigenmodes.count("axial"), len(eigenmodes)) == (6, 1, 7)
@@ -130,7 +130,7 @@ def test_list_of_families_and_default_count(modal_body):
 
 def test_count_must_be_given_without_attachment_modes(link_file):
     with pytest.raises(InputError, match="modes: expected either count or indices, found neither"):
-        make_link(link_file(replace={"count = 10": "attachment_modes = false"}))
+        make_link(link_file(replace={"count = 10": ""}))
 
 
 def test_timoshenko_with_masses(modal_body):
@@ -176,7 +176,7 @@ def test_same_modes_with_other_damping_and_stress(link_file):
 def test_switching_is_another_link(link_file):
     path = link_file(replace=ATTACHED)
     assert make_link(path).body.mode_count == 12
-    path.write_text(path.read_text().replace("attachment_modes = true", "attachment_modes = false"))
+    path.write_text(path.read_text().replace("[modes]\n", "[modes]\nattachment_modes = false\n"))
     assert make_link(path).body.mode_count == 10
 
 

@@ -34,6 +34,7 @@ order = 2
 condition = "cantilever"
 
 [modes]
+attachment_modes = false
 count = 2
 family = "axial"
 """

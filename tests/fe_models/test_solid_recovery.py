@@ -19,6 +19,7 @@ KIND
 [reference]
 condition = "simply-supported"
 [modes]
+attachment_modes = false
 count = 3
 family = "in-plane-bending"
 [[interface]]

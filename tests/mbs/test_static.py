@@ -20,6 +20,7 @@ elements = 20
 [reference]
 condition = "cantilever"
 [modes]
+attachment_modes = false
 count = 40
 family = "in-plane-bending"
 """

@@ -12,7 +12,15 @@ from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import InputError
 
 GROUP = "PZT layouts"
-PATCH = {"body": "link2", "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12}
+PATCH = {
+    "body": "link2",
+    "length": 0.05,
+    "width": 0.025,
+    "thickness": 0.75e-3,
+    "modulus": 63e9,
+    "d31": 110e-12,
+    "structural": False,
+}
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ BAR = {
         "section": {"shape": "rectangle", "height": 0.015, "width": 0.025},
     },
     "reference": {"condition": "cantilever"},
-    "modes": {"count": 20, "family": "all"},
+    "modes": {"count": 20, "family": "all", "attachment_modes": False},
 }
 REFERENCE = {"cell": "tetrahedron", "order": 3, "divisions": [150, 3, 4]}
 # Divisions along x, y, z from coarse to fine, by element.

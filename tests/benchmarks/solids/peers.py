@@ -41,6 +41,7 @@ order = {order}
 [reference]
 condition = "cantilever"
 [modes]
+attachment_modes = false
 count = {count}
 family = "all"
 """
