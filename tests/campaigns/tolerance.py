@@ -1,6 +1,6 @@
 """What `tolerance` promises, tried on random robots: every integrator, every output of every reported history.
 
-    python tests/campaigns/tolerance.py found.jsonl [--count 200] [--seed 1] [--record]
+    python tests/campaigns/tolerance.py found.jsonl [--count 200] [--seeds 1 2] [--record]
 
 Robots that are in the file already are not run again. Each is run by every integrator at random tolerances. Errors are
 differences to a run at 3e-11, in parts of the history's peak and in tolerances. Histories smaller than a thousandth of
@@ -184,17 +184,19 @@ def counts(records):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", type=Path, help="a JSON record per robot; those in it are not run again")
-    parser.add_argument("--count", type=int, default=200, help="robots")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=200, help="robots of each seed")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--record", action="store_true", help="write the counts, for docs/stability.md")
     asked = parser.parse_args()
     text = asked.file.read_text() if asked.file.exists() else ""
-    records = {one["number"]: one for one in map(json.loads, text.splitlines()) if one["seed"] == asked.seed}
+    wanted = [(seed, number) for seed in asked.seeds for number in range(asked.count)]
+    records = {(one["seed"], one["number"]): one for one in map(json.loads, text.splitlines())}
+    records = {key: one for key, one in records.items() if key in wanted}
     with asked.file.open("a") as file:
-        for number in range(asked.count):
-            if number not in records:
-                records[number] = try_robot(asked.seed, number)
-                file.write(json.dumps(records[number]) + "\n")
+        for key in wanted:
+            if key not in records:
+                records[key] = try_robot(*key)
+                file.write(json.dumps(records[key]) + "\n")
                 file.flush()
     robots = sum("left out" not in one for one in records.values())
     for integrator, done, too_long, outside, worst, kind in counts(records.values()):
