@@ -22,7 +22,17 @@ from ..common.hdf5 import blaming
 from ..common.tables import key_path
 from ..common.version import program_version
 from ..mbs import _core
-from ..mbs.analysis.outcome import BODY_PEAKS, STEPS, Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
+from ..mbs.analysis.outcome import (
+    BODY_PEAKS,
+    METHOD_HISTORY,
+    STEPS,
+    Continuation,
+    EarlierRun,
+    Forces,
+    Motion,
+    Outcome,
+    Statistics,
+)
 from ..mbs.scene.analysis import IntegratedAnalysis
 from ..mbs.solve.integrators import METHODS, Choice
 from ..run.inputs import digest_of_file, named_files
@@ -114,10 +124,14 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
     for name in (*BODY_PEAKS, "groups"):
         group[f"checkpoint/peaks/{name}"] = getattr(checkpoint.peaks, name)
     about = {"time": checkpoint.time, "outputs": checkpoint.outputs}
-    group["checkpoint"].attrs.update(about | {name: getattr(checkpoint.steps, name) for name in STEPS})
+    about |= {name: getattr(checkpoint.steps, name) for name in STEPS}
+    about |= {name: getattr(checkpoint.methods, name) for name in METHOD_HISTORY}
+    group["checkpoint"].attrs.update(about)
     if recording is not None:
         group["recording/times"] = recording.times
         group["recording/states"] = recording.states
+        names = {kind: name for name, kind in METHODS.items()}
+        group["recording"].attrs["methods"] = json.dumps([(first, names[kind]) for first, kind in recording.methods])
 
 
 def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
@@ -150,10 +164,23 @@ def _continuation(solution: Solution, file: Results, name: str) -> Continuation:
     analysis = next(analysis for analysis in solution.scene.analysis if analysis.name == name)
     assert isinstance(analysis, IntegratedAnalysis)
     times, states = (_vector(file, f"{group}/recording/{key}") for key in ("times", "states"))
-    method = METHODS[about["integrator"]]
+    methods = _methods(file, f"{group}/recording")
     return Continuation(
-        checkpoint, _core.Recording(times, states, method, analysis.spectral_radius, analysis.tolerance)
+        checkpoint, _core.Recording(times, states, methods, analysis.spectral_radius, analysis.tolerance)
     )
+
+
+def _methods(file: Results, group: str) -> list[tuple[int, _core.MethodKind]]:
+    """The first step of each integrator of a recording, and its kind."""
+    text = file.attributes(group).get("methods", "")
+    try:
+        methods = [(int(first), METHODS[name]) for first, name in json.loads(text)]
+    except (TypeError, ValueError, KeyError):
+        methods = []
+    firsts = [first for first, _ in methods]
+    if firsts[:1] != [0] or firsts != sorted(firsts):
+        raise InputError(f"{file.path}: {group}: methods: expected integrators from step 0 on, found {text!r}")
+    return methods
 
 
 def _checkpoint(file: Results, group: str) -> _core.Checkpoint:
@@ -165,6 +192,7 @@ def _checkpoint(file: Results, group: str) -> _core.Checkpoint:
             steps=_core.StepHistory(**{name: about[name].item() for name in STEPS}),
             peaks=_core.Peaks(**{name: _vector(file, f"{group}/peaks/{name}") for name in (*BODY_PEAKS, "groups")}),
             outputs=int(about["outputs"]),
+            methods=_core.MethodHistory(**{name: about[name].item() for name in METHOD_HISTORY}),
         )
     except (TypeError, ValueError, KeyError, AttributeError) as error:
         raise InputError(f"{file.path}: {group}: expected where the run has stopped, found {error}") from None

@@ -15,7 +15,7 @@ from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause
 from ..solve.initial_state import undeformed_state
-from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls
+from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls, unmet
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
 from .earlier_check import check_earlier
@@ -88,16 +88,16 @@ def drive(
             continuation=replace(earlier.continuation, assembly=integrated),
         )  # fmt: skip
     began = time.perf_counter()
-    if earlier is None:
-        integrator = choose_integrator(assembly, analysis, start, steering, len(times))
-        continuation = Continuation(_core.Checkpoint(), recording)
-    else:
-        integrator, continuation = earlier.statistics.integrator, earlier.continuation
+    integrator = choose_integrator(assembly, analysis, start, steering, len(times))
+    continuation = Continuation(_core.Checkpoint(), recording)
+    if earlier is not None:  # with the same candidates, and what they have become since
+        known, continuation = earlier.statistics.integrator, earlier.continuation
+        integrator = replace(integrator, name=known.name, reason=known.reason)
     run = _integrated(assembly, analysis, start, times, integrator, steering, control, resolver, continuation, progress)
-    seconds = time.perf_counter() - began
+    seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)
     if statistics.status == "step underflow" and not statistics.cause:
-        statistics = replace(statistics, cause=beyond_order(integrator, analysis))
+        statistics = replace(statistics, cause=beyond_order(integrator, analysis) or unmet(integrator, run))
     outcome = Outcome(
         analysis=analysis,
         assembly=assembly,
@@ -123,7 +123,8 @@ def _integrated(
     progress: Progress,
 ) -> _core.Run:
     common: dict[str, Any] = {
-        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments, "times": as_list(times),
+        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments,
+        "joints": assembly.joint_measures, "times": as_list(times),
         "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
     }  # fmt: skip
     if control is None:

@@ -9,7 +9,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ..model.system import MechanismSystem
-from .outcome import BODY_PEAKS, STEPS, EarlierRun
+from .outcome import BODY_PEAKS, METHOD_HISTORY, STEPS, EarlierRun
 
 
 def check_earlier(
@@ -36,7 +36,7 @@ class _Check:
         self._expect(not self._completed or outputs == len(self.times), "status", "a run up to its end")
         self._rows(outputs, motors)
         if not self._completed:
-            self._checkpoint(outputs)
+            self._checkpoint(outputs, motors)
         self._recording(recorded)
 
     @property
@@ -54,14 +54,17 @@ class _Check:
             if of_forces is not None:
                 self._numbers(name, found[name], (outputs, of_forces))
 
-    def _checkpoint(self, outputs: int) -> None:
+    def _checkpoint(self, outputs: int, motors: int | None) -> None:
         point, times = self.earlier.continuation.checkpoint, self.times
         self._numbers("checkpoint/state", point.state, (self._state_size,))
         for name in BODY_PEAKS:
             self._numbers(f"checkpoint/peaks/{name}", getattr(point.peaks, name), (len(self.assembly.model.bodies),))
-        groups = max(self.assembly.groups, default=-1) + 1
+        groups = max(self.assembly.groups, default=-1) + 1 + len(self.assembly.joint_measures)
+        groups += motors or 0
         self._numbers("checkpoint/peaks/groups", point.peaks.groups, (groups,))
-        self._numbers("checkpoint", np.array([float(getattr(point.steps, name)) for name in STEPS]), (len(STEPS),))
+        for record, names in ((point.steps, STEPS), (point.methods, METHOD_HISTORY)):
+            values = np.array([float(getattr(record, name)) for name in names])
+            self._numbers("checkpoint", values, (len(names),))
         until = times[outputs] if outputs < len(times) else times[-1]
         in_time = times[outputs - 1] - self._slack <= point.time <= until + self._slack  # False of NaN
         self._expect(bool(in_time) and point.outputs == outputs, "checkpoint", f"a time after {outputs} outputs")

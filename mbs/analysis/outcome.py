@@ -19,8 +19,7 @@ from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
 
 _ADVICE = {
-    "step underflow": "no step is small enough there: the motion turns singular (a stretched arm, a jump in a load) or"
-    " the load grows without bound",
+    "step underflow": "no step is small enough there",
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
     "interrupted": "stopped on request",
     "mesh too coarse": "motors do not get close enough to the path: vibrations of the zero dynamics that are hardly"
@@ -88,6 +87,9 @@ class Statistics:
 
 STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error", "in_transient")
 """Of the core's `StepHistory`, all."""
+
+METHOD_HISTORY = ("second", "pace_of_other", "since", "measured", "tries", "window", "trial")
+"""Of the core's `MethodHistory`, all."""
 
 BODY_PEAKS = (
     "velocity", "angular_velocity", "modal_velocity", "modal", "acceleration", "angular_acceleration",

@@ -45,10 +45,11 @@ def run_static(model: Model, analysis: Analysis) -> Outcome:
     state = static_equilibrium(assembly, undeformed_state(assembly))
     at_rest, resolver, began = np.zeros_like(state.v), resolver_of(assembly), time.perf_counter()
     controls = _core.IntegrationControls(
-        tolerance=analysis.tolerance, max_steps=1, method=METHODS["dop853"], spectral_radius=0.0
+        tolerance=analysis.tolerance, max_steps=1, methods=[(METHODS["dop853"], 1.0, 0.0)], spectral_radius=0.0
     )
     run = _core.run(  # no step is made: accelerations and multipliers of one state
-        system=assembly.system, groups=assembly.groups, moments=assembly.moments, times=[0.0], q=state.q, v=at_rest,
+        system=assembly.system, groups=assembly.groups, moments=assembly.moments, joints=[], times=[0.0],
+        q=state.q, v=at_rest,
         controls=controls, carry_on=lambda _: True, actuator_forces=resolver,
     )  # fmt: skip
     return Outcome(

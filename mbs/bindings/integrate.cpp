@@ -2,6 +2,11 @@
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <stdexcept>
 
 #include "bindings/bindings.h"
 
@@ -16,9 +21,31 @@ VectorXd as_vector(const std::vector<double> &values) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
-void make_recording(Recording *r, const VectorXd &times, const VectorXd &states, MethodKind method,
+using Kinds = std::vector<std::pair<std::size_t, MethodKind>>; // of a recording's steps, from the first of each on
+
+void make_recording(Recording *r, const VectorXd &times, const VectorXd &states, const Kinds &kinds,
                     double spectral_radius, double tolerance) {
-  new (r) Recording{{times.begin(), times.end()}, {states.begin(), states.end()}, {method, spectral_radius}, tolerance};
+  if (kinds.empty() || kinds.front().first != 0)
+    throw std::invalid_argument("methods: expected one from the first step on, found none");
+  new (r) Recording{{times.begin(), times.end()}, {states.begin(), states.end()}, tolerance, {}};
+  for (const auto &[first, kind] : kinds)
+    r->methods.emplace_back(first, MethodChoice{kind, spectral_radius});
+}
+
+Kinds kinds_of(const Recording &r) {
+  Kinds kinds;
+  for (const auto &[first, method] : r.methods)
+    kinds.emplace_back(first, method.kind);
+  return kinds;
+}
+
+void make_controls(IntegrationControls *c, double tolerance, unsigned long max_steps,
+                   const std::vector<std::tuple<MethodKind, double, double>> &methods, double spectral_radius) {
+  if (methods.empty() || methods.size() > 2)
+    throw std::invalid_argument("methods: expected one or two, found " + std::to_string(methods.size()));
+  new (c) IntegrationControls{tolerance, max_steps, {}};
+  for (const auto &[kind, cost, pace] : methods)
+    c->methods.push_back({{kind, spectral_radius}, cost, pace});
 }
 
 void bind_kinds(nb::module_ &m) {
@@ -35,23 +62,7 @@ void bind_kinds(nb::module_ &m) {
       .value("generalized_alpha", MethodKind::generalized_alpha);
 }
 
-} // namespace
-
-void bind_integrate(nb::module_ &m) {
-  bind_kinds(m);
-  nb::class_<IntegrationControls>(m, "IntegrationControls", "What an integration is made with; max_steps 0: no limit.")
-      .def(
-          "__init__",
-          [](IntegrationControls *c, double tolerance, unsigned long max_steps, MethodKind method,
-             double spectral_radius) { new (c) IntegrationControls{tolerance, max_steps, {method, spectral_radius}}; },
-          nb::kw_only(), "tolerance"_a, "max_steps"_a, "method"_a, "spectral_radius"_a);
-  nb::class_<Recording>(m, "Recording", "The accepted steps of a run, from which its dense output can be made again.")
-      .def(nb::init<>())
-      .def("__init__", &make_recording, "times"_a, "states"_a, "method"_a, "spectral_radius"_a, "tolerance"_a,
-           "That of an earlier run: times (N,), states (N (n_q + n_v),) one after the other.")
-      .def_prop_ro("steps", [](const Recording &r) { return r.times.size(); })
-      .def_prop_ro("times", [](const Recording &r) { return as_vector(r.times); })
-      .def_prop_ro("states", [](const Recording &r) { return as_vector(r.states); });
+void bind_histories(nb::module_ &m) {
   nb::class_<StepHistory>(m, "StepHistory", "What the size of the next step follows from.")
       .def(
           "__init__",
@@ -67,4 +78,39 @@ void bind_integrate(nb::module_ &m) {
       .def_ro("previous_step", &StepHistory::previous_step)
       .def_ro("previous_error", &StepHistory::previous_error)
       .def_ro("in_transient", &StepHistory::in_transient);
+  nb::class_<MethodHistory>(m, "MethodHistory", "What the choice between two integrators follows from during a run.")
+      .def(
+          "__init__",
+          [](MethodHistory *h, bool second, double pace_of_other, double since, double measured, unsigned long tries,
+             unsigned long window, unsigned long trial) {
+            new (h) MethodHistory{second, pace_of_other, since, measured, tries, window, trial};
+          },
+          nb::kw_only(), "second"_a, "pace_of_other"_a, "since"_a, "measured"_a, "tries"_a, "window"_a, "trial"_a)
+      .def_ro("second", &MethodHistory::second)
+      .def_ro("pace_of_other", &MethodHistory::pace_of_other)
+      .def_ro("since", &MethodHistory::since)
+      .def_ro("measured", &MethodHistory::measured)
+      .def_ro("tries", &MethodHistory::tries)
+      .def_ro("window", &MethodHistory::window)
+      .def_ro("trial", &MethodHistory::trial);
+}
+
+} // namespace
+
+void bind_integrate(nb::module_ &m) {
+  bind_kinds(m);
+  bind_histories(m);
+  nb::class_<IntegrationControls>(m, "IntegrationControls", "What an integration is made with; max_steps 0: no limit.")
+      .def("__init__", &make_controls, nb::kw_only(), "tolerance"_a, "max_steps"_a, "methods"_a, "spectral_radius"_a,
+           "methods: one, or two of which the faster is found out, each with the cost of a step and the pace that is\n"
+           "expected of it, in s of the run per cost.");
+  nb::class_<Recording>(m, "Recording", "The accepted steps of a run, from which its dense output can be made again.")
+      .def(nb::init<>())
+      .def("__init__", &make_recording, "times"_a, "states"_a, "methods"_a, "spectral_radius"_a, "tolerance"_a,
+           "That of an earlier run: times (N,), states (N (n_q + n_v),) one after the other; methods: the first step\n"
+           "of each and its kind.")
+      .def_prop_ro("steps", [](const Recording &r) { return r.times.size(); })
+      .def_prop_ro("methods", &kinds_of)
+      .def_prop_ro("times", [](const Recording &r) { return as_vector(r.times); })
+      .def_prop_ro("states", [](const Recording &r) { return as_vector(r.states); });
 }

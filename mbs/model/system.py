@@ -40,6 +40,8 @@ class MechanismSystem:
         frictions = [(core(measure), friction) for measure, friction in model.frictions]
         state_forces = [(self._marker(marker), function) for marker, function in model.state_forces]
         self.motor_measures = [core(measure) for measure in motors]
+        coordinates = [joint.coordinate("section") for joint in model.scene.joint]
+        self.joint_measures = [core(measure) for measure in coordinates if measure is not None]
         springs = [(core(gear.motor), core(gear.coordinate)) for gear in model.gears]
         self.system = _core.System(np.array(model.scene.gravity))
         for body, markers in zip(model.bodies, self._markers, strict=True):

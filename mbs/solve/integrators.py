@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -24,11 +24,13 @@ METHODS = {
 # What the rule is made of, measured on the two-link case (26 coordinates; tests/benchmarks): step size times frequency
 # at which DOP853 is stable, and at which both resolve a vibration to a tolerance of 1e-4; time of a step of Radau IIA
 # in steps of DOP853, alone and where a replay of actuation is most of an evaluation; parts of the tolerance below which
-# both need not resolve a vibration, Radau since it damps it away. DOPRI5 never wins by more than clocks scatter:
-# undamped, its steps have to be five times as short as those of DOP853 (it is stable up to 1.0), damped nearly three.
+# both need not resolve a vibration, Radau since it damps it away; steps that Radau takes before they have found their
+# size. DOPRI5 never wins by more than clocks scatter: undamped, its steps have to be five times as short as those of
+# DOP853 (it is stable up to 1.0), damped nearly three.
 STABLE = 4.8
-RESOLVED_DOP853, RESOLVED_RADAU = 1.25, 0.34
-COST_OF_RADAU, COST_OF_RADAU_STEERED = 2.4, 1.4
+RESOLVED_DOP853, RESOLVED_RADAU = 1.25, 0.30
+STEPS_TO_START = 100
+COST_OF_RADAU, COST_OF_RADAU_STEERED = 2.4, 0.75
 NEGLIGIBLE_DOP853, NEGLIGIBLE_RADAU = 0.1, 1.0
 
 MOST_COORDINATES = 600  # beyond them the eigenproblem takes longer than many a run
@@ -36,17 +38,50 @@ MANY_PERIODS = 1e5
 ASKED_FOR = "asked for"
 
 
+AFTER = " after "  # in names of integrators that were changed during a run
+MOST_TOLD = 3  # changes
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An integrator for a run: what a step of it costs, and how far it is expected to get for that, s per cost."""
+
+    name: str
+    cost: float = 1.0
+    pace: float = 0.0
+
+
 @dataclass(frozen=True)
 class Choice:
-    """An integrator by its name in scenes, and why it was chosen."""
+    """An integrator by its name in scenes, and why it was chosen.
+
+    Of two `candidates` the second takes over during the run where it turns out faster, and the first again. The name
+    is then that of the last one "after" the other.
+    """
 
     name: str
     reason: str
+    candidates: tuple[Candidate, ...] = ()
 
     @property
     def is_automatic(self) -> bool:
         """Whether the program made it, not the scene."""
         return self.reason != ASKED_FOR
+
+    def changed_in(self, run: _core.Run) -> Choice:
+        """What it has become during `run`, which says when and why."""
+        if not run.changes:
+            return self
+        names = {kind: name for name, kind in METHODS.items()}
+        last = names[run.changes[-1][2]]
+        before = {*self.name.split(AFTER), *(names[before] for _, before, _, _ in run.changes)} - {last}
+        told = [
+            f"{names[to]} from t = {t:.4g} s, where steps of {names[before]} were {step:.2g} s"
+            for t, before, to, step in run.changes[:MOST_TOLD]
+        ]
+        if len(run.changes) > MOST_TOLD:
+            told.append(f"changed {len(run.changes)} times in all")
+        return replace(self, name=f"{last}{AFTER}{' and '.join(before)}", reason="; ".join([self.reason, *told]))
 
 
 NOT_INTEGRATED = Choice("none", "nothing to integrate")
@@ -62,7 +97,7 @@ def choose_integrator(
     """The integrator for an analysis from `start`, under the actuation `steering` that it replays, if any.
 
     Explicit steps are held by the highest frequency whether it is excited or not, implicit ones by the highest that
-    rings above the tolerance. The rule estimates the number of steps of both; a wrong guess costs time, not accuracy.
+    rings above the tolerance. The rule estimates the number of steps of both; a wrong one is found out in the run.
     """
     if analysis.integrator != "auto":
         return Choice(analysis.integrator, ASKED_FOR)
@@ -84,18 +119,23 @@ def choose_integrator(
     phase = partial(_ringing_phase, modes.frequency, modes.damping_ratio, excited, analysis.end)
     explicit = phase(NEGLIGIBLE_DOP853 * analysis.tolerance) / (RESOLVED_DOP853 * scale ** (1 / 8))
     implicit = phase(NEGLIGIBLE_RADAU * analysis.tolerance) / (RESOLVED_RADAU * scale ** (1 / 5))
-    explicit, implicit = max(analysis.end * top / STABLE, explicit), max(outputs, implicit)
+    explicit, implicit = max(analysis.end * top / STABLE, explicit), max(outputs, implicit) + STEPS_TO_START
     rings = excited > analysis.tolerance
     felt = f"{modes.frequency[rings].max():.3g} rad/s" if rings.any() else "no frequency"
     reason = f"vibrations up to {top:.3g} rad/s, ringing above the tolerance up to {felt}"
     cost = COST_OF_RADAU if steering is None else COST_OF_RADAU_STEERED
-    return Choice("radau" if cost * implicit < explicit else "dop853", reason)
+    dop853 = Candidate("dop853", 1.0, analysis.end / explicit)
+    radau = Candidate("radau", cost, analysis.end / (cost * implicit))
+    first, second = (radau, dop853) if radau.pace > dop853.pace else (dop853, radau)
+    return Choice(first.name, reason, (first, second))
 
 
 def integration_controls(analysis: IntegratedAnalysis, choice: Choice) -> _core.IntegrationControls:
     """What the core integrates an analysis with."""
+    candidates = choice.candidates or (Candidate(choice.name),)
+    methods = [(METHODS[one.name], one.cost, one.pace) for one in candidates]
     return _core.IntegrationControls(
-        tolerance=analysis.tolerance, max_steps=analysis.max_steps, method=METHODS[choice.name],
+        tolerance=analysis.tolerance, max_steps=analysis.max_steps, methods=methods,
         spectral_radius=analysis.spectral_radius,
     )  # fmt: skip
 
@@ -107,6 +147,18 @@ def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:
     return (
         f"a tolerance of {analysis.tolerance:g} is below what generalized-alpha reaches here: at order 2 it takes steps"
         ' too short to get anywhere, down to rounding; loosen the tolerance, or use integrator = "radau" or "dop853"'
+    )
+
+
+def unmet(choice: Choice, run: _core.Run) -> str:
+    """What the integrator saw where steps have become too short and no cause is found in loads or positions."""
+    if np.isfinite(run.last_error):
+        saw = f"a step of {run.last_step:.2g} s still errs by {run.last_error:.2g} times what it may"
+    else:
+        saw = f"the equations of a step of {run.last_step:.2g} s could not be solved"
+    return (
+        f"{saw} ({choice.name}), and neither loads nor the configuration there tell why; loosen the tolerance, or use"
+        " another integrator"
     )
 
 

@@ -75,10 +75,10 @@ def always(_):
 def core_run(assembly, q, v, times, tolerance=1e-6, max_steps=0, **keys):
     """A run of the core itself from (q, v), with DOP853."""
     controls = _core.IntegrationControls(
-        tolerance=tolerance, max_steps=max_steps, method=_core.MethodKind.dop853, spectral_radius=0.8
+        tolerance=tolerance, max_steps=max_steps, methods=[(_core.MethodKind.dop853, 1.0, 0.0)], spectral_radius=0.8
     )
     return _core.run(
-        system=assembly.system, groups=assembly.groups, moments=assembly.moments, times=times, q=q, v=v,
+        system=assembly.system, groups=assembly.groups, moments=assembly.moments, joints=[], times=times, q=q, v=v,
         controls=controls, carry_on=always, **keys,
     )  # fmt: skip
 

@@ -101,12 +101,8 @@ def test_errors_of_all_reported_quantities_are_within_the_tolerance(tight, integ
 
 
 # The factors by which the integrators tighten the tolerance (`error_share`) were found with `arm()`. These arms had no
-# part in that: links, path and start by seed, the last two of them the worst of 11 … 29. Of all 19, everything but the
-# velocities keeps to the tolerance (forces to 0.63 of it), and explicit methods with all (0.27); the velocities of
-# implicit ones err by more in 5 (Radau, up to 1.29) and in 8 (generalized-α, up to 1.43): their factors are a third too
-# large for arms in general.
+# part in that: links, path and start by seed, the last two of them the worst of 11 … 29.
 HELD_OUT = (11, 12, 20, 29)
-SLACK = {"radau": 1.4, "generalized-alpha": 1.55}  # of velocities
 
 
 def held_out(seed):
@@ -131,7 +127,6 @@ def test_errors_of_arms_that_nothing_was_tuned_with(seed):
     for integrator, tolerance in (("dop853", 1e-5), ("dopri5", 1e-4), ("radau", 1e-3), ("generalized-alpha", 1e-2)):
         outcome = inverse(model, tolerance=tolerance, integrator=integrator)
         ratios = {name: relative(getattr(outcome, name), getattr(exact, name)) / tolerance for name in REPORTED}
-        assert ratios.pop("v") <= SLACK.get(integrator, 1.0), integrator
         assert max(ratios.values()) <= 1.0, (integrator, ratios)
         assert ratios["lambda_"] > 0.001, (integrator, ratios)
 
@@ -155,21 +150,24 @@ def test_newton_s_method_of_radau_hardly_iterates_and_keeps_its_matrix():
 
 @pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
 def test_stiff_links_at_rest_do_not_hold_implicit_steps(integrator):
-    """Twelve modes a link, up to 34 krad/s, none of which is felt at a percent."""
+    """Twelve modes a link, up to 34 krad/s, none of which is felt at a percent.
+
+    A method of order 2 takes more steps for the rest; each of them is 1.5 radians of the highest mode.
+    """
     model = arm(arm_links(modes=12, extra=2), initial={"angles": ANGLES, "state": "static"})
     outcome = inverse(model, tolerance=1e-2, integrator=integrator)
-    assert outcome.statistics.steps < (10_000 if integrator == "generalized-alpha" else 600)
+    assert outcome.statistics.steps < (25_000 if integrator == "generalized-alpha" else 600)
 
 
 def test_radau_damps_away_what_rings_below_the_tolerance():
     """A path whose jerk jumps at the start: vibrations up to 85 krad/s, those above 2 krad/s below the tolerance.
 
-    2 808 steps; resolved they would be 7 251, and resolved at their frequency 250 000.
+    3 708 steps; resolved they would be 7 251, and resolved at their frequency 250 000.
     """
     model = arm(arm_links(EI=300.0, modes=12, extra=2), initial={"angles": ANGLES, "state": "static"})
     exact = inverse(model, tolerance=1e-6, integrator="dop853")
     outcome = inverse(model, tolerance=1e-4, integrator="radau")
-    assert outcome.statistics.steps < 3500
+    assert outcome.statistics.steps < 4500
     assert relative(outcome.lambda_, exact.lambda_) < 1e-4
 
 
@@ -214,6 +212,16 @@ def test_generalized_alpha_says_that_a_tolerance_is_beyond_it():
     analysis = pcid(end=0.2, tolerance=1e-8, integrator="generalized-alpha")
     with pytest.raises(SolveError, match=r"1e-08 is below what generalized-alpha reaches here.*loosen the tolerance"):
         run_pcid(model, analysis, False, always).check_completed()
+
+
+def test_where_steps_collapse_does_not_depend_on_max_steps():
+    path = {"name": "tip", "point": "link2.tip", "x": f"{TIP[0]!r}-0.12*sin(100*t)", "y": f"{TIP[1]!r}"}
+    model = arm(gravity=(0.0, 0.0), trajectory=[path])
+    keys = {"end": 0.2, "tolerance": 1e-8, "integrator": "generalized-alpha"}
+    runs = [run_pcid(model, pcid(max_steps=most, **keys), False, always) for most in (50_000, 1_000_000)]
+    assert [run.status for run in runs] == ["step underflow"] * 2
+    assert runs[0].statistics.steps == runs[1].statistics.steps
+    assert runs[0].statistics.time_reached == runs[1].statistics.time_reached
 
 
 def test_a_run_stops_when_asked_to():

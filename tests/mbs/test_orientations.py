@@ -87,7 +87,9 @@ def test_the_equations_are_those_of_a_top(exact):
 )
 def test_adaptive_steps_and_their_outputs(exact, method, tolerance):
     times = np.linspace(0.0, 1.0, 41)
-    controls = _core.IntegrationControls(tolerance=tolerance, max_steps=0, method=method, spectral_radius=0.8)
+    controls = _core.IntegrationControls(
+        tolerance=tolerance, max_steps=0, methods=[(method, 1.0, 0.0)], spectral_radius=0.8
+    )
     states = _core.top_motion(*TOP, times.tolist(), START, SPIN, controls)
     assert np.abs(np.linalg.norm(states[:, :4], axis=1) - 1).max() < 1e-15
     assert max(distance(s, e) for s, e in zip(states, exact[::160], strict=True)) < tolerance

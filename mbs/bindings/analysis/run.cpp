@@ -3,6 +3,7 @@
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/function.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "bindings/analysis/analysis.h"
@@ -52,15 +53,24 @@ void bind_checkpoint(nb::module_ &m) {
       .def(nb::init<>())
       .def(
           "__init__",
-          [](Checkpoint *c, double time, VectorXd state, const StepHistory &steps, Peaks peaks, std::size_t outputs) {
-            new (c) Checkpoint{{time, std::move(state), steps, outputs}, std::move(peaks)};
+          [](Checkpoint *c, double time, VectorXd state, const StepHistory &steps, Peaks peaks, std::size_t outputs,
+             const MethodHistory &methods) {
+            new (c) Checkpoint{{time, std::move(state), steps, outputs, methods}, std::move(peaks)};
           },
-          nb::kw_only(), "time"_a, "state"_a, "steps"_a, "peaks"_a, "outputs"_a, "state (n_q + n_v,).")
+          nb::kw_only(), "time"_a, "state"_a, "steps"_a, "peaks"_a, "outputs"_a, "methods"_a, "state (n_q + n_v,).")
       .def_prop_ro("time", [](const Checkpoint &c) { return c.integration.time; })
       .def_prop_ro("state", [](const Checkpoint &c) { return c.integration.state; })
       .def_prop_ro("steps", [](const Checkpoint &c) { return c.integration.steps; })
       .def_prop_ro("outputs", [](const Checkpoint &c) { return c.integration.outputs; })
+      .def_prop_ro("methods", [](const Checkpoint &c) { return c.integration.methods; })
       .def_ro("peaks", &Checkpoint::peaks);
+}
+
+auto changes_of(const Run &r) {
+  std::vector<std::tuple<double, MethodKind, MethodKind, double>> changes;
+  for (const MethodChange &change : r.report.changes)
+    changes.emplace_back(change.time, change.from, change.to, change.mean_step);
+  return changes;
 }
 
 void bind_outputs(nb::module_ &m) {
@@ -71,6 +81,9 @@ void bind_outputs(nb::module_ &m) {
       .def_prop_ro("steps", [](const Run &r) { return r.report.steps; })
       .def_prop_ro("rejected", [](const Run &r) { return r.report.rejected; })
       .def_prop_ro("evaluations", [](const Run &r) { return r.report.evaluations; })
+      .def_prop_ro("last_step", [](const Run &r) { return r.report.last_step; })
+      .def_prop_ro("last_error", [](const Run &r) { return r.report.last_error; })
+      .def_prop_ro("changes", &changes_of, "Of integrators: (time, from, to, mean step before) of each.")
       // references: the arrays are views that keep their Run alive
       .def_prop_ro("q", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.q; })
       .def_prop_ro("v", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.v; })
@@ -81,7 +94,7 @@ void bind_outputs(nb::module_ &m) {
       .def_prop_ro("residual", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.residual; });
 }
 
-Run run_system(const System &system, std::vector<int> groups, const std::vector<bool> &moments,
+Run run_system(const System &system, std::vector<int> groups, std::vector<bool> moments, std::vector<Measure> joints,
                const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
                const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
                ExternalLoads *external_loads, ActuatorForces *actuator_forces, Recording *recording,
@@ -90,7 +103,8 @@ Run run_system(const System &system, std::vector<int> groups, const std::vector<
   check_size("v", v.size(), system.n_v());
   check_size("moments", static_cast<Index>(moments.size()), static_cast<Index>(groups.size()));
   const nb::gil_scoped_release unlocked;
-  ConstrainedMotion motion(system, {system, std::move(groups), moments}, external_loads);
+  ConstrainedMotion motion(
+      system, {system, {std::move(groups), std::move(moments), std::move(joints), actuator_forces}}, external_loads);
   const auto ask = [&](double t) {
     const nb::gil_scoped_acquire locked;
     return carry_on(t);
@@ -104,8 +118,8 @@ Run run_system(const System &system, std::vector<int> groups, const std::vector<
 void bind_run(nb::module_ &m) {
   bind_checkpoint(m);
   bind_outputs(m);
-  m.def("run", &run_system, nb::kw_only(), "system"_a, "groups"_a, "moments"_a, "times"_a, "q"_a, "v"_a, "controls"_a,
-        "carry_on"_a, "external_loads"_a = nb::none(), "actuator_forces"_a = nb::none(), "recording"_a = nb::none(),
-        "checkpoint"_a = nb::none(),
+  m.def("run", &run_system, nb::kw_only(), "system"_a, "groups"_a, "moments"_a, "joints"_a, "times"_a, "q"_a, "v"_a,
+        "controls"_a, "carry_on"_a, "external_loads"_a = nb::none(), "actuator_forces"_a = nb::none(),
+        "recording"_a = nb::none(), "checkpoint"_a = nb::none(),
         "Integrates the motion from (q, v), or on from a checkpoint, which it moves, and reports it at `times`.");
 }

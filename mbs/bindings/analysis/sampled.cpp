@@ -40,18 +40,18 @@ RowMajorMatrix read_all(Sensing &sensing, const RowMajorMatrix &q, const RowMajo
   return readings;
 }
 
-Run run_under_controller(const System &system, std::vector<int> groups, const std::vector<bool> &moments,
-                         const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
-                         const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
-                         std::size_t motors, std::vector<HeldCommands::Patches> patches, const VectorXd &first_command,
-                         Sensing &sensing, const std::vector<double> &samples, double delay,
-                         const Controller &controller) {
+Run run_under_controller(const System &system, std::vector<int> groups, std::vector<bool> moments,
+                         std::vector<Measure> joints, const std::vector<double> &times, const VectorXd &q,
+                         const VectorXd &v, const IntegrationControls &controls,
+                         const std::function<bool(double)> &carry_on, std::size_t motors,
+                         std::vector<HeldCommands::Patches> patches, const VectorXd &first_command, Sensing &sensing,
+                         const std::vector<double> &samples, double delay, const Controller &controller) {
   check_size("q", q.size(), system.n_q());
   check_size("v", v.size(), system.n_v());
   const nb::gil_scoped_release unlocked;
   HeldCommands commands(motors, std::move(patches));
   commands.set(first_command);
-  ConstrainedMotion motion(system, {system, std::move(groups), moments}, &commands);
+  ConstrainedMotion motion(system, {system, {std::move(groups), std::move(moments), std::move(joints)}}, &commands);
   const auto ask = [&](double t) {
     const nb::gil_scoped_acquire locked;
     return carry_on(t);
@@ -69,7 +69,7 @@ void bind_sampled(nb::module_ &m) {
   nb::class_<Sensing>(m, "Sensing", "What sensors read of a state: rows, then modal coordinates, or their rates.")
       .def("__init__", &make_sensing, "system"_a, "rows"_a, "modes"_a, nb::keep_alive<1, 2>())
       .def("read", &read_all, "q"_a, "v"_a, "a"_a, "Readings (T, sensors) of q (T, n_q), v and a (T, n_v).");
-  m.def("run_sampled", &run_under_controller, nb::kw_only(), "system"_a, "groups"_a, "moments"_a, "times"_a, "q"_a,
-        "v"_a, "controls"_a, "carry_on"_a, "motors"_a, "patches"_a, "first_command"_a, "sensing"_a, "samples"_a,
+  m.def("run_sampled", &run_under_controller, nb::kw_only(), "system"_a, "groups"_a, "moments"_a, "joints"_a, "times"_a,
+        "q"_a, "v"_a, "controls"_a, "carry_on"_a, "motors"_a, "patches"_a, "first_command"_a, "sensing"_a, "samples"_a,
         "delay"_a, "controller"_a, "As run, under commands that `controller`(k, t, readings) gives at samples.");
 }

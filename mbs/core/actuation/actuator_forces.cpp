@@ -33,17 +33,15 @@ void resultant(const System &system, const Workspace &w, const std::vector<Eigen
 
 } // namespace
 
-void ActuatorForces::resolve(const Workspace &w) {
+const Eigen::VectorXd &ActuatorForces::tau_of(const Eigen::VectorXd &lambda, const Workspace &w) {
   for (auto &wrench : wrench_)
     wrench.setZero();
   Index column = 0;
-  for (std::size_t r = 0; r < trajectory_.size(); ++r) {
-    const Measure &row = system_.rows[r];
+  for (std::size_t r = 0; r < trajectory_.size(); ++r)
     if (trajectory_[r])
-      add_wrench(row, w.rows[r], -w.lambda[static_cast<Index>(r)], wrench_);
+      add_wrench(system_.rows[r], w.rows[r], -lambda[static_cast<Index>(r)], wrench_);
     else
-      joint_system_.set_column(column++, row, w.rows[r], w.bodies);
-  }
+      joint_system_.set_column(column++, system_.rows[r], w.rows[r], w.bodies);
   for (std::size_t i = 0; i < motors_.size(); ++i) {
     evaluate(motors_[i], w.bodies, motor_rows_[i]);
     joint_system_.set_column(column++, motors_[i], motor_rows_[i], w.bodies);
@@ -52,15 +50,18 @@ void ActuatorForces::resolve(const Workspace &w) {
   resultant(system_, w, wrench_, rhs_);
   joint_system_.factorise();
   solution_ = joint_system_.solve(rhs_);
+  tau_ = solution_.tail(tau_.size());
+  return tau_;
+}
 
-  column = 0;
+void ActuatorForces::resolve(const Workspace &w) {
+  tau_of(w.lambda, w);
+  Index column = 0;
   for (std::size_t r = 0; r < trajectory_.size(); ++r)
     if (!trajectory_[r])
       add_wrench(system_.rows[r], w.rows[r], -solution_[column++], wrench_);
-  for (std::size_t i = 0; i < motors_.size(); ++i) {
-    tau_[static_cast<Index>(i)] = solution_[column];
+  for (std::size_t i = 0; i < motors_.size(); ++i)
     add_wrench(motors_[i], motor_rows_[i], -solution_[column++], wrench_);
-  }
   for (std::size_t b = 0; b < system_.bodies.size(); ++b) {
     F_p_[b].setZero();
     add_modal_force(system_.bodies[b], w.bodies[b], wrench_[b], F_p_[b]);

@@ -14,7 +14,7 @@ namespace ffrobot {
 //     -C_sq^T lambda_s = C_mq^T nu + T_q^T tau + (0, 0, F_p)
 //
 // This is F_je = -D^T C_sq^T lambda_s (Eq. 21) with D eliminated: its (R, theta) rows give nu and tau, its p rows F_p.
-class ActuatorForces {
+class ActuatorForces final : public ForcesOfMotors {
 public:
   // trajectory[i]: whether constraint i is a specified trajectory (C_s) or a mechanical joint (C_m).
   // Needs as many motors as the mechanism with rigid links has degrees of freedom.
@@ -22,6 +22,9 @@ public:
 
   // After accelerations(): uses the kinematics and multipliers in w.
   void resolve(const Workspace &w);
+
+  const std::vector<Measure> &motors() const override { return motors_; }
+  const Eigen::VectorXd &tau_of(const Eigen::VectorXd &lambda, const Workspace &w) override;
 
   const Eigen::VectorXd &tau() const { return tau_; }                      // (motors)
   const std::vector<Eigen::VectorXd> &modal_force() const { return F_p_; } // of each body

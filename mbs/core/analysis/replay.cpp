@@ -10,8 +10,7 @@ RecordedMotion::RecordedMotion(const System &system, const Recording &recording)
     : motion_(system), recording_(recording), z_(motion_.size()) {
   motion_.norm().plan(recording.times.back() - recording.times.front());
   constexpr int remembered = 4;
-  for (int i = 0; i < remembered; ++i)
-    cache_.push_back({static_cast<std::size_t>(-1), make_method(recording.method, motion_)});
+  cache_.resize(remembered);
 }
 
 const double *RecordedMotion::recorded(std::size_t i) const {
@@ -28,7 +27,13 @@ void RecordedMotion::find_interval(double t) {
     --hint_;
 }
 
-void RecordedMotion::make_again(Method &method) {
+void RecordedMotion::make_again(Interval &interval) {
+  const MethodChoice &choice = recording_.method_of(hint_);
+  if (!interval.method || interval.kind != choice.kind)
+    interval.method = make_method(choice, motion_);
+  interval.kind = choice.kind;
+  interval.index = hint_;
+  Method &method = *interval.method;
   const double t0 = recording_.times[hint_], h = recording_.times[hint_ + 1] - t0;
   motion_.local().from_state(recorded(hint_), z_.data());
   motion_.slope(t0, z_.data(), method.first_slope());
@@ -46,8 +51,7 @@ const double *RecordedMotion::state(double t) {
   if (found == cache_.end()) {
     found = cache_.begin() + static_cast<std::ptrdiff_t>(next_);
     next_ = (next_ + 1) % cache_.size();
-    found->index = hint_;
-    make_again(*found->method);
+    make_again(*found);
   }
   found->method->interpolate(t, z_.data());
   return motion_.local().state(z_.data());

@@ -22,12 +22,13 @@ public:
 private:
   struct Interval { // between two recorded states
     std::size_t index = static_cast<std::size_t>(-1);
+    MethodKind kind = MethodKind::dop853;
     std::unique_ptr<Method> method;
   };
 
   const double *recorded(std::size_t i) const; // state i
   void find_interval(double t);                // that of hint_
-  void make_again(Method &method);             // the step of the interval
+  void make_again(Interval &interval);         // the step of the interval, by the method that made it
 
   ConstrainedMotion motion_;
   const Recording &recording_;

@@ -31,6 +31,9 @@ enum class MeasureKind {
          // on a that turns N times as fast as b does on a
 };
 
+// Whether a force along it is a moment.
+constexpr bool carries_moment(MeasureKind kind) { return kind == MeasureKind::angle || kind == MeasureKind::gear; }
+
 // Whether the directions of such rows, and with them their coefficients below, move with the bodies.
 constexpr bool moves(MeasureKind kind) { return kind == MeasureKind::slide; }
 

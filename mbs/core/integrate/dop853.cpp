@@ -19,18 +19,20 @@ bool Dop853::step(double t, const double *y, double h, double) {
   return true;
 }
 
-double Dop853::estimate(double h, Eigen::VectorXd &error) {
+// A coordinate and its rate have one factor, and every pair its own: large slow motion, whose estimate of order 5 is
+// far below that of order 3, would bring the error of fast vibration down as well.
+void Dop853::estimate(double h, Eigen::VectorXd &error) {
   constexpr auto all = std::make_index_sequence<Tableau::stages + 1>();
-  double square5 = 0, square3 = 0;
-  for (Index i = 0; i < n_; ++i) {
-    const double e5 = combine<Tableau::e5>(K_.data(), n_, i, all);
-    const double e3 = combine<Tableau::e3>(K_.data(), n_, i, all);
-    error[i] = h * e5;
-    square5 += e5 * e5;
-    square3 += e3 * e3;
+  const auto e5 = [&](Index i) { return combine<Tableau::e5>(K_.data(), n_, i, all); };
+  const auto e3 = [&](Index i) { return combine<Tableau::e3>(K_.data(), n_, i, all); };
+  const Index n_v = n_ / 2;
+  for (Index i = 0; i < n_v; ++i) {
+    const double q5 = e5(i), v5 = h * e5(n_v + i), q3 = e3(i), v3 = h * e3(n_v + i);
+    const double square5 = q5 * q5 + v5 * v5, square = square5 + 0.01 * (q3 * q3 + v3 * v3);
+    const double factor = square == 0 ? 1.0 : std::sqrt(square5 / square);
+    error[i] = h * factor * q5;
+    error[n_v + i] = factor * v5;
   }
-  const double denominator = square5 + 0.01 * square3;
-  return denominator > 0 ? std::sqrt(square5 / denominator) : (denominator == 0 ? 1.0 : NAN);
 }
 
 void Dop853::prepare_dense(double t, const double *y, double h) {
@@ -46,6 +48,15 @@ void Dop853::prepare_dense(double t, const double *y, double h) {
     for (Index j = 0; j < Tableau::dense_stages; ++j)
       F_.col(3 + row) += (h * Tableau::d[row][j]) * K_.col(j);
   }
+}
+
+// The last term of the interpolation is at most (4/7)^4 (3/7)^3 of its coefficient. On a vibration of 0.3 to 7 radians
+// a step it is 6 to 7 times the largest error, which is 3 times the estimate of the step as long as that is stable and
+// 8 times where it is not.
+bool Dop853::estimate_dense(Eigen::VectorXd &error) const {
+  constexpr double largest_of_last = 0.0084, of_error = 6;
+  error = largest_of_last / of_error * F_.col(Tableau::dense_order - 1);
+  return true;
 }
 
 void Dop853::interpolate(double t, double *y) const {

@@ -4,6 +4,7 @@
 #include "core/integrate/dop853_tableau.h"
 #include "core/integrate/method.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ffrobot {
@@ -15,13 +16,14 @@ public:
   bool step(double t, const double *y, double h, double tolerance) override;
   bool correct(double t) override { return system_.correct(t, end_.data()); }
 
-  // Estimate of order 5, and the factor that the estimate of order 3 brings it down by: together they shrink as h^8.
-  double estimate(double h, Eigen::VectorXd &error) override;
+  // Estimate of order 5, times a factor that the estimate of order 3 brings it down by: together they shrink as h^8.
+  void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 8; }
-  double error_share(double fraction) const override { return std::sqrt(fraction) / 8; }
+  double error_share(double fraction) const override { return std::min(std::sqrt(fraction) / 10, 16 * fraction); }
 
   bool lands_on_outputs() const override { return false; }
   void prepare_dense(double t, const double *y, double h) override; // three more slopes
+  bool estimate_dense(Eigen::VectorXd &error) const override;
   void interpolate(double t, double *y) const override;
 
   double *end() override { return end_.data(); }

@@ -17,10 +17,9 @@ bool Dopri5::step(double t, const double *y, double h, double) {
   return true;
 }
 
-double Dopri5::estimate(double h, Eigen::VectorXd &error) {
+void Dopri5::estimate(double h, Eigen::VectorXd &error) {
   for (Index i = 0; i < n_; ++i)
     error[i] = h * combine<Tableau::e>(K_.data(), n_, i, std::make_index_sequence<Tableau::stages + 1>());
-  return 1;
 }
 
 void Dopri5::prepare_dense(double t, const double *y, double h) {

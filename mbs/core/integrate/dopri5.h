@@ -4,6 +4,7 @@
 #include "core/integrate/dopri5_tableau.h"
 #include "core/integrate/method.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ffrobot {
@@ -14,9 +15,9 @@ public:
 
   bool step(double t, const double *y, double h, double tolerance) override;
   bool correct(double t) override { return system_.correct(t, end_.data()); }
-  double estimate(double h, Eigen::VectorXd &error) override;
+  void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 5; }
-  double error_share(double fraction) const override { return std::sqrt(fraction) / 8; }
+  double error_share(double fraction) const override { return std::min(std::sqrt(fraction) / 8, 3 * fraction); }
 
   bool lands_on_outputs() const override { return false; }
   void prepare_dense(double t, const double *y, double h) override;

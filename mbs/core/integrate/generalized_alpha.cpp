@@ -106,7 +106,7 @@ bool GeneralizedAlpha::step(double t, const double *y, double h, double toleranc
 
 // Against the integral of the parabola through the last three accelerations (order 3), smoothed by N^-1 M: a difference
 // of accelerations is large in stiff modes, what it does to them is not. The first step has a straight line only.
-double GeneralizedAlpha::estimate(double h, VectorXd &error) {
+void GeneralizedAlpha::estimate(double h, VectorXd &error) {
   const VectorXd &next = next_v_dot_;
   auto e_q = error.head(n_), e_v = error.tail(n_);
   e_v = h * (0.5 * v_dot_ + 0.5 * next - (1 - gamma_) * a_ - gamma_ * next_a_);
@@ -125,7 +125,6 @@ double GeneralizedAlpha::estimate(double h, VectorXd &error) {
     system_.solve(force_.data(), nullptr, x_.data());
     e += x_;
   }
-  return 1;
 }
 
 void GeneralizedAlpha::accept(double h) {

@@ -16,9 +16,9 @@ public:
 
   bool step(double t, const double *y, double h, double tolerance) override;
   bool correct(double t) override { return project_(t, end_.data()); }
-  double estimate(double h, Eigen::VectorXd &error) override;
+  void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 3; }
-  double error_share(double fraction) const override { return 4 * fraction; }
+  double error_share(double fraction) const override { return 2 * fraction; }
   void accept(double h) override;
   void restart() override {
     started_ = false;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <memory>
 
 namespace ffrobot {
@@ -14,18 +15,30 @@ namespace {
 constexpr unsigned long steps_between_questions = 1000;
 constexpr std::chrono::milliseconds time_between_questions{200}; // where steps take long
 
-// A step size that collapses never quite reaches rounding where noise feeds its estimates. A run that would take this
-// many times the steps it is allowed, at the pace of its last thousand, is given up.
-constexpr double hopeless = 100;
+// A step size that collapses never quite reaches rounding where noise feeds its estimates. Nothing that the equations
+// describe asks for a thousand steps in a row so much shorter, in the mean, than the first one to try, a tenth of the
+// fastest vibration's radian.
+constexpr double shortest_steps = 1e-5;
 
 // The reserve is a second tolerance, as large as the first, for errors that happen once and not at every step. There
 // are two kinds. A load that jumps leaves an error in proportion to the step across it, more than that step's share of
-// the tolerance however short it is: steps that are that much shorter than the usual ones may take from the reserve.
+// the tolerance however short it is: steps that are that much shorter than the usual ones may take from the reserve. A
+// small part of it, as estimates may see a twentieth of a jump late in a step; a larger one where steps near rounding.
 // Vibrations below the tolerance that a step damps away are gone after it: a method that damps begins with the longest
 // step there is, and may take from the reserve until these are gone.
-constexpr double much_shorter = 1e-3, part_of_reserve = 0.25;
+constexpr double much_shorter = 1e-3, part_at_jump = 0.03;
+constexpr double near_rounding = 1e-8, part_of_reserve = 0.25;
+
+// Part of the tolerance that the iterations of a step are measured by at least. The share of very short steps is below
+// the noise of forces, which no iteration gets through: they would stay as short as they are.
+constexpr double least_to_iterate = 1e-4;
 
 constexpr double rounding = 2e-14; // what error estimates see of it: shorter steps would not help
+
+// What is judged of dense output: steps of this many radians of the fastest vibration are too long for it. Their
+// estimates hardly see it, and most harm is done between their ends. Only where it may be a notable part of the
+// tolerance.
+constexpr double radians_too_long = 5, notable = 0.1;
 
 // Length of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
 double next_step(double h, double left, bool lands) {
@@ -53,20 +66,20 @@ public:
               const IntegrationControls &controls, const StateFunctionOfTime &output,
               const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks)
       : system_(system), times_(times), controls_(controls), output_(output), carry_on_(carry_on),
-        recording_(recording), breaks_(breaks), method_(make_method(controls.method, system)),
-        control_(method_->error_order()), t_(times.front()), t_asked_(t_), end_(times.back()),
-        duration_(times.back() - times.front()), z_(system.size()), error_(system.size()), z_output_(system.size()) {
+        recording_(recording), breaks_(breaks), methods_(controls.methods, times.front(), times.back()),
+        method_(make_method(methods_.at_work(), system)), control_(method_->error_order()), t_(times.front()),
+        t_asked_(t_), end_(times.back()), duration_(times.back() - times.front()), z_(system.size()),
+        error_(system.size()), z_output_(system.size()) {
     system_.local().set_centre(y.data());
     system_.local().from_state(y.data(), z_.data());
-    steps_.in_transient = method_->damps();
-    steps_.next_step = method_->damps() ? end_ - t_ : std::min(system.initial_step(), end_ - t_);
   }
 
   void begin() {
     pass_breaks();
-    system_.slope(t_, z_.data(), method_->first_slope());
+    begin_method();
     system_.accepted(t_, z_.data(), method_->first_slope());
     record();
+    record_method();
     output_(report_.outputs++, t_, state(z_.data()));
   }
 
@@ -75,6 +88,8 @@ public:
     system_.local().set_centre(checkpoint.state.data());
     system_.local().from_state(checkpoint.state.data(), z_.data());
     t_ = t_asked_ = checkpoint.time;
+    methods_.go_on(checkpoint.methods);
+    make_method_at_work();
     steps_ = checkpoint.steps;
     control_.go_on(steps_.previous_step, steps_.previous_error);
     system_.slope(t_, z_.data(), method_->first_slope());
@@ -87,12 +102,16 @@ public:
       const Attempt attempt = next_attempt();
       const Allowance allowance = allowance_of(attempt.step);
       const double size = try_step(attempt, allowance);
-      if (!(size <= 1)) {
+      report_.last_step = attempt.step;
+      report_.last_error = size;
+      if (size <= 1) {
+        accept(attempt, allowance, size);
+      } else {
         ++report_.rejected;
         steps_.next_step = control_.after_rejected(attempt.step, size);
-        continue;
       }
-      accept(attempt, allowance, size);
+      if (report_.outputs < times_.size() && methods_.takes_over(t_, method_->damps()))
+        change_method();
     }
     report_.time = t_;
     report_.evaluations = system_.evaluations();
@@ -107,11 +126,33 @@ public:
     StepHistory steps = steps_;
     steps.previous_step = control_.previous_step();
     steps.previous_error = control_.previous_error();
-    return {t_, final_state(), steps, report_.outputs};
+    return {t_, final_state(), steps, report_.outputs, methods_.history()};
   }
 
 private:
   const double *state(const double *z) const { return system_.local().state(z); }
+
+  void make_method_at_work() {
+    method_ = make_method(methods_.at_work(), system_);
+    control_ = StepControl(method_->error_order());
+  }
+
+  // The method at work knows nothing of what was before.
+  void begin_method() {
+    StepHistory steps;
+    steps.in_transient = method_->damps();
+    steps.next_step = method_->damps() ? end_ - t_ : std::min(system_.initial_step(), end_ - t_);
+    steps.reserve = steps_.reserve;
+    steps_ = steps;
+    system_.slope(t_, z_.data(), method_->first_slope());
+  }
+
+  void change_method() {
+    make_method_at_work();
+    begin_method();
+    record_method();
+    report_.changes.push_back({t_, methods_.before().kind, methods_.at_work().kind, methods_.mean_step()});
+  }
 
   // False where the run ends here, with its status set.
   bool may_go_on() {
@@ -133,8 +174,8 @@ private:
         return end_as(IntegrationStatus::interrupted);
     }
     if (counted) {
-      const double most = hopeless * static_cast<double>(controls_.max_steps) / steps_between_questions;
-      collapsed = collapsed || (taken > 0 && controls_.max_steps && left > most * (t_ - t_asked_));
+      const double mean_step = (t_ - t_asked_) / static_cast<double>(steps_between_questions);
+      collapsed = collapsed || (taken > 0 && mean_step < shortest_steps * system_.initial_step());
       t_asked_ = t_;
     }
     return collapsed ? end_as(IntegrationStatus::step_underflow) : true;
@@ -153,20 +194,36 @@ private:
 
   Allowance allowance_of(double step) const {
     const double regular = method_->error_share(step / duration_);
-    const bool once = steps_.in_transient || step < much_shorter * steps_.usual_step;
-    const double part = once ? std::max(regular, part_of_reserve * steps_.reserve) : regular;
+    const double of_reserve = steps_.in_transient || step < near_rounding * steps_.usual_step ? part_of_reserve
+                              : step < much_shorter * steps_.usual_step                       ? part_at_jump
+                                                                                              : 0.0;
+    const double part = std::max(regular, of_reserve * steps_.reserve);
     const auto error = [&](double of_tolerance) { return std::max(controls_.tolerance * of_tolerance, rounding); };
     return {regular, part, error(regular), error(part)};
   }
 
   // Size of the step's error relative to the largest one allowed; NaN where it could not be made.
   double try_step(const Attempt &attempt, const Allowance &allowance) {
-    const double tolerance = steps_.in_transient ? allowance.regular_error : allowance.error;
-    if (!method_->step(t_, z_.data(), attempt.step, tolerance) || !method_->correct(attempt.end))
+    const double allowed = steps_.in_transient ? allowance.regular_error : allowance.error;
+    const double to_iterate = std::max(allowed, least_to_iterate * controls_.tolerance);
+    if (!method_->step(t_, z_.data(), attempt.step, to_iterate) || !method_->correct(attempt.end))
       return NAN;
     system_.slope(attempt.end, method_->end(), method_->last_slope());
-    const double damping = method_->estimate(attempt.step, error_);
-    return system_.error_size(attempt.end, method_->end(), error_.data()) * damping / allowance.error;
+    method_->estimate(attempt.step, error_);
+    const double size = system_.error_size(attempt.end, method_->end(), error_.data()) / allowance.error;
+    const bool is_dense = size <= 1 && times_[report_.outputs] < attempt.end;
+    return is_dense ? std::max(dense_size(attempt), size) : size; // keeps NaN
+  }
+
+  // That of outputs between its ends, which no later step depends on: relative to the whole tolerance.
+  double dense_size(const Attempt &attempt) {
+    method_->prepare_dense(t_, z_.data(), attempt.step);
+    if (!method_->estimate_dense(error_) ||
+        system_.change_size(method_->end(), error_.data(), radians_too_long / attempt.step) <=
+            notable * controls_.tolerance)
+      return 0;
+    system_.slope(attempt.end, method_->end(), method_->last_slope());
+    return system_.error_size(attempt.end, method_->end(), error_.data()) / controls_.tolerance;
   }
 
   void accept(const Attempt &attempt, const Allowance &allowance, double size) {
@@ -191,7 +248,7 @@ private:
 
   // The size of the error for the control of the next step, which should do without the reserve.
   double take_from_reserve(double step, const Allowance &allowance, double size) {
-    steps_.usual_step = std::max(step, 0.8 * steps_.usual_step);
+    steps_.usual_step = std::max(step, 0.95 * steps_.usual_step);
     if (allowance.part > allowance.regular_part &&
         (!steps_.in_transient || size * allowance.error > allowance.regular_error))
       steps_.reserve -= size * allowance.part;
@@ -203,16 +260,12 @@ private:
   }
 
   void deliver_outputs(const Attempt &attempt) {
-    bool dense = false;
     for (; report_.outputs < times_.size() && times_[report_.outputs] <= attempt.end; ++report_.outputs) {
       const double t = times_[report_.outputs];
       if (t == attempt.end) {
         output_(report_.outputs, t, state(method_->end()));
         continue;
       }
-      if (!dense)
-        method_->prepare_dense(t_, z_.data(), attempt.step);
-      dense = true;
       method_->interpolate(t, z_output_.data());
       output_(report_.outputs, t, state(z_output_.data()));
     }
@@ -239,6 +292,11 @@ private:
     return next_break_ > before;
   }
 
+  void record_method() {
+    if (recording_)
+      recording_->methods.emplace_back(recording_->times.size() - 1, methods_.at_work());
+  }
+
   void record() {
     if (!recording_)
       return;
@@ -254,6 +312,7 @@ private:
   const std::function<bool(double)> &carry_on_;
   Recording *recording_;
   const Breaks *breaks_;
+  FasterMethod methods_;
   std::unique_ptr<Method> method_;
   StepControl control_;
   StepHistory steps_;
@@ -266,6 +325,11 @@ private:
 
 } // namespace
 
+const MethodChoice &Recording::method_of(std::size_t step) const {
+  const auto after = std::find_if(methods.begin(), methods.end(), [&](const auto &m) { return m.first > step; });
+  return std::prev(after)->second;
+}
+
 IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
@@ -275,10 +339,8 @@ IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &t
     integration.go_on(*checkpoint);
   else
     integration.begin();
-  if (recording) {
-    recording->method = controls.method;
+  if (recording)
     recording->tolerance = controls.tolerance;
-  }
   const IntegrationReport report = integration.run();
   y = integration.final_state();
   if (checkpoint)

@@ -2,10 +2,11 @@
 // method.h say.
 #pragma once
 
-#include "core/integrate/method.h"
+#include "core/integrate/faster_method.h"
 #include "core/integrate/ode.h"
 
 #include <functional>
+#include <utility>
 #include <vector>
 
 namespace ffrobot {
@@ -14,8 +15,10 @@ namespace ffrobot {
 struct Recording {
   std::vector<double> times;  // s
   std::vector<double> states; // (q, v) of each, one after the other
-  MethodChoice method;
   double tolerance = 0;
+  std::vector<std::pair<std::size_t, MethodChoice>> methods; // from the step that begins at times[first] on
+
+  const MethodChoice &method_of(std::size_t step) const;
 };
 
 // What the size of the next step follows from.
@@ -27,13 +30,15 @@ struct StepHistory {
   bool in_transient = false;                    // vibrations of the start are still being damped away
 };
 
-// Where an integration has stopped, and all that its next step depends on. Explicit methods go on as if nothing had
-// been; what implicit ones extrapolate from earlier steps is lost.
+// Where an integration has stopped, and all that its next step depends on: the same candidates given, it goes on with
+// the method that was at work. Explicit ones go on as if nothing had been; what implicit ones extrapolate from earlier
+// steps is lost.
 struct IntegrationCheckpoint {
   double time = 0;       // s
   Eigen::VectorXd state; // (q, v); empty: the integration has not begun
   StepHistory steps;
   std::size_t outputs = 0; // delivered
+  MethodHistory methods;
 
   bool has_begun() const { return state.size() > 0; }
 };
@@ -46,17 +51,26 @@ enum class IntegrationStatus {
   diverged,    // beyond what the equations describe
 };
 
+struct MethodChange {
+  double time; // s
+  MethodKind from, to;
+  double mean_step; // s, of the one before
+};
+
 struct IntegrationReport {
   IntegrationStatus status = IntegrationStatus::completed;
   double time = 0; // s, reached
   unsigned long steps = 0, rejected = 0, evaluations = 0;
   std::size_t outputs = 0; // delivered
+  double last_step = 0;    // s, tried
+  double last_error = 0;   // of it, relative to the largest one allowed; NaN where its equations could not be solved
+  std::vector<MethodChange> changes;
 };
 
 struct IntegrationControls {
   double tolerance = 1e-6;
-  unsigned long max_steps = 0; // 0: no limit
-  MethodChoice method;
+  unsigned long max_steps = 0;        // 0: no limit
+  std::vector<Candidate> methods{{}}; // one, or two of which the faster is found out
 };
 
 using StateFunctionOfTime = std::function<void(std::size_t, double, const double *)>; // of number, time and (q, v)

@@ -22,15 +22,15 @@ public:
   // Moves end() back onto the invariants; false where that fails.
   virtual bool correct(double t) = 0;
 
-  // Error of the step of size h just made, and a factor on its size; needs last_slope(), the slope at end(), set by the
-  // caller.
-  virtual double estimate(double h, Eigen::VectorXd &error) = 0;
+  // Error of the step of size h just made; needs last_slope(), the slope at end(), set by the caller.
+  virtual void estimate(double h, Eigen::VectorXd &error) = 0;
 
   virtual double error_order() const = 0; // the estimate shrinks as h^error_order
 
   // Part of the tolerance that the estimate of one step may take, which covers `fraction` of the run. The estimates of
-  // single steps add up like a random walk where errors scatter, step by step where they all point the same way;
-  // factors are from tests/mbs/test_integrator.py, errors against tolerances.
+  // single steps add up like a random walk where errors scatter, step by step where they all point the same way, as
+  // those of a vibration's phase do in a long run; factors are from tests/mbs/test_integrator.py and
+  // tests/campaigns/tolerance.py, errors against tolerances.
   virtual double error_share(double fraction) const = 0;
 
   // Whether a step leaves little of vibrations that it does not resolve. They are an error once, not at every step.
@@ -50,6 +50,10 @@ public:
 
   // Coefficients for interpolate() within the step just made.
   virtual void prepare_dense(double t, const double *y, double h) = 0;
+
+  // Largest error of interpolate() within the step, once prepared; false where it is never much more than that of the
+  // step's end.
+  virtual bool estimate_dense(Eigen::VectorXd &) const { return false; }
   virtual void interpolate(double t, double *y) const = 0;
 
   virtual double *end() = 0;

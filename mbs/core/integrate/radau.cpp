@@ -41,6 +41,7 @@ const Matrix3d A_inverse =
 
 constexpr int most_iterations = 12;
 constexpr double newton_share = 0.01; // of the step's tolerance that the iteration may leave
+constexpr double noise_share = 0.1;   // the same where only noise is left, which differs from step to step
 constexpr double rounding = 1e-14;
 constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton's method is slower than this
 
@@ -156,12 +157,14 @@ bool Radau::step(double t, const double *y, double h, double tolerance) {
     if (iteration > 0 && shrinks)
       contraction_ = size / (previous_size - size);
     previous_size = size;
+    double share = newton_share;
     if (!shrinks) {
       // Where stiff forces are nothing but rounding, their size does not shrink: then the change of state has to do.
       contraction_ = 1;
       size = largest_change(y, 0);
+      share = noise_share;
     }
-    if (contraction_ * size <= std::max(newton_share * tolerance, rounding)) {
+    if (contraction_ * size <= std::max(share * tolerance, rounding)) {
       stale_ = contraction_ > slow_contraction;
       end_ = VectorMap(y, 2 * n_) + Z_.col(2);
       return true;
@@ -187,7 +190,7 @@ bool Radau::correct(double t) {
 // Order 5: the integral of the polynomial through the slopes at the stages, at the start and at two stages of the step
 // before, against the method's own. Without the last one they agree (five nodes, exact for degree 4 both), so the
 // difference is one of Newton's divided differences. (mu - h J)^-1 mu takes the stiff parts out, as for order 3.
-double Radau::estimate(double h, Eigen::VectorXd &error) {
+void Radau::estimate(double h, Eigen::VectorXd &error) {
   slopes_.noalias() = Z_ * (A_inverse.transpose() / h);
   if (previous_step_ == 0) {
     error = first_slope_ + Z_ * (error_weights / h);
@@ -211,7 +214,6 @@ double Radau::estimate(double h, Eigen::VectorXd &error) {
     }
   }
   solve(mu_real / h, error);
-  return 1;
 }
 
 void Radau::accept(double h) {

@@ -14,9 +14,9 @@ public:
 
   bool step(double t, const double *y, double h, double tolerance) override;
   bool correct(double t) override;
-  double estimate(double h, Eigen::VectorXd &error) override;
+  void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 6; }
-  double error_share(double fraction) const override { return 3 * fraction; }
+  double error_share(double fraction) const override { return 1.5 * fraction; }
   bool damps() const override { return true; }
   void accept(double h) override;
   void restart() override { previous_step_ = 0; }

@@ -9,14 +9,33 @@ namespace ffrobot {
 using Eigen::Index;
 using VectorMap = Eigen::Map<const Eigen::VectorXd>;
 
-ErrorNorm::ErrorNorm(const System &system, std::vector<int> group, const std::vector<bool> &moment)
-    : system_(system), group_(std::move(group)) {
-  const int groups = group_.empty() ? 0 : *std::max_element(group_.begin(), group_.end()) + 1;
-  peaks_.bodies.resize(system.bodies.size());
-  peaks_.groups = group_now_ = group_error_ = Eigen::VectorXd::Zero(groups);
-  group_is_moment_.assign(static_cast<std::size_t>(groups), false);
+namespace {
+
+constexpr double small_moment = 0.1; // of what the largest force makes at a link's length
+constexpr double slowest = 0.01; // lengths (radians) in the time that counts: rates below are not worth comparing with
+
+} // namespace
+
+ErrorNorm::ErrorNorm(const System &system, Judged judged)
+    : system_(system), joints_(std::move(judged.joints)), motors_(judged.motors),
+      multipliers_(static_cast<Index>(judged.group.size())), group_(std::move(judged.group)) {
+  multiplier_groups_ =
+      group_.empty() ? 0 : static_cast<std::size_t>(*std::max_element(group_.begin(), group_.end()) + 1);
+  per_force_.assign(multiplier_groups_, 1);
   for (std::size_t r = 0; r < group_.size(); ++r)
-    group_is_moment_[static_cast<std::size_t>(group_[r])] = moment[r];
+    if (judged.moment[r])
+      per_force_[static_cast<std::size_t>(group_[r])] = system.length;
+  const auto add_group = [&](double per_force) { // of one value
+    group_.push_back(static_cast<int>(per_force_.size()));
+    per_force_.push_back(per_force);
+  };
+  for (std::size_t i = 0; i < joints_.size(); ++i)
+    add_group(0);
+  if (motors_)
+    for (const Measure &motor : motors_->motors())
+      add_group(carries_moment(motor.kind) ? system.length : 1);
+  peaks_.bodies.resize(system.bodies.size());
+  peaks_.groups = group_now_ = group_error_ = Eigen::VectorXd::Zero(static_cast<Index>(per_force_.size()));
   for (const PlanarBody &body : system.bodies)
     frequency_.push_back(body.stiffness.cwiseSqrt());
 }
@@ -62,27 +81,64 @@ double ErrorNorm::of_change(const double *z, const double *change, double rate) 
   return size;
 }
 
-// The size of each force or moment that the multipliers are components of.
-void ErrorNorm::measure_groups(const Eigen::VectorXd &lambda, Eigen::VectorXd &size) const {
+void ErrorNorm::observe(const Workspace &w, Eigen::VectorXd &values) {
+  values.setZero(static_cast<Index>(group_.size()));
+  values.head(multipliers_) = w.lambda.head(multipliers_);
+  rates_of_joints(w, values);
+  if (has_small_moments()) {
+    const Eigen::VectorXd &tau = motors_->tau_of(w.lambda, w);
+    values.tail(tau.size()) = tau;
+  }
+}
+
+// Or what little would move the bodies, where nothing has happened yet.
+double ErrorNorm::largest_force() const {
+  double largest = 0;
+  for (std::size_t b = 0; b < system_.bodies.size(); ++b)
+    largest += system_.bodies[b].mass * peaks_.bodies[b].acceleration;
+  for (std::size_t g = 0; g < multiplier_groups_; ++g)
+    largest = std::max(largest, peaks_.groups[static_cast<Index>(g)] / per_force_[g]);
+  return largest;
+}
+
+// Others are about as good as the forces that they stand for, for less work.
+bool ErrorNorm::has_small_moments() const {
+  if (!motors_)
+    return false;
+  const double force = small_moment * largest_force();
+  for (std::size_t g = per_force_.size() - motors_->motors().size(); g < per_force_.size(); ++g)
+    if (peaks_.groups[static_cast<Index>(g)] <= force * per_force_[g])
+      return true;
+  return false;
+}
+
+void ErrorNorm::rates_of_joints(const Workspace &w, Eigen::VectorXd &values) const {
+  MeasureMotion motion;
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    evaluate(joints_[i], w.bodies, motion);
+    values[multipliers_ + static_cast<Index>(i)] = motion.rate;
+  }
+}
+
+// The size of each force or moment that the values are components of.
+void ErrorNorm::measure_groups(const Eigen::VectorXd &values, Eigen::VectorXd &size) const {
   size.setZero();
   for (std::size_t r = 0; r < group_.size(); ++r)
-    size[group_[r]] += std::pow(lambda[static_cast<Index>(r)], 2);
+    size[group_[r]] += std::pow(values[static_cast<Index>(r)], 2);
   size = size.cwiseSqrt();
 }
 
-double ErrorNorm::of_multipliers(const Eigen::VectorXd &lambda, const Eigen::VectorXd &shifted) {
+double ErrorNorm::of_observed(const Eigen::VectorXd &values, const Workspace &w) {
+  observe(w, change_);
+  change_ -= values;
   double size = 0;
-  const auto length_of = [&](std::size_t g) { return group_is_moment_[g] ? system_.length : 1.0; };
-  double largest = 0; // or what little would move the bodies, where nothing has happened yet
-  for (std::size_t b = 0; b < system_.bodies.size(); ++b)
-    largest += system_.bodies[b].mass * peaks_.bodies[b].acceleration;
-  for (std::size_t g = 0; g < group_is_moment_.size(); ++g)
-    largest = std::max(largest, peaks_.groups[static_cast<Index>(g)] / length_of(g));
-  measure_groups(lambda, group_now_);
-  measure_groups(shifted - lambda, group_error_);
-  for (std::size_t g = 0; g < group_is_moment_.size(); ++g) {
+  const double largest = largest_force();
+  measure_groups(values, group_now_);
+  measure_groups(change_, group_error_);
+  for (std::size_t g = 0; g < per_force_.size(); ++g) {
     const auto i = static_cast<Index>(g);
-    const double scale = std::max({peaks_.groups[i], group_now_[i], 1e-3 * largest * length_of(g)});
+    const double least = per_force_[g] > 0 ? 1e-3 * largest * per_force_[g] : slowest * rate_;
+    const double scale = std::max({peaks_.groups[i], group_now_[i], least});
     if (group_error_[i] > 0)
       size = std::max(size, group_error_[i] / scale);
     else if (!(group_error_[i] == 0))
@@ -100,7 +156,7 @@ Eigen::VectorXd ErrorNorm::applied_modal_force(std::size_t b, const Workspace &w
   return F_p;
 }
 
-void ErrorNorm::take(const double *z, const double *z_dot, const Eigen::VectorXd &lambda, const Workspace &w) {
+void ErrorNorm::take(const double *z, const double *z_dot, const Eigen::VectorXd &observed, const Workspace &w) {
   const Index n = system_.n_v();
   const double length = system_.length;
   const auto raise = [](double &peak, double value) { peak = std::max(peak, value); };
@@ -108,8 +164,8 @@ void ErrorNorm::take(const double *z, const double *z_dot, const Eigen::VectorXd
     const Index i = system_.first_coordinate[b], modes = system_.bodies[b].modes();
     const double *v = z + n + i, *a = z_dot + n + i;
     BodyPeaks &peak = peaks_.bodies[b];
-    // floors: a hundredth of a length (a radian) in the time that counts; the vibration that accelerations would start
-    const double slow = 0.01 * rate_;
+    // floors, and the vibration that accelerations would start
+    const double slow = slowest * rate_;
     raise(peak.velocity, std::max(std::hypot(v[0], v[1]), slow * length));
     raise(peak.angular_velocity, std::max(std::abs(v[2]), slow));
     raise(peak.acceleration, std::max({std::hypot(a[0], a[1]), system_.gravity.norm(), slow * rate_ * length}));
@@ -123,11 +179,13 @@ void ErrorNorm::take(const double *z, const double *z_dot, const Eigen::VectorXd
       applied_ = applied_modal_force(b, w).cwiseQuotient(omega); // may hold the links straight: p stays zero then
       raise(peak.modal, std::max({p.norm(), p_ddot.cwiseQuotient(omega).cwiseQuotient(omega).norm(),
                                   applied_.cwiseQuotient(omega).norm(), 1e-3 * force / std::pow(omega.minCoeff(), 2)}));
-      raise(peak.modal_velocity, std::max({p_dot.norm(), p_ddot.cwiseQuotient(omega).norm(), applied_.norm(),
+      // A coordinate that the constraints carry along faster than its own frequency has large accelerations: little of
+      // what they are worth as vibration, enough for a start at rest.
+      raise(peak.modal_velocity, std::max({p_dot.norm(), 0.01 * p_ddot.cwiseQuotient(omega).norm(), applied_.norm(),
                                            std::sqrt(system_.bodies[b].mass) * peak.velocity}));
     }
   }
-  measure_groups(lambda, group_now_);
+  measure_groups(observed, group_now_);
   peaks_.groups = peaks_.groups.cwiseMax(group_now_);
 }
 

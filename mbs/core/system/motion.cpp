@@ -47,19 +47,20 @@ bool ConstrainedMotion::correct(double t, double *z) {
 double ConstrainedMotion::error_size(double t, const double *z, const double *e) {
   assert(evaluated_at_ == t);
   const double size = norm_.of_state(z, e);
-  lambda_ = workspace_.lambda;
-  if (!norm_.judges_multipliers())
+  norm_.observe(workspace_, observed_);
+  if (!norm_.observes())
     return size;
   // Forces amplify errors of the state (stiffness times the error of a fast mode): measure what e does to them.
   shifted_ = VectorMap(z, this->size()) + VectorMap(e, this->size());
   slope(t, shifted_.data(), shifted_slope_.data());
-  const double of_multipliers = norm_.of_multipliers(lambda_, workspace_.lambda);
-  return std::isnan(of_multipliers) ? of_multipliers : std::max(size, of_multipliers); // keeps NaN
+  return std::isnan(size) ? size : std::max(norm_.of_observed(observed_, workspace_), size); // keeps NaN
 }
 
 // Stages of dense output may have been evaluated since the step was judged.
 void ConstrainedMotion::accepted(double, const double *z, const double *z_dot) {
-  norm_.take(z, z_dot, lambda_.size() ? lambda_ : workspace_.lambda, workspace_);
+  if (observed_.size() == 0)
+    norm_.observe(workspace_, observed_);
+  norm_.take(z, z_dot, observed_, workspace_);
 }
 
 void ConstrainedMotion::factorise(double damping_factor, double stiffness_factor) {

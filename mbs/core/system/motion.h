@@ -23,7 +23,7 @@ public:
   // The system, and external_loads, which may be null, must outlive this.
   ConstrainedMotion(const System &system, ErrorNorm norm, ExternalLoads *external_loads);
   // Multipliers are not judged: for steps that are made again, or of equal length.
-  explicit ConstrainedMotion(const System &system) : ConstrainedMotion(system, {system, {}, {}}, nullptr) {}
+  explicit ConstrainedMotion(const System &system) : ConstrainedMotion(system, {system, {}}, nullptr) {}
 
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
@@ -59,7 +59,7 @@ private:
   Eigen::VectorXd stiffness_, damping_; // diagonals (n_v)
   std::unique_ptr<IterationMatrix<double>> real_;
   std::unique_ptr<IterationMatrix<Complex>> complex_;
-  Eigen::VectorXd lambda_; // at the end of the step that error_size() has judged last; empty before
+  Eigen::VectorXd observed_; // at the end of the step that error_size() has judged last; empty before
   Eigen::VectorXd shifted_, shifted_slope_;
 };
 

@@ -1,0 +1,193 @@
+"""What `integrator = "auto"` costs against the best single integrator, over 36 varied runs.
+
+    python tests/campaigns/choice.py found.jsonl [--repeat 3] [--record]
+
+Runs that are in the file already are not made again. Times are those of the processor, the shortest of `--repeat`, all
+integrators in turn; evaluations are those of the equations of motion. A run by a single integrator ends with four times
+the evaluations of "auto", which always completes.
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.append(str(Path(__file__).parents[1] / "mbs"))
+
+from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
+from mechanisms import always, forward, make_model, pcid, revolute
+from record import record
+
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.motors_only import MotorsOnly, run_motors_only
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.analysis.replay import ActuatorSet
+
+SINGLE = ("dop853", "radau", "dopri5")
+EVALUATIONS = 7  # of a step, of an integrator that takes few
+AIM = 1.5
+REST = {"angles": ANGLES, "state": "static"}
+JOLT = {"name": "tip", "point": "link2.tip", "x": f"{TIP[0]!r}-0.5*t**2", "y": f"{TIP[1]!r}+0.3*t**2"}
+STIFF, SOFT = {"EI": 3000.0, "modes": 8, "extra": 2}, {"EI": 10.0, "modes": 2}
+MANY = {"EI": 300.0, "modes": 12, "extra": 2}
+
+
+def damped(ratio, **keys):
+    return arm_links(damping_ratio=ratio, **keys)
+
+
+def heavy(ratio):
+    """Ten times the mass on the second link, as a payload spread over it."""
+    return [
+        ritz_link("link1", "simply-supported", EI=120.0, damping_ratio=ratio),
+        ritz_link("link2", "cantilever", EI=120.0, mass=10.0, damping_ratio=ratio),
+    ]
+
+
+def chain(count, EI, damping, **keys):
+    """Cantilever links hinged one to the next, hanging out to the side."""
+    names = [f"link{k + 1}" for k in range(count)]
+    links = [ritz_link(name, "cantilever", length=0.6, EI=EI, damping_ratio=damping) for name in names]
+    ends = ["ground", *(f"{name}.tip" for name in names)]
+    joints = [revolute(f"j{k}", ends[k], f"{name}.root") for k, name in enumerate(names)]
+    return make_model(links, joint=joints, initial={"angles": {n: 0.3 - 0.4 * k for k, n in enumerate(names)}}, **keys)
+
+
+def slider_crank(EI, damping):
+    rod = ritz_link("rod", "simply-supported", length=0.5, EI=EI, damping_ratio=damping)
+    crank = ritz_link("crank", "cantilever", length=0.15, mass=0.2, EI=100 * EI, modes=1)
+    pin = ritz_link("slider", "cantilever", length=0.05, mass=0.3, modes=0)
+    turn = 1.0
+    return make_model(
+        [crank, rod, pin],
+        gravity=(0.0, 0.0),
+        joint=[
+            revolute("O", "ground", "crank.root", motor=True),
+            revolute("A", "crank.tip", "rod.root"),
+            revolute("B", "rod.tip", "slider.root"),
+            {"name": "guide", "type": "prismatic", "between": ("ground", "slider.root"), "axis": (1.0, 0.0)},
+        ],
+        initial={"state": "static", "angles": {"crank": turn, "rod": -float(np.arcsin(0.3 * np.sin(turn)))}},
+        trajectory=[{"name": "turn", "joint": "O", "value": quintic(turn, turn + 6.0)}],
+    )
+
+
+def inverse_of(model):
+    return lambda **keys: run_pcid(model, pcid(**keys), False, always)
+
+
+def motion_of(model, end):
+    return lambda **keys: run_forward(model, forward(end=end, **keys), None, ActuatorSet(), always)
+
+
+def replay_of(model, apply):
+    source = run_pcid(model, pcid(tolerance=1e-6, integrator="dop853"), True, always)
+    keys_of = {"actuation": "inverse", "apply": apply}
+    return lambda **keys: run_forward(model, forward(**keys_of, **keys), source, ActuatorSet(), always)
+
+
+def motors_only_replay_of(model):
+    analysis = MotorsOnly(name="exact", kind="motors-only", end=1.0, output_step=0.01)
+    source = run_motors_only(model, analysis, always)
+    keys_of = {"actuation": "exact", "apply": "joints"}
+    return lambda **keys: run_forward(model, forward(**keys_of, **keys), source, ActuatorSet(), always)
+
+
+def runs():
+    """Name, what makes the run (called only where it is needed), and its tolerances."""
+    every, common = (1e-2, 1e-4, 1e-6), (1e-2, 1e-4)
+    section = {"motors": "section", "initial": REST}
+    yield "arm, undeformed, smooth path", lambda: inverse_of(arm()), every
+    yield "arm, static, smooth path", lambda: inverse_of(arm(initial=REST)), every
+    yield "arm, static, jolt", lambda: inverse_of(arm(initial=REST, trajectory=[JOLT])), common
+    yield "arm, damped, undeformed", lambda: inverse_of(arm(damped(0.01))), common
+    yield "arm, damped, static, jolt", lambda: inverse_of(arm(damped(0.01), initial=REST, trajectory=[JOLT])), (1e-4,)
+    yield "stiff links, static", lambda: inverse_of(arm(arm_links(**STIFF), initial=REST)), every
+    yield "stiff links, damped, undeformed", lambda: inverse_of(arm(damped(0.02, **STIFF))), common
+    yield "12 modes, static", lambda: inverse_of(arm(arm_links(**MANY), initial=REST)), common
+    yield "soft links, undeformed", lambda: inverse_of(arm(arm_links(**SOFT))), every
+    yield "heavy second link, static", lambda: inverse_of(arm(heavy(0.0), initial=REST)), (1e-4,)
+    yield "heavy second link, damped, undeformed", lambda: inverse_of(arm(heavy(0.01))), common
+    yield "slider-crank", lambda: inverse_of(slider_crank(30.0, 0.0)), common
+    yield "slider-crank, stiff, damped", lambda: inverse_of(slider_crank(3000.0, 0.02)), common
+    yield "chain of two, soft", lambda: motion_of(chain(2, 10.0, 0.0), 0.3), (1e-4,)
+    yield "chain of three, damped", lambda: motion_of(chain(3, 100.0, 0.02), 0.3), common
+    yield "replay, all forces", lambda: replay_of(arm(damped(0.01), initial=REST), "trajectory"), (1e-4,)
+    yield "replay, moments alone", lambda: replay_of(arm(damped(0.01), **section), "joints"), common
+    yield "replay of motors-only moments", lambda: motors_only_replay_of(arm(damped(0.02), **section)), every
+
+
+def measured(run, tolerance, repeat):
+    """By integrator: seconds, evaluations, what ran; None where it did not complete. All of them in turn."""
+    found, names, limits = {}, ["auto", *SINGLE], {"max_steps": 400_000}
+    for _ in range(repeat):
+        for integrator in tuple(names):
+            before = time.process_time()
+            outcome = run(tolerance=tolerance, integrator=integrator, **limits)
+            seconds, counts = time.process_time() - before, outcome.statistics
+            if outcome.status != "completed":
+                names.remove(integrator)
+                continue
+            if integrator == "auto":
+                limits = {"max_steps": max(4 * counts.evaluations // EVALUATIONS, 2000)}
+            now = {"seconds": seconds, "evaluations": counts.evaluations, "ran": counts.integrator.name}
+            now |= {"reason": counts.integrator.reason}
+            found[integrator] = min(found.get(integrator, now), now, key=lambda one: one["seconds"])
+    return found
+
+
+def table(records):
+    """Lines that show each run: time and evaluations of auto over the least of the others."""
+    yield "| run | tolerance | auto takes | best | time over best | evaluations over best |"
+    yield "|---|---|---|---|---|---|"
+    for one in records:
+        best, of_time, of_evaluations = against_best(one)
+        run = f"{one['run']} | {one['tolerance']:g} | {one['auto']['ran']}"
+        yield f"| {run} | {best} | {of_time:.2f} | {of_evaluations:.2f} |"
+
+
+def against_best(one):
+    """The fastest single integrator, and time and evaluations of auto over the least of all."""
+    single = {name: one[name] for name in SINGLE if name in one}
+    best = min(single, key=lambda name: single[name]["seconds"])
+    fewest = min(found["evaluations"] for found in single.values())
+    return best, one["auto"]["seconds"] / single[best]["seconds"], one["auto"]["evaluations"] / fewest
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path, help="a JSON record per run; those in it are not run again")
+    parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--record", action="store_true", help="write the counts, for docs/stability.md")
+    asked = parser.parse_args()
+    text = asked.file.read_text() if asked.file.exists() else ""
+    records = [json.loads(line) for line in text.splitlines()]
+    known = {(one["run"], one["tolerance"]) for one in records}
+    with asked.file.open("a") as file:
+        for name, make, tolerances in runs():
+            wanted = [tolerance for tolerance in tolerances if (name, tolerance) not in known]
+            run = make() if wanted else None
+            for tolerance in wanted:
+                records.append({"run": name, "tolerance": tolerance} | measured(run, tolerance, asked.repeat))
+                file.write(json.dumps(records[-1]) + "\n")
+                file.flush()
+    print("\n".join(table(records)))
+    times = sorted((against_best(one)[1], one["run"], one["tolerance"]) for one in records)
+    median, (worst, run, tolerance) = times[len(times) // 2][0], times[-1]
+    slow = sum(over > AIM for over, *_ in times)
+    found = (
+        f"{slow} above {AIM} times the best single one; median {median:.2f}, worst {worst:.2f} ({run}, {tolerance:g})"
+    )
+    print(found)
+    if asked.record:
+        tried = (
+            f'`integrator = "auto"` in {len(records)} runs: {", ".join(dict.fromkeys(one["run"] for one in records))}'
+        )
+        record("choice", tried=tried, found=f"time of the processor: {found}")
+
+
+if __name__ == "__main__":
+    main()
