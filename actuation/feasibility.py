@@ -13,6 +13,7 @@ from ..mbs.joints.joint import JointRecord
 from ..mbs.quantities.joint_space import motor_rates
 from .patches.patches import PatchArray
 from .patches.voltages import Voltages, voltage_gain
+from .prediction import Unsupplied
 
 MOST_PATCHES = 200  # that are tried on one link
 
@@ -93,21 +94,42 @@ class MotorFeasibility:
 
 @dataclass(frozen=True)
 class Feasibility:
-    """Everything that one analysis asks of the actuators: motors by joint, patches by body."""
+    """Everything that one analysis asks of the actuators: motors by joint, patches by body.
+
+    `unsupplied` where it asks for modal forces that no actuator is there for: then motors and patches cannot do it,
+    whatever their limits.
+    """
 
     motors: dict[str, MotorFeasibility]
     patches: dict[str, PatchFeasibility]
+    unsupplied: Unsupplied | None = None
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether any motor or patch has a limit."""
+        limits = [(of.moment_limit, of.speed_limit, of.power_limit) for of in self.motors.values()]
+        return bool(np.isfinite(limits).any()) or any(
+            np.isfinite(of.available_moment).any() for of in self.patches.values()
+        )
+
+    @property
+    def judged(self) -> dict[str, MotorFeasibility | PatchFeasibility]:
+        """Every actuator by the name that messages have for it."""
+        motors = {f"motor {name}": motor for name, motor in self.motors.items()}
+        return {**motors, **{f"patches of {name}": patches for name, patches in self.patches.items()}}
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """The largest ratio of what is required of each actuator to its limit."""
+        return {name: float(np.max(judged.factor)) for name, judged in self.judged.items()}
 
     @property
     def short(self) -> dict[str, tuple[float, float]]:
         """Actuators that cannot do it: the factor they lack, and from what time on (s)."""
-        judged: dict[str, MotorFeasibility | PatchFeasibility] = {}
-        judged.update({f"motor {name}": motor for name, motor in self.motors.items()})
-        judged.update({f"patches of {name}": patches for name, patches in self.patches.items()})
         return {
-            name: (float(np.max(j.factor)), float(np.nanmin(j.saturation_time)))
-            for name, j in judged.items()
-            if np.max(j.factor) > 1.0
+            name: (factor, float(np.nanmin(self.judged[name].saturation_time)))
+            for name, factor in self.factors.items()
+            if factor > 1.0
         }
 
 

@@ -37,8 +37,11 @@ class ActuationPoints(Record):
     """
 
     body: str
+    """Body that they sit on."""
     axial: tuple[Place, ...] = ()
+    """Places (m from the root, or a point's name) where a force along the body's x axis acts."""
     transverse: tuple[Place, ...] = ()
+    """Places where a force along the body's y axis acts."""
 
     @property
     def is_automatic(self) -> bool:

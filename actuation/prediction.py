@@ -3,14 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..common.arrays import Array
 from ..common.plane import rotated
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.quantities.joint_space import held_joint_motion
+from ..mbs.model.masses import system_mass_matrix
+from ..mbs.quantities.joint_space import held_joint_motion, motor_joint_motion
 from .patches.voltages import Voltages
+
+ROWS = 50  # of a run, at most, at which mass matrices are made
+RINGING = 2.0  # times the static shift, of a force that is missing all at once
+
+
+@dataclass(frozen=True)
+class Unsupplied:
+    """What motors, with the patches that there are, miss of a path whose modal forces nothing supplies.
+
+    Attributes:
+        bodies: links without patches or points, or with too few, for the modal forces that were found.
+        with_patches: whether any link has patches.
+        point: of a trajectory (of any body where trajectories are of angles), the one that misses most.
+        angles_kept: m, largest distance from the path where the motors keep the angles that were found, quasi-static.
+        at_start: m, likewise at the first output: what the links sag by.
+        moments_repeated: m, likewise where they repeat the moments that were found: the first vibration. The robot
+            drifts away from there, which no quasi-static estimate knows.
+    """
+
+    bodies: tuple[str, ...]
+    with_patches: bool
+    point: str
+    angles_kept: float
+    at_start: float
+    moments_repeated: float
+
+    @property
+    def in_words(self) -> str:
+        """What it means, and what to do."""
+        return (
+            f"nothing supplies the modal forces of {', '.join(self.bodies)}, or not all: with"
+            f" {'patches within their limits' if self.with_patches else 'motors alone'} {self.point} is off its path by"
+            f" {_length(self.angles_kept)} where motors keep their angles ({_length(self.at_start)} at the start), by"
+            f" {_length(self.moments_repeated)} and drifting where they repeat these moments;"
+            ' kind = "motors-only" finds moments that follow it'
+        )
 
 
 def unmet_modal_forces(outcome: Outcome, voltages: Mapping[str, Voltages]) -> Array:
@@ -26,16 +64,56 @@ def predicted_shift(outcome: Outcome, unmet: Array) -> dict[str, Array]:
     """Shift (T, 2), m, global axes, of every point by unmet modal forces r, where motors keep their angles.
 
     To first order, and slowly: δp = −K⁻¹ r, δq = ∂q/∂p δp, δr = δR + A_θ u δθ + A Φ δp. Vibration that a sudden lack of
-    force starts can be twice as large; motors that keep their moments instead of their angles let an arm drift away.
+    force starts can be twice as large.
     """
-    model = outcome.assembly.model
-    stiffness = np.concatenate([body.stiffness for body in model.bodies])
-    delta_q = np.einsum("tkn,tn->tk", held_joint_motion(outcome), -unmet / stiffness)
+    return _shift_of_points(outcome, _held_shift(outcome, unmet), slice(None))
+
+
+def unsupplied(
+    outcome: Outcome, unmet: Array, shift: Mapping[str, Array], bodies: tuple[str, ...], *, with_patches: bool
+) -> Unsupplied:
+    """What motors miss by the `unmet` modal forces, of `bodies` above all; their `shift` (T, 2) of points is known."""
+    trajectories = outcome.assembly.model.scene.trajectory
+    followed = [trajectory.point for trajectory in trajectories if trajectory.point is not None]
+    points = {name: np.linalg.norm(shift[name], axis=1) for name in followed or shift}
+    point = max(points, key=lambda name: float(points[name].max()))
+    rows = slice(None, None, max(1, len(outcome.time) // ROWS))
+    freed = np.linalg.norm(_shift_of_points(outcome, _freed_shift(outcome, unmet, rows), rows)[point], axis=1)
+    kept = points[point]
+    return Unsupplied(bodies, with_patches, point, float(kept.max()), float(kept[0]), RINGING * float(freed.max()))
+
+
+def _held_shift(outcome: Outcome, unmet: Array) -> Array:
+    """δq (T, coordinates) with the angles of motors kept."""
+    stiffness = np.concatenate([body.stiffness for body in outcome.assembly.model.bodies])
+    shift: Array = np.einsum("tkn,tn->tk", held_joint_motion(outcome), -unmet / stiffness)
+    return shift
+
+
+def _freed_shift(outcome: Outcome, unmet: Array, rows: slice) -> Array:
+    """δq of these rows with the moments of motors kept: the robot recoils by γ, no momentum comes from within.
+
+    δq = δq_held + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still.
+    """
+    shift = _held_shift(outcome, unmet)[rows]
+    for k, (q, R) in enumerate(zip(outcome.q[rows], motor_joint_motion(outcome, rows), strict=True)):
+        MR = system_mass_matrix(outcome.assembly, q) @ R
+        shift[k] -= R @ np.linalg.solve(R.T @ MR, MR.T @ shift[k])
+    return shift
+
+
+def _shift_of_points(outcome: Outcome, delta_q: Array, rows: slice) -> dict[str, Array]:
+    """δr (outputs, 2) of every point for δq (outputs, coordinates) of these rows."""
     shifts = {}
-    for body in model.bodies:
-        q, delta = (x[:, outcome.coordinates(body.name)] for x in (outcome.q, delta_q))
+    for body in outcome.assembly.model.bodies:
+        columns = outcome.coordinates(body.name)
+        q, delta = outcome.q[rows, columns], delta_q[:, columns]
         for name, point in body.points.items():
             u = point.position + q[:, 3:] @ point.translation.T
             in_body = delta[:, 3:] @ point.translation.T + delta[:, 2:3] * np.column_stack([-u[:, 1], u[:, 0]])
             shifts[f"{body.name}.{name}"] = delta[:, :2] + rotated(q[:, 2], in_body)
     return shifts
+
+
+def _length(value: float) -> str:
+    return f"{1e3 * value:.2g} mm"

@@ -28,6 +28,12 @@ class SolveError(FfrobotError):
     exit_code = 1
 
 
+class FfrobotWarning(UserWarning):
+    """Results may be wrong, or do not mean what they seem to: the message says why, by how much, what to do."""
+
+    __module__ = "ffrobot"
+
+
 class StoppedError(SolveError):
     """A signal has ended a run, which has kept what it had computed."""
 

@@ -32,9 +32,10 @@ def open_checked(path: Path) -> h5py.File:
         raise checksum.refuse(path)
     file = h5py.File(path, "r")
     try:
-        if state == "none" and checksum.MARK in file.attrs:
-            raise checksum.refuse(path)
-        check_links(file, path)
+        with blaming(path):
+            if state == "none" and checksum.MARK in file.attrs:
+                raise checksum.refuse(path)
+            check_links(file, path)
     except BaseException:
         file.close()
         raise

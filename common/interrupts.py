@@ -1,12 +1,48 @@
-"""Ctrl-C and SIGTERM while nothing may be interrupted."""
+"""How Ctrl-C and SIGTERM are answered: by an exception, later, or at once, by the end of the process."""
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class EndOfCommand:
+    """The command line's answer: `KeyboardInterrupt`, and the `number` of the signal, 0 before one has come.
+
+    While a module is loaded, the process ends at once, with the exit code of a command that was stopped: what Python
+    loads modules with would print stacks, or swallow the exception.
+    """
+
+    number = 0
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Raise `KeyboardInterrupt`."""
+        self.number = number
+        if _is_importing(frame):
+            os._exit(128 + number)
+        signal.default_int_handler(number, frame)
+
+
+@contextmanager
+def ending_at_once() -> Iterator[None]:
+    """Within its context the signals end the process at once, without a word, where they end a command anyway.
+
+    For work that has nothing to keep before its end, and calls libraries for long: Python answers a signal when such a
+    call returns, which may be minutes later. Whoever uses ffrobot from Python has other answers to signals, which stay.
+    """
+    ours = [number for number in SIGNALS if isinstance(signal.getsignal(number), EndOfCommand)]
+    previous = {number: signal.signal(number, signal.SIG_DFL) for number in ours if _in_main_thread()}
+    try:
+        yield
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
 
 
 @contextmanager
@@ -16,7 +52,7 @@ def deferred_interrupts() -> Iterator[None]:
     For loading dolfinx: where Python raises while the compiled modules of version 0.9 load, C++ ends the process.
     Signals reach the main thread only: in any other the context does nothing.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if not _in_main_thread():
         yield
         return
     arrived: list[int] = []
@@ -25,7 +61,7 @@ def deferred_interrupts() -> Iterator[None]:
         arrived.append(number)
 
     # What Python does not handle itself ends the process at once, or is ignored, without raising anything.
-    handled = [number for number in (signal.SIGINT, signal.SIGTERM) if callable(signal.getsignal(number))]
+    handled = [number for number in SIGNALS if callable(signal.getsignal(number))]
     previous = {number: signal.signal(number, note) for number in handled}
     try:
         yield
@@ -34,3 +70,13 @@ def deferred_interrupts() -> Iterator[None]:
             signal.signal(number, handler)
         if arrived:
             signal.raise_signal(arrived[0])
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
+        frame = frame.f_back
+    return frame is not None
+
+
+def _in_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()

@@ -147,6 +147,7 @@ _EXPECTED = {
     "list_type": "a list",
     "dict_type": "a table",
     "model_type": "a table",
+    "model_attributes_type": "a table",
     "finite_number": "a finite number",
     "too_short": "at least {min_length} entries",
     "too_long": "at most {max_length} entries",

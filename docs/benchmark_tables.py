@@ -1,4 +1,7 @@
-"""The page of what was measured, from the records that `ffrobot bench -o docs/benchmarks` wrote."""
+"""The page of what was measured, from the records that `ffrobot bench -o docs/benchmarks` wrote.
+
+It is kept in the repository, so that it can be read there: `python docs/benchmark_tables.py` writes it anew.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +21,13 @@ makes them. Seconds are those of the machine named beside them, and of how busy 
 
 def write_benchmark_tables(folder: Path, page: Path) -> None:
     """Write `page` with a section for every record (JSON) in `folder` and below."""
+    page.write_text(benchmark_page(folder, page), encoding="utf-8")
+
+
+def benchmark_page(folder: Path, page: Path) -> str:
+    """The text of `page`."""
     sections = [line for path in sorted(folder.rglob("*.json")) for line in _section(path, page)]
-    page.write_text("\n".join([INTRODUCTION, *(sections or ["No records yet."])]) + "\n", encoding="utf-8")
+    return "\n".join([INTRODUCTION, *(sections or ["No records yet."])]).rstrip("\n") + "\n"
 
 
 def _section(path: Path, page: Path) -> Iterator[str]:
@@ -40,3 +48,8 @@ def _section(path: Path, page: Path) -> Iterator[str]:
 
 
 _FIGURES = {"work-precision": "work_precision", "axes": "error_", "growth": "growth", "aims": "-", "peer": "-"}
+
+
+if __name__ == "__main__":
+    here = Path(__file__).parent
+    write_benchmark_tables(here / "benchmarks", here / "reference" / "measured.md")

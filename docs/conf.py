@@ -23,6 +23,7 @@ myst_heading_anchors = 3
 html_theme = "furo"
 html_title = f"ffrobot {version}"
 autodoc_typehints = "description"
+autodoc_use_type_comments = False  # there are none, and Python 3.13 looks for them in the wrong file
 exclude_patterns = ["_build"]
 
 

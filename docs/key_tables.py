@@ -1,4 +1,7 @@
-"""Pages with every key of link and scene files, from the schemas that `ffrobot schema` prints."""
+"""Pages with every key of link, scene and figures files, from the schemas that `ffrobot schema` prints.
+
+They are kept in the repository, so that they can be read there: `python docs/key_tables.py` writes them anew.
+"""
 
 from __future__ import annotations
 
@@ -12,21 +15,32 @@ from ffrobot.schema import schema
 INTRODUCTION = {
     "link": "What stage 1 reads. SI units; the link's axis is x, in-plane bending displaces along y.",
     "scene": "What stage 2 reads. SI units, angles in rad; files are named relative to the scene's folder. Values that"
-    " the program cannot do yet are refused, with a message that says so.",
+    " the program cannot do yet are refused, with a message that says so."
+    " Axes and signs: [conventions](conventions.md).",
+    "figures": "What `ffrobot plot` draws: a file `figures.toml` beside the results. Without it, the standard figures.",
 }
+HERE = Path(__file__).parent / "reference"
 
 
 LINK_TABLES = tuple(schema("link")["$defs"])
 
 
 def write_key_tables(folder: Path) -> None:
-    """Write `link_keys.md` and `scene_keys.md` into `folder`."""
+    """Write `link_keys.md`, `scene_keys.md` and `figures_keys.md` into `folder`."""
+    for name, text in key_pages().items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def key_pages() -> dict[str, str]:
+    """The pages by the name of their file."""
+    pages = {}
     for kind, introduction in INTRODUCTION.items():
         lines = [f"# Keys of a {kind} file", "", introduction, ""]
         elsewhere = LINK_TABLES if kind == "scene" else ()  # a body's link has the keys of a link file
         records = [(name, record) for name, record in _records(schema(kind)) if name not in elsewhere]
         lines += [line for name, record in records for line in _section(name, record)]
-        (folder / f"{kind}_keys.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        pages[f"{kind}_keys.md"] = "\n".join(lines).rstrip("\n") + "\n"
+    return pages
 
 
 def _records(described: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -37,12 +51,13 @@ def _records(described: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _section(name: str, record: dict[str, Any]) -> Iterator[str]:
-    yield from (f"## {name}", "", record.get("description", ""), "")
-    yield from ("| key | value | default |", "|---|---|---|")
+    about = record.get("description", "").splitlines()  # stars are products here, not emphasis
+    yield from (f"## {name}", "", *(line.replace("*", "\\*") for line in about), "")
+    yield from ("| key | what | value | default |", "|---|---|---|---|")
     required = record.get("required", [])
     for key, entry in record["properties"].items():
         default = "required" if key in required else _code(entry.get("default"))
-        yield f"| `{key}` | {_kind(entry)} | {default} |"
+        yield f"| `{key}` | {entry['description']} | {_kind(entry)} | {default} |"
     yield ""
 
 
@@ -81,3 +96,7 @@ def _array(entry: dict[str, Any]) -> str:
         return f"{len(kinds)} of: {kinds[0]}" if len(set(kinds)) == 1 else ", ".join(kinds)
     kind = _kind(entry.get("items", {}))
     return kind.replace("table ", "tables ", 1) if kind.startswith("table ") else f"list of {kind}"
+
+
+if __name__ == "__main__":
+    write_key_tables(HERE)

@@ -16,8 +16,8 @@ from platformdirs import user_cache_path
 
 from ..common.errors import FfrobotError, SolveError, of_file
 from ..common.files import check_output
-from ..common.interrupts import deferred_interrupts
-from ..common.parallel import on_first, processes
+from ..common.interrupts import deferred_interrupts, ending_at_once
+from ..common.parallel import on_first, processes, without_daemon
 from ..mesh.kept_parts import kept_path
 from .link_file import LinkSource, link_path, read_link
 from .link_records import BeamLink, Link, SolidLink
@@ -136,7 +136,7 @@ def _compute(
     compute = _computation(link, source_path, force)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
-        with of_file(source_path):
+        with of_file(source_path), ending_at_once():
             body = compute(link, source_path, progress or _silent)
         return replace(body, input_hash=digest, modes_hash=modes_hash(link))
 
@@ -170,7 +170,8 @@ def _has_mesh(link: Link) -> bool:
 
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
     try:
-        with deferred_interrupts():
+        without_daemon()
+        with ending_at_once(), deferred_interrupts():
             if isinstance(link, BeamLink):
                 from .beam.link import beam_modal_body
 

@@ -163,6 +163,9 @@ def _check_modes(link: Link, path: Path) -> None:
         _reject(path, "modes.indices", "ascending numbers, each once", modes.indices)
     if damping.ratio is not None and damping.rayleigh is not None:
         _reject(path, "damping", "either ratio or rayleigh", "both")
+    if damping.of == "robot" and not isinstance(damping.ratio, float):
+        given = damping.rayleigh if damping.ratio is None else damping.ratio
+        _reject(path, "damping", 'one ratio, with of = "robot"', "none" if given is None else given)
     number = modes.count or len(modes.indices or ()) or sum(DEFAULT_COUNT[family] for family in link.families)
     if isinstance(damping.ratio, tuple) and len(damping.ratio) != number:
         _reject(path, "damping.ratio", f"one number, or one for each of the {number} modes", len(damping.ratio))

@@ -121,6 +121,8 @@ def _optional(file: h5py.File) -> dict[str, Any]:
         found["surface_stress"] = _array(file, "stress/surface")
     if "modes/residual" in file:
         found["residual"] = np.asarray(file["modes/residual"][()], dtype=np.int64)
+    if "damping_of" in file["modes"].attrs:
+        found["damping_of"] = _text(file["modes"].attrs["damping_of"])
     if "surface_patches" in file:
         found["surface_patches"] = OutlinedPatches(**_arrays(file["surface_patches"], OutlinedPatches))
     return found
@@ -167,6 +169,8 @@ def _image(body: ModalBody) -> bytes:
             file[dataset].attrs["unit"] = unit
         file["modes"].create_dataset("family", data=list(body.family), dtype=h5py.string_dtype(), track_times=False)
         _write_arrays(file, {"modes/residual": body.residual})
+        if body.damping_of != "link":
+            file["modes"].attrs["damping_of"] = body.damping_of
         _write_arrays(file.create_group("geometric_stiffness"), dict(sorted(body.geometric_stiffness.items())))
         for name, interface in sorted(body.interfaces.items()):
             _write_arrays(file.create_group(f"interfaces/{name}"), vars(interface))

@@ -66,6 +66,7 @@ def restated(body: ModalBody, link: Link) -> ModalBody | None:
         body,
         name=link.name,
         damping_ratio=damping_ratio(link, np.sqrt(np.diag(body.stiffness))),
+        damping_of=link.damping.of,
         stress=stress,
         surface_stress=body.surface_stress if link.stress.surface else None,
         input_hash=input_hash(link),

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .api import load_scene, make_link, plot_results, read_modal_body, solve, view_file, write_report
-    from .common.errors import FfrobotError, InputError, SolveError
+    from .common.errors import FfrobotError, FfrobotWarning, InputError, SolveError
     from .fe_models.modal_body import ModalBody
     from .results.file import Results
     from .run.watcher import Watcher
@@ -38,6 +38,7 @@ _HOME = {
     "view_file": ".api",
     "write_report": ".api",
     "FfrobotError": ".common.errors",
+    "FfrobotWarning": ".common.errors",
     "InputError": ".common.errors",
     "SolveError": ".common.errors",
     "ModalBody": ".fe_models.modal_body",
@@ -49,6 +50,7 @@ _HOME = {
 
 __all__ = [
     "FfrobotError",
+    "FfrobotWarning",
     "InputError",
     "ModalBody",
     "Results",

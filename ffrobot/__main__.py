@@ -1,5 +1,18 @@
-"""`python -m ffrobot` is the command line, in any environment that has the package."""
+"""Where `ffrobot` and `python -m ffrobot` begin: signals are answered before anything else is loaded."""
 
-from .cli import main
+import signal
 
-main()
+from .common.interrupts import SIGNALS, EndOfCommand
+
+
+def main() -> None:
+    """Run the command line."""
+    for number in SIGNALS:
+        signal.signal(number, EndOfCommand())
+    from .cli import main as command_line
+
+    command_line()
+
+
+if __name__ == "__main__":
+    main()

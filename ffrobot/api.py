@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from os import PathLike
@@ -33,9 +34,10 @@ def solve(
     Python files that a scene file names run from below its folder, and from `allow_python` (files and folders).
     `resume` goes on with a run that was stopped, from `output`; functions of Python have to be the same then.
     Raises `InputError` for anything wrong with the scene, `SolveError` where an analysis does not reach its end; what
-    was computed until then is in `output` all the same.
+    was computed until then is in `output` all the same. Warns (`FfrobotWarning`) where results may be wrong, or do not
+    mean what they seem to; `Results.warnings` has the same texts.
     """
-    from .common.errors import InputError
+    from .common.errors import FfrobotWarning, InputError
     from .common.files import check_output
     from .common.outputs import protected
     from .results.file import FORMAT, Results
@@ -65,6 +67,9 @@ def solve(
     if solution is None:
         assert path is not None
         return Results(path)
+    for name, result in solution.analyses.items():
+        for text in result.warnings:
+            warnings.warn(f'{solution.scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=2)
     for outcome in solution.outcomes.values():
         outcome.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if path is not None else "")
     if path is not None:

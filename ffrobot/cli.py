@@ -8,13 +8,13 @@ import time
 import traceback
 from collections.abc import Iterable
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .bench.command import bench
 from .common.errors import FfrobotError
+from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first, on_first
 from .present.failures import describe, ready_streams, without_output
 from .present.logs import FILE, LOGGER, logging_options, python_option
@@ -74,9 +74,10 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     help="Where to write [SCENE.results.h5 beside the input].",
 )
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped, from its results file.")
+@click.option("--strict", is_flag=True, help="Exit with 1 where there is a warning; results are written all the same.")
 @python_option
 @logging_options
-def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
+def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) -> None:
     """Run the analyses of a scene (stage 2).
 
     Links given as .toml are taken through stage 1 first where they are not up to date. Prints a summary: time per
@@ -122,6 +123,9 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool) -> None:
     if display.signal:
         done = "before all analyses" if left_out(solution) else "when all was computed and written"
         raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
+    for name, result in solution.analyses.items() if strict else ():
+        for text in result.warnings:
+            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
 @cli.command()
@@ -282,9 +286,9 @@ def sweep(
 
 
 @cli.command()
-@click.argument("kind", type=click.Choice(["link", "scene"]))
+@click.argument("kind", type=click.Choice(["link", "scene", "figures"]))
 def schema(kind: str) -> None:
-    """Print the JSON schema of link or scene files, for editors.
+    """Print the JSON schema of link, scene or figures files, for editors.
 
     \b
     ffrobot schema scene > scene.schema.json
@@ -312,16 +316,10 @@ def main() -> None:
 
     Exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C, 143 after SIGTERM.
     """
-    stopped = 0
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        nonlocal stopped
-        stopped = number
-        signal.default_int_handler(number, frame)
-
+    stop = EndOfCommand()
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
     ready_streams()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         signal.signal(number, stop)
     try:
         cli(standalone_mode=False)
@@ -330,9 +328,9 @@ def main() -> None:
         error.show()
         sys.exit(error.exit_code)
     except Exception as error:
-        if stopped:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
+        if stop.number:  # not only Abort: libraries turn a KeyboardInterrupt into what they like, ImportError for one
             click.echo("ffrobot: stopped", err=True)
-            sys.exit(128 + stopped)
+            sys.exit(128 + stop.number)
         message = describe(error)
         if message is None:
             LOGGER.error("failed", exc_info=True)
@@ -345,5 +343,5 @@ def main() -> None:
         without_output()
         sys.exit(error.exit_code if isinstance(error, FfrobotError) else 1)
     finally:  # nothing is left to keep: at the interpreter's end an interrupt would be a traceback
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in SIGNALS:
             signal.signal(number, signal.SIG_DFL)

@@ -1,7 +1,7 @@
-"""JSON schemas of link and scene files, generated from the records that validate these files.
+"""JSON schemas of link, scene and figure files, generated from the records that validate these files.
 
-Editors complete and check TOML files by them. What ties several keys together (a revolute joint has no axis) is beyond
-a schema: the records and the readers of the files say so.
+Editors complete and check TOML files by them, and show what a key means. What ties several keys together (a revolute
+joint has no axis) is beyond a schema: the records and the readers of the files say so.
 """
 
 from __future__ import annotations
@@ -9,25 +9,47 @@ from __future__ import annotations
 from typing import Any
 
 from pydantic import TypeAdapter
-from pydantic.json_schema import GenerateJsonSchema
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from .common.key_descriptions import key_descriptions
 
 DIALECT = GenerateJsonSchema.schema_dialect
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """The JSON schema of a "link" or "scene" file, as a dictionary."""
+    """The JSON schema of a "link", "scene" or "figures" file, as a dictionary."""
+    described = TypeAdapter(_record(kind)).json_schema(schema_generator=_Described)
+    if kind == "scene":
+        for link in ("BeamLink", "SolidLink"):
+            described["$defs"][link]["required"].remove("name")  # that of the body
+    if kind == "link":
+        described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
+    return {"$schema": DIALECT, **_for_toml(described), "title": f"ffrobot {kind} file"}
+
+
+def _record(kind: str) -> Any:  # noqa: ANN401 (a record or a union of them)
     if kind == "scene":
         from .scene.scene import SceneKeys
 
-        described = TypeAdapter(SceneKeys).json_schema()
-        for link in ("BeamLink", "SolidLink"):
-            described["$defs"][link]["required"].remove("name")  # that of the body
-    else:
+        return SceneKeys
+    if kind == "link":
         from .fe_models.link_records import Link
 
-        described = TypeAdapter(Link).json_schema()
-        described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
-    return {"$schema": DIALECT, **_for_toml(described), "title": f"ffrobot {kind} file"}
+        return Link
+    from .pictures.figures.figure_file import FigureFile
+
+    return FigureFile
+
+
+class _Described(GenerateJsonSchema):
+    """The schema with the meaning of each key."""
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        described = super().model_schema(schema)
+        for key, text in key_descriptions(schema["cls"]).items():
+            described["properties"][key]["description"] = text
+        return described
 
 
 def _for_toml(node: Any) -> Any:  # noqa: ANN401 (any part of a JSON document)

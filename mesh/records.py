@@ -27,24 +27,30 @@ class RectangleSection(Record):
     """Rectangle; hollow where `wall` is given (solids only)."""
 
     shape: Literal["rectangle"]
-    height: Positive  # along y, m
-    width: Positive  # along z, m
-    wall: Positive | None = None  # thickness, m
+    height: Positive
+    """Along y, m."""
+    width: Positive
+    """Along z, m."""
+    wall: Positive | None = None
+    """Thickness of the wall of a hollow section, m; full where it is left out (solids only)."""
 
 
 class CircleSection(Record):
     """Solid circle."""
 
     shape: Literal["circle"]
-    diameter: Positive  # m
+    diameter: Positive
+    """Diameter, m."""
 
 
 class TubeSection(Record):
     """Circular tube."""
 
     shape: Literal["tube"]
-    outer: Positive  # diameter, m
-    inner: Positive  # diameter, m
+    outer: Positive
+    """Outer diameter, m."""
+    inner: Positive
+    """Inner diameter, m."""
 
 
 SectionRecord = Annotated[RectangleSection | CircleSection | TubeSection, Field(discriminator="shape")]
@@ -53,17 +59,22 @@ SectionRecord = Annotated[RectangleSection | CircleSection | TubeSection, Field(
 class Segment(Record):
     """A stretch of constant section."""
 
-    until: Positive  # m from the root
+    until: Positive
+    """Where it ends, m from the root; it begins where the one before ends."""
     section: SectionRecord
+    """Its cross section."""
 
 
 class BeamGeometry(Record):
     """A straight beam along x, of one section or of several in a row."""
 
     kind: Literal["beam"]
-    length: Positive  # m
+    length: Positive
+    """From root to tip, m."""
     section: SectionRecord | None = None
+    """Cross section of the whole beam; or give `segment`."""
     segment: Annotated[tuple[Segment, ...], Field(min_length=1)] | None = None
+    """Stretches of constant section from root to tip, in place of `section`."""
 
     @property
     def breakpoints(self) -> list[float]:
@@ -77,31 +88,45 @@ class BeamMesh(Record):
     """Element boundaries: `elements` of them as equal as the steps of the section allow, or the list of `nodes`."""
 
     elements: Annotated[int, Field(ge=1, le=MOST_ELEMENTS)] | None = None
-    nodes: Annotated[tuple[float, ...], Field(min_length=2)] | None = None  # m from the root
+    """Number of elements, as equal as the steps of the section allow; or give `nodes`."""
+    nodes: Annotated[tuple[float, ...], Field(min_length=2)] | None = None
+    """Element boundaries, m from the root: 0 first, `length` last."""
 
 
 class Hole(Record):
     """A round hole along z, through the whole width of a solid."""
 
-    position: Positive  # of its centre, m from the root
-    diameter: Positive  # m
-    offset: float = 0.0  # y of its centre, m
+    position: Positive
+    """Of its centre, m from the root along x."""
+    diameter: Positive
+    """Diameter, m."""
+    offset: float = 0.0
+    """y of its centre, m."""
 
 
 class SolidGeometry(Record):
     """A section drawn out along x, or a part from a file (`.step`, or a mesh: `.msh`, `.inp`, `.bdf`, `.vtk` …)."""
 
     kind: Literal["solid"]
-    length: Positive  # m
+    length: Positive
+    """From root to tip along x, m."""
     section: SectionRecord | None = None
-    tip_section: SectionRecord | None = None  # the section then changes linearly from root to tip
+    """Cross section drawn out along x; or give `file`."""
+    tip_section: SectionRecord | None = None
+    """Cross section at the tip: from root to tip it changes linearly."""
     hole: tuple[Hole, ...] = ()
+    """Round holes along z."""
     file: InputFile | None = None
-    unit: Literal["m", "mm", "in"] = "m"  # of the file's coordinates
+    """STEP file or mesh (.msh, .inp, .bdf, .vtk …) in place of `section`."""
+    unit: Literal["m", "mm", "in"] = "m"
+    """Unit of the coordinates in `file`."""
     # Where the link's frame stands in the file's axes: origin in the file's unit, directions of any length.
     origin: Vector3 = (0.0, 0.0, 0.0)
+    """Root of the link in the axes of `file`, in its unit."""
     x_axis: Vector3 = (1.0, 0.0, 0.0)
+    """Direction of the link's x axis in the axes of `file`, of any length."""
     y_axis: Vector3 = (0.0, 1.0, 0.0)
+    """Direction of the link's y axis in the axes of `file`, of any length."""
 
 
 class SolidMeshRecord(Record):
@@ -112,9 +137,13 @@ class SolidMeshRecord(Record):
     """
 
     cell: Literal["tetrahedron", "hexahedron"] | None = None
+    """Shape of the cells; by default hexahedra where there are `divisions`, else tetrahedra."""
     order: Annotated[int, Field(ge=1, le=3)] | None = None
-    size: Positive | None = None  # m
+    """Polynomial order of the displacements."""
+    size: Positive | None = None
+    """Wanted edge length of cells, m; by default what fits the part."""
     divisions: tuple[Division, Division, Division] | None = None
+    """Number of cells along x, y, z: a structured mesh, of boxes only."""
 
 
 class PlaceRecord(Record):
@@ -127,9 +156,14 @@ class PlaceRecord(Record):
     """
 
     name: Name
+    """What joints and loads call it, as "BODY.NAME"."""
     position: NotNegative | Vector3 | None = None
-    normal: Vector3 | None = None  # outward
+    """m from the root (on solids the cross section there), or a point (m, link axes) of which the nearest face is
+    taken."""
+    normal: Vector3 | None = None
+    """Outward direction of the face nearest to `position`, link axes (solids)."""
     group: Title | None = None
+    """Physical surface group of the mesh file that is the face (solids)."""
 
 
 @dataclass(frozen=True)

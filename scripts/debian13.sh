@@ -52,6 +52,10 @@ for file in /etc/apt/apt.conf.d/*proxy* /etc/pip.conf /etc/ssl/certs/ca-certific
   [[ ! -f $file ]] || install -D -m 644 "$file" "$SYSTEM$file"
 done
 
-rm -rf "$SYSTEM/root/ffrobot"
-git clone -q --no-hardlinks "$PWD" "$SYSTEM/root/ffrobot" # a repository: ruff leaves out what git does
+# A repository, for ruff leaves out what git does. One kept has its build and environment still.
+copy=$SYSTEM/root/ffrobot
+[[ -d $copy/.git ]] || git init -q "$copy"
+git -C "$copy" fetch -q "$PWD" HEAD
+git -C "$copy" checkout -q --force --detach FETCH_HEAD
+git -C "$copy" clean -qfd
 chroot "$SYSTEM" env -C /root/ffrobot HOME=/root LANG=C.UTF-8 ./test.sh "$@"

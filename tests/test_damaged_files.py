@@ -26,19 +26,22 @@ def results(two_link, tmp_path):
 
 
 def damaged(content, kind, chance):
-    """One or four bits flipped, 64 bytes zero, or cut off."""
+    """One or four bits flipped, 64 bytes zero, all zero from some byte on, or cut off there."""
     content = bytearray(content)
     if kind == "truncated":
         return bytes(content[: chance.randrange(len(content) - 1)])
     if kind == "zeros":
         first = chance.randrange(len(content) - 64)
         content[first : first + 64] = bytes(64)
+    if kind == "lost end":  # as after a loss of power
+        last = int(len(content) ** chance.random())
+        content[-last:] = bytes(last)
     for _ in range({"bit": 1, "bits": 4}.get(kind, 0)):
         content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
     return bytes(content)
 
 
-@pytest.mark.parametrize("kind", ["bit", "bits", "zeros", "truncated"])
+@pytest.mark.parametrize("kind", ["bit", "bits", "zeros", "lost end", "truncated"])
 @pytest.mark.parametrize("file", ["modal", "results"])
 def test_random_damage(request, file, kind):
     path = request.getfixturevalue(file)
@@ -196,3 +199,96 @@ def test_resume_checks_where_it_goes_on(stopped, attribute):
     checksum.seal(path)
     with pytest.raises(ffrobot.InputError, match=r"r\.h5: inverse"):
         ffrobot.solve(scene, path, resume=True)
+
+
+@pytest.mark.parametrize(("group", "attribute"), [("inverse", "status"), ("inverse", "integrator_reason")])
+def test_attributes_that_are_missing(results, group, attribute):
+    with h5py.File(results, "r+") as file:
+        del file[group].attrs[attribute]
+    checksum.seal(results)
+    with (
+        Results(results) as file,
+        pytest.raises(InputError, match=f'r.h5: {group}: expected the attribute "{attribute}", found none'),
+    ):
+        file.attributes(group)[attribute]
+
+
+@pytest.fixture(scope="module")
+def members(two_link):
+    """Every dataset, group and attribute of a results file: kind, name, attribute."""
+    found = [("attribute", "/", name) for name in two_link.file.attrs if name != checksum.MARK]
+
+    def collect(name, item):
+        found.append(("member", name, ""))
+        found.extend(("attribute", name, key) for key in item.attrs)
+
+    two_link.file.visititems(collect)
+    return found
+
+
+def spoil(path, member, chance):
+    """One member gone, of another type or shape, or not a number; the file sealed as one changed on purpose."""
+    kind, name, key = member
+    how = chance.choice(["gone", "text", "other"])
+    with h5py.File(path, "r+") as file:
+        if kind == "attribute":
+            del file[name].attrs[key]
+            if how != "gone":
+                file[name].attrs[key] = "text" if how == "text" else float("nan")
+        else:
+            values = None if isinstance(file[name], h5py.Group) else file[name][()]
+            del file[name]
+            if values is not None and how != "gone":
+                file[name] = "text" if how == "text" else np.zeros(2)
+    checksum.seal(path)
+    return f"{member}, {how}"
+
+
+@pytest.mark.parametrize("command", ["info", "feasibility", "linear", "plot", "report", "view"])
+def test_results_that_lack_something(results, members, tmp_path, command):
+    """Changed on purpose, sealed again: a message, or all is well."""
+    from ffrobot.common.hdf5 import reading
+    from ffrobot.pictures.report import write_report
+    from ffrobot.pictures.view import Options, view_file
+    from ffrobot.present.feasibility import print_feasibility
+    from ffrobot.present.info import describe
+    from ffrobot.present.summary import summary_console
+
+    def linear(path):
+        with Results(path) as opened:
+            opened.export_linear(None, tmp_path / "model.npz")
+
+    run = {
+        "info": describe,
+        "feasibility": lambda path: print_feasibility(path, None, summary_console()),
+        "linear": linear,
+        "plot": lambda path: ffrobot.plot_results(path, tmp_path / "figures", ["svg"]),
+        "report": lambda path: write_report([path], tmp_path / "page.html"),
+        "view": lambda path: view_file(path, tmp_path / "view", Options(frames=2, pictures=False)),
+    }[command]
+    content, chance, refused = results.read_bytes(), random.Random(command), 0
+    for member in chance.sample(members, 4 if command in ("plot", "report", "view") else 40):
+        results.write_bytes(content)
+        label = spoil(results, member, chance)
+        try:
+            with reading(results):
+                run(results)
+        except InputError as error:
+            message = str(error)
+        else:
+            message = ""
+        refused += bool(message)
+        assert not message or message.startswith(f"{results}"), label
+    assert refused or command not in ("feasibility", "linear")
+
+
+def test_what_lacks_is_named(results):
+    from ffrobot.common.hdf5 import reading
+    from ffrobot.present.info import describe
+
+    with h5py.File(results, "r+") as file:
+        del file["inverse"].attrs["wall_seconds"]
+    checksum.seal(results)
+    assert checksum.state(results) == "changed"
+    with pytest.raises(InputError, match='expected the attribute "wall_seconds", found none'), reading(results):
+        describe(results)

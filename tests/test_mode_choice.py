@@ -65,7 +65,7 @@ def test_the_estimate_is_honest_and_meets_the_tolerance(truth):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_estimate_is_honest_on_paths_it_was_not_made_with(seed):
     """Other ways of the tip, drawn by seed: as the paper's arm on its own."""
-    x, y = np.random.default_rng(seed).uniform([-1.0, -0.5], [0.0, 0.5])
+    x, y = np.random.default_rng(seed).uniform([-1.0, -0.5], [0.0, 0.5]).tolist()
     path = {"x": f"1.5+{x!r}*{S}", "y": f"sqrt(3)/2+{y!r}*{S}"}
     exact = reported_of(solve(scene("static", path, tolerance=1e-5)), "inverse")
     solution = solve(scene("static", path, "auto", tolerance=1e-2))

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import ffrobot
+from ffrobot.mbs.fields.derivatives import check_derivatives
+from ffrobot.mbs.fields.functions import user_function
 
 SINE = "void sine(double t, double *out) { out[0] = 0.5 * sin(t); out[1] = 0.5 * cos(t); out[2] = -out[0]; }"
 
@@ -73,14 +75,71 @@ def test_functions_that_are_none_of_a_path(value, complaint):
     assert complaint in str(error.value)
 
 
+def cosine(t):
+    return 0.5 * math.cos(9 * t), -4.5 * math.sin(9 * t), -40.5 * math.cos(9 * t)
+
+
+def jumping(t):
+    """Its acceleration jumps at t = 0.0371."""
+    s = max(0.0, t - 0.0371)
+    return 0.3 + 5 * s**2, 10 * s, 10.0 * (s > 0)
+
+
+HONEST = {
+    "sine": sine,
+    "constant": lambda t: (0.3, 0.0, 0.0),
+    "large and slow": lambda t: (1e3 + 1e-4 * t**2, 2e-4 * t, 2e-4),
+    "acceleration jumps": jumping,
+    "rounded to single precision": lambda t: tuple(float(np.float32(x)) for x in cosine(t)),
+    "vibrates fast": lambda t: (math.sin(3e4 * t), 3e4 * math.cos(3e4 * t), -9e8 * math.sin(3e4 * t)),
+    "zero and then not": lambda t: (0.0, 0.0, 0.0) if t < 0.05 else ((t - 0.05) ** 3, 3 * (t - 0.05) ** 2, 6 * t - 0.3),
+}
+WRONG = {
+    "no rate": (lambda t: (cosine(t)[0], 0.0, 0.0), "rate"),
+    "no acceleration": (lambda t: (*cosine(t)[:2], 0.0), "acceleration"),
+    "sign of the acceleration": (lambda t: (*cosine(t)[:2], -cosine(t)[2]), "acceleration"),
+    "rate in degrees": (lambda t: (cosine(t)[0], math.degrees(cosine(t)[1]), cosine(t)[2]), "rate"),
+    "inner derivative forgotten": (lambda t: (cosine(t)[0], cosine(t)[1] / 9, cosine(t)[2]), "rate"),
+    "off by a per cent": (lambda t: (cosine(t)[0], 1.01 * cosine(t)[1], cosine(t)[2]), "rate"),
+    "wrong after a jump only": (lambda t: (jumping(t)[0], jumping(t)[1], 0.0), "acceleration"),
+}
+
+
+@pytest.mark.parametrize("function", HONEST.values(), ids=HONEST)
+@pytest.mark.parametrize("end", [0.1, 1.0, 7.3])
+def test_honest_derivatives_are_taken(function, end):
+    check_derivatives(user_function(function), end, "path")
+
+
+@pytest.mark.parametrize(("function", "said"), WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize("end", [0.1, 1.0])
+def test_wrong_derivatives_are_found(function, said, end):
+    difference = {"rate": "value", "acceleration": "rate"}[said]
+    complaint = rf"found the {said} \S+ at t = \S+ s, where differences of the {difference} are"
+    with pytest.raises(ffrobot.InputError, match=complaint):
+        check_derivatives(user_function(function), end, "path")
+
+
+def test_wrong_derivatives_of_a_compiled_function(tmp_path):
+    """What it leaves as it is, is zero."""
+    (tmp_path / "part.c").write_text("void part(double t, double *out) { out[0] = t * t; }\n", encoding="utf-8")
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", "part.so", "part.c"], cwd=tmp_path, check=True)
+    library = ctypes.CDLL(str(tmp_path / "part.so"))
+    function = SimpleNamespace(address=ctypes.cast(library.part, ctypes.c_void_p).value)
+    with pytest.raises(ffrobot.InputError, match='trajectory "turn": value: expected the derivatives of the value'):
+        swing(function)
+
+
 def test_errors_of_a_function_come_through():
     def breaks(t):
         if 0.031 < t < 0.039:  # no output time
             raise ZeroDivisionError("in my function")
         return sine(t)
 
-    with pytest.raises(ZeroDivisionError, match="in my function"):
+    with pytest.raises(ZeroDivisionError, match="in my function") as error:
         ffrobot.solve(swing(breaks))
+    (note,) = error.value.__notes__
+    assert "breaks, a function of the scene, at t = 0.03" in note
 
 
 def test_pandas_view():

@@ -198,3 +198,48 @@ analysis = [{{ name = "fall", kind = "forward", end = 0.1, output_step = 0.1 }}]
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_results_in_memory_can_be_saved_and_drawn(folder, results, tmp_path):
+    """As those in a file: figures, page, view, the same numbers."""
+    saved = results.save(tmp_path / "saved.h5")
+    with ffrobot.Results(saved) as again:
+        np.testing.assert_array_equal(
+            again["inverse/joints/shoulder/moment"], results["inverse/joints/shoulder/moment"]
+        )
+    assert ffrobot.plot_results(results, tmp_path / "figures", ["svg"])
+    assert ffrobot.view_file(results, tmp_path / "view", pictures=False)
+    ffrobot.write_report(results, tmp_path / "one.html")
+    ffrobot.write_report([results, saved], tmp_path / "two.html")
+    assert (tmp_path / "one.html").stat().st_size < (tmp_path / "two.html").stat().st_size
+    with pytest.raises(ffrobot.InputError, match="found one of kind html"):
+        results.save(tmp_path / "one.html")
+
+
+def test_a_group_is_no_dataset(results):
+    with pytest.raises(ffrobot.InputError, match=r'found the group "inverse/joints/shoulder" of .*shoulder/moment"'):
+        results["inverse/joints/shoulder"]
+
+
+def test_library_that_is_not_installed(results, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(
+        ffrobot.SolveError, match=r"this needs pandas, which is not installed: pip install 'ffrobot\[pan"
+    ):
+        results.frame("inverse")
+
+
+def test_payload_without_mass(folder):
+    """The first point of a sweep over payloads."""
+    bare, zero = (
+        ffrobot.solve(swing(folder, payload=payload)) for payload in ([], [{"point": "arm.tip", "mass": 0.0}])
+    )
+    moment = "inverse/joints/shoulder/moment"
+    np.testing.assert_allclose(zero[moment], bare[moment], rtol=1e-6)  # the tolerance: modes are found anew
+
+
+def test_tables_without_end():
+    endless: dict[str, object] = {}
+    endless["a"] = endless
+    with pytest.raises(ffrobot.InputError, match="expected"):
+        ffrobot.make_scene(name="endless", initial=endless)

@@ -31,7 +31,7 @@ def validator(ffrobot):
         cls.check_schema(printed)
         return cls(printed)
 
-    return {kind: make(kind) for kind in ("link", "scene")}
+    return {kind: make(kind) for kind in ("link", "scene", "figures")}
 
 
 def parsed(path):
@@ -48,6 +48,24 @@ def test_scenes_of_the_cases_pass(validator, path):
 def test_links_of_the_cases_pass(validator, path):
     read_link(path)
     validator["link"].validate(parsed(path))
+
+
+@pytest.mark.parametrize("path", sorted(CASES.glob("*/figures.toml")), ids=lambda path: path.parent.name)
+def test_figures_of_the_cases_pass(validator, path):
+    validator["figures"].validate(parsed(path))
+
+
+@pytest.mark.parametrize("kind", ["link", "scene", "figures"])
+def test_every_key_says_what_it_means(kind):
+    """Hover text of editors, and the pages of keys: the text under the field in its record."""
+    described = schema(kind)
+    tables = {"the file": described, **described["$defs"]}
+    assert not [
+        f"{name}.{key}"
+        for name, table in tables.items()
+        for key, entry in table.get("properties", {}).items()
+        if not entry.get("description", "").endswith(".")
+    ]
 
 
 def test_link_in_a_scene_passes(validator):
@@ -121,7 +139,7 @@ def test_mistakes_in_a_link_are_refused_by_both(validator, tmp_path, keys, value
 
 
 def test_schema_knows_only_what_toml_can_say():
-    for kind in ("link", "scene"):
+    for kind in ("link", "scene", "figures"):
         text = json.dumps(schema(kind))
         assert '"null"' not in text
         assert ": null" not in text

@@ -48,15 +48,25 @@ class ClosedLoop(ActuatedAnalysis):
 
     kind: Literal["closed-loop"]
     sample_time: Positive
+    """Time between samples, s."""
     delay: NotNegative = 0.0
+    """From a sample to its command, s."""
     start: Literal["actuation", "scene"] = "actuation"
+    """Where the run starts: as `actuation` does, or as [initial] says."""
     feed_forward: Literal["none", "joints", "joints+pzt"] = "joints"
+    """What of `actuation` is added to the commands: moments, with voltages, or nothing."""
     unlimited: bool = False
+    """Moments and voltages beyond the limits of the scene are allowed."""
     seed: Annotated[int, Field(ge=0)] = 0
+    """Of the noise of sensors."""
     tip: PointReference | None = None
+    """Point "BODY.POINT" whose error is reported."""
     controller: tuple[ControllerKeys, ...] = ()
+    """Controllers; their commands add up."""
     sensor: tuple[Sensor, ...] = ()
+    """What is measured beside what the controllers need."""
     disturbance: tuple[Load, ...] = ()
+    """Loads at points that `actuation` does not know."""
 
     findings = ("diverged", "step underflow")  # what a controller does is what is to be found out
 

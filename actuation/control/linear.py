@@ -26,6 +26,7 @@ class Linear(InstantAnalysis):
 
     kind: Literal["linear"]
     points: tuple[PointReference, ...] | None = None
+    """Points whose motion and disturbance the model knows; by default those of trajectories, or all tips."""
 
     needs_actuators = True
 

@@ -15,6 +15,7 @@ from .linear_model import LinearModel, linear_model
 from .modes import controllability, observability
 from .records import JointPid, Lqr
 
+MOST_STATES = 500  # with which the Riccati equation takes seconds, not minutes
 MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion
 
 
@@ -98,6 +99,12 @@ class LqrControl:
         names = [setup.inputs[i] for i in self.inputs]
         self.warnings = _out_of_reach(record, setup, model, names)
         Q, R = _weights(record, setup, model, names)
+        waiting = int(np.ceil(setup.delay / setup.sample_time)) * len(names)
+        if len(model.A) + waiting > MOST_STATES:
+            raise InputError(
+                f"{setup.model.scene.path}: controller lqr: expected at most {MOST_STATES} states, found {len(model.A)}"
+                f" of the model and {waiting} commands on their way: a shorter delay or fewer inputs"
+            )
         discrete = sampled(model.A, model.B[:, model.inputs(names)], setup.sample_time, setup.delay)
         try:
             self.K = gains(discrete, Q, R)

@@ -40,6 +40,7 @@ class PatchPlacement(InstantAnalysis):
 
     kind: Literal["placement"]
     placement: Placement
+    """Which patches, and what makes a place good."""
 
     @property
     def is_over_path(self) -> bool:

@@ -36,14 +36,23 @@ class Sensor(Record):
     """
 
     joint: str | None = None
+    """Joint whose coordinate is read, rad (m where prismatic)."""
     motor: str | None = None
+    """Joint with stiffness whose motor's angle behind its gear is read, rad."""
     point: PointReference | None = None
+    """Point "BODY.POINT" whose x and y are read, m, global axes."""
     pzt: str | None = None
+    """Body whose patches are read, V."""
     modal: str | None = None
+    """Body whose modal coordinates are read as they are, which no sensor can (m·√kg)."""
     measure: Literal["value", "rate", "acceleration"] = "value"
+    """The value, its rate, or its acceleration (points)."""
     resolution: NotNegative = 0.0
+    """Readings are whole numbers of it, in their unit; 0: any number."""
     noise: NotNegative = 0.0
+    """Standard deviation of Gaussian noise, in the unit of the reading."""
     capacitance: Positive | None = None
+    """Of each patch, F; by default its own."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Sensor:
@@ -86,10 +95,15 @@ class JointPid(ControllerRecord):
 
     kind: Literal["joint-pid"]
     proportional: dict[Name, NotNegative] = Field(default_factory=dict)
+    """P by joint, N·m/rad (N/m where prismatic)."""
     derivative: dict[Name, NotNegative] = Field(default_factory=dict)
+    """D by joint, N·m·s/rad (N·s/m where prismatic)."""
     integral: dict[Name, NotNegative] = Field(default_factory=dict)
+    """I by joint, N·m/(rad·s) (N/(m·s) where prismatic)."""
     rate: Literal["measured", "difference"] = "measured"
-    side: Literal["joint", "motor"] = "joint"  # of gears that give, on which the angles are read
+    """Rates are measured, or the difference of two readings over the sample time."""
+    side: Literal["joint", "motor"] = "joint"
+    """Of gears that give, on which the angles are read."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -108,8 +122,10 @@ class ComputedTorque(ControllerRecord):
     """Moments of the mechanism with rigid links for γ̈_ref + 2 ζ ω ė + ω² e, instead of a feed-forward of moments."""
 
     kind: Literal["computed-torque"]
-    bandwidth: Positive  # ω, rad/s
+    bandwidth: Positive
+    """ω of the error's dynamics, rad/s."""
     damping_ratio: Positive = 1.0
+    """ζ of the error's dynamics."""
 
 
 class ModalVelocity(ControllerRecord):
@@ -120,9 +136,13 @@ class ModalVelocity(ControllerRecord):
 
     kind: Literal["modal-velocity"]
     bodies: Annotated[tuple[str, ...], NotEmpty]
+    """Links whose patches act."""
     modes: ModeCount = 1
+    """How many of the lowest modes of each link."""
     damping_ratio: Positive
+    """ζ that is added to each of these modes."""
     sensor: Literal["pzt", "ideal"] = "pzt"
+    """Voltages of the same patches, or p and its rate as they are."""
 
     def references(self) -> Iterator[Reference]:
         """The links."""
@@ -141,14 +161,23 @@ class Lqr(ControllerRecord):
 
     kind: Literal["lqr"]
     inputs: Literal["all", "motors", "patches"] = "all"
+    """What acts: motors and patches, or one of them."""
     modes: ModeCount = 1
+    """How many of the lowest modes of each link the design knows."""
     time: NotNegative = 0.0
+    """Instant of the reference about which it is linear, s."""
     angle: Positive = 0.01
+    """Acceptable error of joints, rad."""
     rate: Positive = 0.1
+    """Acceptable error of their rates, rad/s."""
     deflection: Positive = 1e-3
+    """Acceptable deflection of links, relative to their length."""
     moment: Positive = 10.0
+    """Acceptable moment of motors, N·m."""
     voltage: Positive = 100.0
+    """Acceptable voltage of patches, V."""
     sensor: Literal["pzt", "ideal"] = "pzt"
+    """Voltages of patches, or p and its rate as they are."""
 
 
 def _python_function(value: object, info: ValidationInfo) -> object:
@@ -172,6 +201,7 @@ class PythonController(ControllerRecord):
 
     kind: Literal["python"]
     python: Annotated[Any, PlainValidator(_python_function, json_schema_input_type=str)]
+    """Text "FILE.py:FUNCTION" with the file beside the scene; scenes made in Python may have the function itself."""
 
 
 Controller = Annotated[JointPid | ComputedTorque | ModalVelocity | Lqr | PythonController, Field(discriminator="kind")]
@@ -187,12 +217,19 @@ class Placement(Record):
     """
 
     body: str
+    """Link with patches."""
     count: PatchCount | None = None
+    """Number of patches; by default that of its [[pzt]]."""
     criterion: Literal["controllability", "voltage"] = "controllability"
+    """Reach of the robot's lowest modes, or the largest voltage over its limit along the path."""
     measure: Literal["worst", "mean", "product"] = "worst"
+    """Which reach counts: that of the worst mode, their mean, or their product."""
     modes: ModeCount | None = None
+    """How many of the lowest modes count."""
     spacing: Positive | None = None
+    """Between the centres that are tried, m; by default half the length of a patch."""
     most_sets: Annotated[int, Field(gt=0, le=10_000_000)] = 100_000
+    """So many sets are tried one by one; with more, evolution seeks."""
 
     def references(self) -> Iterator[Reference]:
         """The link and its patches."""

@@ -291,6 +291,8 @@ def _pieces(key: str, body: ModalBody, number: int, start: float, end: float) ->
     x = body.stations.position[:, 0]
     slack = min(1e-9 * body.length, 0.25 * (end - start))
     covered = np.flatnonzero((x[1:] > start + slack) & (x[:-1] < end - slack))
+    if not len(covered):  # rounding: it begins where it ends
+        raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m, found less")
     heights = body.stations.height[covered]
     jump = np.abs(np.diff(heights)) / np.maximum(heights[1:], heights[:-1])
     if jump.max(initial=0.0) > STEP:

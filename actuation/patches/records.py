@@ -32,24 +32,43 @@ class PztLayout(Record):
     """
 
     body: str
+    """Link that they sit on."""
     count: PatchCount | None = None
+    """Number of patches, centres at (k − ½)·length of link / count; or give `centers`."""
     centers: Annotated[tuple[float, ...], NotEmpty, Field(max_length=MOST_PATCHES)] | None = None
+    """Their centres, m from the root."""
     length: Positive
+    """Of each along the link, m."""
     width: Positive
+    """Of each across the link, m."""
     thickness: Positive
+    """Of one layer, m."""
     modulus: Positive
+    """Young's modulus, Pa."""
     d31: float
+    """Piezoelectric strain constant, m/V."""
     density: Positive | None = None
+    """Density, kg/m³; for their mass."""
     limit: Positive | Annotated[tuple[Positive, ...], NotEmpty] | None = None
+    """Largest voltage, V: of all, or of each."""
     layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
+    """Layers on each other."""
     face: Literal["+y", "-y", "both"] | None = None
+    """Which face they sit on; without it they bend the link and do nothing else."""
     allocation: Literal["exact", "least-squares"] = "exact"
+    """Voltages that produce all modal forces, or come nearest: then fewer patches than modes will do."""
     mode_weights: Annotated[tuple[NotNegative, ...], NotEmpty] | None = None
+    """What matters of modal forces that are left unmet: a weight of the square for each mode."""
     point_weights: dict[Name, NotNegative] | None = None
+    """What matters of the deflections left: a weight of the square by point of the link."""
     structural: bool | tuple[Literal["mass", "stiffness"], ...] = ("stiffness",)
+    """What of the patches is added to the link: true for both; false for neither, and the bare link's authority."""
     depoling_field: Positive | None = None
+    """Of the material, V/m; for the judgement only."""
     strain_limit: Positive | None = None
+    """Of the material; for the judgement only."""
     coupling: Literal["rotation", "surface"] = "rotation"
+    """On what they work: section rotations at their ends, or faces outlined in the mesh of a solid."""
 
     @model_validator(mode="after")
     def _consistent(self) -> PztLayout:

@@ -93,6 +93,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         stiffness=np.diag(omega**2),
         modal_mass=modal_mass(models, modes),
         damping_ratio=damping_ratio(link, omega),
+        damping_of=link.damping.of,
         family=tuple(mode.family for mode in modes),
         residual=residual,
         geometric_stiffness=with_lumped_loads(geometric_stiffness(link, stations, fields, named), attached),

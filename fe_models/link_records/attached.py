@@ -17,8 +17,12 @@ class InterfaceRecord(PlaceRecord):
     """A place where joints and loads attach, and what is fixed to it there: a hub, a gripper."""
 
     coupling: Coupling | None = None
-    mass: NotNegative = 0.0  # kg, rigidly attached, its center at the interface
-    inertia: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)  # about x, y, z through there, kg·m²
+    """How a solid's face is held to the interface: its mean moves with it, or all of it; by default that of
+    [reference]."""
+    mass: NotNegative = 0.0
+    """Mass that sits on the interface, its center there, kg."""
+    inertia: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
+    """Its moments of inertia about x, y, z through the interface, kg·m²."""
 
 
 class SurfacePatches(Record):
@@ -28,11 +32,16 @@ class SurfacePatches(Record):
     """
 
     count: PatchCount | None = None
+    """Number of patches, evenly spread; or give `centers`."""
     # m from the root
     centers: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PATCHES)] | None = None
-    length: Positive  # m
-    width: Positive  # m
+    """Their centres, m from the root."""
+    length: Positive
+    """Of each along x, m."""
+    width: Positive
+    """Of each along z, m."""
     faces: Literal["top", "bottom", "both"] = "both"
+    """On the face at the largest y, the smallest y, or on both."""
 
     def edges(self, length: float) -> list[tuple[float, float]]:
         """Begin and end of each patch on a link of `length`, m from the root."""

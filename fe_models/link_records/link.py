@@ -33,25 +33,33 @@ Poisson = Annotated[float, Field(gt=-1, lt=0.5)]
 class Material(Record):
     """Linear elastic, isotropic."""
 
-    youngs_modulus: Positive  # Pa
-    density: Positive  # kg/m³
+    youngs_modulus: Positive
+    """E, Pa."""
+    density: Positive
+    """ρ, kg/m³."""
     # Beams need it for torsion and shear only, solids always.
     poissons_ratio: Poisson | None = None
+    """ν; beams need it for torsion and shear only, solids always."""
 
 
 class OrthotropicMaterial(Record):
     """Linear elastic, with three planes of symmetry along the axes of the link (solids only)."""
 
-    youngs_modulus: tuple[Positive, Positive, Positive]  # E_x, E_y, E_z in Pa
-    poissons_ratio: Vector3  # ν_xy, ν_yz, ν_xz: contraction along the second under a pull along the first
-    shear_modulus: tuple[Positive, Positive, Positive]  # G_xy, G_yz, G_xz in Pa
-    density: Positive  # kg/m³
+    youngs_modulus: tuple[Positive, Positive, Positive]
+    """E_x, E_y, E_z, Pa."""
+    poissons_ratio: Vector3
+    """ν_xy, ν_yz, ν_xz: contraction along the second axis under a pull along the first."""
+    shear_modulus: tuple[Positive, Positive, Positive]
+    """G_xy, G_yz, G_xz, Pa."""
+    density: Positive
+    """ρ, kg/m³."""
 
 
 def _symmetry(material: object) -> str:
     """Which record a material table is: three Young's moduli make it orthotropic."""
-    table = material if isinstance(material, Mapping) else vars(material)
-    moduli = table.get("youngs_modulus")
+    moduli = (
+        material.get("youngs_modulus") if isinstance(material, Mapping) else getattr(material, "youngs_modulus", None)
+    )
     return "orthotropic" if isinstance(moduli, list | tuple) else "isotropic"
 
 
@@ -65,13 +73,16 @@ class Region(Record):
     """The part of a solid inside a physical volume `group` of its mesh file, of another material."""
 
     group: Title
+    """Name of the physical volume in the mesh file."""
     material: SolidMaterial
+    """What it is made of."""
 
 
 class BeamModel(Record):
     """Which beam theory."""
 
     theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli"
+    """Without shear, or with shear and rotary inertia of the sections."""
 
 
 class Reference(Record):
@@ -82,7 +93,9 @@ class Reference(Record):
     """
 
     condition: Literal["cantilever", "simply-supported"]
+    """The frame moves with the root's section, or its x axis goes through root and tip."""
     coupling: Coupling | None = None
+    """How a solid's end faces are held; by default mean for simply-supported, rigid for cantilever."""
 
 
 class Modes(Record):
@@ -93,34 +106,53 @@ class Modes(Record):
     """
 
     count: ModeCount | None = None
+    """Number of the lowest eigenmodes; or give `indices`."""
     indices: Annotated[tuple[ModeCount, ...], Field(min_length=1, max_length=MOST_MODES)] | None = None
+    """Numbers of the eigenmodes, 1 the lowest."""
     family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"
+    """Family or families that they are taken from."""
     attachment_modes: bool = True
+    """Add static shapes of loads at the interfaces."""
 
 
 class Damping(Record):
-    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK."""
+    """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK.
+
+    `of` "robot": one ratio, wanted of the vibrations of the assembled robot at its initial posture, motors free.
+    """
 
     ratio: NotNegative | tuple[NotNegative, ...] | None = None
+    """Damping ratio ζ of all modes, or of each."""
     rayleigh: tuple[NotNegative, NotNegative] | None = None
+    """a (1/s) and b (s) of D = aM + bK, in place of `ratio`."""
+    of: Literal["link", "robot"] = "link"
+    """Whose vibrations `ratio` is of: the link's under its reference condition, or the assembled robot's."""
 
 
 class StressRecovery(Record):
     """Where modal stresses are kept: named `points` (m, link frame), and on the whole `surface` of a solid."""
 
     points: dict[Name, Vector3] = Field(default_factory=dict)
+    """Places (m, link axes) by name where stresses are kept."""
     surface: bool = False
+    """Keep stresses on the whole surface of a solid."""
 
 
 class _Link(Record):
     """What all link files have."""
 
     name: Title
+    """Of the link; in a scene that of its body where it is left out."""
     reference: Reference
+    """What the link's frame is fixed to."""
     modes: Modes
+    """Which modes the link may deform in."""
     damping: Damping = Damping()
+    """Of the modes."""
     interface: tuple[InterfaceRecord, ...] = ()
+    """Places for joints and loads beside `root` and `tip`, which always are."""
     stress: StressRecovery = StressRecovery()
+    """Where stresses are wanted."""
 
     @property
     def families(self) -> tuple[Family, ...]:
@@ -133,9 +165,13 @@ class BeamLink(_Link):
     """A whole link file with `geometry.kind = "beam"`."""
 
     material: Material
+    """What it is made of."""
     geometry: BeamGeometry
+    """Length and cross section."""
     mesh: BeamMesh
+    """Its elements."""
     model: BeamModel = BeamModel()
+    """Beam theory."""
 
     @property
     def shapes(self) -> list[SectionRecord]:
@@ -159,10 +195,15 @@ class SolidLink(_Link):
     """A whole link file with `geometry.kind = "solid"`."""
 
     material: SolidMaterial
+    """What it is made of."""
     region: tuple[Region, ...] = ()
+    """Parts of another material."""
     geometry: SolidGeometry
+    """Shape, drawn out along x or from a file."""
     mesh: SolidMeshRecord = SolidMeshRecord()
+    """Its cells; by default what fits the part."""
     surface_patch: SurfacePatches | None = None
+    """Outlines of piezoelectric patches in the mesh."""
 
     @property
     def coupling(self) -> Coupling:

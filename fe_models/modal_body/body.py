@@ -145,6 +145,7 @@ class ModalBody:
         stiffness: (n, n) K_ff = diag(ω²).
         modal_mass: (n, n) m_ff = I to 1e-8.
         damping_ratio: (n,) ζ.
+        damping_of: "link", or "robot" where ζ is wanted of the vibrations of the assembled robot.
         family: n names; of a residual attachment mode, that of the loads behind it.
         residual: (n,) 0 of eigenmodes, 1 of residual attachment modes, which come after them; all 0 where not given.
         S_bar: (3, n) ∫ρ Φ dV.
@@ -188,6 +189,7 @@ class ModalBody:
     surface_stress: Array | None = None
     surface_patches: OutlinedPatches | None = None
     residual: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    damping_of: str = "link"
     input_hash: str = ""
     modes_hash: str = ""
     ffrobot_version: str = ""

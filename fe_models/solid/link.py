@@ -124,6 +124,7 @@ def solid_modal_body(
         stiffness=np.diag(modes.omega2),
         modal_mass=model.total(X.T @ (mass @ X)),
         damping_ratio=damping_ratio(link, omega),
+        damping_of=link.damping.of,
         family=tuple(modes.families),
         residual=np.repeat([0, 1], [count, omega.size - count]),
         geometric_stiffness=with_lumped_loads(stresses, attached),

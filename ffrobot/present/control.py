@@ -14,7 +14,8 @@ from ..actuation.control.placement import Placed
 from ..run.solution import Solution
 from .tables import plain_table
 
-FREQUENCIES = 5  # that are listed
+FREQUENCIES = 5  # that are listed, and damping ratios
+UNDAMPED = 1e-9  # ratios below are rounding
 
 LOOP_COLUMNS = (
     "closed loop", "verdict", "rms (m)", "max (m)", "settled (s)", "vibration (m)", "at end (m)", "work (J)", "N·m",
@@ -76,13 +77,23 @@ def _placement(name: str, placed: Placed) -> tuple[str, ...]:
 
 
 def control_lines(solution: Solution) -> Iterator[str]:
-    """Zeros, modes that nothing moves or sees, and places of patches, a line each."""
+    """Damping ratios, zeros, modes that nothing moves or sees, and places of patches, a line each."""
     for name, outcome in solution.outcomes.items():
         if isinstance(outcome.details, LinearModels):
+            yield from _damping(name, outcome.details)
             yield from _zeros_and_lost(name, outcome.details)
     for name, outcome in solution.outcomes.items():
         if isinstance(outcome.details, Placed):
             yield f"{name}: centres at {', '.join(f'{x:.4g}' for x in outcome.details.best.centers)} m"
+
+
+def _damping(name: str, linear: LinearModels) -> Iterator[str]:
+    """Of the frequencies that are listed for the first time of an analysis; nothing of a robot without damping."""
+    modes = linear.modes[0]
+    ratios = modes.damping_ratio[modes.frequency > 0.0][:FREQUENCIES]
+    if np.any(np.abs(ratios) > UNDAMPED):
+        listed = ", ".join(f"{ratio:.3g}" for ratio in ratios)
+        yield f"{name}, t = {linear.models[0].time:g} s: damping ratios {listed}"
 
 
 def _zeros_and_lost(name: str, linear: LinearModels) -> Iterator[str]:

@@ -37,9 +37,13 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
 
 
 def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
+    from ..results.actuators import read_unsupplied
+
     yield f'analysis "{name}" ({group.attrs["kind"]})'
     if "joints" in group["feasibility"]:
         yield _motors(group["feasibility/joints"])
+    if (missed := read_unsupplied(group["feasibility"])) is not None:
+        yield missed.in_words
     for body, judged in group["feasibility"].get("pzt", {}).items():
         yield _patches(body, group[f"pzt/{body}"], judged)
         yield _modes(body, judged)
@@ -49,7 +53,7 @@ def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
 
 def _motors(group: h5py.Group) -> Table:
     table = _table(
-        "motor of", "moment", "limit", "speed", "limit", "power (W)", "limit", "factor", "from t (s)", "can it?"
+        "motor of", "moment", "limit", "speed", "limit", "power (W)", "limit", "factor", "from t (s)", "within?"
     )
     keys = ("moment", "moment_limit", "speed", "speed_limit", "power", "power_limit")
     for name, motor in group.items():
@@ -61,7 +65,7 @@ def _motors(group: h5py.Group) -> Table:
 def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
     table = _table(
         body, "at (m)", "needs (V)", "has (V)", "needs (N·m)", "has", "factor", "from (s)", "kV/mm", "depoling",
-        "strain (µ)", "can it?",
+        "strain (µ)", "within?",
     )  # fmt: skip
     required, available = judged["required_moment"][()], judged["available_moment"][()]
     c, depoling = np.abs(pzt["moment_per_volt"][()]), judged.attrs["depoling_field"]

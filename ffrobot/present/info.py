@@ -20,6 +20,7 @@ from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
 from ..results.control import read_metrics
 from ..results.file import FORMAT as RESULTS_FORMAT
+from ..results.file import status_in_words
 from .control import LOOP_COLUMNS, loop_row
 
 
@@ -89,7 +90,8 @@ def _results(file: h5py.File) -> str:
     for name, group in file.items():
         time, attributes = group["time"], group.attrs
         analyses.add_row(
-            name, attributes["kind"], attributes["status"], f"{len(time)}", f"{time[-1]:g}", f"{attributes['steps']}",
+            name, attributes["kind"], status_in_words(attributes), f"{len(time)}", f"{time[-1]:g}",
+            f"{attributes['steps']}",
             f"{attributes['wall_seconds']:.3f}",
         )  # fmt: skip
         if "control/commands" in group:

@@ -10,15 +10,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..actuation.control.closed_loop import LoopRecord
 from ..actuation.feasibility import Feasibility
-from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.raised_mass import raised_in_words
 from ..mbs.model.truncation import modes_kept
-from ..mbs.quantities.stiffening import NOTABLE
+from ..mbs.quantities.validity import deflection_warning
 from ..run.solution import ModeChoice, Solution
+from .accuracy import error_budget
 from .control import control_lines, control_tables
 from .tables import plain_table
 
@@ -34,7 +33,8 @@ def summary_console() -> Console:
 def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], console: Console) -> None:
     """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
     console.print(_analyses(solution))
-    console.print("error aim: relative to the peak of each quantity; constraints: largest violation")
+    for line in _warnings(solution):
+        console.print(f"warning    {line}")
     for table in _tables(solution):
         console.print()
         console.print(table)
@@ -62,6 +62,7 @@ def _tables(solution: Solution) -> Iterator[Table]:
 
 def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     outcomes = solution.outcomes
+    yield from (("path", note) for note in solution.path_notes)
     chosen = {
         name: f"{chosen.name}; {chosen.reason}"
         for name, outcome in outcomes.items()
@@ -75,15 +76,21 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
         yield "modes", _modes(solution, solution.mode_choice)
     if (raised := raised_in_words(solution.model)) and any(one.analysis.is_integrated for one in outcomes.values()):
         yield "modes", raised
-    yield from (("patches", patches.stiffness_in_words) for patches in solution.patches.values())
-    loops = {name: outcome.details for name, outcome in outcomes.items() if isinstance(outcome.details, LoopRecord)}
-    warnings = [(name, line) for name, loop in loops.items() for line in loop.warnings]
-    warnings += [(name, line) for name, outcome in outcomes.items() for line in unresolved_gears(outcome.gears)]
-    yield from (("warning", line) for line in _alike(warnings))
-    yield _stiffening(solution)
+    yield "accuracy", "\n".join(error_budget(solution))
     yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
     if solution.omissions:
         yield "skipped", "; ".join(solution.omissions)
+
+
+def _warnings(solution: Solution) -> Iterator[str]:
+    """Of all analyses; of those whose links bend too much the worst in full, the others by name."""
+    bent = {name: text for name, result in solution.analyses.items() if (text := deflection_warning(result.bending))}
+    if bent:
+        worst = max(bent, key=lambda name: solution.analyses[name].position_error)
+        others = [name for name in bent if name != worst]
+        yield f"{worst}: {bent[worst]}" + (f" (likewise, but less: {', '.join(others)})" if others else "")
+    told = ((name, text) for name, result in solution.analyses.items() for text in result.warnings)
+    yield from _alike((name, text) for name, text in told if text != bent.get(name))
 
 
 def _alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
@@ -135,19 +142,8 @@ def _inversion(outcome: Outcome, found: InvertedPath) -> str:
     )
 
 
-def _stiffening(solution: Solution) -> tuple[str, str]:
-    """What loads along the links do to their stiffness, and whether the equations know."""
-    effect = max((result.stiffening_effect for result in solution.analyses.values()), default=0.0)
-    changes = f"loads change a mode's stiffness by up to {100 * effect:.2g} %"
-    if solution.stiffened:
-        return "stiffening", f"geometric stiffening is on: {changes}"
-    if effect > NOTABLE:
-        return "warning", f"geometric stiffening is off, and {changes}: consider geometric_stiffening = true"
-    return "stiffening", f"geometric stiffening is off: {changes}"
-
-
 def _analyses(solution: Solution) -> Table:
-    table = plain_table("analysis", "kind", "integrator", "t (s)", "steps", "error aim", "constraints", "wall (s)")
+    table = plain_table("analysis", "kind", "integrator", "t (s)", "steps", "tolerance", "constraints", "wall (s)")
     for name, outcome in solution.outcomes.items():
         analysis, run, reached = outcome.analysis, outcome.statistics, outcome.time[-1]
         integrated = analysis.is_integrated
@@ -185,9 +181,21 @@ def _verdict(feasibility: Feasibility) -> str:
     """Whether the actuators can do it, and which cannot."""
     short = feasibility.short
     if not short:
-        return "motors and patches can do it, as far as limits are given"
+        return _enough(feasibility)
     lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
     return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility"
+
+
+def _enough(feasibility: Feasibility) -> str:
+    """Of actuators none of which is beyond its limits."""
+    patches = any(np.isfinite(of.available_moment).any() for of in feasibility.patches.values())
+    motors = any(
+        np.isfinite([of.moment_limit, of.speed_limit, of.power_limit]).any() for of in feasibility.motors.values()
+    )
+    within = "within the limits that are given" if motors or patches else "no limits are given"
+    if feasibility.unsupplied is not None:
+        return f"not by motors alone: see the warning ({within})"
+    return f"motors{' and patches' if feasibility.patches else ''} can do it, {within}"
 
 
 def _stresses(solution: Solution) -> Table:

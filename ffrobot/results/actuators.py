@@ -10,6 +10,7 @@ from ..actuation.feasibility import Feasibility
 from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointForces, PointSet
+from ..actuation.prediction import Unsupplied
 from ..mbs.analysis.outcome import Outcome
 from ..run.solution import AnalysisResult, Solution
 
@@ -43,6 +44,8 @@ def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) 
 
 
 def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
+    if judged.unsupplied is not None:
+        group.create_group("unsupplied").attrs.update(vars(judged.unsupplied))
     for joint, motor in judged.motors.items():
         group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
     for body, patches in judged.patches.items():
@@ -53,6 +56,14 @@ def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibilit
         entry.attrs["depoling_field"] = layout.depoling_field or np.inf
         entry.attrs["strain_limit"] = layout.strain_limit or np.inf
         entry.create_group("remedies").attrs.update(vars(patches.remedies))
+
+
+def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
+    """Of the feasibility of an analysis: what nothing supplies; None where there is nothing of the kind."""
+    if "unsupplied" not in group:
+        return None
+    about = dict(group["unsupplied"].attrs)
+    return Unsupplied(**(about | {"bodies": tuple(about["bodies"])}))
 
 
 def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces) -> None:

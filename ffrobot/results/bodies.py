@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import h5py
 
 from ..common.arrays import Array
@@ -9,6 +11,7 @@ from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.observation import body_motion, energies, point_motion, stored_coordinates
 from ..mbs.quantities.stress import BodyStress
+from ..mbs.quantities.validity import Bending
 
 
 def write_motion(group: h5py.Group, outcome: Outcome) -> None:
@@ -32,6 +35,22 @@ def write_motion(group: h5py.Group, outcome: Outcome) -> None:
         group[f"energy/{key}"] = values
     violation = group.create_dataset("constraint_violation", data=outcome.residual)
     violation.attrs["columns"] = ["position", "velocity", "acceleration"]
+
+
+def write_bending(group: h5py.Group, links: Mapping[str, Bending]) -> None:
+    """How far flexible bodies leave small deformations: attributes of bodies/BODY."""
+    for name, link in links.items():
+        group[f"bodies/{name}"].attrs.update(
+            {
+                "largest_deflection": link.deflection,
+                "largest_rotation": link.rotation,
+                "foreshortening": link.foreshortening,
+                "foreshortening_moment": link.foreshortening_moment,
+                "stiffness_change": link.stiffness_change,
+                "position_error": link.position_error,
+                "relative_error": link.relative_error,
+            }
+        )
 
 
 def read_modal(group: h5py.Group, body: str) -> Array:

@@ -45,6 +45,12 @@ class ModalFile:
     input_hash: str
 
 
+def status_in_words(attributes: Mapping[str, Any]) -> str:
+    """How an analysis with these attributes ended, with the number of its warnings: "completed, 2 warnings"."""
+    status, count = attributes["status"], len(attributes.get("warnings", ()))
+    return f"{status}, {count} warning{'s' if count > 1 else ''}" if count else str(status)
+
+
 class _Attributes(dict[str, Any]):
     """Attributes of a group, which messages call `where`; `InputError` for one that it does not have."""
 
@@ -101,7 +107,8 @@ class Results:
         lines = [f"Results({str(self.path)!r}): scene {self.name!r}"]
         for name in self.analyses:
             about, time = self.attributes(name), self.time(name)
-            lines.append(f"  {name}: {about['kind']}, {len(time)} outputs up to {time[-1]:g} s, {about['status']}")
+            ended = f"{len(time)} outputs up to {time[-1]:g} s, {status_in_words(about)}"
+            lines.append(f"  {name}: {about['kind']}, {ended}")
         return "\n".join(lines)
 
     def save(self, path: PathLike[str] | str) -> Path:
@@ -201,6 +208,12 @@ class Results:
 
     def _with_models(self) -> list[str]:
         return [name for name in self.analyses if self.has(f"{name}/linear")]
+
+    @property
+    def warnings(self) -> dict[str, list[str]]:
+        """Why results of an analysis may be wrong, or not mean what they seem to; by analysis, where there is any."""
+        told = {name: self.attributes(name).get("warnings", ()) for name in self.analyses}
+        return {name: [str(text) for text in texts] for name, texts in told.items() if len(texts)}
 
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`.

@@ -8,6 +8,7 @@ import numpy as np
 from ..mbs.analysis.motors_only import InvertedPath, is_minimum_phase, path_error
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.observation import joint_forces, motor_angle, trajectory_force, trajectory_target
+from ..mbs.scene.trajectories import Trajectory
 
 
 def write_forces(group: h5py.Group, outcome: Outcome) -> None:
@@ -19,6 +20,7 @@ def write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["force"] = trajectory_force(outcome, trajectory.name)
             entry["target"] = trajectory_target(outcome, trajectory.name)
             entry.attrs["components"] = list(trajectory.components)
+            _write_path(entry, trajectory)
     for joint in outcome.assembly.model.scene.joint:
         forces = joint_forces(outcome, joint.name)
         entry = group.create_group(f"joints/{joint.name}")
@@ -47,6 +49,7 @@ def write_inversion(group: h5py.Group, outcome: Outcome, found: InvertedPath) ->
         entry["target"] = trajectory_target(outcome, trajectory.name)
         entry["error"] = error[:, column : column + count]
         entry.attrs["components"] = list(trajectory.components)
+        _write_path(entry, trajectory)
         column += count
     entry = group.create_group("zero_dynamics")
     entry["time"] = inversion.linearisation.times
@@ -56,3 +59,13 @@ def write_inversion(group: h5py.Group, outcome: Outcome, found: InvertedPath) ->
     entry.attrs["minimum_phase"] = is_minimum_phase(inversion.linearisation)
     entry.attrs["unmet_force"] = inversion.unmet
     entry.attrs["off_rest"] = inversion.off_rest
+
+
+def _write_path(entry: h5py.Group, trajectory: Trajectory) -> None:
+    """When a path made of legs begins and is over, and what was found for it."""
+    if trajectory.path is None:
+        return
+    entry.attrs["begin"], entry.attrs["end"] = trajectory.path.begin, trajectory.path.end
+    entry.attrs["stretch"] = trajectory.stretch
+    if trajectory.shaper is not None and trajectory.shaper.frequency is not None:
+        entry.attrs["shaper_frequency"] = np.atleast_1d(trajectory.shaper.frequency)

@@ -19,7 +19,7 @@ from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Details, Outcome
 from ..run.solution import AnalysisResult, Solution
 from .actuators import write_actuators, write_placement
-from .bodies import write_motion, write_stress
+from .bodies import write_bending, write_motion, write_stress
 from .control import write_loop
 from .file import FORMAT
 from .forces import write_forces, write_inversion
@@ -75,10 +75,17 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     outcome, name = result.outcome, result.outcome.analysis.name
     _write_attributes(group, outcome)
     group.attrs["stiffening_effect"] = result.stiffening_effect
+    if result.mode_error is not None:
+        group.attrs["mode_error"] = result.mode_error
+    group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
     if solution.mode_choice is not None and name in solution.mode_choice.errors:
         for kind, error in solution.mode_choice.errors[name].items():
             group.attrs[f"mode_error_{kind}"] = error
+    if result.check is not None:
+        check = vars(result.check) | {"modes": json.dumps(dict(result.check.modes))}
+        group.attrs.update({f"check_{key}": value for key, value in check.items()})
     write_motion(group, outcome)
+    write_bending(group, result.bending)
     write_forces(group, outcome)
     write_actuators(group, solution, result)
     for body, stress in result.stresses.items():

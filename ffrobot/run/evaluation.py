@@ -3,30 +3,42 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+
+import numpy as np
 
 from ..actuation.feasibility import Feasibility, MotorFeasibility, judge_motors, judge_patches
 from ..actuation.patches.patches import with_patch_count
 from ..actuation.points import PointForces, solve_point_forces
-from ..actuation.prediction import predicted_shift, unmet_modal_forces
+from ..actuation.prediction import Unsupplied, predicted_shift, unmet_modal_forces, unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.quantities.attachment_error import mode_error
 from ..mbs.quantities.observation import modes_of_file
 from ..mbs.quantities.stress import BodyStress, body_stress
 from .solution import AnalysisResult, Solution
+from .warnings import warnings_of
+
+FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces
+ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
 
 
 def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
     """The result with all that follows from its outcome."""
     began, outcome = time.perf_counter(), result.outcome
+    shift, unsupplied = _unmet(solution, result)
+    feasibility = _feasibility(solution, result)
     result = replace(
         result,
         point_forces=_point_forces(solution, outcome),
-        predicted_shift=_predicted_shift(solution, result),
-        feasibility=_feasibility(solution, result),
+        predicted_shift=shift,
+        feasibility=feasibility and replace(feasibility, unsupplied=unsupplied),
         stresses=_stresses(solution, outcome),
+        mode_error=mode_error(outcome) if outcome.analysis.is_integrated else None,
     )
+    result = replace(result, warnings=tuple(warnings_of(result)))
     return replace(result, seconds=result.seconds + time.perf_counter() - began)
 
 
@@ -36,10 +48,38 @@ def _point_forces(solution: Solution, outcome: Outcome) -> dict[str, PointForces
     return {body: solve_point_forces(points, outcome) for body, points in solution.points.items()}
 
 
-def _predicted_shift(solution: Solution, result: AnalysisResult) -> dict[str, Array]:
-    if result.outcome.F_p is None or not solution.patches:
-        return {}
-    return predicted_shift(result.outcome, unmet_modal_forces(result.outcome, result.voltages))
+def _unmet(solution: Solution, result: AnalysisResult) -> tuple[dict[str, Array], Unsupplied | None]:
+    """What modal forces that patches leave undone do to points; empty where none are left."""
+    outcome = result.outcome
+    if outcome.F_p is None:
+        return {}, None
+    unmet = unmet_modal_forces(outcome, result.voltages)
+    lacking = tuple(_without_means(solution, result))
+    if not (solution.patches or lacking):
+        return {}, None
+    shift = predicted_shift(outcome, unmet)
+    with_patches = bool(solution.patches)
+    found = unsupplied(outcome, unmet, shift, lacking, with_patches=with_patches) if lacking else None
+    if found is not None and found.angles_kept <= outcome.analysis.tolerance * outcome.assembly.system.length:
+        found = None
+    return (shift if with_patches or found else {}), found
+
+
+def _without_means(solution: Solution, result: AnalysisResult) -> Iterator[str]:
+    """Bodies of whose modal forces something is left without any limit on voltages."""
+    outcome, F_p = result.outcome, result.outcome.F_p
+    analyses = (other for other in solution.scene.analysis if other.source == outcome.analysis.name)
+    if F_p is None or any(getattr(other, "apply", None) in FORCES_AT_POINTS for other in analyses):
+        return
+    for body in outcome.assembly.model.links:
+        needed = F_p[:, outcome.modal_columns(body.name)]
+        if body.name in solution.patches:
+            patches = solution.patches[body.name]
+            needed = (needed - result.voltages[body.name].required @ patches.Phi_V.T)[:, : patches.served]
+        if body.name not in solution.points and np.abs(needed).max(initial=0.0) > ROUNDING * np.abs(F_p).max(
+            initial=0.0
+        ):
+            yield body.name
 
 
 def _feasibility(solution: Solution, result: AnalysisResult) -> Feasibility | None:

@@ -13,6 +13,7 @@ from ..actuation.points import point_set, with_points
 from ..common.errors import InputError, of_file
 from ..mbs.model.model import ModalLoad, build_model
 from ..mbs.model.planar_body import PlanarBody
+from ..mbs.solve.robot_damping import with_robot_damping
 from ..scene.load import load_scene
 from ..scene.scene import Scene
 from .bodies import LoadedBody, add_patches, load_bodies
@@ -50,6 +51,11 @@ def with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Solutio
     return _assembled(solution.scene, bodies, solution.structure, solution.preparation, solution.stiffened)
 
 
+def with_scene(solution: Solution, scene: Scene) -> Solution:
+    """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
+    return _assembled(scene, solution.bodies, solution.structure, solution.preparation, solution.stiffened)
+
+
 def stiffened(solution: Solution) -> Solution:
     """The scene with geometric stiffening, nothing solved yet."""
     return _assembled(solution.scene, solution.bodies, solution.structure, solution.preparation, stiffened=True)
@@ -80,10 +86,15 @@ def _assembled(
         name: replace(body, planar=with_points(body.planar, points[name])) if name in points else body
         for name, body in bodies.items()
     }
+    ratios = {
+        name: float(modal.damping_ratio[0])
+        for name, body in bodies.items()
+        if (modal := body.modal) is not None and modal.damping_of == "robot"
+    }
     planar = [body.planar if stiffened else replace(body.planar, stiffening=None) for body in bodies.values()]
     return Solution(
         scene=scene,
-        model=build_model(scene, planar, list(_voltage_loads(scene, patches))),
+        model=with_robot_damping(build_model(scene, planar, list(_voltage_loads(scene, patches))), ratios),
         bodies=bodies,
         patches=patches,
         points=points,

@@ -11,9 +11,11 @@ from ..actuation.patches.structure import StructureEffect
 from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointForces, PointSet
 from ..common.arrays import Array
+from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.outcome import EarlierRun, Outcome
 from ..mbs.model.model import Model
 from ..mbs.quantities.stress import BodyStress
+from ..mbs.quantities.validity import Bending
 from ..scene.scene import Scene
 from .bodies import LoadedBody
 
@@ -42,28 +44,61 @@ class ModeChoice:
 
 
 @dataclass(frozen=True)
+class FinerCheck:
+    """What a replay on twice the modes found.
+
+    Attributes:
+        modes: eigenmodes of each flexible body in it.
+        point: that is farthest from where the inverse analysis has it, of those on trajectories where there are any.
+        error: by how much, m, at worst.
+        status: how the replay ended.
+    """
+
+    modes: Mapping[str, int]
+    point: str
+    error: float
+    status: str
+
+
+@dataclass(frozen=True)
 class AnalysisResult:
     """What was computed of one analysis.
 
     Attributes:
         outcome: motion, forces, and what only its kind finds.
-        stiffening_effect: largest relative change of a mode's stiffness by the loads of the run.
+        bending: how far flexible bodies leave small deformations, and what loads do to their stiffness.
         seconds: wall time, with all that follows from the outcome.
         voltages: of patches, by body.
         point_forces: at actuation points, by body.
         predicted_shift: by point, (T, 2) m: what voltages within their limits leave undone.
         feasibility: whether motors and patches can do it; None where nothing is asked of them.
         stresses: by body, where modal body files hold modal stresses.
+        mode_error: estimated for too few modes, of peaks; None where it is not known.
+        check: what a replay on finer links found, where that is asked for.
+        warnings: why results may be wrong, or not mean what they seem to, a text each.
     """
 
     outcome: Outcome
-    stiffening_effect: float = 0.0
+    bending: Mapping[str, Bending] = field(default_factory=dict)
     seconds: float = 0.0
     voltages: Mapping[str, Voltages] = field(default_factory=dict)
     point_forces: Mapping[str, PointForces] = field(default_factory=dict)
     predicted_shift: Mapping[str, Array] = field(default_factory=dict)
     feasibility: Feasibility | None = None
     stresses: Mapping[str, BodyStress] = field(default_factory=dict)
+    mode_error: float | None = None
+    check: FinerCheck | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def stiffening_effect(self) -> float:
+        """Largest relative change of a mode's stiffness by the loads of the run."""
+        return max((link.stiffness_change for link in self.bending.values()), default=0.0)
+
+    @property
+    def position_error(self) -> float:
+        """The largest estimated error of positions for deflections that are not small, of the length of a link."""
+        return max((link.position_error for link in self.bending.values()), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -79,6 +114,7 @@ class Solution:
         mode_choice: where `modes = "auto"`.
         stiffened: whether geometric stiffening is in the equations.
         earlier: runs of analyses to go on with, from a results file: see `results.resume`.
+        path_notes: what was found of paths before the analyses, one line each.
         failure: what ended the run, where that was an error after analyses that are worth keeping.
     """
 
@@ -94,12 +130,18 @@ class Solution:
     mode_choice: ModeChoice | None = None
     stiffened: bool = False
     earlier: Mapping[str, EarlierRun] = field(default_factory=dict)
+    path_notes: tuple[str, ...] = ()
     failure: Exception | None = None
 
     @property
     def outcomes(self) -> Mapping[str, Outcome]:
         """The outcome of each analysis, by its name."""
         return {name: result.outcome for name, result in self.analyses.items()}
+
+    @property
+    def links(self) -> dict[str, ModalBody]:
+        """The modal bodies of the flexible bodies, as their files have them."""
+        return {name: body.modal for name, body in self.bodies.items() if body.modal is not None}
 
     @property
     def seconds(self) -> dict[str, float]:

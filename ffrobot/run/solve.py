@@ -18,11 +18,14 @@ from ..common.errors import of_file
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import ActuatorSet
 from ..mbs.model.raised_mass import by_body
-from ..mbs.quantities.stiffening import NOTABLE, estimated_effect
+from ..mbs.quantities.stiffening import NOTABLE, stiffness_changes
+from ..mbs.quantities.validity import bending
 from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
 from .evaluation import evaluated
+from .finer import check_on, finer_scene
 from .mode_choice import ModeSearch
+from .paths import with_paths
 from .prepare import prepare, stiffened, with_bodies
 from .solution import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
@@ -36,6 +39,7 @@ Keep = Callable[[Solution], None]
 def solve(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None = None) -> Solution:
     """Run every analysis of a scene or a scene file; stage 1 runs first for links that are not up to date.
 
+    Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
@@ -50,11 +54,14 @@ def solve(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """What `solve` does with everything prepared; analyses go on from where `solution.earlier` has them."""
     with Interruption(watcher.stopping) as interruption:
+        solution, path_notes = with_paths(
+            solution, lambda trial: _evaluated(_completed(trial, watcher, interruption)), watcher.stage
+        )
         if any(body.modes == "auto" for body in solution.scene.body):
             solution = _with_enough_modes(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
-        solution = _evaluated(solution)
+        solution = replace(_checked(_evaluated(solution), watcher), path_notes=path_notes)
         if keep is not None and solution.analyses:
             keep(solution)
     if solution.failure is not None:
@@ -71,6 +78,27 @@ def _evaluated(solution: Solution) -> Solution:
                 results[name] = evaluated(solution, result)
         except Exception as error:
             failure = failure or error
+    return replace(solution, analyses=results, failure=failure)
+
+
+def _checked(solution: Solution, watcher: Watcher) -> Solution:
+    """The solution with completed analyses replayed on finer links where the scene asks for that."""
+    wanted = [
+        name for name, result in solution.analyses.items()
+        if result.outcome.analysis.is_checked and result.outcome.status == "completed"
+    ]  # fmt: skip
+    if not wanted:
+        return solution
+    results, failure = dict(solution.analyses), solution.failure
+    try:
+        finer = prepare(finer_scene(solution.scene, solution.bodies), watcher)
+        finer = stiffened(finer) if solution.stiffened else finer
+        for name in wanted:
+            watcher.stage(f'check of "{name}" on finer links')
+            check = check_on(results[name].outcome, solution, finer, watcher)
+            results[name] = replace(results[name], check=check)
+    except Exception as error:
+        failure = failure or error
     return replace(solution, analyses=results, failure=failure)
 
 
@@ -108,15 +136,16 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             if not results:
                 raise
             return replace(solution, analyses=results, failure=error)
-        effect = estimated_effect(outcome, stiffening)
+        changes = stiffness_changes(outcome, stiffening)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
-        if automatic and effect > NOTABLE and outcome.status != "interrupted":
+        if automatic and max(changes.values(), default=0.0) > NOTABLE and outcome.status != "interrupted":
             return None
         voltages = {} if outcome.F_p is None else {
             body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
             for body, array in solution.patches.items()
         }  # fmt: skip
-        results[analysis.name] = AnalysisResult(outcome, effect, time.perf_counter() - began, voltages)
+        bent = bending(outcome, solution.links, changes, solution.stiffened)
+        results[analysis.name] = AnalysisResult(outcome, bent, time.perf_counter() - began, voltages)
         _log(outcome)
         if outcome.failed:
             break
@@ -140,10 +169,11 @@ def _context(
         outcomes={name: result.outcome for name, result in results.items()},
         make_actuators=lambda raised: _actuator_set(solution, raised=raised),
         progress=progress,
-        is_replayed=any(other.takes_actuation and other.source == analysis.name for other in later),
+        is_replayed=analysis.is_checked
+        or any(other.takes_actuation and other.source == analysis.name for other in later),
         earlier=solution.earlier.get(analysis.name),
         patches=solution.patches,
-        links={name: body.modal for name, body in solution.bodies.items() if body.modal is not None},
+        links=solution.links,
     )
 
 

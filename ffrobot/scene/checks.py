@@ -41,7 +41,7 @@ def check_functions(scene: SceneKeys, path: Path) -> None:
     following = [analysis for analysis in scene.analysis if analysis.follows_trajectories]
     for trajectory in scene.trajectory:
         for component, function in trajectory.components.items():
-            key = component if trajectory.waypoints is None else "waypoints"
+            key = component if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
             for analysis in following:
                 times = np.clip(analysis.times, 0.0, analysis.last_time)
                 _check_path(function, times, f'{path}: trajectory "{trajectory.name}": {key}')

@@ -20,8 +20,11 @@ class SceneKeys(MechanismKeys):
     """
 
     pzt: tuple[PztLayout, ...] = ()
+    """Piezoelectric patches."""
     actuation_points: tuple[ActuationPoints, ...] = ()
+    """Places of forces that stand for the driving forces."""
     analysis: Annotated[tuple[Analysis, ...], NotEmpty]
+    """What is computed, in this order."""
 
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""

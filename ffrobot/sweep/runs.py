@@ -119,6 +119,7 @@ def _quantities(path: Path, collect: Sequence[str]) -> dict[str, float]:
         for analysis in results.analyses:
             about = results.attributes(analysis)
             found |= {f"{analysis} {key}": float(about[key]) for key in ("steps", "wall_seconds")}
+            found[f"{analysis} warnings"] = float(len(about["warnings"]))
             for name in _standard(results, analysis):
                 found[f"{name} max"] = _reduce(results, name, "max")
         for request in collect:

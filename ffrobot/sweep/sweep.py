@@ -151,10 +151,9 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, Run]]:
 def _performed(runs: Sequence[Run], side_by_side: int) -> Iterator[Iterable[Row | None]]:
     """Rows of the runs as they finish; the body of the `with` ends when the last one is there."""
     if processes() > 1:
-        from mpi4py.futures import MPICommExecutor, MPIPoolExecutor
+        from mpi4py.futures import MPICommExecutor
 
-        with MPICommExecutor() as entered:  # None but on the first process: the others serve it until it is done
-            executor: MPIPoolExecutor | None = entered
+        with MPICommExecutor() as executor:  # None but on the first process: the others serve it until it is done
             yield () if executor is None else executor.map(perform, runs, unordered=True)
         return
     with ThreadPoolExecutor(side_by_side) as threads:  # each waits for a process

@@ -21,7 +21,7 @@ from ..fields.waypoints import spline
 from ..model.model import ZERO, Model
 from ..model.planar_body import PlanarBody
 from ..model.system import MechanismSystem
-from ..scene.analysis import Need, TimedAnalysis
+from ..scene.analysis import Check, Need, TimedAnalysis
 from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
 from ..solve.reach import check_reach
@@ -40,12 +40,16 @@ class Fcid(TimedAnalysis):
     """Forces that move the robot along its trajectories while the modal coordinates p(t) follow a prescribed shape.
 
     `shape`: no deflection, that of the static equilibrium at every instant, or the one given in `modal`: expressions
-    for the first modes of a body, as its modal file numbers them; all others are 0.
+    for the first modes of a body, as its modal file numbers them; all others are 0. `check` as in `Pcid`.
     """
 
     kind: Literal["fcid"]
     shape: Literal["zero", "static", "given"]
+    """No deflection, that of the static equilibrium at every instant, or that in `modal`."""
     modal: dict[Name, tuple[Expression, ...]] | None = None
+    """By body, expressions in t for its first modal coordinates (m·√kg); the others are 0."""
+    check: Check = None
+    """Replay the result on links with twice the modes ("finer")."""
 
     is_algebraic = True
     allocates_patches = True

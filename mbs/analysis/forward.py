@@ -33,7 +33,10 @@ class Forward(ActuatedAnalysis):
 
     kind: Literal["forward"]
     apply: Literal["joints", "joints+pzt", "trajectory", "points"] | None = None
+    """As what the findings of `actuation` act: moments of motors, with voltages of patches, forces along the
+    trajectories, or at the actuation points."""
     limits: bool = False
+    """Whether motors and patches keep within their limits."""
 
     follows_trajectories = False
     is_resumable = True

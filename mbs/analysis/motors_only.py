@@ -25,7 +25,7 @@ from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline
 from ..joints.measure import Measure
 from ..model.model import Model
-from ..scene.analysis import Need, TimedAnalysis, output_times
+from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice
 from ..solve.reach import check_reach
@@ -49,14 +49,20 @@ class MotorsOnly(TimedAnalysis):
     `output` "tip" has the path's own points follow it, "redefined" where they would be with `factor` times the
     vibration (nine tenths of the largest that is minimum phase where none is given). `pre_actuation` and
     `post_actuation` (s) are how long motors act before and after the path, which is held there; where they are not
-    given, as long as the zero dynamics asks for.
+    given, as long as the zero dynamics asks for. `check` as in `Pcid`.
     """
 
     kind: Literal["motors-only"]
     output: Literal["tip", "redefined"] = "tip"
+    """The points of the trajectories themselves, or where they would be with `factor` times the vibration."""
     factor: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    """Share of the vibration in the "redefined" output; by default nine tenths of the largest that is minimum phase."""
     pre_actuation: NotNegative | None = None
+    """How long motors act before the path begins, s; by default as long as the zero dynamics asks for."""
     post_actuation: NotNegative | None = None
+    """How long they act after it, s; by default likewise."""
+    check: Check = None
+    """Replay the result on links with twice the modes ("finer")."""
 
     is_integrated = True
     applicable = ("joints",)

@@ -29,7 +29,9 @@ class InstantAnalysis(Analysis):
     """`about` the static equilibrium (not given, or "static") or an earlier analysis at `times`."""
 
     about: str | None = None
+    """Earlier analysis of a motion, or "static" (the default): the equilibrium at t = 0."""
     instants: tuple[NotNegative, ...] | None = Field(default=None, alias="times", min_length=1)
+    """Instants of that motion, s."""
 
     is_motion = False
 

@@ -9,7 +9,7 @@ from .. import _core
 from ..model.model import Model
 from ..model.raised_mass import integrated
 from ..model.system import MechanismSystem
-from ..scene.analysis import IntegratedAnalysis, Need
+from ..scene.analysis import Check, IntegratedAnalysis, Need
 from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
 from ..solve.reach import check_reach
@@ -20,9 +20,14 @@ from .outcome import EarlierRun, Outcome
 
 
 class Pcid(IntegratedAnalysis):
-    """Forces that move the robot along its trajectories while the links vibrate as they do (Shaban 2022)."""
+    """Forces that move the robot along its trajectories while the links vibrate as they do (Shaban 2022).
+
+    `check` "finer" replays them on links with twice the modes, and tells how far the end effector is off.
+    """
 
     kind: Literal["pcid"]
+    check: Check = None
+    """Replay the result on links with twice the modes ("finer")."""
 
     is_resumable = True
     allocates_patches = True

@@ -20,7 +20,7 @@ MAX_NESTING = 60  # parentheses, calls and signs within each other
 MAX_LITERAL = 1e100
 MAX_EXPONENT = 1000.0
 
-_NAMES = {"t": None, "pi": math.pi}
+_NAMES = {"t": None, "pi": math.pi, "deg": math.pi / 180, "mm": 1e-3}
 _FUNCTIONS = {
     "sin": Op.sin,
     "cos": Op.cos,
@@ -62,9 +62,9 @@ class ExpressionError(ValueError):
 def parse_expression(text: str) -> TimeFunction:
     """Translate `text` to a function of time t (s) with exact first and second derivatives.
 
-    Grammar: `+ - * / **`, parentheses, numbers, `t`, `pi`, `sin cos tan exp log sqrt abs tanh`, and
-    `where(condition, a, b)`, whose condition compares by `< <= > >=`, joined by `and`, `or`, `not`. Constant parts are
-    evaluated here.
+    Grammar: `+ - * / **`, parentheses, numbers, `t`, `pi`, the units `deg` (π/180) and `mm` (0.001), `sin cos tan exp
+    log sqrt abs tanh`, and `where(condition, a, b)`, whose condition compares by `< <= > >=`, joined by `and`, `or`,
+    `not`. Constant parts are evaluated here.
 
     Raises `ExpressionError` for anything else, for constant parts without a real, finite value (`log(-1)`), and for
     oversize texts, numbers and exponents.

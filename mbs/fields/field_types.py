@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -13,7 +14,7 @@ from ...common.numbers import NotNegative as NotNegative
 from ...common.numbers import PatchCount as PatchCount
 from ...common.numbers import Positive as Positive
 from ...common.numbers import Vector2 as Vector2
-from ...common.tables import shown
+from ...common.tables import LARGEST, shown
 from ...common.validation import Record, existing_file, quoted
 from .._core import TimeFunction
 from .expressions import parse_expression
@@ -44,6 +45,19 @@ def _time_function(value: object, info: ValidationInfo) -> TimeFunction:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return parse_expression(repr(float(value)))
     raise ValueError(f"expected an expression in t, found {value!r}")
+
+
+def _quantity(value: object) -> float:
+    """A number, or an expression without t, such as "30*deg"."""
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    if not isinstance(value, str):
+        raise ValueError(f'expected a finite number, or an expression such as "30*deg", found {value!r}')
+    function = parse_expression(value)
+    number = function(0.0)[0]
+    if number != function(1.0)[0] or abs(number) > LARGEST:
+        raise ValueError(f'expected a number or an expression without t, such as "30*deg", found "{shown(value)}"')
+    return number
 
 
 def _point(value: str) -> str:
@@ -95,6 +109,7 @@ def present(**functions: TimeFunction | None) -> dict[str, TimeFunction]:
 
 PointReference = Annotated[str, AfterValidator(_point)]
 Side = Annotated[str, AfterValidator(_side)]
+Quantity = Annotated[float, PlainValidator(_quantity, json_schema_input_type=str | float)]
 Expression = Annotated[TimeFunction, PlainValidator(_time_function, json_schema_input_type=str | float)]
 WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints, json_schema_input_type=str)]
 NotEmpty = AfterValidator(_not_empty)

@@ -13,37 +13,48 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.tables import LARGEST, shown
 from .._core import TimeFunction
+from .piecewise import Piecewise, superposed
 
 
 @dataclass(frozen=True)
 class Waypoints:
-    """Splines through the columns of a waypoint table, defined from `start` to `end` (s)."""
+    """The `columns` of a waypoint table after t, their values (T, columns) and times (T,), s, strictly increasing."""
 
-    start: float
-    end: float
-    components: dict[str, TimeFunction]
+    columns: tuple[str, ...]
+    times: Array
+    values: Array
+
+    def spline(self) -> Piecewise:
+        """The quintic spline (four continuous derivatives) through the rows, from rest to rest.
+
+        Rows that follow each other with the same values are a hold: the spline comes to rest there, and begins anew
+        after it. Velocity and acceleration are zero at holds and at both ends.
+        """
+        moves = np.any(np.diff(self.values, axis=0), axis=1)
+        if not moves.any():
+            return Piecewise(self.times[[0, -1]], self.values[None, :1])
+        begins = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
+        ends = np.flatnonzero(moves & ~np.append(moves[1:], False)) + 1
+        parts = [interpolated(self.times[a : b + 1], self.values[a : b + 1]) for a, b in zip(begins, ends, strict=True)]
+        rest = Piecewise(parts[0].breaks[:2], self.values[None, :1])
+        ways = [Piecewise(part.breaks, _from_zero(part, self.values[a])) for part, a in zip(parts, begins, strict=True)]
+        return superposed([rest, *ways])
 
 
 def load_waypoints(path: Path) -> Waypoints:
-    """Read the CSV table at `path` (header `t,x,y` or `t,value` …) as one function per column after t.
-
-    Each column is interpolated by the quintic spline (four continuous derivatives) that starts and ends at rest: zero
-    velocity and acceleration at both ends. At least two rows; t (s) strictly increasing.
+    """Read the CSV table at `path`: header `t,x,y` or `t,value` …; at least two rows; t (s) strictly increasing.
 
     Raises `InputError` naming file and line.
     """
-    # Loaded here: a scene without waypoints does not pay for it.
-    from scipy.interpolate import PPoly, make_interp_spline
-
     columns, table = _read_table(path)
-    at_rest = [(1, 0.0), (2, 0.0)]
-    components = {}
-    for name, values in zip(columns[1:], table[:, 1:].T, strict=True):
-        spline = PPoly.from_spline(make_interp_spline(table[:, 0], values, k=5, bc_type=(at_rest, at_rest)))
-        proper = np.diff(spline.x) > 0.0  # the end knots are repeated
-        breaks = np.append(spline.x[:-1][proper], spline.x[-1])
-        components[name] = TimeFunction.polynomial(breaks, np.ascontiguousarray(spline.c[:, proper].T))
-    return Waypoints(float(table[0, 0]), float(table[-1, 0]), components)
+    return Waypoints(tuple(columns[1:]), table[:, 0], table[:, 1:])
+
+
+def _from_zero(part: Piecewise, first: Array) -> Array:
+    """Coefficients of a part that begins at zero."""
+    coefficients = part.coefficients.copy()
+    coefficients[:, -1] -= first
+    return coefficients
 
 
 def _read_table(path: Path) -> tuple[list[str], Array]:
@@ -82,16 +93,23 @@ def _numbers(path: Path, line: int, row: list[str], count: int) -> list[float]:
     return numbers
 
 
-def spline(nodes: Array, values: Array, degree: int = 5, at_rest: bool = False) -> list[TimeFunction]:
-    """The n interpolating splines of a degree through the columns of `values` (T, n) at `nodes` (T,), in s.
+def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = True) -> Piecewise:
+    """The spline of a degree through `values` (T, n) at `nodes` (T,), s.
 
-    With `at_rest` their first two derivatives vanish at both ends.
+    With `at_rest` its first two derivatives vanish at both ends.
     """
+    # Loaded here: a scene without waypoints does not pay for it.
     from scipy.interpolate import make_interp_spline
 
     rest = [(m, np.zeros(values.shape[1])) for m in (1, 2)]
     curve = make_interp_spline(nodes, values, k=degree, bc_type=(rest, rest) if at_rest else None)
     breaks = np.unique(curve.t)
     powers = [curve.derivative(m)(breaks[:-1]) / math.factorial(m) for m in range(degree, -1, -1)]
-    coefficients = np.ascontiguousarray(np.array(powers).transpose(2, 1, 0))  # (n, intervals, powers)
-    return [TimeFunction.polynomial(breaks, of_one) for of_one in coefficients]
+    return Piecewise(breaks, np.array(powers).transpose(1, 0, 2))
+
+
+def spline(nodes: Array, values: Array, degree: int = 5, at_rest: bool = False) -> list[TimeFunction]:
+    """One function of time for each column of `values`: see `interpolated`."""
+    curve = interpolated(nodes, values, degree, at_rest)
+    each = np.ascontiguousarray(np.moveaxis(curve.coefficients, 2, 0))  # (n, intervals, powers)
+    return [TimeFunction.polynomial(curve.breaks, of_one) for of_one in each]

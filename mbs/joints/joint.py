@@ -28,9 +28,13 @@ class JointRecord(Record, ABC):
     """
 
     name: Name
+    """Of the joint, unique in the scene."""
     type: str
+    """How it moves."""
     between: tuple[Side, Side]
+    """Its two sides, "BODY.POINT" or "ground"; coordinate, moment and reaction are the second's on the first."""
     at: Vector2 = (0.0, 0.0)
+    """Where it sits on the ground, m, global axes."""
 
     locates: ClassVar[bool] = True
     """Whether it fixes the place of one body on the other; the initial guess goes along such joints first."""

@@ -27,6 +27,7 @@ class PrismaticJoint(MovingJoint):
 
     type: Literal["prismatic"]
     axis: Vector2 | None = None
+    """Direction of motion, axes of the first body (global ones on the ground), of any length."""
 
     locates: ClassVar[bool] = False  # it leaves the place along its axis open
     force_unit: ClassVar[str] = "N"

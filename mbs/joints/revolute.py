@@ -28,7 +28,9 @@ class RevoluteJoint(MovingJoint):
 
     type: Literal["revolute"]
     stiffness: Positive | None = None
+    """Of a gear that gives, N·m/rad; rigid where it is left out."""
     damping: NotNegative = 0.0
+    """Of that gear, N·m·s/rad."""
 
     @model_validator(mode="after")
     def _has_rotor_behind_spring(self) -> RevoluteJoint:

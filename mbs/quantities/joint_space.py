@@ -35,6 +35,16 @@ def held_joint_motion(outcome: Outcome) -> Array:
     return motion
 
 
+def motor_joint_motion(outcome: Outcome, rows: slice) -> Array:
+    """∂q/∂γ (outputs, coordinates, motors) of the motor coordinates γ with all joints closed and p kept."""
+    gradients, frames = _gradients(outcome)[rows], outcome.assembly.frame_coordinates
+    closed = len(outcome.assembly.model.joints)
+    unit = np.eye(gradients.shape[1])[:, closed:]
+    motion = np.zeros((len(gradients), outcome.q.shape[1], unit.shape[1]))
+    motion[:, frames] = np.linalg.solve(gradients[:, :, frames], np.broadcast_to(unit, (len(gradients), *unit.shape)))
+    return motion
+
+
 def _gradients(outcome: Outcome) -> Array:
     """Gradients (T, rows, coordinates) of the joint constraints and then of the motor coordinates."""
     model = outcome.assembly.model

@@ -13,15 +13,15 @@ from ..model.geometric_stiffening import GeometricStiffening
 NOTABLE = 0.01  # relative change of a mode's stiffness from which on the summary warns, and "auto" switches it on
 
 
-def estimated_effect(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> float:
-    """Largest relative change of a mode's stiffness by the loads of a run, whether it was on in the run or not.
+def stiffness_changes(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> dict[str, float]:
+    """Largest relative change of a mode's stiffness by the loads of a run, by body, whether it was on or not.
 
-    `stiffening` by the names of bodies. Loads are those of θ̇², of the frame's acceleration less gravity, of θ̈, and of
-    the constraints.
+    `stiffening` by the names of bodies; those without have no entry. Loads are those of θ̇², of the frame's acceleration
+    less gravity, of θ̈, and of the constraints.
     """
     assembly, gravity = outcome.assembly, np.array(outcome.assembly.model.scene.gravity)
     wrenches = assembly.constraint_wrenches(outcome.q, outcome.lambda_)
-    largest = 0.0
+    changes = {}
     for body in assembly.model.bodies:
         known = stiffening.get(body.name)
         if known is None or not body.n_modes:
@@ -35,5 +35,5 @@ def estimated_effect(outcome: Outcome, stiffening: Mapping[str, GeometricStiffen
             if point in known.K_points:
                 loads = np.column_stack([rotated(-q[:, 2], wrench[:, :2]), wrench[:, 2]])
                 diagonal += loads @ np.einsum("kii->ki", known.K_points[point])
-        largest = max(largest, float((np.abs(diagonal) / body.stiffness).max(initial=0.0)))
-    return largest
+        changes[body.name] = float((np.abs(diagonal) / body.stiffness).max(initial=0.0))
+    return changes

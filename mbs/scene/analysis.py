@@ -49,8 +49,11 @@ class Analysis(Record):
     """
 
     name: Name
+    """Of the analysis, and of its group in the results."""
     kind: str
+    """What is computed."""
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
+    """Error aimed at in each reported quantity, relative to its peak."""
 
     follows_trajectories: ClassVar[bool] = True  # whether targets have to have values at all its `times`
     is_motion: ClassVar[bool] = True  # whether it finds a motion, at whose instants other analyses may look
@@ -95,6 +98,11 @@ class Analysis(Record):
         """Name of the earlier analysis that this one rests on; None where there is none."""
         return None
 
+    @property
+    def is_checked(self) -> bool:
+        """Whether what it finds is to be replayed on links with more modes."""
+        return getattr(self, "check", None) is not None
+
     def needs(self) -> Iterator[Need]:
         """Tables without which the scene makes no sense."""
         yield from ()
@@ -112,11 +120,17 @@ class Analysis(Record):
         yield from ()
 
 
+Check = Literal["finer"] | None
+"""Of an inverse analysis: whether it is replayed on links with twice the modes."""
+
+
 class TimedAnalysis(Analysis):
     """Outputs at 0, output_step, …, end (s)."""
 
     end: Positive
+    """When the run is over, s; it begins at 0."""
     output_step: Positive
+    """Time between outputs, s; `end` is a whole number of them."""
 
     @model_validator(mode="after")
     def _divides(self) -> Self:
@@ -142,8 +156,11 @@ class IntegratedAnalysis(TimedAnalysis):
     """
 
     integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
-    spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8  # of generalized-alpha at infinite frequency
+    """Method of integration; "auto" chooses."""
+    spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8
+    """Of generalized-alpha at infinite frequency: what a step leaves of vibrations far above one over its size."""
     max_steps: Annotated[int, Field(gt=0, le=MOST_STEPS)] = 5_000_000
+    """The run ends after so many steps."""
 
     is_integrated = True
 
@@ -164,8 +181,11 @@ class ActuatedAnalysis(IntegratedAnalysis):
     """
 
     end: Positive = 0.0
+    """When the run is over, s; by default that of `actuation`."""
     output_step: Positive = 0.0
+    """Time between outputs, s; by default that of `actuation`."""
     actuation: str | None = None
+    """Earlier inverse analysis whose findings act."""
 
     takes_actuation = True
 

@@ -20,9 +20,13 @@ class RigidBody(Record):
     """Mass (kg), moment of inertia about the center (kg·m²), center and named points (m) in the body frame."""
 
     mass: Positive
+    """Mass, kg."""
     inertia: float
+    """Moment of inertia about the center of mass, kg·m²."""
     center: Vector2
+    """Center of mass, m, axes of the body."""
     points: dict[Name, Vector2] = Field(default_factory=dict)
+    """Places for joints, loads and trajectories by name: m, axes of the body."""
 
     @field_validator("inertia")
     @classmethod
@@ -57,10 +61,15 @@ class Body(Record):
     """
 
     name: Name
+    """Of the body, unique in the scene."""
     link: LinkInput | None = None
+    """Link file, or a table with its keys; stage 1 runs where needed."""
     modal: InputFile | None = None
+    """Modal body file, as stage 1 writes it."""
     rigid: RigidBody | None = None
+    """A body that does not deform."""
     modes: Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)] | None = None
+    """How many of the lowest in-plane modes; "auto": as many as the tolerances need; all where it is left out."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Body:
@@ -74,8 +83,11 @@ class Payload(Record):
     """A mass (kg) on a point, with its moment of inertia about that point (kg·m²)."""
 
     point: PointReference
+    """Where it sits, "BODY.POINT"."""
     mass: NotNegative
+    """Mass, kg."""
     inertia: NotNegative = 0.0
+    """Moment of inertia about that point, kg·m²."""
 
     def references(self) -> Iterator[Reference]:
         """The point that carries it."""

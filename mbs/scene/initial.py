@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from ...common.validation import Record
+from ..fields.field_types import Quantity
 from ..fields.references import Reference
 
 
@@ -15,8 +16,11 @@ class Initial(Record):
     """State at t = 0; `angles` (rad) and `rates` (rad/s) of body frames are guesses that the constraints correct."""
 
     state: Literal["undeformed", "static"] = "undeformed"
-    angles: dict[str, float] = Field(default_factory=dict)
-    rates: dict[str, float] = Field(default_factory=dict)
+    """Undeformed links, or the static equilibrium under gravity and loads."""
+    angles: dict[str, Quantity] = Field(default_factory=dict)
+    """Guess of each body frame's absolute angle, against the global x axis, rad (or such as "60*deg")."""
+    rates: dict[str, Quantity] = Field(default_factory=dict)
+    """Guess of their rates, rad/s."""
 
     def references(self) -> Iterator[Reference]:
         """The bodies with guesses."""

@@ -37,13 +37,21 @@ class Load(Record):
     """
 
     point: PointReference | None = None
+    """Where it acts, "BODY.POINT"."""
     joint: str | None = None
+    """Joint along whose coordinate it acts."""
     pzt: str | None = None
+    """Body whose patches get voltages."""
     x: Expression | None = None
+    """Force along the ground's x axis, N; expression in t."""
     y: Expression | None = None
+    """Force along the ground's y axis, N; expression in t."""
     moment: Expression | None = None
+    """Counter-clockwise moment on the point, or on the second body of the joint, N·m; expression in t."""
     force: StateForce | None = None
+    """Scenes made in Python: function of t, position and velocity that gives force (N) and moment (N·m)."""
     voltage: tuple[Expression, ...] | None = None
+    """One expression in t for each patch, V."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Load:

@@ -27,16 +27,27 @@ class MechanismKeys(Record):
     """
 
     name: Title
+    """Of the scene."""
     space: Literal["planar", "spatial"] = "planar"
+    """Dimension of the motion."""
     gravity: Vector2
+    """Acceleration of gravity, m/s², global axes."""
     motors: Literal["section", "frame"] = "section"
+    """What motors and joint coordinates turn: the sections at the joint, or the frames of the bodies."""
     geometric_stiffening: bool | Literal["auto"] = False
+    """Loads change the stiffness of links; "auto": where they change that of a mode by more than 1 %."""
     body: Annotated[tuple[Body, ...], NotEmpty]
+    """Links and rigid bodies."""
     joint: tuple[Joint, ...] = ()
+    """What joins them to each other and to the ground."""
     trajectory: tuple[Trajectory, ...] = ()
+    """Motion that is specified."""
     load: tuple[Load, ...] = ()
+    """Forces, moments and voltages that are given."""
     payload: tuple[Payload, ...] = ()
+    """Masses on points."""
     initial: Initial = Initial()
+    """Where the robot starts."""
 
     @property
     def topology(self) -> Topology:

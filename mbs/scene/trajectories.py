@@ -4,44 +4,59 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cached_property
 
+import numpy as np
 from pydantic import model_validator
 
-from ...common.validation import Record, quoted
+from ...common.validation import quoted
 from .. import _core
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name, PointReference, WaypointTable, one_of, only, present
+from ..fields.piecewise import Piecewise
 from ..fields.references import Reference, marker_reference
 from ..joints.measure import GROUND_FRAME, Marker, Measure, coincident, marker_at
+from .motion_keys import MotionKeys
 
 
-class Trajectory(Record):
+class Trajectory(MotionKeys):
     """Motion that is specified (C_s): of a point (m, global axes), a joint coordinate, or an angle (rad).
 
     `angle` is a body (its frame) or BODY.POINT (the section there).
     """
 
     name: Name
+    """Of the trajectory, unique in the scene."""
     point: PointReference | None = None
+    """What moves along it, "BODY.POINT"."""
     joint: str | None = None
+    """The joint whose coordinate follows it: relative, of the second side on the first."""
     angle: str | None = None
+    """The body, or the section "BODY.POINT", whose angle follows it: absolute, against the ground's x axis."""
     x: Expression | None = None
+    """Along the ground's x axis, m; expression in t (s)."""
     y: Expression | None = None
+    """Along the ground's y axis, m; expression in t (s)."""
     value: Expression | None = None
+    """Of the joint's coordinate (rad, or m where prismatic) or the angle (rad); expression in t (s)."""
     waypoints: WaypointTable | None = None
+    """CSV file with the columns t (s) and x, y (m) or value (rad, m)."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Trajectory:
         subject = one_of(self, ("point", "joint", "angle"))
         allowed = ("x", "y") if subject == "point" else ("value",)
-        found = only(self, subject, (*allowed, "waypoints"), ("x", "y", "value", "waypoints"))
-        if self.waypoints is None:
-            return self
-        if len(found) > 1:
-            raise ValueError(f"expected either waypoints or expressions, found {quoted(found)}")
-        if not set(self.components) <= set(allowed):
-            columns = ",".join(("t", *self.components))
+        found = only(self, subject, (*allowed, "waypoints", "via"), ("x", "y", "value", "waypoints", "via"))
+        if len(found) > 1 and {"waypoints", "via"} & set(found):
+            raise ValueError(f"expected either waypoints, via or expressions, found {quoted(found)}")
+        if self.waypoints is not None and not set(self.waypoints.columns) <= set(allowed):
+            columns = ",".join(("t", *self.waypoints.columns))
             raise ValueError(f'expected waypoints with the header t,{",".join(allowed)}, found "{columns}"')
+        self.check_motion(len(allowed), self.waypoints)
+        with np.errstate(all="ignore"):
+            path = self.path
+        if path is not None and not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()):
+            raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
         return self
 
     def references(self) -> Iterator[Reference]:
@@ -66,9 +81,20 @@ class Trajectory(Record):
         x, y = coincident(label, GROUND_FRAME, marker_at(self.point))
         return {component: {"x": x, "y": y}[component] for component in self.components}
 
-    @property
+    def changed(self, **keys: object) -> Trajectory:
+        """The same with some keys replaced."""
+        return Trajectory(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
+
+    @cached_property
+    def path(self) -> Piecewise | None:
+        """The motion where it is made of polynomials; None where expressions give it."""
+        return self.motion(self.waypoints)
+
+    @cached_property
     def components(self) -> dict[str, TimeFunction]:
         """The specified functions of time by component: "x" and/or "y", or "value"."""
-        if self.waypoints is not None:
-            return self.waypoints.components
-        return present(x=self.x, y=self.y, value=self.value)
+        if self.path is None:
+            return present(x=self.x, y=self.y, value=self.value)
+        columns = ("x", "y") if self.point is not None else ("value",)
+        names = columns if self.waypoints is None else self.waypoints.columns
+        return dict(zip(names, self.path.functions(), strict=True))

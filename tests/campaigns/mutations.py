@@ -1,14 +1,15 @@
 """Every key of every case with hostile values: what is solved, refused, stopped with a reason, and what falls over.
 
-    python tests/campaigns/mutations.py [SEED] [COUNT] [FOLDER]
+    python tests/campaigns/mutations.py [--count 100] [--seed 0] [--case NAME …] [--folder FOLDER] [--record]
 
 Run by hand, about half a second each. Every case is cut short, and its scene, link or figure file changed in one place:
 values of other types, huge, tiny, not finite, empty, nested, with markup and line breaks, keys removed, added, doubled,
 damage to the text. Keys take turns, values are drawn. The command runs in a process forked from this one, with limits
-of time and memory, and after `solve` the commands that read its results. The cases and their links, ready for use, stay
-in FOLDER where one is given. Exit code 1 where anything fell over.
+of time and memory, and after `solve` the commands that read its results. Exit code 1 where anything fell over: a
+traceback, a crash, no end within a minute of processor time, a message that names no file, other words on stderr.
 """
 
+import argparse
 import copy
 import os
 import random
@@ -25,17 +26,35 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import tomli_w
+from record import record
 
 ROOT = Path(__file__).parents[2]
 CASES = ROOT / "cases"
-PATIENCE = 60  # s for one command
+CPU_TIME = 60  # s for one command
+PATIENCE = 600  # s of wall time: something waits for ever
 MEMORY = 8 << 30  # bytes of address space
 OUTPUTS = 10  # of each analysis
+GOOD = ("solved", "refused", "stopped")
 BAD = ("traceback", "crash", "hang", "no file named", "noise")
+LOADED_ONCE = (
+    "h5py",
+    "scipy.linalg",
+    "scipy.optimize",
+    "scipy.interpolate",
+    "ffrobot.run.solve",
+    "ffrobot.results.write",
+    "ffrobot.results.resume",
+    "matplotlib.backends.backend_agg",
+    "ffrobot.cli",
+    "ffrobot.pictures.figures.plot",
+    "ffrobot.pictures.report",
+    "ffrobot.present.summary",
+)
 
 NAMES = [
     "", " ", ".", "..", "a/b", "a.b", "$x", "$\\bad{$", "a_b^c", "\\", "<b>x</b>", "</script>", "&amp;", "{{ 7*7 }}",
@@ -245,6 +264,7 @@ def run(arguments: list[str], folder: Path, patience: float = PATIENCE) -> tuple
             os.setsid()
             resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            resource.setrlimit(resource.RLIMIT_CPU, (CPU_TIME, CPU_TIME))
             os.dup2(os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             sys.argv = ["ffrobot", *arguments]
@@ -277,7 +297,7 @@ def outcome(code: int, told: str, files: list[str]) -> str:
     lines = [line for line in told.splitlines() if line.strip()]
     if "Traceback" in told:
         return "traceback"
-    if told == "no end":
+    if told == "no end" or code == -signal.SIGXCPU or (code == -signal.SIGKILL and not told):
         return "hang"
     if code < 0 or code not in (0, 1, 2):
         return "crash"
@@ -400,20 +420,27 @@ def campaign(seed: int, count: int, cases: list[str] | None = None, folder: Path
 
 def main() -> None:
     """Prints what was found."""
-    seed, count = (int(text) for text in [*sys.argv[1:3], *("0", "100")[len(sys.argv[:3]) - 1 :]])
-    folder = Path(sys.argv[3]) if len(sys.argv) > 3 else None
-    import h5py  # noqa: F401 (loaded once, before processes are forked)
-    import scipy.interpolate
-    import scipy.linalg
-    import scipy.optimize  # noqa: F401
-
-    import ffrobot.cli
-    import ffrobot.results.write
-    import ffrobot.run.solve  # noqa: F401
-
-    found = campaign(seed, count, None, folder)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--case", action="append", help="only this one; repeatable")
+    parser.add_argument("--folder", type=Path, help="where the cases and their links, ready for use, are and stay")
+    parser.add_argument("--record", action="store_true", help="write what was found, for docs/stability.md")
+    asked = parser.parse_args()
+    for module in LOADED_ONCE:
+        import_module(module)
+    found = campaign(asked.seed, asked.count, asked.case, asked.folder)
     for kind, number in sorted(found.counts.items()):
         print(f"{number:6d} {kind}")
+    if asked.record:
+        kinds = Counter({kind: 0 for kind in (*BAD, *GOOD)})
+        for key, number in found.counts.items():
+            kinds[key.partition(": ")[2]] += number
+        tried = (
+            f"{asked.count} single changes of keys and text in scene, link and figure files of all cases, cut short;"
+            f" {found.counts.total()} commands: solve, and those that read results"
+        )
+        record("mutations", tried=tried, found=", ".join(f"{kinds[kind]} × {kind}" for kind in (*GOOD, *BAD)))
     sys.exit(bool(found.bad))
 
 

@@ -147,7 +147,7 @@ def test_joints_alone_leave_the_path(two_link):
 def test_departure_from_the_path_grows_and_falls_with_the_tolerance(solved):
     """The path is not stable under actuation given over time: differences grow, from a start the tolerance sets."""
     departures = {}
-    for tolerance in (1e-4, 1e-6):
+    for tolerance in (1e-3, 1e-5):  # both above rounding
         keys = ["end = 0.5", "output_step = 0.001", f"tolerance = {tolerance}"]
         inverse = ['name = "inverse"', 'kind = "pcid"', *keys]
         forward = ['name = "forward"', 'kind = "forward"', 'actuation = "inverse"', 'apply = "joints+pzt"', *keys]

@@ -205,6 +205,53 @@ MISTAKES = {
         {"tolerance = 1e-7": "tolerance = 1e-18"},
         ['analysis "inverse": tolerance', "1e-18"],
     ),
+    "name with a line break": (
+        "scene.toml",
+        {'name = "forward"': 'name = "for\\nward"'},
+        ['analysis "for\\nward": name: expected a name without line breaks', 'found "for\\nward"'],
+    ),
+    "name with a slash": ("scene.toml", {'name = "forward"': 'name = "a/b"'}, ['name: expected a name without "/"']),
+    "number beyond all sense": (
+        "scene.toml",
+        {"end = 1.0": "end = 1e300"},
+        ['analysis "inverse": end: expected a number between -1e+30 and 1e+30, found 1e+300'],
+    ),
+    "number next to nothing": (
+        "link1.toml",
+        {"density = 7850.0": "density = 1e-300"},
+        ["link1.toml: material.density: expected a number of at least 1e-30, found 1e-300"],
+    ),
+    "whole number beyond all sense": (
+        "scene.toml",
+        {FIRST_PZT: f"{FIRST_PZT}\nlayers = 1{'0' * 24}"},
+        ['pzt "link1": layers: expected a whole number of at most 9.22e+18, found a larger one'],
+    ),
+    "more patches than any link has": (
+        "scene.toml",
+        {FIRST_PZT: 'body = "link1"\ncount = 1000000000'},
+        ['pzt "link1": count: expected a number of at most 1000, found 1000000000'],
+    ),
+    "number of thousands of digits": (
+        "scene.toml",
+        {"end = 1.0": f"end = {'1' * 5000}"},
+        ["scene.toml: not a valid TOML scene file: a whole number of too many digits"],
+    ),
+    "lists in lists": (
+        "scene.toml",
+        {INITIAL: f"{INITIAL}x = {'[' * 40}{']' * 40}\n"},
+        ["initial", "expected at most 32 tables and lists within each other"],
+    ),
+    "lists in lists without end": (
+        "link1.toml",
+        {"[mesh]": f"x = {'[' * 3000}{']' * 3000}\n[mesh]"},
+        ["link1.toml: not a valid TOML link file: expected at most 32 tables and lists within each other"],
+    ),
+    "file name that is too long": (
+        "scene.toml",
+        {'link = "link1.toml"': f'link = "{"a" * 5000}.toml"'},
+        ['body "link1": link: expected an existing file, found "aaaa', "File name too long"],
+    ),
+    "folder in place of a file": ("scene.toml", {'link = "link1.toml"': 'link = "."'}, ["which is a folder"]),
     "actuation that comes later": (
         "scene.toml",
         {'actuation = "inverse"': 'actuation = "joints_only"'},

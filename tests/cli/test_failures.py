@@ -149,8 +149,8 @@ def test_ctrl_c_before_any_analysis_writes_nothing(two_link_copy, ffrobot, tmp_p
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
     summary, message = process.communicate(timeout=60)
-    assert process.returncode == 130, message
-    assert "Traceback" not in message
+    assert process.returncode == -signal.SIGINT, message  # which shells show as 130
+    assert message == ""
     assert summary == ""
     assert sorted(folder.iterdir()) == before
 

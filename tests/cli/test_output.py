@@ -35,9 +35,17 @@ def test_summary(two_link):
         assert lines[name][1:4] == [kind, "dop853", "1"]
     assert "…" not in out
     assert "\x1b" not in out
-    for text in ("steps", "error aim", "constraints", "wall (s)", "largest (V)", "times limit", "cond Φ_V"):
+    for text in ("steps", "tolerance", "constraints", "wall (s)", "largest (V)", "times limit", "cond Φ_V"):
         assert text in out
-    for text in ("wall time", "writing", "skipped", "damping, which is zero"):
+    for text in (
+        "accuracy",
+        "time integration: 1e-07 of peaks, asked for",
+        "modes: not estimated",
+        "wall time",
+        "writing",
+        "skipped",
+        "damping, which is zero",
+    ):
         assert text in " ".join(out.split())  # may go over two lines
     required = abs(two_link.file["inverse/pzt/link1/required_voltage"][()]).max()
     assert f"{required:.0f}" in out

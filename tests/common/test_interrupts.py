@@ -1,11 +1,22 @@
-"""Signals that wait for the end of what may not be interrupted."""
+"""Signals that wait for the end of what may not be interrupted, and those that end a process at once."""
 
 import signal
+import subprocess
+import sys
 import threading
+import time
 
 import pytest
 
-from ffrobot.common.interrupts import deferred_interrupts
+from ffrobot.common.interrupts import deferred_interrupts, ending_at_once
+
+
+@pytest.fixture(autouse=True)
+def usual_answer():
+    """Python's own: a test run in the background of a shell ignores Ctrl-C."""
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, previous)
 
 
 def test_ctrl_c_waits_for_the_end():
@@ -50,3 +61,41 @@ def test_other_threads_change_no_handler():
     thread.start()
     thread.join()
     assert seen == [before]
+
+
+def test_users_of_the_library_keep_their_answer():
+    with pytest.raises(KeyboardInterrupt), ending_at_once():
+        signal.raise_signal(signal.SIGINT)
+
+
+COMMAND = """
+import ctypes, signal
+from ffrobot.common.interrupts import SIGNALS, EndOfCommand, ending_at_once
+for number in SIGNALS:
+    signal.signal(number, EndOfCommand())
+with ending_at_once():
+    print("begins", flush=True)
+    ctypes.PyDLL(None).sleep({seconds})  # a call that holds the interpreter, as those of PETSc do
+try:
+    signal.raise_signal(signal.SIGTERM)
+except KeyboardInterrupt:
+    print("kept")
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_long_call_of_a_library_is_ended_at_once(number):
+    command = [sys.executable, "-c", COMMAND.format(seconds=60)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "begins\n"
+        began = time.monotonic()
+        process.send_signal(number)
+        _, told = process.communicate(timeout=90)
+    assert time.monotonic() - began < 10.0
+    assert process.returncode == -number
+    assert told == ""
+
+
+def test_afterwards_signals_are_answered_as_before():
+    done = subprocess.run([sys.executable, "-c", COMMAND.format(seconds=0)], capture_output=True, text=True)
+    assert done.stdout == "begins\nkept\n", done.stderr

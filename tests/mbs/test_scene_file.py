@@ -1,5 +1,6 @@
 """Scene files: what is read, and what is said about each kind of mistake."""
 
+import re
 import subprocess
 import sys
 
@@ -188,17 +189,18 @@ MISTAKES = [
     ('name = "A"', 'name = "O"', 'joint "O": expected one joint of this name, found 2', ""),
     # initial
     ("link2 = 1.04", "link3 = 1.04", 'initial.angles: expected one of the bodies "link1", "link2", "hand"', 'found "link3"'),
-    ("link1 = 0,", 'link1 = "0",', 'initial.angles.link1: expected a number, found "0"', ""),
+    ("link1 = 0,", 'link1 = "t",', 'initial.angles.link1: expected a number or an expression without t', 'found "t"'),
+    ("link1 = 0,", "link1 = nan,", "initial.angles.link1: expected a finite number", "found nan"),
     # trajectories
     ("1.5*cos(", "1.5*csh(", 'trajectory "tip": x: expected an expression in t, found', "at character 5 (did you mean"),
     ("1.5*cos(pi*t/4)", "1/(t - 0.25)", 'trajectory "tip": x: expected a finite value', "found none at t = 0.25 s"),
     ("1.5*cos(pi*t/4)", "sqrt(t)", 'trajectory "tip": x: expected a finite velocity', "found none at t = 0 s"),
     ('point = "link2.tip"', 'point = "link2.tip"\njoint = "O"', 'trajectory "tip": expected exactly one', '"point", "joint"'),
-    ('point = "link2.tip"', 'joint = "O"', 'trajectory "tip": expected the keys "value", "waypoints" beside "joint"', '"x", "y"'),
+    ('point = "link2.tip"', 'joint = "O"', 'trajectory "tip": expected the keys "value", "waypoints", "via" beside "joint"', '"x", "y"'),
     ('point = "link2.tip"', 'point = "link3.tip"', 'trajectory "tip": point: expected one of the bodies', '"link3.tip"'),
     (TIP, 'joint = "B"\nvalue = "t"', 'trajectory "tip": joint: expected one of the joints "O", "A"', '"B"'),
     (TIP, 'angle = "B"\nvalue = "t"', 'trajectory "tip": angle: expected one of the bodies', '"B"'),
-    ('x = "1.5*cos(pi*t/4)"', 'waypoints = "path.csv"', 'trajectory "tip": expected either waypoints or expr', '"y", "way'),
+    ('x = "1.5*cos(pi*t/4)"', 'waypoints = "path.csv"', 'trajectory "tip": expected either waypoints, via or expr', '"y", "way'),
     ('x = "1.5*cos(pi*t/4)"', 'waypoints = "pth.csv"', 'trajectory "tip": waypoints: expected an existing', '"path.csv"?'),
     # patches and loads
     ("count = 2", "count = 2.5", 'pzt "link1": count: expected a whole number, found 2.5', ""),
@@ -293,16 +295,50 @@ def test_actuation_comes_from_pcid(folder):
         load(folder, SCENE.replace('kind = "pcid"', 'kind = "forward"', 1))
 
 
-@pytest.mark.parametrize(
-    ("table", "says"),
-    [
-        ("short.csv", "waypoints: expected a finite value .* t = 0.501 s"),
-        ("value.csv", 'header t,x,y, found "t,value"'),
-    ],
-)
-def test_waypoints_must_cover_the_run_and_fit(folder, table, says):
-    text = SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', f'waypoints = "{table}"')
-    with pytest.raises(InputError, match=says):
+def by_waypoints(table):
+    return SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', f'waypoints = "{table}"')
+
+
+def test_waypoints_must_fit(folder):
+    with pytest.raises(InputError, match='header t,x,y, found "t,value"'):
+        load(folder, by_waypoints("value.csv"))
+
+
+def test_a_path_that_ends_before_the_run_is_held(folder):
+    x = load(folder, by_waypoints("short.csv")).trajectory[0].components["x"]
+    assert x(0.5)[0] == x(0.9)[0]
+    assert x(0.9)[1:] == (0.0, 0.0)
+
+
+VIA = "via = [[1.5, 0.8], [1.2, 0.8], [1.2, 1.0]]"
+MOTION_MISTAKES = [
+    (f"{VIA}", 'expected either limits ("speed", "acceleration", "jerk") or a "duration" beside "via", found neither'),
+    (f"{VIA}\nspeed = 1.0\nduration = 1.0", "found both"),
+    (f"{VIA}\nspeed = 1.0\nhold = [1.0, 1.0]", 'expected 1 numbers in "hold", found 2'),
+    (f"{VIA}\nduration = [1.0]", 'expected 2 numbers in "duration", found 1'),
+    (f'{VIA}\nspeed = 1.0\nprofile = "s-curve"', 'expected "acceleration" or "jerk"'),
+    (f'{VIA}\nacceleration = 1.0\njerk = 9.0\nprofile = "trapezoid"', 'expected no "jerk"'),
+    (f'{VIA}\nduration = 1.0\nprofile = "spline"', 'only beside "waypoints"'),
+    ("via = [1.0, 2.0]\nduration = 1.0", "expected places [x, y] in via, found [1.0, 2.0]"),
+    ("via = [[1.0, 2.0], [1.0, 2.0]]\nduration = 1.0", "expected places in via that differ"),
+    ("via = [[1.0, 2.0]]\nduration = 1.0", "expected at least 2 entries"),
+    ('via = [["t", 2.0], [1.0, 2.0]]\nduration = 1.0', "expression without t"),
+    (f'{VIA}\nx = "t"\nduration = 1.0', 'expected either waypoints, via or expressions, found "x", "via"'),
+    ('x = "t"\nspeed = 1.0', 'expected "speed" only beside "via" or "waypoints"'),
+    ('waypoints = "path.csv"\nhold = 1.0', 'expected "hold" only beside "via"'),
+    (f'{VIA}\nspeed = 1e-25\nacceleration = 1e25\nprofile = "s-curve"', "that fit each other in size"),
+    (f'{VIA}\nspeed = 1.0\nacceleration = 1e30\nprofile = "trapezoid"', "that fit each other in size"),
+    (f"{VIA}\nduration = [1e-30, 1e30]", "that fit each other in size"),
+    (f"{VIA}\nduration = 1.0\nfastest = true\nstretch = 2.0", 'expected one of the keys "fastest" and "stretch"'),
+    (f'{VIA}\nduration = 1.0\nshaper = {{ kind = "zv", frequency = 0.0 }}', "shaper.frequency"),
+    (f'{VIA}\nduration = 1.0\nshaper = {{ kind = "zv", frequency = 1.0, modes = 2 }}', '"frequency" and "modes"'),
+]
+
+
+@pytest.mark.parametrize(("keys", "says"), MOTION_MISTAKES, ids=range(len(MOTION_MISTAKES)))
+def test_keys_of_motions_that_do_not_fit(folder, keys, says):
+    text = SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', keys)
+    with pytest.raises(InputError, match=re.escape(says)):
         load(folder, text)
 
 

@@ -123,6 +123,11 @@ def test_values_outside_the_domain_are_nan_by_component():
     assert math.isnan(acceleration)
 
 
+def test_units_are_factors():
+    assert parse_expression("30*deg")(0.0)[0] == pytest.approx(math.radians(30), rel=1e-15)
+    assert parse_expression("750*mm*t")(2.0)[:2] == pytest.approx((1.5, 0.75), rel=1e-15)
+
+
 def test_sample_is_the_call_at_each_time():
     function = parse_expression("exp(sin(t))")
     times = np.linspace(0, 2, 7)
@@ -233,21 +238,38 @@ def test_waypoints_reproduce_a_quintic_at_rest_at_both_ends(tmp_path):
     times = np.concatenate([[0.0], np.sort(np.random.default_rng(1).uniform(0.0, 1.0, 9)), [1.0]])
     rows = "".join(f"{t!r},{t**3 * (10 - 15 * t + 6 * t * t)!r},2\n" for t in times.tolist())
     table = load_waypoints(write(tmp_path / "path.csv", "t,x,y\n" + rows))
+    assert table.columns == ("x", "y")
+    x, y = table.spline().functions()
     t = np.linspace(0, 1, 101)
     exact = [t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2, 60 * t * (1 - t) * (1 - 2 * t)]
-    np.testing.assert_allclose(table.components["x"].sample(t), exact, atol=1e-9)
-    np.testing.assert_allclose(table.components["y"].sample(t), [2 + 0 * t, 0 * t, 0 * t], atol=1e-9)
-    assert (table.start, table.end) == (0.0, 1.0)
+    np.testing.assert_allclose(x.sample(t), exact, atol=1e-9)
+    np.testing.assert_allclose(y.sample(t), [2 + 0 * t, 0 * t, 0 * t], atol=1e-9)
+    np.testing.assert_allclose([x(-0.5), x(1.5)], [[0, 0, 0], [1, 0, 0]], atol=1e-12)  # held before and after
 
 
 def test_waypoints_pass_through_and_are_smooth(tmp_path):
     times, values = [0.0, 0.3, 0.7, 1.0, 2.0], [0.0, 1.0, -1.0, 0.5, 0.0]
     rows = "".join(f"{t},{v}\n" for t, v in zip(times, values, strict=True))
-    function = load_waypoints(write(tmp_path / "path.csv", "t,value\n" + rows)).components["value"]
+    (function,) = load_waypoints(write(tmp_path / "path.csv", "t,value\n" + rows)).spline().functions()
     np.testing.assert_allclose(function.sample(np.array(times))[0], values, atol=1e-12)
     for inner in times[1:-1]:
         np.testing.assert_allclose(function(inner - 1e-9), function(inner + 1e-9), atol=1e-4)
     np.testing.assert_allclose([function(0.0)[1:], function(2.0)[1:]], 0.0, atol=1e-9)
+
+
+def test_rows_that_repeat_are_a_hold(tmp_path):
+    """Nothing overshoots: a move between two holds, and one that goes on through a row."""
+    rows = "t,value\n0,0\n0.5,0\n1.5,1\n2,1\n2.5,0.6\n3,0.5\n4,0.5\n"
+    (function,) = load_waypoints(write(tmp_path / "path.csv", rows)).spline().functions()
+    value = function.sample(np.linspace(-1, 5, 6001))[0]
+    assert value.min() > -1e-14
+    assert value.max() == pytest.approx(1.0, abs=1e-14)
+    for begin, end, height in ((0.0, 0.5, 0.0), (1.5, 2.0, 1.0), (3.0, 4.0, 0.5)):
+        held = function.sample(np.linspace(begin, end, 11))
+        np.testing.assert_allclose(held, np.array([height, 0, 0])[:, None] * np.ones(11), atol=1e-12)
+    t = np.linspace(0.5, 1.5, 11)
+    s = t - 0.5
+    np.testing.assert_allclose(function.sample(t)[0], s**3 * (10 - 15 * s + 6 * s**2), atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -257,7 +279,7 @@ def test_waypoints_pass_through_and_are_smooth(tmp_path):
         ("x,y\n0,0\n1,1\n", "header"),
         ("t,x,x\n0,0,0\n1,1,1\n", "header"),
         ("t,x\n0,0\n", "at least 2"),
-        ("t,x\n0,0\n1,one\n", "line 3: expected 2 finite numbers"),
+        ("t,x\n0,0\n1,one\n", "line 3: expected 2 numbers"),
         ("t,x\n0,0\n1,nan\n", "line 3"),
         ("t,x\n0,0\n1,1,1\n", "line 3"),
         ("t,x\n0,0\n\n1,1\n1,2\n", "line 5: expected times that increase, found t = 1 after 1"),

@@ -32,8 +32,12 @@ class Curve(Record):
     """
 
     data: str
+    """Dataset of the results file, "inverse/joints/A/moment", or one column of it, "…/position[0]"; with `file`, the
+    name of its column."""
     label: str
+    """In the legend."""
     file: InputFile | None = None
+    """CSV file whose first column is the time (s), drawn as separate points."""
 
 
 class FigureRecord(Record):
@@ -46,16 +50,27 @@ class FigureRecord(Record):
     """
 
     name: FileName
+    """Of the files, without suffix."""
     title: str = ""
+    """Above the axes."""
     kind: Literal["time", "path", "configurations", "bode", "modes", "placement"] = "time"
+    """What is drawn; see above."""
     transfers: tuple[tuple[str, str], ...] = ()
+    """Pairs [input, output] of the linear model for kind = "bode"."""
     curves: tuple[Curve, ...] = ()
+    """What is drawn over time or as paths."""
     analysis: str | None = None
+    """Of which the robot, its modes, responses or patches are drawn."""
     times: tuple[float, ...] = ()
+    """Instants of the configurations, s."""
     y_label: str = ""
+    """Of the vertical axis, with its unit."""
     x_range: Range | None = None
+    """Of the horizontal axis; by default that of the data."""
     y_range: Range | None = None
-    limits: tuple[float, ...] = Field(default=())  # horizontal lines, such as the voltages a patch can take
+    """Of the vertical axis; by default that of the data."""
+    limits: tuple[float, ...] = Field(default=())
+    """Values at which horizontal lines are drawn, such as a voltage limit."""
 
     @model_validator(mode="after")
     def _consistent(self) -> FigureRecord:
@@ -76,6 +91,7 @@ class FigureFile(Record):
     """The figures of a case, in order."""
 
     figure: tuple[FigureRecord, ...]
+    """The figures, in this order."""
 
 
 def load_figures(path: Path) -> FigureFile:

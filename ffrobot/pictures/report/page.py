@@ -18,7 +18,7 @@ from .mechanism import mechanism
 from .modes import link_modes
 from .modes_3d import modes_3d
 from .runs import runs, sources
-from .tables import analyses_table, origins_table, peaks_table, voltages_table
+from .tables import analyses_table, bending_table, origins_table, peaks_table, voltages_table, warnings_table
 
 HERE = Path(__file__).parent
 
@@ -76,6 +76,8 @@ def _content(files: Sequence[Results]) -> dict[str, Any]:
         "histories": histories,
         "modes": modes,
         "analyses": analyses_table(all_runs),
+        "warnings": warnings_table(all_runs),
+        "bending": bending_table(all_runs),
         "peaks": peaks_table(all_runs),
         "voltages": voltages_table(all_runs),
         "origins": origins_table(files),

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mbs.joints.joints import JOINT_TYPES
-from ...results.file import Results
+from ...results.file import Results, status_in_words
 from .histories import path_error
 from .runs import Run, sources, targets
 
@@ -26,7 +26,7 @@ class Table:
 def analyses_table(runs: Sequence[Run]) -> Table:
     """One row for each run, as the summary of a solve has it."""
     heading = ("analysis", "kind", "status", "reached (s)", "outputs", "steps", "rejected", "evaluations",
-               "error aim", "constraint violation", "wall (s)")  # fmt: skip
+               "tolerance", "constraint violation", "wall (s)")  # fmt: skip
     rows = []
     for run in runs:
         about, time = run.results.attributes(run.analysis), run.results.time(run.analysis)
@@ -34,9 +34,30 @@ def analyses_table(runs: Sequence[Run]) -> Table:
         counts = tuple(f"{about[key]}" if integrated else "" for key in ("steps", "rejected", "evaluations"))
         violation = run.results[f"{run.analysis}/constraint_violation"].max(initial=0.0)
         rows.append(
-            (run.label, about["kind"], about["status"], f"{time[-1]:g}", f"{len(time)}", *counts,
+            (run.label, about["kind"], status_in_words(about), f"{time[-1]:g}", f"{len(time)}", *counts,
              f"{about['tolerance']:.0e}" if integrated else "", f"{violation:.0e}", f"{about['wall_seconds']:.3f}")
         )  # fmt: skip
+    return Table(heading, rows)
+
+
+def warnings_table(runs: Sequence[Run]) -> Table:
+    """Why results may be wrong, a text in each row."""
+    rows = [(run.label, text) for run in runs for text in run.results.warnings.get(run.analysis, ())]
+    return Table(("analysis", "warning"), rows)
+
+
+def bending_table(runs: Sequence[Run]) -> Table:
+    """How far the links bend in every run, and how wrong that makes it."""
+    heading = ("analysis", "link", "deflection (% of length)", "rotation (rad)", "foreshortening (mm)",
+               "change of stiffness (%)", "error of points (% of length)", "of moments (% of peak)")  # fmt: skip
+    scaled = (("largest_deflection", 100), ("largest_rotation", 1), ("foreshortening", 1e3), ("stiffness_change", 100),
+              ("position_error", 100), ("relative_error", 100))  # fmt: skip
+    rows = []
+    for run in runs:
+        for body in run.results.names(f"{run.analysis}/bodies"):
+            about = run.results.attributes(f"{run.analysis}/bodies/{body}")
+            if "largest_deflection" in about:
+                rows.append((run.label, body, *(f"{scale * about[key]:.2g}" for key, scale in scaled)))
     return Table(heading, rows)
 
 
@@ -73,10 +94,11 @@ def voltages_table(runs: Sequence[Run]) -> Table:
     for run in runs:
         for body in run.results.names(f"{run.analysis}/pzt"):
             group = f"{run.analysis}/pzt/{body}"
-            about, largest = run.results.attributes(group), np.abs(run.results[f"{group}/required_voltage"]).max()
-            limited = np.isfinite(about["limit"])
-            limit = (f"{about['limit']:g}", f"{largest / about['limit']:.3g}") if limited else ("none", "")
-            rows.append((run.label, body, f"{largest:.6g}", *limit, f"{about['condition_number']:.3g}"))
+            about, required = run.results.attributes(group), np.abs(run.results[f"{group}/required_voltage"])
+            limits = np.atleast_1d(about["limit"])  # one for all patches, or one each
+            times = np.max(required / limits)
+            limit = (f"{limits.min():g}", f"{times:.3g}") if np.isfinite(limits).any() else ("none", "")
+            rows.append((run.label, body, f"{required.max():.6g}", *limit, f"{about['condition_number']:.3g}"))
     return Table(heading, rows)
 
 

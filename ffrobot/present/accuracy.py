@@ -1,0 +1,53 @@
+"""What is known of the errors of a solve, by where they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..mbs.quantities.validity import largest
+from ..run.solution import AnalysisResult, Solution
+
+NOT_ESTIMATED = "not estimated"
+RESOLVED = 0.3  # an estimated error of modes beyond is none: they do not resolve the motion
+
+
+def error_budget(solution: Solution) -> Iterator[str]:
+    """A line each: time integration, modes, deflection, patches."""
+    if aims := [result.outcome.analysis.tolerance for result in integrated(solution)]:
+        asked = " … ".join(f"{aim:.0e}" for aim in sorted({min(aims), max(aims)}))
+        yield f"time integration: {asked} of peaks, asked for"
+    yield f"modes: {_modes(solution)}"
+    yield f"deflection: {_deflection(solution)}"
+    for name, result in solution.analyses.items():
+        if (check := result.check) is not None:
+            ended = "" if check.status == "completed" else f", which ended early ({check.status})"
+            modes = ", ".join(map(str, dict.fromkeys(check.modes.values())))
+            yield f"{name}, replayed on {modes} modes{ended}: {check.point} is off by {1e3 * check.error:.2g} mm"
+    yield from (f"patches of {patches.stiffness_in_words}" for patches in solution.patches.values())
+
+
+def integrated(solution: Solution) -> list[AnalysisResult]:
+    """The analyses that went through time."""
+    return [result for result in solution.analyses.values() if result.outcome.analysis.is_integrated]
+
+
+def _modes(solution: Solution) -> str:
+    if solution.mode_choice is not None:
+        known = [error for of in solution.mode_choice.errors.values() for error in of.values()]
+        return f"{max(known):.0e} of peaks, against all modes of the files" if any(known) else NOT_ESTIMATED
+    found = [result.mode_error for result in integrated(solution)]
+    known = [error for error in found if error is not None]
+    if not found or len(known) < len(found):
+        return NOT_ESTIMATED
+    if max(known) > RESOLVED:
+        return "too few: vibrations faster than the highest take part"
+    return f"{max(known):.0e} of peaks, estimated"
+
+
+def _deflection(solution: Solution) -> str:
+    """Of the analysis in which it is worst."""
+    found = [worst for result in solution.analyses.values() if (worst := largest(result.bending)) is not None]
+    if not found:
+        return "links are rigid"
+    name, link = max(found, key=lambda item: (item[1].is_beyond, item[1].position_error))
+    return "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"

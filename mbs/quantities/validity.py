@@ -1,0 +1,154 @@
+"""How far a run leaves the small deformations that modes describe, and how wrong its results may be for that.
+
+Deflection and section rotation are measured from the chord, the straight line between the ends of a link's axis: a
+rigid rotation of the frame counts for nothing, so that they are the same under every reference condition. The
+foreshortening ½ pᵀG p = ½∫w'² dx is that in the link's own frame, for just that is what the equations leave out, or
+know to second order where geometric stiffening is on; a cantilever, whose frame turns away from its chord, loses more
+than a link on simple supports.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...fe_models.modal_body import ModalBody
+from ..analysis.outcome import Outcome
+from .observation import modes_of_file
+from .stiffening import NOTABLE
+
+DEFLECTION_LIMIT = {False: 0.02, True: 0.05}  # of the length, from the chord; without and with geometric stiffening
+SHORTENING_LIMIT = {False: 1e-3, True: 1e-2}  # of the length: a half wave at 2 %; where the second order ends
+USELESS = 0.1  # of the length, in the position of points
+
+# Estimates are 0.4 to 5 times the errors of falling double pendulums with deflections of 0.1 to 10 %, and the errors
+# of cantilevers under tip forces: tests/test_large_deflections.py; docs/theory.md, Limits.
+GROWTH = 2.0  # times the change of stiffness: what is wrong with deflections and moments without geometric stiffening
+SECOND_ORDER = 0.5  # of the foreshortening is wrong with geometric stiffening
+
+
+@dataclass(frozen=True)
+class Bending:
+    """Largest values of one flexible link over a run.
+
+    Attributes:
+        deflection: distance of its axis from its chord, of its length.
+        rotation: angle between a section's normal and the chord, rad.
+        foreshortening: ½∫w'² dx over its length, in its own frame, m.
+        foreshortening_moment: N·m, that times the largest force at an interface at the same time: what moments miss.
+        stiffness_change: of a mode by the loads of the run, relative; 0 where the modal body file does not tell.
+        length: m, of the link.
+        is_stiffened: whether geometric stiffening is in the equations.
+    """
+
+    deflection: float
+    rotation: float
+    foreshortening: float
+    foreshortening_moment: float
+    stiffness_change: float
+    length: float
+    is_stiffened: bool
+
+    @property
+    def shortening(self) -> float:
+        """The foreshortening, of the length."""
+        return self.foreshortening / self.length
+
+    @property
+    def relative_error(self) -> float:
+        """Estimated error of deflections, forces and moments, of their peaks."""
+        if self.is_stiffened:
+            return SECOND_ORDER * self.shortening
+        return min(1.0, self.shortening + GROWTH * self.stiffness_change)
+
+    @property
+    def position_error(self) -> float:
+        """Estimated error of positions, of the link's length."""
+        if self.is_stiffened:
+            return SECOND_ORDER * self.shortening
+        return self.shortening + GROWTH * self.stiffness_change * self.deflection
+
+    @property
+    def is_beyond(self) -> bool:
+        """Whether small deformations end before."""
+        return (
+            self.deflection > DEFLECTION_LIMIT[self.is_stiffened]
+            or self.shortening > SHORTENING_LIMIT[self.is_stiffened]
+            or (not self.is_stiffened and self.stiffness_change > NOTABLE)
+        )
+
+    @property
+    def in_words(self) -> str:
+        """What was measured."""
+        stiffening = "with geometric stiffening" if self.is_stiffened else "geometric stiffening is off"
+        return (
+            f"bends by {_percent(self.deflection)} of its length, loads change a mode's stiffness by"
+            f" {_percent(self.stiffness_change)} ({stiffening})"
+        )
+
+    @property
+    def estimate(self) -> str:
+        """How wrong results may be."""
+        if self.position_error > USELESS:
+            return "results may be entirely wrong"
+        return (
+            f"points may be off by {_percent(self.position_error)} of its length, deflections and moments by"
+            f" {_percent(self.relative_error)} of their peaks"
+        )
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        if self.is_stiffened or self.shortening > SHORTENING_LIMIT[True]:
+            return "divide the link into shorter ones, welded"
+        return "consider geometric_stiffening = true"
+
+
+def bending(
+    outcome: Outcome, links: Mapping[str, ModalBody], stiffness_changes: Mapping[str, float], is_stiffened: bool
+) -> dict[str, Bending]:
+    """Of the flexible `links` of a run, by name. They are modal bodies as their files have them."""
+    wrenches = outcome.assembly.constraint_wrenches(outcome.q, outcome.lambda_)
+    found = {}
+    for name, link in links.items():
+        p = modes_of_file(outcome, outcome.assembly.model.body(name))
+        deflection, rotation, shortening = _shape(link, p)
+        forces = [np.linalg.norm(w[:, :2], axis=1) for w in wrenches.get(name, {}).values()]
+        force = np.max(forces, axis=0) if forces else np.zeros(len(p))
+        change = stiffness_changes.get(name, 0.0)
+        peaks = (deflection / link.length, rotation, shortening, force * shortening)
+        w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
+        found[name] = Bending(w, phi, s, moment, change, link.length, is_stiffened)
+    return found
+
+
+def _shape(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
+    """Largest deflection (m) and section rotation (rad) from the chord, and foreshortening (m), each (T,)."""
+    stations, x = link.stations, link.stations.position[:, 0]
+    y, slope = p @ stations.translation[:, 1].T, p @ stations.rotation[:, 2].T
+    chord = (y[:, -1:] - y[:, :1]) / (x[-1] - x[0])
+    deflection = y - y[:, :1] - chord * (x - x[0])
+    squares = slope**2
+    shortening = 0.5 * (0.5 * (squares[:, 1:] + squares[:, :-1])) @ np.diff(x)
+    return np.abs(deflection).max(axis=1), np.abs(slope - chord).max(axis=1), shortening
+
+
+def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:
+    """The link whose results are worst, of those beyond small deformations where there are any; None of no links."""
+    return max(bodies.items(), key=lambda item: (item[1].is_beyond, item[1].position_error), default=None)
+
+
+def deflection_warning(bodies: Mapping[str, Bending]) -> str:
+    """What to tell of links that bend too much; empty where none does."""
+    worst = largest(bodies)
+    if worst is None or not worst[1].is_beyond:
+        return ""
+    name, link = worst
+    return f"{name} {link.in_words}: {link.estimate}; {link.advice}"
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.2g} %"

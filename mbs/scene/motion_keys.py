@@ -1,0 +1,163 @@
+"""Keys of a trajectory by places it goes through: law of motion, limits, holds, shaping. SI units; angles in rad."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import inf
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ...common.validation import Record, quoted
+from ..fields.field_types import NotNegative, Positive, Quantity
+from ..fields.motion_laws import SMOOTHNESS, Limits
+from ..fields.paths import Legs, path_of
+from ..fields.piecewise import Piecewise
+from ..fields.shapers import impulses, shaped
+from ..fields.waypoints import Waypoints
+
+Place = Quantity | tuple[Quantity, Quantity]
+MOST_PLACES = 1000
+LIMITS = ("speed", "acceleration", "jerk")
+OF_LEGS = ("hold", "blend", "duration", *LIMITS, "start", "stretch", "fastest")  # a table of waypoints has its times
+
+
+class Shaper(Record):
+    """Delayed parts of the motion that cancel each other's vibrations (Singer and Seering 1990).
+
+    Where `frequency` is left out it is that of the robot's lowest vibrations while the path is held, averaged over it.
+    """
+
+    kind: Literal["none", "zv", "zvd", "ei"]
+    """"zv" is shortest, "zvd" and "ei" take twice as long and forgive a wrong frequency; "none" does nothing."""
+    frequency: Positive | tuple[Positive, ...] | None = None
+    """Of the vibrations, Hz: one or several; by default those of the robot."""
+    damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    """Of these vibrations; by default that of the robot, and 0 beside `frequency`."""
+    modes: Annotated[int, Field(gt=0, le=4)] = 1
+    """How many of the robot's lowest vibrations."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Shaper:
+        if self.frequency is not None and "modes" in self.model_fields_set:
+            raise ValueError('expected one of the keys "frequency" and "modes", found both')
+        return self
+
+    @property
+    def asks_robot(self) -> bool:
+        """Whether its frequencies are yet to be found."""
+        return self.kind != "none" and self.frequency is None
+
+    def shape(self, motion: Piecewise) -> Piecewise:
+        """The motion, shaped for each frequency; unchanged as long as there is none."""
+        if self.kind == "none" or self.frequency is None:
+            return motion
+        for frequency in np.atleast_1d(self.frequency):
+            motion = shaped(motion, impulses(self.kind, float(frequency), self.damping_ratio or 0.0))
+        return motion
+
+
+class MotionKeys(Record):
+    """What a trajectory has beside what follows it."""
+
+    via: Annotated[tuple[Place, ...], Field(min_length=2, max_length=MOST_PLACES)] | None = None
+    """Places to go through from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle."""
+    profile: Literal["rest-to-rest", "s-curve", "trapezoid", "spline"] | None = None
+    """Law of motion between places: a polynomial (default of `via`), limited jerk, limited acceleration, or a spline
+    through the rows of `waypoints` (their default)."""
+    smoothness: Annotated[int, Field(ge=1, le=6)] | None = None
+    """Number of continuous derivatives; by default 4 of rest-to-rest, 2 of s-curve, 1 of trapezoid."""
+    speed: Positive | None = None
+    """Largest speed along the path, m/s or rad/s."""
+    acceleration: Positive | None = None
+    """Largest acceleration along the path, m/s² or rad/s²."""
+    jerk: Positive | None = None
+    """Largest jerk along the path, m/s³ or rad/s³."""
+    duration: Positive | tuple[Positive, ...] | None = None
+    """Of each leg, s, in place of limits: one for all, or one for each."""
+    start: NotNegative = 0.0
+    """When the first leg begins, s."""
+    hold: NotNegative | tuple[NotNegative, ...] = 0.0
+    """Rest at each place between, s: one for all, or one for each."""
+    blend: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
+    """Places without a hold are passed beside: legs overlap by this share of the shorter one. 0: a stop at each."""
+    stretch: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
+    """Factor of the times of all legs."""
+    fastest: bool = False
+    """Seek the smallest `stretch` at which motors and patches keep their limits in the first inverse analysis."""
+    shaper: Shaper | None = None
+    """Shapes the motion so that it leaves vibrations of certain frequencies at rest."""
+
+    def check_motion(self, components: int, waypoints: Waypoints | None) -> None:
+        """Raise `ValueError` for keys that do not fit each other, or a path of so many components."""
+        given = [key for key in (*OF_LEGS, "profile", "smoothness", "shaper") if key in self.model_fields_set]
+        if self.via is None and waypoints is None and given:
+            raise ValueError(f'expected {quoted(given)} only beside "via" or "waypoints", found neither')
+        if waypoints is not None:
+            self._check_table(given)
+        if self.via is not None:
+            self._check_via(self.via, components)
+
+    def _check_table(self, given: list[str]) -> None:
+        refused = [key for key in given if key in OF_LEGS]
+        if refused:
+            raise ValueError(f'expected {quoted(refused)} only beside "via", found them beside "waypoints"')
+        if self.profile in (None, "spline") and self.smoothness is not None:
+            raise ValueError('expected no key "smoothness" beside profile = "spline", found it there')
+
+    def _check_via(self, via: tuple[Place, ...], components: int) -> None:
+        wanted = "places [x, y]" if components == 2 else "numbers"
+        if any(np.size(place) != components for place in via):
+            raise ValueError(f"expected {wanted} in via, found {[list(p) if isinstance(p, tuple) else p for p in via]}")
+        if self.profile == "spline":
+            raise ValueError('expected profile = "spline" only beside "waypoints", found it beside "via"')
+        for k, (place, following) in enumerate(pairwise(via), 1):
+            if place == following:
+                raise ValueError(f"expected places in via that differ (a rest is a hold), found no. {k} twice")
+        self._check_limits()
+        for key, count in (("duration", len(via) - 1), ("hold", len(via) - 2)):
+            value = getattr(self, key)
+            if isinstance(value, tuple) and len(value) != count:
+                raise ValueError(f'expected {count} numbers in "{key}", found {len(value)}')
+
+    def _check_limits(self) -> None:
+        if self.fastest and "stretch" in self.model_fields_set:
+            raise ValueError('expected one of the keys "fastest" and "stretch", found both')
+        limits = [key for key in LIMITS if getattr(self, key) is not None]
+        if bool(limits) == (self.duration is not None):
+            found = "both" if limits else "neither"
+            raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" beside "via", found {found}')
+        if self.profile in ("s-curve", "trapezoid") and limits == ["speed"]:
+            raise ValueError(f'expected "acceleration" or "jerk" beside profile = "{self.profile}", found only "speed"')
+        if self.profile == "trapezoid" and self.jerk is not None:
+            raise ValueError('expected no "jerk" beside profile = "trapezoid" (its acceleration jumps), found it')
+
+    def motion(self, waypoints: Waypoints | None) -> Piecewise | None:
+        """The motion of all components; None where it is given by expressions."""
+        if waypoints is not None and self.profile in (None, "spline"):
+            motion = waypoints.spline()
+        elif waypoints is not None:
+            motion = path_of(self._legs_of_table(waypoints))
+        elif self.via is not None:
+            motion = path_of(self._legs(self.via))
+        else:
+            return None
+        return motion if self.shaper is None else self.shaper.shape(motion)
+
+    def _legs(self, via: tuple[Place, ...]) -> Legs:
+        profile, count = self.profile or "rest-to-rest", len(via) - 1
+        assert profile != "spline"
+        limits = Limits(*(inf if value is None else value for value in (self.speed, self.acceleration, self.jerk)))
+        durations = None if self.duration is None else tuple(np.broadcast_to(self.duration, count).tolist())
+        holds = tuple(np.broadcast_to(self.hold, count - 1).tolist())
+        smoothness = self.smoothness or SMOOTHNESS[profile]
+        places = np.array(via, dtype=float).reshape(count + 1, -1)
+        return Legs(places, self.start, profile, smoothness, limits, durations, holds, self.blend, self.stretch)
+
+    def _legs_of_table(self, waypoints: Waypoints) -> Legs:
+        profile, times = self.profile or "rest-to-rest", waypoints.times
+        assert profile != "spline"
+        smoothness, durations = self.smoothness or SMOOTHNESS[profile], tuple(np.diff(times).tolist())
+        holds = (0.0,) * (len(times) - 2)
+        return Legs(waypoints.values, float(times[0]), profile, smoothness, Limits(), durations, holds)

@@ -1,0 +1,120 @@
+"""`check = "finer"`: what inverse results leave on links with twice the modes."""
+
+import json
+
+import numpy as np
+import pytest
+
+import ffrobot as library
+from ffrobot.mbs.quantities.observation import point_motion
+from ffrobot.run.solve import solve
+
+LENGTHS, START, END = (0.7, 0.5), (0.4, 1.3), (0.7, 1.1)
+
+
+def place(angles):
+    return np.array([np.cos(angles), np.sin(angles)]) @ LENGTHS
+
+
+def link(name, length, condition, modes, damping=0.005):
+    return {
+        "name": name,
+        "material": {"youngs_modulus": 70e9, "density": 2700.0},
+        "geometry": {
+            "kind": "beam", "length": length, "section": {"shape": "rectangle", "height": 0.006, "width": 0.02},
+        },
+        "mesh": {"elements": 20},
+        "reference": {"condition": condition},
+        "modes": {"count": modes, "family": "in-plane-bending", "attachment_modes": False},
+        "damping": {"ratio": damping},
+    }  # fmt: skip
+
+
+def arm(modes, kind="pcid", gravity=0.0, bodies=None, patches=True, **keys):
+    names = ("link1", "link2")
+    path = {
+        axis: f"{a!r}+{b - a!r}*(10*t**3-15*t**4+6*t**5)"
+        for axis, a, b in zip("xy", place(START).tolist(), place(END).tolist(), strict=True)
+    }
+    conditions = ("simply-supported", "cantilever")
+    layout = {"count": modes, "length": 0.05, "width": 0.02, "thickness": 5e-4, "modulus": 63e9, "d31": 110e-12}
+    apply = "joints+pzt" if patches else "joints"
+    return library.make_scene(
+        name="arm",
+        space="planar",
+        gravity=[0.0, -gravity],
+        body=bodies
+        or [
+            {"name": n, "link": link(n, length, condition, modes)}
+            for n, length, condition in zip(names, LENGTHS, conditions, strict=True)
+        ],
+        joint=[
+            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
+            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
+        ],
+        payload=[{"point": "link2.tip", "mass": 0.2}],
+        initial={"state": "static", "angles": dict(zip(names, START, strict=True))},
+        trajectory=[{"name": "tip", "point": "link2.tip", **path}],
+        pzt=[{"body": name, **layout} for name in names] if patches else [],
+        analysis=[
+            {"name": "inverse", "kind": kind, "end": 1.0, "output_step": 0.005, "tolerance": 1e-5, "check": "finer"}
+            | keys,
+            {"name": "same", "kind": "forward", "actuation": "inverse", "apply": apply},
+        ],
+    )
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_error_is_that_of_the_modes_left_out(gravity):
+    """It falls with every mode, where the replay on the same modes has none to speak of."""
+    errors = []
+    for modes in (2, 4):
+        solution = solve(arm(modes, gravity=gravity))
+        check = solution.analyses["inverse"].check
+        same, path = (point_motion(solution.outcomes[name], "link2.tip").position for name in ("same", "inverse"))
+        assert np.abs(same - path).max() < 1e-3 * check.error
+        assert check.modes == {"link1": 2 * modes, "link2": 2 * modes}
+        assert check.status == "completed"
+        errors.append(check.error)
+    assert errors[0] > 4 * errors[1]
+    assert 1e-7 < errors[1] < 1e-3
+
+
+def test_links_with_all_that_matters_leave_nothing():
+    """Motors alone in a horizontal plane, eight modes: what sixteen add is below the tolerance of the replay."""
+    check = solve(arm(8, kind="motors-only", patches=False)).analyses["inverse"].check
+    assert check.point == "link2.tip"
+    assert check.error < 1e-5 * 0.4  # of the path
+
+
+def test_it_is_told_and_kept(tmp_path, ffrobot):
+    path = tmp_path / "scene.toml"
+    path.write_text(arm(2).text, encoding="utf-8")
+    done = ffrobot("solve", path)
+    assert done.returncode == 0, done.stderr
+    assert "inverse, replayed on 4 modes: link2.tip is off by" in " ".join(done.stdout.split())
+    with library.Results(path.with_suffix(".results.h5")) as results:
+        about = results.attributes("inverse")
+    assert json.loads(about["check_modes"]) == {"link1": 4, "link2": 4}
+    assert about["check_error"] > 1e-7
+
+
+def test_modal_body_files_cannot_be_refined(tmp_path):
+    (tmp_path / "link.toml").write_text(
+        """
+name = "link1"
+material = { youngs_modulus = 70e9, density = 2700.0 }
+geometry = { kind = "beam", length = 0.7, section = { shape = "rectangle", height = 0.006, width = 0.02 } }
+mesh = { elements = 20 }
+reference = { condition = "simply-supported" }
+modes = { count = 2, family = "in-plane-bending", attachment_modes = false }
+""",
+        encoding="utf-8",
+    )
+    library.make_link(tmp_path / "link.toml")
+    bodies = [
+        {"name": "link1", "modal": str(tmp_path / "link.h5")},
+        {"name": "link2", "link": link("link2", 0.5, "cantilever", 2)},
+    ]
+    with pytest.raises(library.InputError, match=r'check: expected "link" in body "link1" for "finer"'):
+        solve(arm(2, bodies=bodies))

@@ -1,0 +1,172 @@
+"""Names, files and streams that are out of the ordinary: they work, or one message says why not; never a traceback."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import pytest
+
+SHORT = {"end = 1.0": "end = 0.004"}
+HIDE = "import sys; sys.modules[{!r}] = None; sys.argv[0] = 'ffrobot'; from ffrobot.cli import main; main()"
+NAMES = ["$\\bad{$ $x_1^{", "<b>größe& <script>", "関節 🤖", "[red]{{ 7*7 }}%s", "_a", "e\u0301\u202e"]
+
+
+@pytest.fixture(scope="module")
+def solved(case_copy_of_module, ffrobot):
+    """A short run whose names are markup, formulas and letters of other scripts."""
+    folder = case_copy_of_module("two_link").parent
+    text = (folder / "scene.toml").read_text(encoding="utf-8")
+    renamed = dict(zip(('"link1', '"link2', '"A"', '"tip"', '"inverse"', '"two_link"'), NAMES, strict=True))
+    for old, new in SHORT.items():
+        text = text.replace(old, new)
+    text = text.replace('link = "link1.toml"', "LINK1").replace('link = "link2.toml"', "LINK2")
+    for old, new in renamed.items():
+        quoted = new.replace("\\", "\\\\")
+        text = text.replace(old, f'"{quoted}' if not old.endswith('"') else f'"{quoted}"')
+    text = text.replace("link1 =", f"'{NAMES[0]}' =").replace("link2 =", f"'{NAMES[1]}' =")
+    text = text.replace("LINK1", 'link = "link1.toml"').replace("LINK2", 'link = "link2.toml"')
+    (folder / "scene.toml").write_text(text, encoding="utf-8-sig")  # with a byte order mark
+    (folder / "figures.toml").unlink()
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.mark.parametrize(
+    "command", [("info",), ("feasibility",), ("report",), ("plot", "--format", "svg"), ("view", "--frames", "2")]
+)
+def test_names_of_all_kinds(solved, ffrobot, command):
+    done = ffrobot(command[0], "scene.results.h5", *command[1:], cwd=solved)
+    assert done.returncode == 0, done.stderr
+    if command[0] == "info":
+        with h5py.File(solved / "scene.results.h5") as file:
+            assert NAMES[4] in file
+            assert f"{NAMES[4]}/joints/{NAMES[2]}/moment" in file
+    if command[0] == "report":
+        page = (solved / "scene.results.html").read_text(encoding="utf-8")
+        assert NAMES[1] not in page  # but as text
+    if command[0] == "plot":
+        drawn = [path.name for path in (solved / "scene.results.figures").iterdir()]
+        assert sum(name.startswith("angle_") for name in drawn) == 2
+
+
+@pytest.mark.parametrize("command", ["info", "feasibility"])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"PYTHONIOENCODING": "ascii"},
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""},
+    ],
+)
+def test_output_of_few_characters(solved, ffrobot, command, settings):
+    done = subprocess.run(
+        [ffrobot.path, command, "scene.results.h5"], cwd=solved, env=ffrobot.environment | settings,
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "\\u" in done.stdout
+
+
+def test_output_that_goes_nowhere(solved, ffrobot):
+    def info(how):
+        return subprocess.run(
+            f"{ffrobot.path} info scene.results.h5 {how}", shell=True, cwd=solved, env=ffrobot.environment,
+            capture_output=True, text=True, timeout=60,
+        )  # fmt: skip
+
+    full, closed, silent = info("> /dev/full"), info(">&-"), info(">&- 2>&-")
+    assert (full.returncode, full.stderr) == (1, "ffrobot: standard output: No space left on device\n")
+    assert (closed.returncode, closed.stderr, silent.returncode) == (0, "", 0)
+
+
+@pytest.mark.parametrize(
+    ("library", "command", "extra"),
+    [("matplotlib", ("plot", "scene.results.h5"), "plot"), ("jinja2", ("report", "scene.results.h5"), "plotly jinja2")],
+)
+def test_library_that_is_not_installed(solved, ffrobot, library, command, extra):
+    done = subprocess.run(
+        [sys.executable, "-c", HIDE.format(library), *command], cwd=solved, env=ffrobot.environment,
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 1
+    (message,) = done.stderr.splitlines()
+    assert f"needs {library}, which is not installed: pip install" in message
+    assert extra in message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("solve", "a" * 5000), "expected the name of a file, found File name too long"),
+        (("solve", "loop"), "loop: expected the name of a file, found links that lead in a circle"),
+        (("solve", "scene.toml", "-o", "loop"), "loop: expected the name of a file, found links that lead in a circle"),
+        (("info", "a" * 300), "File name too long"),
+        (("sweep", "scene.toml", "--vary", "gravity.1=0:1:1000000000"), "expected at most 100000 values"),
+        (("sweep", "scene.toml", *("--vary", "gravity.1=0:1:1000", "--vary", "gravity.0=0:1:1000")), "100000 runs"),
+        (("sweep", "scene.toml", "--vary", "gravity.1=" + "[" * 3000), "expected FIRST:LAST:COUNT"),
+        (("sweep", "scene.toml", "--vary", "gravity.1=" + "1" * 5000), "expected FIRST:LAST:COUNT"),
+        (("sweep", "scene.toml", "--vary", "gravity.²=1"), 'found "²"'),
+        (("sweep", "scene.toml", "--vary", "gravity.1=0", "-o", "scene.toml"), "scene.toml"),
+    ],
+)
+def test_arguments(two_link_copy, refused, arguments, named):
+    folder = two_link_copy()
+    os.symlink("loop", folder / "loop")
+    assert named in refused(folder, *arguments)
+
+
+LOOP = """
+[[analysis]]
+name = "loop"
+kind = "closed-loop"
+actuation = "inverse"
+sample_time = 0.001
+controller = [{ kind = "python", python = "own.py:controller" }]
+sensor = [{ joint = "O" }]
+"""
+
+
+@pytest.mark.parametrize(
+    ("code", "named"),
+    [
+        (
+            "def controller(setup):\n    return 1 / 0\n",
+            "ZeroDivisionError: division by zero (line 2 of own.py, in contr",
+        ),
+        ("def controller(setup):\n    pass\n", "expected it to return a function (k, y) → u, found None"),
+        ("def controller(setup):\n    return lambda k, y: [][k]\n", "sample 0, t = 0 s: IndexError: list index out of"),
+        ("raise SystemExit(0)\n", "own.py: controller: SystemExit: 0 (line 1 of own.py"),
+    ],
+)
+def test_controllers_that_fail(two_link_copy, ffrobot, code, named):
+    folder = two_link_copy({"scene.toml": SHORT})
+    with (folder / "scene.toml").open("a", encoding="utf-8") as scene:
+        scene.write(LOOP)
+    (folder / "own.py").write_text(code, encoding="utf-8")
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    assert done.returncode in (1, 2)
+    (message,) = done.stderr.splitlines()
+    assert "own.py" in message
+    assert named in message
+
+
+def test_extreme_numbers_name_the_link(two_link_copy, ffrobot):
+    """Valid each for itself, but no eigenvalues can be found."""
+    folder = two_link_copy({"link1.toml": {"density = 7850.0": "density = 1e30", "2.068427e11": "1e-30"}})
+    done = ffrobot("link", "link1.toml", cwd=folder)
+    assert done.returncode == 1, done.stderr
+    (message,) = done.stderr.splitlines()
+    assert message.startswith("ffrobot: link1.toml: ")
+
+
+def test_sample_of_the_campaign(tmp_path):
+    """tests/campaigns/mutations.py, a few changes of one case; others each time it is run by hand."""
+    script = Path(__file__).parents[1] / "campaigns" / "mutations.py"
+    done = subprocess.run(
+        [sys.executable, script, "--seed", "1", "--count", "12", "--case", "slider_crank", "--folder", tmp_path],
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+    assert "solve: refused" in done.stdout

@@ -1,0 +1,188 @@
+"""Paths as machines run them: laws of motion, limits, legs with holds, shapers."""
+
+from itertools import pairwise
+from math import inf
+
+import numpy as np
+import pytest
+
+from ffrobot.mbs.fields.motion_laws import Limits, averaged_step, law_in, law_within, polynomial_law
+from ffrobot.mbs.fields.paths import Legs, path_of
+from ffrobot.mbs.fields.piecewise import Piecewise, superposed
+from ffrobot.mbs.fields.shapers import RESIDUAL, impulses, shaped
+
+LAWS = [("rest-to-rest", 2), ("rest-to-rest", 4), ("s-curve", 2), ("s-curve", 4), ("trapezoid", 1)]
+
+
+def legs(places, **keys):
+    count = len(places) - 1
+    given = {"start": 0.0, "profile": "s-curve", "smoothness": 2, "limits": Limits(), "durations": (1.0,) * count}
+    return Legs(np.array(places, dtype=float), **(given | {"holds": (0.0,) * (count - 1)} | keys))
+
+
+def over(motion, count=2001, beyond=0.0):
+    return np.linspace(motion.begin - beyond, motion.end + beyond, count)
+
+
+@pytest.mark.parametrize(("profile", "smoothness"), LAWS)
+def test_law_goes_from_0_to_1_with_as_many_continuous_derivatives(profile, smoothness):
+    law = law_in(0.7, profile, smoothness)
+    assert (law.begin, law.end) == (0.0, pytest.approx(0.7, rel=1e-14))
+    assert (float(law.first[0]), float(law.last[0])) == (0.0, pytest.approx(1.0, abs=1e-13))
+    for order in range(smoothness + 1):
+        # Left of each break against right of it, in units of the largest value of that derivative.
+        size = np.abs(law.sample(over(law), order)).max()
+        outer = np.concatenate([[0.0], law.sample(law.breaks[1:-1], order)[:, 0], [float(order == 0)]])
+        before = [_left(law, k, order) for k in range(len(law.breaks))]
+        np.testing.assert_allclose(before, outer, atol=1e-11 * size)
+    assert abs(_left(law, len(law.breaks) - 1, smoothness + 1)) > 1.0  # the next one jumps
+
+
+def _left(law, k, order):
+    if k == 0:
+        return 0.0
+    piece = Piecewise(law.breaks[k - 1 : k + 1], law.coefficients[k - 1 : k])
+    powers = np.polyder(piece.coefficients[0, :, 0], order)
+    return float(np.polyval(powers, law.breaks[k] - law.breaks[k - 1]))
+
+
+@pytest.mark.parametrize(("profile", "smoothness"), LAWS)
+@pytest.mark.parametrize("distance", [1e-4, 0.03, 0.5, 7.0])
+def test_limits_are_kept_and_one_is_reached(profile, smoothness, distance):
+    limits = Limits(1.5, 6.0, inf if profile == "trapezoid" else 50.0)
+    law = law_within(distance, limits, profile, smoothness).along(np.array([distance]))
+    ratios = [np.abs(law.sample(over(law, 20001), k)).max() / limit for k, limit in enumerate(limits.by_order, 1)]
+    assert max(ratios) == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("distance", "duration"),
+    [  # h/v + v/a + a/j; a not reached: h/v + 2√(v/j); v not reached; neither: 4 (h/2j)^⅓
+        (7.0, 7.0 / 1.5 + 1.5 / 6.0 + 6.0 / 50.0),
+        (0.02, 4 * (0.02 / 100.0) ** (1 / 3)),
+        (0.3, 6.0 / 50.0 + np.sqrt((6.0 / 50.0) ** 2 + 4 * 0.3 / 6.0)),
+    ],
+)
+def test_s_curve_takes_the_time_of_the_textbook(distance, duration):
+    """Biagiotti and Melchiorri 2008, sec. 3.4."""
+    assert law_within(distance, Limits(1.5, 6.0, 50.0), "s-curve", 2).end == pytest.approx(duration, rel=1e-12)
+
+
+def test_s_curve_of_given_duration_has_seven_equal_segments():
+    np.testing.assert_allclose(law_in(7.0, "s-curve", 2).breaks, np.arange(8.0), atol=1e-12)
+
+
+def test_polynomial_of_smoothness_2_is_the_quintic():
+    t = np.linspace(0, 1, 31)
+    np.testing.assert_allclose(polynomial_law(2).sample(t)[:, 0], t**3 * (10 - 15 * t + 6 * t**2), atol=1e-15)
+
+
+def test_averaged_step_is_the_moving_average_of_the_one_before():
+    """Against a running mean of samples."""
+    T, dt = np.array([0.4, 0.25, 0.1]), 1e-4
+    t = np.arange(-0.5, 1.5, dt)
+    before, after = (averaged_step(times).sample(t)[:, 0] for times in (T[:2], T))
+    window = round(T[2] / dt)
+    mean = np.convolve(before, np.ones(window) / window)[: len(t)]
+    np.testing.assert_allclose(after[window:], mean[window:], atol=2 * dt)
+
+
+def test_path_stops_at_its_places_and_holds_there():
+    motion = path_of(legs([[0, 0], [1, 0], [1, 2]], start=0.2, durations=(1.0, 2.0), holds=(0.5,)))
+    assert (motion.begin, motion.end) == (pytest.approx(0.2), pytest.approx(3.7))
+    t = np.array([0.0, 0.2, 1.2, 1.45, 1.7, 3.7, 9.0])
+    expected = [[0, 0], [0, 0], [1, 0], [1, 0], [1, 0], [1, 2], [1, 2]]
+    np.testing.assert_allclose(motion.sample(t), expected, atol=1e-13)
+    for order in (1, 2):
+        np.testing.assert_allclose(motion.sample(t, order), 0.0, atol=1e-10)
+    along = motion.sample(over(motion))
+    assert along.min() > -1e-13  # nothing overshoots
+    assert (along.max(axis=0) < [1 + 1e-13, 2 + 1e-13]).all()
+    functions = motion.functions()
+    t = over(motion, 301, beyond=0.5)
+    for k, function in enumerate(functions):
+        np.testing.assert_allclose(function.sample(t)[0], motion.sample(t)[:, k], atol=1e-13)
+
+
+def test_blended_corner_stays_within_its_triangle_and_the_limits():
+    limits, places = Limits(1.0, 4.0, 40.0), [[0, 0], [1, 0], [1, 1]]
+    stopping, passing = (path_of(legs(places, limits=limits, durations=None, blend=blend)) for blend in (0.0, 0.4))
+    assert passing.end < stopping.end
+    x, y = passing.sample(over(passing, 4001)).T
+    assert (y >= -1e-13).all()
+    assert (x <= 1 + 1e-13).all()
+    assert (y <= x + 1e-13).all()
+    speed = np.linalg.norm(passing.sample(over(passing, 4001), 1), axis=1)
+    assert speed[1300:2700].min() > 0.2  # no stop at the corner
+    peaks = [np.linalg.norm(passing.sample(over(passing, 20001), k), axis=1).max() for k in (1, 2, 3)]
+    ratios = np.array(peaks) / limits.by_order
+    assert ratios.max() == pytest.approx(1.0, abs=1e-3)  # found by sampling
+
+
+def test_stretch_is_of_legs_not_of_holds():
+    one, two = (path_of(legs([[0], [1], [0]], holds=(0.5,), stretch=stretch)) for stretch in (1.0, 2.0))
+    assert (one.end, two.end) == (pytest.approx(2.5), pytest.approx(4.5))
+
+
+def test_superposition_is_the_sum():
+    generator = np.random.default_rng(3)
+    motions = []
+    for _ in range(4):
+        breaks = np.cumsum(generator.uniform(0.1, 0.5, 4))
+        motions.append(Piecewise(breaks, generator.normal(size=(3, generator.integers(1, 6), 2))))
+    weights = [0.3, -1.0, 2.0, 0.5]
+    total, t = superposed(motions, weights), np.linspace(-0.2, 2.5, 997)
+    for order in (0, 1, 2):
+        expected = sum(w * m.sample(t, order) for w, m in zip(weights, motions, strict=True))
+        np.testing.assert_allclose(total.sample(t, order), expected, atol=1e-10)
+
+
+def residual(sequence, frequency, damping_ratio):
+    """Amplitude after the last impulse, of that after a single one then (Singer and Seering 1990, Eq. 3)."""
+    omega = 2 * np.pi * frequency
+    decay, turn = damping_ratio * omega, omega * np.sqrt(1 - damping_ratio**2)
+    last = sequence[-1].delay
+    return abs(sum(i.share * np.exp((decay - 1j * turn) * (i.delay - last)) for i in sequence)) / np.exp(-decay * last)
+
+
+@pytest.mark.parametrize("damping_ratio", [0.0, 0.02, 0.2])
+def test_shapers_cancel_their_frequency(damping_ratio):
+    zv, zvd, ei = (impulses(kind, 3.0, damping_ratio) for kind in ("zv", "zvd", "ei"))
+    for sequence in (zv, zvd, ei):
+        assert sum(i.share for i in sequence) == pytest.approx(1.0, rel=1e-15)
+    assert residual(zv, 3.0, damping_ratio) < 1e-14
+    assert residual(zvd, 3.0, damping_ratio) < 1e-14
+    if damping_ratio == 0.0:
+        assert residual(ei, 3.0, 0.0) == pytest.approx(RESIDUAL, rel=1e-12)
+
+
+def test_wrong_frequencies_matter_less_to_zvd_and_ei():
+    """Undamped: |cos(π f/2f₀)|, its square, and the width for 5 %: 0.06, 0.29, 0.40 (Singhose 1994, table 1)."""
+    f = np.linspace(0.5, 1.5, 2001)
+    zv, zvd, ei = (np.array([residual(impulses(kind, 1.0, 0.0), x, 0.0) for x in f]) for kind in ("zv", "zvd", "ei"))
+    np.testing.assert_allclose(zv, np.abs(np.cos(np.pi * f / 2)), atol=1e-12)
+    np.testing.assert_allclose(zvd, zv**2, atol=1e-12)
+    widths = [np.ptp(f[v <= RESIDUAL + 1e-9]) for v in (zv, zvd, ei)]
+    assert widths == pytest.approx([0.064, 0.286, 0.398], abs=0.002)
+
+
+def test_shaped_motion_leaves_an_oscillator_at_rest():
+    """x'' + 2ζω x' + ω² x = ω² u: integrated with the unshaped and the shaped path."""
+    from scipy.integrate import solve_ivp
+
+    f, zeta = 4.0, 0.02
+    omega, path = 2 * np.pi * f, law_in(0.3, "s-curve", 2)
+
+    def swing(motion):
+        def slope(t, x):
+            u = motion.sample(np.array([t]))[0, 0]
+            return [x[1], omega**2 * (u - x[0]) - 2 * zeta * omega * x[1]]
+
+        x = [0.0, 0.0]
+        for a, b in pairwise(motion.breaks):
+            x = solve_ivp(slope, (a, b), x, rtol=1e-10, atol=1e-12).y[:, -1]
+        return np.hypot(x[0] - 1.0, x[1] / omega)
+
+    assert swing(path) > 0.1
+    assert swing(shaped(path, impulses("zv", f, zeta))) < 1e-8
+    assert swing(shaped(path, impulses("zvd", f, zeta))) < 1e-8

@@ -1,0 +1,106 @@
+"""Damping ratios of an assembled robot: of its links' modes, and as `of = "robot"` wants them."""
+
+import numpy as np
+import pytest
+
+import ffrobot as library
+from ffrobot.run.solve import solve
+
+RATIO = 0.01
+CHOICES = [("simply-supported", "simply-supported"), ("simply-supported", "cantilever"), ("cantilever", "cantilever")]
+
+
+def link(name, condition, of):
+    return {
+        "name": name,
+        "material": {"youngs_modulus": 2.068e11, "density": 7850.0},
+        "geometry": {
+            "kind": "beam", "length": 1.0, "section": {"shape": "rectangle", "height": 0.015, "width": 0.025},
+        },
+        "mesh": {"elements": 20},
+        "reference": {"condition": condition},
+        "modes": {"count": 10, "family": "in-plane-bending", "attachment_modes": False},
+        "damping": {"ratio": RATIO, "of": of},
+    }  # fmt: skip
+
+
+def linear(conditions, of, **keys):
+    """Modes of the two-link arm of docs/theory.md, Damping."""
+    names = ("link1", "link2")
+    scene = library.make_scene(
+        name="arm",
+        space="planar",
+        gravity=[0.0, 0.0],
+        body=[{"name": n, "link": link(n, c, of)} for n, c in zip(names, conditions, strict=True)],
+        joint=[
+            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
+            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
+        ],
+        payload=[{"point": "link2.tip", "mass": 2.0}],
+        initial={"angles": {"link1": 0.4, "link2": -0.6}},
+        analysis=[{"name": "at_rest", "kind": "linear"}],
+        **keys,
+    )
+    modes = solve(scene).outcomes["at_rest"].details.modes[0]
+    return modes.frequency[modes.frequency > 0.0], modes.damping_ratio[modes.frequency > 0.0]
+
+
+@pytest.mark.parametrize("conditions", CHOICES)
+def test_ratios_wanted_of_the_robot_are_met_whatever_the_frame(conditions):
+    """Within 3 % in the first ten, since damping between the links is left out."""
+    _, ratio = linear(conditions, "robot")
+    np.testing.assert_allclose(ratio[:10], RATIO, rtol=0.035)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "expected"),
+    list(zip(CHOICES, [(0.0105, 0.0115), (0.0115, 0.0164), (0.0159, 0.0175)], strict=True)),
+    ids=["ss", "sc", "cc"],
+)
+def test_ratios_of_the_links_are_others_in_the_robot(conditions, expected):
+    """The numbers of docs/theory.md; that they depend on the frame is the point."""
+    _, ratio = linear(conditions, "link")
+    np.testing.assert_allclose(ratio[:2], expected, rtol=0.01)
+    assert np.all(ratio[:2] > 1.04 * RATIO)
+
+
+def test_frequencies_do_not_depend_on_the_frame():
+    first, *others = (linear(conditions, "robot")[0][:2] for conditions in CHOICES)
+    for frequency in others:
+        np.testing.assert_allclose(frequency, first, rtol=0.02)
+
+
+def test_the_summary_lists_ratios(tmp_path, ffrobot):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        """
+name = "arm"
+space = "planar"
+gravity = [0.0, 0.0]
+body = [{ name = "link", link = "link.toml" }]
+joint = [{ name = "O", type = "revolute", between = ["ground", "link.root"] }]
+analysis = [{ name = "at_rest", kind = "linear" }]
+""",
+        encoding="utf-8",
+    )
+    (tmp_path / "link.toml").write_text(
+        """
+name = "link"
+material = { youngs_modulus = 70e9, density = 2700.0 }
+geometry = { kind = "beam", length = 0.5, section = { shape = "rectangle", height = 0.01, width = 0.02 } }
+mesh = { elements = 10 }
+reference = { condition = "cantilever" }
+modes = { count = 3, family = "in-plane-bending", attachment_modes = false }
+damping = { ratio = 0.02, of = "robot" }
+""",
+        encoding="utf-8",
+    )
+    done = ffrobot("solve", scene)
+    assert done.returncode == 0, done.stderr
+    assert "damping ratios" in done.stdout
+    assert "0.02, 0.02, 0.02" in done.stdout
+    link = tmp_path / "link.toml"
+    link.write_text(link.read_text(encoding="utf-8").replace("ratio = 0.02", "ratio = [0.1, 0.1, 0.1]"))
+    done = ffrobot("solve", scene)
+    assert done.returncode == 2
+    assert 'damping: expected one ratio, with of = "robot"' in done.stderr

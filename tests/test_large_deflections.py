@@ -1,0 +1,175 @@
+"""How wrong small deformations are, as the program says it, against a pendulum of rods and the elastica."""
+
+import warnings
+
+import ffcx  # noqa: F401, once loaded it sends warnings to the log, past those who were recording them
+import h5py
+import numpy as np
+import pytest
+from rod_chain import falling_tip
+from scipy.integrate import solve_bvp
+
+import ffrobot as library
+
+TIMES = np.linspace(0.0, 1.0, 101)
+
+
+def link(name, E, condition, modes=8):
+    return {
+        "name": name,
+        "material": {"youngs_modulus": E, "density": 2700.0},
+        "geometry": {
+            "kind": "beam", "length": 1.0, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02},
+        },
+        "mesh": {"elements": 20},
+        "reference": {"condition": condition},
+        "modes": {"count": modes, "family": "in-plane-bending", "attachment_modes": False},
+        "damping": {"ratio": 0.0},
+    }  # fmt: skip
+
+
+def pendulum(E, condition, **keys):
+    names = ("link1", "link2")
+    return library.make_scene(
+        name="double_pendulum",
+        space="planar",
+        gravity=[0.0, -9.81],
+        body=[{"name": name, "link": link(name, E, condition)} | keys.pop(name, {}) for name in names],
+        joint=[
+            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
+            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
+        ],
+        analysis=[{"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}],
+        **keys,
+    )
+
+
+def solved(scene, path):
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        results = library.solve(scene, path)
+    return results, [str(one.message) for one in told if one.category is library.FfrobotWarning]
+
+
+def worst(results, key, analysis="fall"):
+    names = results.names(f"{analysis}/bodies")
+    return max(results.attributes(f"{analysis}/bodies/{name}")[key] for name in names)
+
+
+@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+@pytest.mark.parametrize("E", [2e10, 7e9, 5e9])
+def test_estimated_error_of_a_falling_pendulum(E, condition, tmp_path):
+    """Within 0.4 and 5 times the error, from 6e-4 to 9e-2 of the length; said from 1e-3 on at the latest."""
+    results, told = solved(pendulum(E, condition), tmp_path / "fall.h5")
+    error = np.abs(results["fall/points/link2.tip/position"] - falling_tip(E, 12, TIMES)).max()
+    estimate = worst(results, "position_error")
+    assert 0.4 * error < estimate < 5 * error
+    assert len(told) == 1 or error < 1e-3
+    assert list(results.attributes("fall")["warnings"]) == [text.partition('"fall": ')[2] for text in told]
+
+
+def test_stiffening_and_its_estimate(tmp_path):
+    """Three modes, which the present form bears: 6e-5 of the length and no warning, where 2e-2 was wrong without."""
+    keys = {name: {"modes": 3} for name in ("link1", "link2")}
+    scene = pendulum(7e9, "cantilever", geometric_stiffening=True, **keys)
+    results, told = solved(scene, tmp_path / "fall.h5")
+    error = np.abs(results["fall/points/link2.tip/position"] - falling_tip(7e9, 20, TIMES)).max()
+    assert error < 5e-4
+    assert worst(results, "position_error") < 5e-4
+    assert not told
+
+
+def elastica(load):
+    """Tip (x, y) of a cantilever of unit length and rigidity under a transverse tip force: θ'' = −P cos θ."""
+    found = solve_bvp(
+        lambda s, y: np.array([y[1], -load * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])]),
+        lambda a, b: np.array([a[0], b[1], a[2], a[3]]),
+        np.linspace(0, 1, 50),
+        np.zeros((4, 50)),
+        tol=1e-8,
+    )
+    return found.y[2:, -1]
+
+
+def bent(load, condition, tmp_path):
+    """A horizontal arm held at its root, `load` = P L²/EI upwards at its tip, no gravity."""
+    E = 7e9
+    force = load * E * 0.02 * 0.01**3 / 12
+    scene = library.make_scene(
+        name="bent",
+        space="planar",
+        gravity=[0.0, 0.0],
+        body=[{"name": "arm", "link": link("arm", E, condition, modes=30)}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}],
+        trajectory=[{"name": "still", "joint": "O", "value": "0"}],
+        load=[{"point": "arm.tip", "y": f"{force!r}"}],
+        analysis=[{"name": "held", "kind": "static"}],
+    )
+    return solved(scene, tmp_path / f"{condition}.h5")
+
+
+def test_a_bent_cantilever_is_too_long_by_its_foreshortening(tmp_path):
+    """Loads across the link change no mode's stiffness: there deflection alone has to tell."""
+    results, told = bent(0.25, "cantilever", tmp_path)
+    tip = results["held/points/arm.tip/position"][0]
+    assert tip[1] == pytest.approx(0.25 / 3, rel=1e-3)
+    about = results.attributes("held/bodies/arm")
+    assert about["foreshortening"] == pytest.approx(tip[0] - elastica(0.25)[0], rel=0.03)
+    assert about["position_error"] == pytest.approx(about["foreshortening"], rel=1e-6)
+    assert len(told) == 1
+    assert "foreshorten" not in told[0]  # in the reader's words
+    assert "points may be off by 0.4" in told[0]
+
+
+def test_deflection_and_rotation_are_those_from_the_chord(tmp_path):
+    """The same bent link in either frame: w = P (L x²/2 − x³/6)/EI less the straight line through its ends."""
+    x = np.linspace(0.0, 1.0, 2001)
+    expected = 0.1 * np.abs(x**2 / 2 - x**3 / 6 - x / 3).max()
+    for condition in ("cantilever", "simply-supported"):
+        results, _ = bent(0.1, condition, tmp_path)
+        about = results.attributes("held/bodies/arm")
+        assert about["largest_deflection"] == pytest.approx(expected, rel=0.01)
+        assert about["largest_rotation"] == pytest.approx(0.1 / 3, rel=0.03)
+
+
+@pytest.fixture(scope="module")
+def soft_pendulum(tmp_path_factory):
+    """A scene file of a pendulum whose error is a third of its length."""
+    path = tmp_path_factory.mktemp("soft") / "scene.toml"
+    path.write_text(pendulum(3.5e9, "cantilever").text, encoding="utf-8")
+    return path
+
+
+def test_a_run_that_is_wrong_never_says_completed_alone(soft_pendulum, ffrobot):
+    done = ffrobot("solve", soft_pendulum)
+    assert done.returncode == 0, done.stderr
+    after_table = done.stdout.split("fall      forward")[1].splitlines()[1]
+    assert after_table.startswith("warning")
+    assert "results may be entirely wrong" in " ".join(done.stdout.split())
+    assert "divide the link" in " ".join(done.stdout.split())
+    results = soft_pendulum.with_suffix(".results.h5")
+    assert "completed, 1 warning" in ffrobot("info", results).stdout
+    with h5py.File(results) as file:
+        assert file["fall"].attrs["status"] == "completed"
+        assert file["fall/bodies/link1"].attrs["largest_deflection"] > 0.02
+
+
+def test_strict_makes_a_warning_an_error_and_keeps_results(soft_pendulum, ffrobot, tmp_path):
+    results = tmp_path / "strict.h5"
+    done = ffrobot("solve", soft_pendulum, "--strict", "-o", results)
+    assert done.returncode == 1
+    assert "entirely wrong" in done.stderr
+    assert "--strict" in done.stderr
+    assert results.exists()
+
+
+def test_a_run_that_ends_early_tells_what_it_has(ffrobot, tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(pendulum(1e9, "cantilever").text, encoding="utf-8")
+    done = ffrobot("solve", path)
+    assert done.returncode == 1
+    assert "warning" in done.stdout
+    with h5py.File(path.with_suffix(".results.h5")) as file:
+        assert file["fall"].attrs["status"] == "diverged"
+        assert len(file["fall"].attrs["warnings"]) == 1
+        assert max(file[f"fall/bodies/{name}"].attrs["largest_deflection"] for name in ("link1", "link2")) > 0.1

@@ -1,0 +1,116 @@
+"""Paths as machines run them, solved: time scaling, shapers for the robot's frequencies, what is left of vibrations."""
+
+import numpy as np
+import pytest
+
+import ffrobot
+from ffrobot.common.errors import InputError
+from ffrobot.mbs.fields.motion_laws import law_peak
+from ffrobot.run.fastest import least_stretch
+
+INERTIA, TURN = 0.3, 1.2
+RIGID = {"rigid": {"mass": 2.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}}
+BEAM = {
+    "link": {
+        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+        "geometry": {"kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 4e-3, "width": 0.03}},
+        "mesh": {"elements": 12},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 3, "family": "in-plane-bending"},
+        "damping": {"ratio": 0.005},
+    }
+}
+
+
+def arm(body, path, joint=None, end=2.0):
+    return ffrobot.make_scene(
+        name="arm",
+        gravity=[0.0, 0.0],
+        body=[{"name": "arm", **body}],
+        joint=[{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"], **(joint or {})}],
+        trajectory=[{"name": "swing", "joint": "shoulder", "via": [0.0, TURN], **path}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": end, "output_step": 1e-3}],
+    )
+
+
+@pytest.mark.parametrize("limit", [0.5, 2.0, 30.0])
+def test_fastest_rigid_arm_takes_its_limit(limit):
+    """I h p/(s T)² = limit, where p is the peak acceleration of the law."""
+    path = {"duration": 0.5, "fastest": True}
+    results = ffrobot.solve(arm(RIGID, path, {"moment_limit": limit}, end=4.0))
+    exact = np.sqrt(INERTIA * TURN * law_peak(4, 2) / limit) / 0.5
+    found = results.attributes("inverse/trajectories/swing")["stretch"]
+    assert exact <= found * (1 + 1e-4)  # a peak lies between outputs
+    assert found <= 1.0051 * exact
+    assert np.abs(results["inverse/joints/shoulder/moment"]).max() <= limit * (1 + 1e-9)
+
+
+def test_limits_of_the_path_hold_for_the_fastest_motion():
+    """Motors that are strong enough leave the path as it is."""
+    path = {"speed": 1.0, "acceleration": 5.0, "fastest": True}
+    results = ffrobot.solve(arm(RIGID, path, {"moment_limit": 100.0}, end=3.0))
+    assert results.attributes("inverse/trajectories/swing")["stretch"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("joint", "end", "says"),
+    [
+        ({}, 2.0, "expected limits of motors"),
+        ({"moment_limit": 0.05}, 2.0, 'end = 2 s of "inverse", found motor shoulder, which lacks a factor'),
+        ({"moment_limit": 0.05}, 0.4, "expected a path that is over before"),
+    ],
+)
+def test_what_cannot_be_made_faster_says_so(joint, end, says):
+    path = {"speed": 4.0, "acceleration": 40.0, "fastest": True}
+    with pytest.raises(InputError, match=says):
+        ffrobot.solve(arm(RIGID, path, joint, end))
+
+
+@pytest.mark.parametrize("limit", [0.013, 0.4, 1.0, 7.7])
+def test_least_stretch_is_found_from_both_sides(limit):
+    tried = []
+
+    def keeps(stretch):
+        tried.append(stretch)
+        return stretch >= limit
+
+    found = least_stretch(keeps, 0.01, 10.0)
+    assert limit <= found <= 1.005 * limit
+    assert len(tried) < 22
+
+
+def test_least_stretch_keeps_to_its_bounds():
+    assert least_stretch(lambda stretch: True, 0.5, 3.0) == 0.5
+    assert least_stretch(lambda stretch: False, 0.5, 3.0) is None
+
+
+def residual(results):
+    """Largest distance of the tip from where the arm without vibration would have it, after the path, m."""
+    over = results["inverse/time"] > results.attributes("inverse/trajectories/swing")["end"]
+    return np.abs(results["inverse/points/arm.tip/deflection"][over, 1]).max()
+
+
+def test_shapers_know_the_robot_and_leave_less_vibration():
+    """With its joint held the arm is a cantilever: 1.8751² √(EI/ρA)/(2π L²)."""
+    found = {}
+    for kind in ("none", "zv", "zvd", "ei"):
+        path = {"profile": "s-curve", "speed": 4.0, "acceleration": 30.0, "jerk": 2000.0, "shaper": {"kind": kind}}
+        found[kind] = ffrobot.solve(arm(BEAM, path))
+    frequency = found["zvd"].attributes("inverse/trajectories/swing")["shaper_frequency"]
+    height, length = 4e-3, 0.8
+    exact = 1.8751041**2 * np.sqrt(70e9 * height**2 / 12 / 2700.0) / (2 * np.pi * length**2)
+    assert frequency == pytest.approx([exact], rel=1e-4)
+    end = {kind: results.attributes("inverse/trajectories/swing")["end"] for kind, results in found.items()}
+    assert end["zv"] - end["none"] == pytest.approx(0.5 / exact, rel=1e-3)
+    assert end["zvd"] - end["none"] == pytest.approx(1 / exact, rel=1e-3)
+    left = {kind: residual(results) for kind, results in found.items()}
+    assert left["none"] > 5e-3
+    assert left["zv"] < 0.05 * left["none"]  # of higher modes, and of what the motion itself does to the frequency
+    assert left["zvd"] < 0.05 * left["none"]
+    assert left["ei"] < 0.1 * left["none"]
+
+
+def test_shaper_of_more_modes_than_there_are_is_refused():
+    path = {"duration": 0.5, "shaper": {"kind": "zv", "modes": 4}}
+    with pytest.raises(InputError, match=r"shaper\.modes: expected at most 3"):
+        ffrobot.solve(arm(BEAM, path))
