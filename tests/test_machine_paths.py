@@ -16,7 +16,7 @@ BEAM = {
         "geometry": {"kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 4e-3, "width": 0.03}},
         "mesh": {"elements": 12},
         "reference": {"condition": "cantilever"},
-        "modes": {"count": 3, "family": "in-plane-bending"},
+        "modes": {"count": 3, "family": "in-plane-bending", "attachment_modes": False},
         "damping": {"ratio": 0.005},
     }
 }

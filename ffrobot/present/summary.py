@@ -74,7 +74,9 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
             yield "motors only", f"{name}: {_inversion(outcome, outcome.details)}"
     if solution.mode_choice is not None:
         yield "modes", _modes(solution, solution.mode_choice)
-    if (raised := raised_in_words(solution.model)) and any(one.analysis.is_integrated for one in outcomes.values()):
+    if solution.divided:
+        yield "pieces", ", ".join(f"{name}: {len(body.names)}" for name, body in solution.divided.items())
+    elif (raised := raised_in_words(solution.model)) and any(one.analysis.is_integrated for one in outcomes.values()):
         yield "modes", raised
     yield "accuracy", "\n".join(error_budget(solution))
     yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())

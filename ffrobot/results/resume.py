@@ -70,7 +70,7 @@ def write_state(file: h5py.File, solution: Solution) -> None:
         return
     for name, outcome in solution.outcomes.items():
         if _goes_on(solution, outcome):
-            _write_outcome(file[name].create_group(GROUP), outcome)
+            _write_outcome(file[name].create_group(GROUP), outcome.computed)
 
 
 def how_to_go_on(solution: Solution, command: str) -> str:
@@ -95,8 +95,8 @@ def _stopped(solution: Solution) -> Outcome | None:
 
 
 def _goes_on(solution: Solution, outcome: Outcome) -> bool:
-    """Whether `outcome` is of use to `resume`; a search for modes has bodies of its own and starts again."""
-    searched = any(body.modes == "auto" for body in solution.scene.body)
+    """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
+    searched = any("auto" in (body.modes, body.pieces) for body in solution.scene.body)
     return not searched and outcome.analysis.is_resumable
 
 

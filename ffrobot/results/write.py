@@ -86,6 +86,8 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
         group.attrs.update({f"check_{key}": value for key, value in check.items()})
     write_motion(group, outcome)
     write_bending(group, result.bending)
+    for body, divided in solution.divided.items():
+        group[f"bodies/{body}"].attrs["pieces"] = len(divided.names)
     write_forces(group, outcome)
     write_actuators(group, solution, result)
     for body, stress in result.stresses.items():

@@ -11,10 +11,11 @@ from ..actuation.patches.patches import PatchArray, check_reach, patch_array
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.points import point_set, with_points
 from ..common.errors import InputError, of_file
-from ..mbs.model.model import ModalLoad, build_model
+from ..mbs.model.model import ModalLoad, Model, build_model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.solve.robot_damping import with_robot_damping
 from ..scene.load import load_scene
+from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody, add_patches, load_bodies
 from .mode_choice import truncation_levels, whole_bodies
@@ -42,7 +43,35 @@ def _prepared(scene: Scene, watcher: Watcher, began: float) -> Solution:
     structure = add_patches(scene, bodies)
     first = truncation_levels(scene, whole_bodies(bodies))[0]
     bodies = {name: replace(body, planar=first.get(name, body.planar)) for name, body in bodies.items()}
-    return _assembled(scene, bodies, structure, seconds, stiffened=scene.geometric_stiffening is True)
+    counts = {body.name: 1 if body.pieces == "auto" else body.pieces for body in scene.body if body.pieces is not None}
+    is_stiffened = bool(counts) or scene.geometric_stiffening is True
+    solution = _assembled(scene, bodies, structure, seconds, stiffened=is_stiffened)
+    return with_pieces(solution, counts, watcher)
+
+
+def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher) -> Solution:
+    """The scene with the bodies named in so many pieces each, nothing solved yet: equations are those of the pieces."""
+    divided = bodies_in_pieces(solution.scene, counts)
+    whole = solution if solution.whole is None else replace(solution, model=solution.whole)
+    if not divided:
+        return replace(whole, analyses={}, divided={}, parts={}, whole=None)
+    scene = scene_of_pieces(solution.scene, divided)
+    loaded = load_bodies(scene, watcher.stage)
+    parts = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
+    return _in_pieces(replace(whole, analyses={}), divided, parts)
+
+
+def _in_pieces(whole: Solution, divided: Mapping[str, BodyInPieces], parts: Mapping[str, LoadedBody]) -> Solution:
+    """The solution with the equations of the pieces in place of those of their links."""
+    if not divided:
+        return whole
+    planar = [_equations_of(part, whole.stiffened) for part in parts.values()]
+    model = _damped(build_model(scene_of_pieces(whole.scene, divided), planar), parts)
+    return replace(whole, model=model, whole=whole.model, divided=divided, parts=parts)
+
+
+def _equations_of(body: LoadedBody, stiffened: bool) -> PlanarBody:
+    return body.planar if stiffened else replace(body.planar, stiffening=None)
 
 
 def with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Solution:
@@ -53,12 +82,14 @@ def with_bodies(solution: Solution, planar: Mapping[str, PlanarBody]) -> Solutio
 
 def with_scene(solution: Solution, scene: Scene) -> Solution:
     """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
-    return _assembled(scene, solution.bodies, solution.structure, solution.preparation, solution.stiffened)
+    found = _assembled(scene, solution.bodies, solution.structure, solution.preparation, solution.stiffened)
+    return _in_pieces(found, solution.divided, solution.parts)
 
 
 def stiffened(solution: Solution) -> Solution:
     """The scene with geometric stiffening, nothing solved yet."""
-    return _assembled(solution.scene, solution.bodies, solution.structure, solution.preparation, stiffened=True)
+    whole = _assembled(solution.scene, solution.bodies, solution.structure, solution.preparation, stiffened=True)
+    return _in_pieces(whole, solution.divided, solution.parts)
 
 
 def _assembled(
@@ -86,15 +117,10 @@ def _assembled(
         name: replace(body, planar=with_points(body.planar, points[name])) if name in points else body
         for name, body in bodies.items()
     }
-    ratios = {
-        name: float(modal.damping_ratio[0])
-        for name, body in bodies.items()
-        if (modal := body.modal) is not None and modal.damping_of == "robot"
-    }
-    planar = [body.planar if stiffened else replace(body.planar, stiffening=None) for body in bodies.values()]
+    planar = [_equations_of(body, stiffened) for body in bodies.values()]
     return Solution(
         scene=scene,
-        model=with_robot_damping(build_model(scene, planar, list(_voltage_loads(scene, patches))), ratios),
+        model=_damped(build_model(scene, planar, list(_voltage_loads(scene, patches))), bodies),
         bodies=bodies,
         patches=patches,
         points=points,
@@ -103,6 +129,16 @@ def _assembled(
         omissions=tuple(omissions(scene, bodies)),
         stiffened=stiffened,
     )
+
+
+def _damped(model: Model, bodies: Mapping[str, LoadedBody]) -> Model:
+    """The model with the damping that links want of the robot's vibrations."""
+    ratios = {
+        name: float(modal.damping_ratio[0])
+        for name, body in bodies.items()
+        if (modal := body.modal) is not None and modal.damping_of == "robot"
+    }
+    return with_robot_damping(model, ratios)
 
 
 def _check_stiffening(scene: Scene, bodies: Mapping[str, LoadedBody], stiffened: bool) -> None:

@@ -16,6 +16,7 @@ from ..mbs.analysis.outcome import EarlierRun, Outcome
 from ..mbs.model.model import Model
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending
+from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody
 
@@ -113,6 +114,8 @@ class Solution:
         omissions: what the scene did not need, one line each.
         mode_choice: where `modes = "auto"`.
         stiffened: whether geometric stiffening is in the equations.
+        divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`, and `whole` the
+            one without them.
         earlier: runs of analyses to go on with, from a results file: see `results.resume`.
         path_notes: what was found of paths before the analyses, one line each.
         failure: what ended the run, where that was an error after analyses that are worth keeping.
@@ -132,6 +135,9 @@ class Solution:
     earlier: Mapping[str, EarlierRun] = field(default_factory=dict)
     path_notes: tuple[str, ...] = ()
     failure: Exception | None = None
+    divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
+    parts: Mapping[str, LoadedBody] = field(default_factory=dict)
+    whole: Model | None = None
 
     @property
     def outcomes(self) -> Mapping[str, Outcome]:

@@ -26,7 +26,8 @@ from .evaluation import evaluated
 from .finer import check_on, finer_scene
 from .mode_choice import ModeSearch
 from .paths import with_paths
-from .prepare import prepare, stiffened, with_bodies
+from .pieces import as_one_link, wanted_pieces, worst_of_pieces
+from .prepare import prepare, stiffened, with_bodies, with_pieces
 from .solution import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
 
@@ -59,6 +60,8 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
         )
         if any(body.modes == "auto" for body in solution.scene.body):
             solution = _with_enough_modes(solution, watcher, interruption)
+        elif any(body.pieces == "auto" for body in solution.scene.body):
+            solution = _with_enough_pieces(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
         solution = replace(_checked(_evaluated(solution), watcher), path_notes=path_notes)
@@ -75,10 +78,19 @@ def _evaluated(solution: Solution) -> Solution:
     for name, result in results.items():
         try:
             with of_file(solution.scene.path):
-                results[name] = evaluated(solution, result)
+                results[name] = evaluated(solution, told_of_links(solution, result))
         except Exception as error:
             failure = failure or error
     return replace(solution, analyses=results, failure=failure)
+
+
+def told_of_links(solution: Solution, result: AnalysisResult) -> AnalysisResult:
+    """The result of links in pieces as that of the one link each."""
+    if solution.whole is None:
+        return result
+    links, pieces = solution.bodies, solution.parts
+    outcome = as_one_link(result.outcome, solution.whole, links, solution.divided, pieces)
+    return replace(result, outcome=outcome, bending=worst_of_pieces(result.bending, solution.divided))
 
 
 def _checked(solution: Solution, watcher: Watcher) -> Solution:
@@ -113,6 +125,15 @@ def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Inter
     return replace(solution, mode_choice=search.choice())
 
 
+def _with_enough_pieces(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+    """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
+    solution = _completed(solution, watcher, interruption)
+    given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
+    while solution.failure is None and not interruption.requested and (wanted := wanted_pieces(solution)):
+        solution = _completed(with_pieces(solution, given | wanted, watcher), watcher, interruption)
+    return solution
+
+
 def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
     """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
     found = _run_all(solution, watcher, interruption) or _run_all(stiffened(solution), watcher, interruption)
@@ -122,7 +143,9 @@ def _completed(solution: Solution, watcher: Watcher, interruption: Interruption)
 
 def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution | None:
     """The analyses up to the first that fails; None where `geometric_stiffening = "auto"` asks for them all again."""
-    stiffening = {name: body.planar.stiffening for name, body in solution.bodies.items()}
+    bodies = solution.parts or solution.bodies
+    stiffening = {name: body.planar.stiffening for name, body in bodies.items()}
+    links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
     results: dict[str, AnalysisResult] = {}
     for analysis in solution.scene.analysis:
         if interruption.requested and results:
@@ -144,7 +167,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
             for body, array in solution.patches.items()
         }  # fmt: skip
-        bent = bending(outcome, solution.links, changes, solution.stiffened)
+        bent = bending(outcome, links, changes, solution.stiffened)
         results[analysis.name] = AnalysisResult(outcome, bent, time.perf_counter() - began, voltages)
         _log(outcome)
         if outcome.failed:

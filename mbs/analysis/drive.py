@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array, as_list
-from ...common.errors import SolveError
 from .. import _core
 from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
-from ..solve.diagnosis import find_cause, lost_inertia
+from ..solve.diagnosis import find_cause
 from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls
 from ..solve.state import State
@@ -76,7 +75,7 @@ def drive(
     raised.
 
     Under `steering` from outside, or sampled `control`. It goes on with an `earlier` run of the same analysis. An
-    integration that ends early is kept with its cause. Raises `SolveError` for a start without inertia.
+    integration that ends early is kept with its cause.
     """
     times = analysis.times if times is None else times
     if earlier is not None:
@@ -88,8 +87,6 @@ def drive(
             analysis, reported or assembly, earlier.motion, earlier.forces, earlier.statistics,
             continuation=replace(earlier.continuation, assembly=integrated),
         )  # fmt: skip
-    if len(times) > 1 and (cause := lost_inertia(assembly, start.q)):
-        raise SolveError(f'{assembly.model.scene.path}: analysis "{analysis.name}": at the start {cause}')
     began = time.perf_counter()
     if earlier is None:
         integrator = choose_integrator(assembly, analysis, start, steering, len(times))

@@ -169,7 +169,11 @@ class Details:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What an analysis computed; `gears` by joint, of inverse analyses with elastic gears."""
+    """What an analysis computed; `gears` by joint, of inverse analyses with elastic gears.
+
+    Where links were divided, it is told of the one link; `in_pieces` is what was computed, and `point_names` say which
+    point of which piece a point of the link is there.
+    """
 
     analysis: Analysis
     assembly: MechanismSystem
@@ -179,6 +183,13 @@ class Outcome:
     details: Details = field(default=Details(), repr=False)
     gears: Mapping[str, GearMotion] = field(default_factory=dict)
     continuation: Continuation | None = field(default=None, repr=False)
+    in_pieces: Outcome | None = field(default=None, repr=False)
+    point_names: Mapping[str, str] = field(default_factory=dict, repr=False)
+
+    @property
+    def computed(self) -> Outcome:
+        """The outcome as computed: that of the pieces where links were divided, else itself."""
+        return self.in_pieces or self
 
     @property
     def time(self) -> Array:

@@ -25,22 +25,34 @@ class GeometricStiffening:
 
     K_omega (n, n) of θ̇² = 1; K_s (2, n, n) of forces ρ along x and y (the opposite of a frame acceleration); K_h (n, n)
     likewise of an angular acceleration; K_points: (3, n, n) of forces along x and y and a moment at each interface.
+    rotary (n, n): Σ I_p φφᵀ of payloads, which have no extent: what K_omega and m_xy would have more of if their moment
+    of inertia were masses about the point, which turn with it.
     """
 
     K_omega: Array
     K_s: Array
     K_h: Array
     K_points: Mapping[str, Array]
+    rotary: Array
 
     def transformed(self, T: Array) -> GeometricStiffening:
         """In coordinates p' with p = T p'."""
         points = {name: T.T @ K @ T for name, K in self.K_points.items()}
         return GeometricStiffening(
-            T.T @ self.K_omega @ T, T.T @ self.K_s @ T, T.T @ self.K_h @ T, MappingProxyType(points)
+            T.T @ self.K_omega @ T,
+            T.T @ self.K_s @ T,
+            T.T @ self.K_h @ T,
+            MappingProxyType(points),
+            T.T @ self.rotary @ T,
         )
 
-    def with_payload(self, point: str, position: Array, mass: float, inertia: float) -> GeometricStiffening:
-        """With a mass (kg) and moment of inertia (kg·m²) at one of its points: the loads of their inertia are added."""
+    def with_payload(
+        self, point: str, position: Array, rotation: Array, mass: float, inertia: float
+    ) -> GeometricStiffening:
+        """With a mass (kg) and moment of inertia (kg·m²) at one of its points: the loads of their inertia are added.
+
+        position (2,) m and section rotation (n,) of the point.
+        """
         n = len(self.K_h)
         K_x, K_y, K_phi = self.K_points.get(point, np.zeros((3, n, n)))
         x, y = position
@@ -49,6 +61,7 @@ class GeometricStiffening:
             self.K_s + mass * np.array([K_x, K_y]),
             self.K_h + mass * (x * K_y - y * K_x) + inertia * K_phi,
             self.K_points,
+            self.rotary + inertia * np.outer(rotation, rotation),
         )
 
 
@@ -63,21 +76,33 @@ def from_modal_body(body: ModalBody, in_plane: Indices) -> GeometricStiffening |
         if f"force/{name}/x" in K
     }
     # The file's loads are d'Alembert's: opposite to the acceleration.
-    return GeometricStiffening(K["omega_zz"], np.array([-K["t_x"], -K["t_y"]]), -K["r_z"], MappingProxyType(points))
+    return GeometricStiffening(
+        K["omega_zz"],
+        np.array([-K["t_x"], -K["t_y"]]),
+        -K["r_z"],
+        MappingProxyType(points),
+        np.zeros((len(in_plane), len(in_plane))),
+    )
 
 
-def core_arguments(stiffening: GeometricStiffening | None, markers: list[str]) -> dict[str, list[Array] | Array]:
-    """`second_order` (by rows of W) and `K_omega` of `_core.System.add_body`; empty where they vanish."""
+def core_arguments(stiffening: GeometricStiffening | None, markers: list[str]) -> dict[str, list[Array]]:
+    """Arguments of `_core.System.add_body`, with empty matrices for those that vanish.
+
+    `second_order` is by rows of markers; `geometric_stiffness` is K of mbs/core/body/affine_inertia.h: of x, y, stretch
+    and turn.
+    """
     none = np.zeros((0, 0))
     if stiffening is None:
-        return {"second_order": [], "K_omega": none}
+        return {"second_order": [], "geometric_stiffness": [none] * 4}
     n = len(stiffening.K_omega)
-    rows = [*stiffening.K_s, stiffening.K_h]
-    for name in markers:
-        rows += list(stiffening.K_points.get(name, np.zeros((3, n, n))))
-    largest = max((float(np.abs(K).max(initial=0.0)) for K in [*rows, stiffening.K_omega]), default=0.0)
-    rows = [K if np.abs(K).max(initial=0.0) > NEGLIGIBLE * largest else none for K in rows]
-    return {"second_order": rows, "K_omega": stiffening.K_omega if n else none}
+    at_markers = [K for name in markers for K in stiffening.K_points.get(name, np.zeros((3, n, n)))]
+    affine = [*stiffening.K_s, stiffening.K_omega + stiffening.rotary, stiffening.K_h]
+    largest = max(float(np.abs(K).max(initial=0.0)) for K in [*at_markers, *affine])
+
+    def kept(matrices: list[Array]) -> list[Array]:
+        return [K if np.abs(K).max(initial=0.0) > NEGLIGIBLE * largest else none for K in matrices]
+
+    return {"second_order": kept(at_markers), "geometric_stiffness": kept(affine)}
 
 
 def second_order_displacement(stiffening: GeometricStiffening | None, point: str, p: Array) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.plane import perpendicular, rotation
+from .geometric_stiffening import GeometricStiffening
 from .planar_body import PlanarBody, PlanarPoint, diagonalised
 from .system import MechanismSystem
 
@@ -16,7 +17,7 @@ from .system import MechanismSystem
 def with_payload(body: PlanarBody, point: str, mass: float, inertia: float) -> PlanarBody:
     """The body with a point mass (kg) and moment of inertia (kg·m²) on one of its points, modes made anew."""
     at = body.points[point]
-    stiffening = body.stiffening and body.stiffening.with_payload(point, at.position, mass, inertia)
+    stiffening = body.stiffening and body.stiffening.with_payload(point, at.position, at.rotation, mass, inertia)
     return with_masses(replace(body, stiffening=stiffening), [at], np.array([mass]), np.array([inertia]))
 
 
@@ -54,19 +55,38 @@ def mass_matrix(body: PlanarBody, q: Array) -> Array:
 
     docs/theory.md, Equations of motion of a planar body (Shabana, Dynamics of Multibody Systems, ch. 5).
     """
-    theta, p = q[2], q[3:]
-    A = rotation(theta)
-    s, s_p, inertia, h = body.first_moment + body.S_bar @ p, body.S_bar, body.m_xy, body.h + p @ body.S_tilde
-    if (K := body.stiffening) is not None:
-        s, s_p, inertia, h = s - 0.5 * p @ K.K_s @ p, s_p - K.K_s @ p, inertia - K.K_omega, h - K.K_h @ p
+    p, to_global = q[3:], np.eye(len(q))
+    to_global[:2, :2] = rotation(q[2])
+    if body.stiffening is not None and len(p):
+        return np.asarray(to_global @ _stiffened_mass_matrix(body, body.stiffening, p) @ to_global.T)
     M = np.eye(len(q))
     M[:2, :2] = body.mass * np.eye(2)
-    M[:2, 2] = M[2, :2] = perpendicular(A @ s)
-    M[:2, 3:] = A @ s_p
+    M[:2, 2] = M[2, :2] = perpendicular(body.first_moment + body.S_bar @ p)
+    M[:2, 3:] = body.S_bar
     M[3:, :2] = M[:2, 3:].T
-    M[2, 2] = body.inertia + 2 * body.j @ p + p @ inertia @ p
-    M[2, 3:] = M[3:, 2] = h
-    return M
+    M[2, 2] = body.inertia + 2 * body.j @ p + p @ body.m_xy @ p
+    M[2, 3:] = M[3:, 2] = body.h + p @ body.S_tilde
+    return np.asarray(to_global @ M @ to_global.T)
+
+
+def _stiffened_mass_matrix(body: PlanarBody, stiffening: GeometricStiffening, p: Array) -> Array:
+    """M (3 + n, 3 + n) in body axes: XᵀN⁻¹X of the affine part, and that of the rest.
+
+    Symbols: mbs/core/body/affine_inertia.h.
+    """
+    m, (s_x, s_y), J = body.mass, body.first_moment, body.inertia
+    N = np.array([[m, 0, s_x, -s_y], [0, m, s_y, s_x], [s_x, s_y, J, 0], [-s_y, s_x, 0, J]])
+    i = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, -1], [0, 0, 1, 0]])
+    F = np.vstack([body.S_bar, body.j, body.h])
+    K = np.array([*stiffening.K_s, stiffening.K_omega + stiffening.rotary, stiffening.K_h])
+    g = N[:, 2] + F @ p - 0.5 * p @ K @ p
+    X = np.column_stack([N[:, :2], i @ g, F - K @ p])
+    N_F = np.linalg.solve(N, F)
+    rest = np.zeros((3 + len(p), 3 + len(p)))
+    rest[2, 2] = p @ (body.m_xy + stiffening.rotary - F.T @ N_F) @ p
+    rest[2, 3:] = rest[3:, 2] = p @ (body.S_tilde - (i @ F).T @ N_F)
+    rest[3:, 3:] = np.eye(len(p)) - F.T @ N_F
+    return np.asarray(X.T @ np.linalg.solve(N, X) + rest)
 
 
 def system_mass_matrix(system: MechanismSystem, q: Array) -> Array:

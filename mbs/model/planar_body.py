@@ -186,6 +186,8 @@ def transformed(body: PlanarBody, T: Array, stiffness: Array) -> PlanarBody:
 
 def core_arguments(body: PlanarBody, markers: list[PlanarPoint], names: list[str]) -> dict[str, Any]:
     """Arguments of `_core.System.add_body`; terms that vanish are passed as empty arrays, which the core skips."""
+    if body.stiffening is not None:
+        body = replace(body, m_xy=body.m_xy + body.stiffening.rotary)
     n, vanishing = body.n_modes, vanishing_terms(body)
     diagonal = np.array_equal(body.damping, np.diag(np.diag(body.damping)))
     none = np.zeros((0, 0))

@@ -68,11 +68,18 @@ def modes_of_file(outcome: Outcome, body: PlanarBody) -> Array:
 
 
 def point_motion(outcome: Outcome, reference: str) -> PointMotion:
-    """Motion of "BODY.POINT": r = R + A (x + Φ p), and what geometric stiffening takes off Φp where it is on."""
+    """Motion of "BODY.POINT": r = R + A (x + Φ p), and what geometric stiffening takes off Φp where it is on.
+
+    Of a link in pieces the position is that of its pieces, and the deflection how far it is from x in the link's frame.
+    """
     name, label = split_point(reference)
     body = outcome.assembly.model.body(name)
     point = body.points[label]
     q = outcome.q[:, outcome.coordinates(name)]
+    if reference in outcome.point_names:
+        assert outcome.in_pieces is not None
+        position = point_motion(outcome.in_pieces, outcome.point_names[reference]).position
+        return PointMotion(position, rotated(-q[:, 2], position - q[:, :2]) - point.position)
     deflection = q[:, 3:] @ point.translation.T + second_order_displacement(body.stiffening, label, q[:, 3:])
     return PointMotion(q[:, :2] + rotated(q[:, 2], point.position + deflection), deflection)
 
@@ -95,6 +102,7 @@ def trajectory_target(outcome: Outcome, trajectory: str) -> Array:
 
 def joint_forces(outcome: Outcome, joint: str) -> JointForces:
     """Reaction of a joint on its second body, and what its motor does."""
+    outcome = outcome.computed
     assembly, reaction, moment = outcome.assembly, np.zeros((len(outcome.time), 2)), None
     for i, constraint in enumerate(assembly.constraints):
         if constraint.is_trajectory or constraint.owner != joint:
@@ -126,5 +134,6 @@ def motor_angle(outcome: Outcome, joint: str) -> Array | None:
 
 def energies(outcome: Outcome) -> dict[str, Array]:
     """Kinetic, strain and gravitational energy (J) and dissipated power (W), each (T,)."""
+    outcome = outcome.computed
     values = outcome.assembly.system.energies(outcome.q, outcome.v)
     return dict(zip(("kinetic", "strain", "gravitational", "dissipated_power"), values.T, strict=True))

@@ -1,4 +1,4 @@
-"""What the loads of a run do to the stiffness of links."""
+"""What the loads of a run do to the stiffness of links, and how far they bend them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...common.arrays import Array
 from ...common.plane import rotated
 from ..analysis.outcome import Outcome
 from ..model.geometric_stiffening import GeometricStiffening
+from ..model.planar_body import PlanarBody
 
 NOTABLE = 0.01  # relative change of a mode's stiffness from which on the summary warns, and "auto" switches it on
 
@@ -37,3 +39,31 @@ def stiffness_changes(outcome: Outcome, stiffening: Mapping[str, GeometricStiffe
                 diagonal += loads @ np.einsum("kii->ki", known.K_points[point])
         changes[body.name] = float((np.abs(diagonal) / body.stiffness).max(initial=0.0))
     return changes
+
+
+def shortenings(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> dict[str, Array]:
+    """By body, b(t) = ½|pᵀβp| (T,): what bending takes off the length of a link, relative to it.
+
+    `stiffening` by the names of bodies, whether it was on in the run or not; bodies without it are left out. The error
+    of a tip, relative to the length of its link, was 0.1 to 0.6 b in motions from b = 1e-4 to 4e-2 with stiffening on.
+    """
+    bodies = [(body, stiffening.get(body.name)) for body in outcome.assembly.model.bodies]
+    return {
+        body.name: shortening(body, known, outcome.q[:, outcome.coordinates(body.name)][:, 3:])
+        for body, known in bodies
+        if known is not None and body.n_modes
+    }
+
+
+def shortening(body: PlanarBody, stiffening: GeometricStiffening, p: Array) -> Array:
+    """B (T,) of modal coordinates p (T, n).
+
+    −½pᵀα_k p + … are the coefficients of the affine fields nearest to the second-order displacement −½pᵀGp
+    (mbs/core/body/affine_inertia.h); b is the size of that of (x, y) and its turn.
+    """
+    m, s, J = body.mass, complex(*body.first_moment), body.inertia
+    K = np.array(
+        [stiffening.K_s[0] + 1j * stiffening.K_s[1], stiffening.K_omega + stiffening.rotary + 1j * stiffening.K_h]
+    )
+    beta = (m * K[1] - s.conjugate() * K[0]) / (m * J - abs(s) ** 2)
+    return np.asarray(0.5 * np.abs(np.einsum("ti,ij,tj->t", p, beta, p)))

@@ -58,6 +58,9 @@ class Body(Record):
 
     `modes` of a flexible body: how many of the lowest that move in the plane; the others are represented by their
     static flexibility. "auto" takes as many as the tolerances of the analyses need; the default is all.
+
+    `pieces` of a beam link: into how many it is divided for large deflections, "auto": as many as these need. Results
+    are those of the one link, and geometric stiffening is on.
     """
 
     name: Name
@@ -70,12 +73,17 @@ class Body(Record):
     """A body that does not deform."""
     modes: Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)] | None = None
     """How many of the lowest in-plane modes; "auto": as many as the tolerances need; all where it is left out."""
+    pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
+    """Of a beam link that bends far: how many welded pieces stand for it; "auto": as many as it needs."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Body:
         one_of(self, ("link", "modal", "rigid"))
         if self.rigid is not None and self.modes is not None:
             raise ValueError(f'expected the key "modes" only in flexible bodies, found it in a rigid one: {self.modes}')
+        if self.pieces is not None and (self.link is None or self.modes is not None):
+            beside = "modes" if self.modes is not None else "modal" if self.modal is not None else "rigid"
+            raise ValueError(f'expected "pieces" beside "link" alone, found "{beside}"')
         return self
 
 

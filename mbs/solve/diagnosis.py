@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array
-from ..model.masses import system_mass_matrix
 from ..model.system import MechanismSystem
 from .path_checks import JUMP
 from .position import frame_gradients
@@ -18,12 +17,11 @@ FAR_BENT = 0.5  # of a link's length, in the mean
 def find_cause(assembly: MechanismSystem, t: float, state: State) -> str:
     """A sentence with numbers and advice; empty where nothing is found.
 
-    The likely causes, the more certain first: a state or target that is not a number, a mass matrix that has lost its
-    sense (geometric stiffening), a link bent too far, constraints that turn singular.
+    The likely causes, the more certain first: a state or target that is not a number, a link bent too far, a load that
+    jumps, constraints that turn singular.
     """
     return (
         _not_a_number(assembly, t, state)
-        or lost_inertia(assembly, state.q)
         or _bent(assembly, state.q)
         or _load_jumps(assembly, t)
         or _singular(assembly, t, state.q)
@@ -37,33 +35,6 @@ def _not_a_number(assembly: MechanismSystem, t: float, state: State) -> str:
     if not np.isfinite(assembly.system.evaluate(t, state.q, state.v)[0]).all():
         return "the accelerations there are no finite numbers: a load or a target grows without bound"
     return ""
-
-
-def lost_inertia(assembly: MechanismSystem, q: Array) -> str:
-    """A sentence where a motion that the constraints allow has no kinetic energy left; empty otherwise.
-
-    m_θθ − pᵀK_ω p has to stay above what the modes take of it, hhᵀ: n modes of a cantilever leave about 1/n³ of J.
-    """
-    stiffened = [body for body in assembly.model.bodies if body.stiffening is not None and body.n_modes]
-    if not stiffened:
-        return ""
-    _, _, C_q = assembly.system.constraints(0.0, q, np.zeros_like(q))
-    free = np.linalg.svd(C_q)[2][len(C_q) :].T if len(C_q) else np.eye(len(q))
-    M = free.T @ system_mass_matrix(assembly, q) @ free
-    undeformed = q.copy()
-    for first, body in zip(assembly.first, assembly.model.bodies, strict=True):
-        undeformed[first + 3 : first + 3 + body.n_modes] = 0.0
-    least, at_first = (
-        float(np.linalg.eigvalsh(m)[0]) for m in (M, free.T @ system_mass_matrix(assembly, undeformed) @ free)
-    )
-    if least > 0.1 * at_first:
-        return ""
-    names = ", ".join(f'"{body.name}"' for body in stiffened)
-    return (
-        f"geometric stiffening has taken away all inertia that the modes of {names} leave (least eigenvalue of the mass"
-        f" matrix {least:.2g}, straight {at_first:.2g}): its second-order terms end here; use fewer modes,"
-        " links divided in two, or geometric_stiffening = false"
-    )
 
 
 def _load_jumps(assembly: MechanismSystem, t: float) -> str:

@@ -52,6 +52,13 @@ def test_pages_that_are_generated_are_those_in_the_repository(monkeypatch):
         assert (measured.parent / name).read_text(encoding="utf-8") == text, name
 
 
+def test_first_page_lists_all_pages_for_readers_of_the_repository():
+    """There the lists of the site are not links."""
+    text = (DOCS / "index.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\* \[.*\]\((.*)\.md\)$", text, flags=re.MULTILINE)
+    assert listed == re.findall(r"^[a-z_/]+$", text, flags=re.MULTILINE)
+
+
 @pytest.mark.parametrize("page", [*sorted(DOCS.rglob("*.md")), DOCS.parent / "README.md"], ids=lambda page: page.stem)
 def test_no_link_leads_nowhere(page):
     """As the repository shows the page: links and pictures within it, and the list of pages of the site."""

@@ -53,6 +53,7 @@ def ritz_link(name, condition, length=1.0, mass=1.0, EI=30.0, modes=3, damping_r
             "mid": np.array([point_stiffness(0.5), zero, zero]),
             "tip": np.array([stiffness_of(np.ones_like(xi)), zero, zero]),
         },
+        rotary=zero,
     )
     return PlanarBody(
         name=name,

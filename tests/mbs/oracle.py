@@ -18,12 +18,44 @@ def rotation_derivative(theta):
     return np.array([[-np.sin(theta), -np.cos(theta)], [np.cos(theta), -np.sin(theta)]])
 
 
-def frame_stiffness(body):
-    """K of θ̇² (n, n), of forces ρ along x and y (2, n, n), of ρ times the arm (n, n): zero where left out."""
+@dataclass
+class Fields:
+    """Positions in the body frame, x + iy = u · (1, x + iy, Φ_x + iΦ_y) with u = (−½pᵀαp, 1 − ½pᵀβp, p).
+
+    H (2 + n, 2 + n): products of the fields; u and its Jacobian u_p (2 + n, n); curvature (2 + n, n, n) of u;
+    m_out = m_ff − m_xy: of what moves otherwise than in the plane.
+    """
+
+    H: np.ndarray
+    u: np.ndarray
+    u_p: np.ndarray
+    curvature: np.ndarray
+    m_out: np.ndarray
+
+
+def fields(body, p):
     n = body.n_modes
-    if body.stiffening is None:
-        return np.zeros((n, n)), np.zeros((2, n, n)), np.zeros((n, n))
-    return body.stiffening.K_omega, body.stiffening.K_s, body.stiffening.K_h
+    m_xy, K = body.m_xy, np.zeros((2, n, n), dtype=complex)
+    if body.stiffening is not None:
+        m_xy = m_xy + body.stiffening.rotary
+        K[0] = body.stiffening.K_s[0] + 1j * body.stiffening.K_s[1]
+        K[1] = body.stiffening.K_omega + body.stiffening.rotary + 1j * body.stiffening.K_h
+    s0 = complex(*body.first_moment)
+    of_modes = np.array([body.S_bar[0] + 1j * body.S_bar[1], body.j + 1j * body.h])
+    affine = np.array([[body.mass, s0], [s0.conjugate(), body.inertia]])
+    H = np.block([[affine, of_modes], [of_modes.conj().T, m_xy + 1j * body.S_tilde]])
+    curvature = np.zeros((2 + n, n, n), dtype=complex)
+    curvature[:2] = -np.einsum("ij,jkl->ikl", np.linalg.pinv(affine, hermitian=True), K)
+    u = np.concatenate([[0, 1], p]) + 0.5 * p @ curvature @ p
+    u_p = np.vstack([np.zeros((2, n)), np.eye(n)]) + curvature @ p
+    return Fields(H, u, u_p, curvature, np.eye(n) - m_xy)
+
+
+def directions(f, p):
+    """T (2 + n, 3 + n): what R (body axes), θ and p do to the coefficients of the fields."""
+    first = np.zeros_like(f.u)
+    first[0] = 1
+    return np.column_stack([first, 1j * first, 1j * f.u, f.u_p])
 
 
 def point_stiffness(body, label):
@@ -36,37 +68,30 @@ def point_stiffness(body, label):
 
 def first_moment(body, p):
     """s = ∫ρ (x + Φp − ½ pᵀK p) and its derivative with respect to p."""
-    _, K_s, _ = frame_stiffness(body)
+    K_s = np.zeros((2, len(p), len(p))) if body.stiffening is None else body.stiffening.K_s
     return body.first_moment + body.S_bar @ p - 0.5 * p @ K_s @ p, body.S_bar - K_s @ p
 
 
+def in_global_axes(theta, force):
+    return np.concatenate([rotation(theta) @ force[:2], force[2:]])
+
+
 def mass_matrix(body, q):
-    """M (3 + n, 3 + n) of one body."""
-    theta, p = q[2], q[3:]
-    A, A_theta = rotation(theta), rotation_derivative(theta)
-    s, s_p = first_moment(body, p)
-    K_omega, _, K_h = frame_stiffness(body)
-    M = np.zeros((len(q), len(q)))
-    M[:2, :2] = body.mass * np.eye(2)
-    M[:2, 2] = M[2, :2] = A_theta @ s
-    M[:2, 3:] = A @ s_p
-    M[3:, :2] = M[:2, 3:].T
-    M[2, 2] = body.inertia + 2 * body.j @ p + p @ (body.m_xy - K_omega) @ p
-    M[2, 3:] = M[3:, 2] = body.h + p @ body.S_tilde - K_h @ p
-    M[3:, 3:] = np.eye(len(p))
-    return M
+    """M = Re TᴴHT (3 + n, 3 + n) of one body."""
+    p, f = q[3:], fields(body, q[3:])
+    T = directions(f, p)
+    M = (T.conj().T @ f.H @ T).real
+    M[3:, 3:] += f.m_out
+    A = np.eye(len(q))
+    A[:2, :2] = rotation(q[2])
+    return A @ M @ A.T
 
 
 def quadratic_velocity_forces(body, q, v):
-    """Q_v: the Coriolis and centrifugal forces."""
-    theta, p, theta_dot, p_dot = q[2], q[3:], v[2], v[3:]
-    A, A_theta = rotation(theta), rotation_derivative(theta)
-    s, s_p = first_moment(body, p)
-    K_omega, K_s, K_h = frame_stiffness(body)
-    Q_R = theta_dot**2 * A @ s - 2 * theta_dot * A_theta @ s_p @ p_dot + A @ (p_dot @ K_s @ p_dot)
-    Q_theta = -2 * theta_dot * (body.j + p @ (body.m_xy - K_omega)) @ p_dot + p_dot @ K_h @ p_dot
-    Q_f = theta_dot**2 * (body.j + (body.m_xy - K_omega) @ p) + 2 * theta_dot * body.S_tilde @ p_dot
-    return np.concatenate([Q_R, [Q_theta], Q_f])
+    """Q_v = −Re TᴴHc, c: the acceleration of the fields' coefficients where R̈ = 0, θ̈ = 0, p̈ = 0."""
+    p, theta_dot, p_dot, f = q[3:], v[2], v[3:], fields(body, q[3:])
+    c = -(theta_dot**2) * f.u + 2j * theta_dot * f.u_p @ p_dot + p_dot @ f.curvature @ p_dot
+    return in_global_axes(q[2], -(directions(f, p).conj().T @ f.H @ c).real)
 
 
 def gravity_forces(body, q, g):

@@ -170,8 +170,9 @@ def random_stiffening(rng, body, size=0.05):
         K = size * rng.standard_normal((*shape, body.n_modes, body.n_modes))
         return K + K.swapaxes(-1, -2)
 
+    n = body.n_modes
     return GeometricStiffening(
-        symmetric(), symmetric(2), symmetric(), {label: symmetric(3) for label in (*body.points,)}
+        symmetric(), symmetric(2), symmetric(), {label: symmetric(3) for label in body.points}, np.zeros((n, n))
     )
 
 

@@ -1,7 +1,9 @@
+#include <array>
 #include <tuple>
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/vector.h>
 
 #include "bindings/bindings.h"
@@ -19,7 +21,7 @@ namespace {
 void add_body(System &system, double mass, double inertia, const Vector2d &first_moment, const VectorXd &stiffness,
               const MatrixXd &damping, const MatrixXd &W, const VectorXd &j, const MatrixXd &S_tilde,
               const MatrixXd &m_xy, const std::vector<Vector2d> &marker_positions,
-              const std::vector<MatrixXd> &second_order, const MatrixXd &K_omega) {
+              const std::vector<MatrixXd> &second_order, const std::array<MatrixXd, 4> &geometric_stiffness) {
   const auto n = stiffness.size();
   check_size("W rows", W.rows(), 3 + 3 * static_cast<Eigen::Index>(marker_positions.size()));
   check_size("W columns", W.cols(), n);
@@ -27,13 +29,16 @@ void add_body(System &system, double mass, double inertia, const Vector2d &first
        {std::pair("damping", damping.rows()), {"j", j.size()}, {"S_tilde", S_tilde.rows()}, {"m_xy", m_xy.rows()}})
     if (size)
       check_size(name, size, n);
-  PlanarBody body{mass,    inertia, first_moment,     stiffness, damping, W,      j,
-                  S_tilde, m_xy,    marker_positions, {},        {},      K_omega};
+  PlanarBody body{mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions, {}, {}, {}};
   for (std::size_t row = 0; row < second_order.size(); ++row)
     if (second_order[row].size()) {
       check_size("second_order", second_order[row].rows(), n);
-      body.second_order.push_back({static_cast<Eigen::Index>(row), second_order[row]});
+      body.second_order.push_back({3 + static_cast<Eigen::Index>(row), second_order[row]});
     }
+  for (const auto &K : geometric_stiffness)
+    if (K.size())
+      check_size("geometric_stiffness", K.rows(), n);
+  stiffen(body, geometric_stiffness);
   system.bodies.push_back(std::move(body));
 }
 
@@ -68,7 +73,7 @@ void add_state_force(System &system, const MarkerReference &marker, const StateF
 void bind_parts(nb::class_<System> &system) {
   system
       .def("add_body", &add_body, "mass"_a, "inertia"_a, "first_moment"_a, "stiffness"_a, "damping"_a, "W"_a, "j"_a,
-           "S_tilde"_a, "m_xy"_a, "marker_positions"_a, "second_order"_a, "K_omega"_a,
+           "S_tilde"_a, "m_xy"_a, "marker_positions"_a, "second_order"_a, "geometric_stiffness"_a,
            "With terms that vanish empty; see core/body/planar_body.h for shapes and units.")
       .def("add_constraint", &add_constraint, "row"_a, "target"_a)
       .def("add_rotor", &add_rotor, "row"_a, "inertia"_a)

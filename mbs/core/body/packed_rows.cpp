@@ -2,6 +2,8 @@
 
 #include "core/body/planar_body.h"
 
+#include <Eigen/LU>
+
 namespace ffrobot {
 
 using Eigen::Index;
@@ -11,11 +13,15 @@ namespace {
 
 constexpr Index empty_row = 3;
 
+// At most eight rows of U.
+using LowRank = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 8, 8>;
+using LowRankVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 8, 1>;
+
 bool moves(const PlanarBody &body, Index row) {
   for (const auto &second : body.second_order)
     if (second.row == row)
       return true;
-  return row == 2 && body.S_tilde.size() > 0;
+  return (row == 2 && body.S_tilde.size() > 0) || (row < 3 && body.affine);
 }
 
 bool carries_anything(const PlanarBody &body, Index row) { return moves(body, row) || !body.W.row(row).isZero(0); }
@@ -38,6 +44,21 @@ template <int Count> void project_rows(const double *p, const double *p_dot, Ind
     store(s.Wp.data() + i, Wp[group]);
     store(s.Wp_dot.data() + i, Wp_dot[group]);
     store(s.Wk.data() + i, Wk[group]);
+  }
+}
+
+// Rows of W W^T
+template <int Count> void multiply_rows(Index first, PackedRows &s) {
+  constexpr int groups = Count / lane_count;
+  const Index n = s.W.cols(), stride = s.rows();
+  for (Index j = 0; j < stride; ++j) {
+    Lanes sum[groups] = {};
+    const double *W = s.W.data();
+    for (Index i = 0; i < n; ++i, W += stride)
+      for (int group = 0; group < groups; ++group)
+        sum[group] += load(W + first + group * lane_count) * W[j];
+    for (int group = 0; group < groups; ++group)
+      store(s.gram.data() + j * stride + first + group * lane_count, sum[group]);
   }
 }
 
@@ -102,6 +123,10 @@ PackedRows::PackedRows(const PlanarBody &body) : place(static_cast<std::size_t>(
     if (used(k) < 3 && carries_anything(body, 5 + 3 * k))
       at(5 + 3 * k) = next++;
 
+  affine = next;
+  for (Index row = body.affine_row(); row < body.W.rows(); ++row)
+    at(row) = next++;
+
   const Index rows = padded(next);
   W = Eigen::MatrixXd::Zero(rows, n);
   for (Index row = 0; row < body.W.rows(); ++row)
@@ -110,6 +135,10 @@ PackedRows::PackedRows(const PlanarBody &body) : place(static_cast<std::size_t>(
   W_transposed = Eigen::MatrixXd::Zero(padded(n), rows);
   W_transposed.topRows(n) = W.transpose();
   G = W * W.transpose();
+  if (body.affine) {
+    gram = G;
+    with_U = reaction = Eigen::MatrixXd::Zero(rows, body.affine.rank());
+  }
   elastic_force = VectorXd::Zero(n);
   W_transposed_z = VectorXd::Zero(padded(n));
   Wp = Wp_dot = Wk = VectorXd::Zero(rows);
@@ -128,8 +157,26 @@ void PackedRows::replace(Index row, const Eigen::Ref<const Eigen::RowVectorXd> &
   const Index i = place[static_cast<std::size_t>(row)];
   W.row(i) = values;
   W_transposed.col(i).head(W.cols()) = values.transpose();
+  if (gram.size())
+    return; // all of G is made anew
   G.row(i).noalias() = W.row(i) * W_transposed.topRows(W.cols());
   G.col(i) = G.row(i).transpose();
+}
+
+void PackedRows::reduce(const Eigen::MatrixXd &C_inverse) {
+  const Index rank = C_inverse.rows();
+  in_pieces(rows(), [&]<int Count>(Index first) { multiply_rows<Count>(first, *this); });
+  with_U = gram.middleCols(affine, rank);
+  const LowRank S = C_inverse + with_U.middleRows(affine, rank);
+  const LowRank S_inverse = S.partialPivLu().inverse();
+  reaction.noalias() = with_U.lazyProduct(S_inverse);
+  G.noalias() = gram - reaction.lazyProduct(with_U.transpose());
+}
+
+void PackedRows::apply_inertia(const Eigen::MatrixXd &C, VectorXd &z) const {
+  const Index rank = C.rows();
+  const LowRankVector y = G.middleCols(affine, rank).transpose().lazyProduct(z);
+  z.segment(affine, rank) -= C.lazyProduct(y);
 }
 
 void PackedRows::project(const PlanarBody &body, const double *p, const double *p_dot) {

@@ -11,6 +11,7 @@ namespace ffrobot {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using VectorMap = Eigen::Map<const Eigen::VectorXd>;
@@ -51,7 +52,7 @@ bool collect_extra(const PlanarBody &body, const double *p, const double *p_dot,
     start();
     s.extra += s.modal_load;
   }
-  if (body.j.size()) {
+  if (body.j.size() && !body.affine) {
     start();
     s.extra += theta_dot_squared * body.j;
   }
@@ -63,10 +64,6 @@ bool collect_extra(const PlanarBody &body, const double *p, const double *p_dot,
     start();
     s.extra.noalias() += theta_dot_squared * (body.m_xy * VectorMap(p, n));
     s.extra -= theta_dot_squared * VectorMap(p, n);
-  }
-  if (body.K_omega.size()) {
-    start();
-    s.extra.noalias() -= theta_dot_squared * (body.K_omega * VectorMap(p, n));
   }
   if (body.damping.cols() > 1) {
     start();
@@ -101,6 +98,22 @@ Vector3d backward(const PlanarBodyState &s, Vector3d b) {
 
 } // namespace
 
+void stiffen(PlanarBody &body, const std::array<Eigen::MatrixXd, 4> &K) {
+  if (std::all_of(K.begin(), K.end(), [](const auto &one) { return one.size() == 0; }))
+    return;
+  const Index n = body.modes();
+  Matrix4Xd F = Matrix4Xd::Zero(4, n); // S_bar, j, h
+  F.topRows<2>() = body.W.topRows<2>();
+  F.row(3) = body.W.row(2);
+  if (body.j.size())
+    F.row(2) = body.j.transpose();
+  const MatrixXd none = MatrixXd::Zero(n, n), one = MatrixXd::Identity(n, n);
+  body.affine = AffineInertia(body.mass, body.first_moment, body.inertia, F, body.m_xy.size() ? body.m_xy : one,
+                              body.S_tilde.size() ? body.S_tilde : none, K);
+  body.W.conservativeResize(body.affine_row() + body.affine.row_count(), n);
+  body.affine.rows(F, body.W.bottomRows(body.affine.row_count()));
+}
+
 double weighted(const PlanarBody &body, const double *p, const double *x) {
   const Index n = body.modes();
   const VectorMap p_(p, n);
@@ -133,7 +146,7 @@ void kinematics(const PlanarBody &body, const double *q, const double *v, Planar
   s.rows.project(body, q + 3, v + 3);
   for (Index i = 0; i < s.rows.rows(); i += lane_count) {
     const Lanes u = load(s.rows.Wp.data() + i);
-    store(s.displacement.data() + i, body.second_order.empty() ? u : u + load(s.displacement.data() + i));
+    store(s.displacement.data() + i, body.is_stiffened() ? u + load(s.displacement.data() + i) : u);
   }
   const double c = s.cosine, sn = s.sine, w = s.theta_dot;
   for (std::size_t k = 0; k < s.markers.size(); ++k) {
@@ -152,9 +165,9 @@ void kinematics(const PlanarBody &body, const double *q, const double *v, Planar
 
 namespace {
 
-// Forces on the frame: (Q_R in body axes, Q_theta) of inertia and gravity (g, body axes).
+// Forces on the frame: (Q_R in body axes, Q_theta) of inertia and gravity (g, body axes); those on affine rows go to z.
 Vector3d frame_force(const PlanarBody &body, const double *p, const double *p_dot, const Vector2d &g,
-                     const PlanarBodyState &s) {
+                     PlanarBodyState &s) {
   const double w = s.theta_dot;
   const Eigen::VectorXd &Wp_dot = s.rows.Wp_dot;
   Vector3d Q;
@@ -162,12 +175,12 @@ Vector3d frame_force(const PlanarBody &body, const double *p, const double *p_do
   Q[1] = body.mass * g[1] + w * w * s.moment[1] - 2 * w * Wp_dot[0];
   Q[2] = s.moment[0] * g[1] - s.moment[1] * g[0];
   Q[2] -= 2 * w * (body.m_xy.size() ? weighted(body, p, p_dot) : s.rows.p_p_dot);
-  if (!body.second_order.empty())
-    Q += s.convective.head<3>();
-  if (body.K_omega.size())
-    Q[2] += 2 * w * VectorMap(p, body.modes()).dot(body.K_omega * VectorMap(p_dot, body.modes()));
-  if (body.j.size())
+  if (body.affine) {
+    Q.head<2>() += s.convective.head<2>();
+    Q[2] += velocity_force(body.affine, s.affine, w, s.z.data() + s.rows.affine);
+  } else if (body.j.size()) {
     Q[2] -= 2 * w * body.j.dot(VectorMap(p_dot, body.modes()));
+  }
   return Q;
 }
 
@@ -179,6 +192,16 @@ void project_modal_force(const Vector2d &g, PlanarBodyState &s) {
     double *Wk = s.rows.Wk.data() + i;
     store(Wk, w_2 * load(rows.Wp.data() + i) - load(Wk) + g[0] * load(G + i) + g[1] * load(G + rows.rows() + i));
   }
+}
+
+// m_ff of affine rows: the force of these on the accelerations that the modes have as if it were the identity.
+void add_affine_inertia(const PlanarBody &body, PlanarBodyState &s) {
+  const Index first = s.rows.affine, rank = body.affine.rank();
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 8, 1> U_c =
+      s.theta_dot * s.theta_dot * s.rows.Wp.segment(first, rank) - s.rows.Wk.segment(first, rank);
+  if (s.has_extra)
+    U_c += s.W_extra.segment(first, rank);
+  s.z.segment(first, rank) -= body.affine.C * U_c;
 }
 
 // Adds the applied wrenches to the force on the frame, and to z in body axes.
@@ -252,25 +275,28 @@ void free_motion(const PlanarBody &body, const double *q, const double *v, const
   s.gravity = rotate_back(s, gravity);
   s.moment[0] = body.first_moment[0] + s.displacement[0];
   s.moment[1] = body.first_moment[1] + s.displacement[1];
+  s.has_load = s.has_wrench || body.affine;
+  if (s.has_load)
+    s.z.setZero();
   Vector3d Q = frame_force(body, p, p_dot, s.gravity, s);
+  s.has_extra = collect_extra(body, p, p_dot, s);
+  if (body.affine)
+    add_affine_inertia(body, s);
   project_modal_force(s.gravity, s);
   Eigen::VectorXd &WQ = rows.Wk;
-  if (s.has_wrench) {
-    s.z.setZero();
+  if (s.has_wrench)
     add_wrenches(body, Q, s);
+  if (s.has_load)
     WQ.noalias() += rows.G * s.z;
-  }
-  s.has_extra = collect_extra(body, p, p_dot, s);
   if (s.has_extra)
     WQ += s.W_extra;
 
   // The frame after elimination of p
   const Index n = body.modes();
-  s.inertia = body.inertia + (body.m_xy.size() ? weighted(body, p, p) : rows.p_p);
-  if (body.j.size())
+  const double p_m_xy_p = body.m_xy.size() ? weighted(body, p, p) : rows.p_p;
+  s.inertia = body.affine ? rotary_inertia(body.affine, s.affine, p_m_xy_p) : body.inertia + p_m_xy_p;
+  if (body.j.size() && !body.affine)
     s.inertia += 2 * body.j.dot(VectorMap(p, n));
-  if (body.K_omega.size())
-    s.inertia -= VectorMap(p, n).dot(body.K_omega * VectorMap(p, n));
   factorise_rotation(-s.moment[1] - rows.G(0, 2), s.moment[0] - rows.G(1, 2), s.inertia - rows.G(2, 2), s);
   s.free_frame = backward(s, forward(s.L, {Q[0] - WQ[0], Q[1] - WQ[1], Q[2] - WQ[2]}));
   eliminate_ports(WQ, s);
@@ -285,7 +311,7 @@ Vector3d frame_response(PlanarBodyState &s, const Eigen::VectorXd &z_applied) {
   const PackedRows &rows = s.rows;
   const double *Z = s.Z.data(), *f = s.port_force.data();
   Vector3d b(0, 0, 0);
-  if (s.has_wrench)
+  if (s.has_load)
     s.z_response = z_applied; // else only ports and the frame carry anything
   for (Index i = 0; i < rows.ports; ++i) {
     b[0] += f[i] * Z[i];
@@ -311,6 +337,8 @@ void accelerations(const PlanarBody &body, const double *q, PlanarBodyState &s, 
   s.z_response[0] = s.gravity[0] - x[0];
   s.z_response[1] = s.gravity[1] - x[1];
   s.z_response[2] = -x[2];
+  if (body.affine)
+    s.rows.apply_inertia(body.affine.C, s.z_response);
   a[0] = s.cosine * x[0] - s.sine * x[1];
   a[1] = s.sine * x[0] + s.cosine * x[1];
   a[2] = x[2];
@@ -353,6 +381,8 @@ void apply_inverse_mass(const PlanarBody &body, PlanarBodyState &s, double *dq) 
   dq[0] = s.cosine * x[0] - s.sine * x[1];
   dq[1] = s.sine * x[0] + s.cosine * x[1];
   dq[2] = x[2];
+  if (body.affine)
+    s.rows.apply_inertia(body.affine.C, s.z_response);
   s.rows.combine(s.z_response);
   std::copy_n(s.rows.W_transposed_z.data(), body.modes(), dq + 3);
 }

@@ -5,6 +5,7 @@
 // mass-orthonormal, so that p is in m sqrt(kg).
 #pragma once
 
+#include "core/body/affine_inertia.h"
 #include "core/body/packed_rows.h"
 
 #include <Eigen/Core>
@@ -12,8 +13,8 @@
 
 namespace ffrobot {
 
-// A second-order displacement: row r of W p has -1/2 p^T K p besides, K (n, n) the geometric stiffness of a unit load
-// along that row.
+// A second-order displacement of a marker: row r of W p has -1/2 p^T K p besides, K (n, n) the geometric stiffness of a
+// unit load along that row.
 struct SecondOrder {
   Eigen::Index row;
   Eigen::MatrixXd K;
@@ -37,15 +38,20 @@ struct PlanarBody {
   Eigen::MatrixXd m_xy;                          // (n, n) S_bar_11 + S_bar_22; empty where it is the identity
   std::vector<Eigen::Vector2d> marker_positions; // m, undeformed, body frame
   std::vector<int> marker_rows; // that constraints use: 0, 2 (translation) or 3 (rotation too); set by System::finish
-  // Geometric stiffening. With W(p) = W - (K p)^T in place of W, and m_thetatheta less p^T K_omega p, every term that
-  // follows from the kinetic energy and virtual work stays consistent. Both empty where it is left out.
+  // Geometric stiffening: W(p) = W - (K p)^T in place of W at markers; the inertia, whose rows W has behind those of
+  // the markers. Both empty where it is left out.
   std::vector<SecondOrder> second_order;
-  Eigen::MatrixXd K_omega; // (n, n) of unit theta_dot^2
+  AffineInertia affine;
 
   Eigen::Index modes() const { return W.cols(); }
   Eigen::Index markers() const { return static_cast<Eigen::Index>(marker_positions.size()); }
   Eigen::Index coordinates() const { return 3 + modes(); }
+  Eigen::Index affine_row() const { return 3 + 3 * markers(); }
+  bool is_stiffened() const { return affine || !second_order.empty(); }
 };
+
+// Puts geometric stiffening into the inertia of a body that is complete otherwise; K of AffineInertia.
+void stiffen(PlanarBody &body, const std::array<Eigen::MatrixXd, 4> &K);
 
 // Motion of one marker in the global frame: m, m/s, rad, rad/s.
 struct MarkerMotion {
@@ -68,6 +74,7 @@ struct PlanarBodyState {
   Eigen::Matrix3Xd wrench;    // (force x, force y, moment) at each marker, global: N, N m
   Eigen::VectorXd modal_load; // (n) generalized forces on p
   bool has_wrench = false, has_modal_load = false;
+  bool has_load = false; // wrenches, or forces on affine rows: there is something in z
 
   // Ports, in global axes: the translations and rotations of markers by which constraints hold the body (PackedRows).
   Eigen::VectorXd port_acceleration; // before constraint forces
@@ -79,10 +86,11 @@ struct PlanarBodyState {
   PackedRows rows;                // the same, and products with it
   Eigen::VectorXd displacement;   // packed W p, its second-order part right
   Eigen::VectorXd convective;     // p_dot^T K p_dot, by packed rows; zero without geometric stiffening
+  AffineMotion affine;            // of a body with geometric stiffening
   Eigen::VectorXd extra, W_extra; // modal forces outside the common fast path, and packed W times them
   bool has_extra = false;
   Eigen::VectorXd curvature;  // (n) K p of a second-order displacement
-  Eigen::VectorXd z, none;    // applied wrenches in body axes, by packed rows; none at all
+  Eigen::VectorXd z, none;    // applied wrenches in body axes and forces on affine rows, by packed rows; none at all
   Eigen::VectorXd z_response; // multipliers of the packed rows in p_ddot
   Eigen::MatrixXd Z; // (ports, 3) B L^-T: B port acceleration per (a, alpha) of the frame, global by body axes, with p
                      // eliminated; L D L^T the eliminated mass matrix

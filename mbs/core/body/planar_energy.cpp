@@ -23,23 +23,22 @@ Energy energy(const PlanarBody &body, const double *q, const double *v, const Ve
   const auto to_body = [&](const Vector2d &u) { return Vector2d(c * u.x() + s * u.y(), -s * u.x() + c * u.y()); };
   const Vector2d R_dot = to_body({v[0], v[1]});
   Vector2d moment = body.first_moment + body.W.topRows<2>() * p;
-  Vector3d rates = body.W.topRows<3>() * p_dot; // (S_bar, m_thetaf) p_dot
-  double inertia = body.inertia + weighted(body, q + 3, q + 3);
-  if (body.j.size())
-    inertia += 2 * body.j.dot(p);
-  if (body.S_tilde.size())
-    rates[2] += p.dot(body.S_tilde * p_dot);
-  if (body.K_omega.size())
-    inertia -= p.dot(body.K_omega * p);
-  for (const auto &[row, K] : body.second_order) {
-    if (row < 2)
-      moment[row] -= 0.5 * p.dot(K * p);
-    if (row < 3)
-      rates[row] -= p.dot(K * p_dot);
-  }
   Energy e;
-  e.kinetic = 0.5 * (body.mass * R_dot.squaredNorm() + inertia * theta_dot * theta_dot + p_dot.squaredNorm()) +
-              theta_dot * R_dot.dot(perpendicular(moment)) + R_dot.dot(rates.head<2>()) + theta_dot * rates[2];
+  if (body.affine) {
+    AffineMotion motion;
+    update(body.affine, q + 3, v + 3, motion);
+    moment = motion.g.head<2>();
+    e.kinetic = kinetic_energy(body.affine, motion, q + 3, v + 3, R_dot, theta_dot);
+  } else {
+    Vector3d rates = body.W.topRows<3>() * p_dot; // (S_bar, m_thetaf) p_dot
+    double inertia = body.inertia + weighted(body, q + 3, q + 3);
+    if (body.j.size())
+      inertia += 2 * body.j.dot(p);
+    if (body.S_tilde.size())
+      rates[2] += p.dot(body.S_tilde * p_dot);
+    e.kinetic = 0.5 * (body.mass * R_dot.squaredNorm() + inertia * theta_dot * theta_dot + p_dot.squaredNorm()) +
+                theta_dot * R_dot.dot(perpendicular(moment)) + R_dot.dot(rates.head<2>()) + theta_dot * rates[2];
+  }
   e.strain = 0.5 * p.dot(body.stiffness.cwiseProduct(p));
   e.gravitational = -(body.mass * gravity.dot(Vector2d(q[0], q[1])) + to_body(gravity).dot(moment));
   if (body.damping.cols() == 1)

@@ -39,37 +39,43 @@ void subtract_loads(const PlanarBody &body, const PlanarBodyState &s, Eigen::Map
 //     f_f     = S_bar^T u + m_thetaf^T theta_ddot + p_ddot - theta_dot^2 (j + m_xy p) - 2 theta_dot S_tilde p_dot
 //               + K p + D p_dot
 //
-// With geometric stiffening m_xy - K_omega stands for m_xy, and W(p) p_ddot has -p_dot^T K p_dot beside it.
+// With geometric stiffening the inertia forces are those of affine_inertia.h.
 void required_force(const PlanarBody &body, const double *q, const double *v, const double *a, const Vector2d &gravity,
                     PlanarBodyState &s, double *f) {
   const Index n = body.modes();
   const VectorMap p(q + 3, n), p_dot(v + 3, n), p_ddot(a + 3, n);
   const double theta_dot = v[2], theta_ddot = a[2];
-  const auto S_bar = s.W.topRows<2>();
-  const auto m_thetaf = s.W.row(2).transpose();
-
   Eigen::Matrix2d A;
   A << s.cosine, -s.sine, s.sine, s.cosine;
   const Vector2d u = A.transpose() * (Vector2d(a[0], a[1]) - gravity);
-  const Vector2d moment = body.first_moment + s.displacement.head<2>(), S_p_dot = S_bar * p_dot;
-  const Vector2d S_p_ddot = S_bar * p_ddot - s.convective.head<2>();
-  VectorXd m_p = body.m_xy.size() ? VectorXd(body.m_xy * p) : VectorXd(p);
-  if (body.K_omega.size())
-    m_p -= body.K_omega * p;
-
-  const Vector2d f_R = body.mass * u + theta_ddot * perpendicular(moment) + S_p_ddot - theta_dot * theta_dot * moment +
-                       2 * theta_dot * perpendicular(S_p_dot);
-  double f_theta = perpendicular(moment).dot(u) + (body.inertia + p.dot(m_p)) * theta_ddot + m_thetaf.dot(p_ddot) -
-                   s.convective[2] + 2 * theta_dot * m_p.dot(p_dot);
+  Vector2d f_R;
+  double f_theta = 0;
   Eigen::Map<VectorXd> f_f(f + 3, n);
-  f_f = S_bar.transpose() * u + theta_ddot * m_thetaf + p_ddot - theta_dot * theta_dot * m_p +
-        body.stiffness.cwiseProduct(p);
-  if (body.j.size()) {
-    f_theta += 2 * body.j.dot(p) * theta_ddot + 2 * theta_dot * body.j.dot(p_dot);
-    f_f -= theta_dot * theta_dot * body.j;
+  if (body.affine) {
+    VectorXd of_frame(3 + n);
+    of_frame << u, theta_ddot, p_ddot;
+    const VectorXd inertia = inertia_force(body.affine, s.affine, q + 3, v + 3, theta_dot, of_frame);
+    f_R = inertia.head<2>();
+    f_theta = inertia[2];
+    f_f = inertia.tail(n) + body.stiffness.cwiseProduct(p);
+  } else {
+    const auto S_bar = s.W.topRows<2>();
+    const auto m_thetaf = s.W.row(2).transpose();
+    const Vector2d moment = body.first_moment + s.displacement.head<2>(), S_p_dot = S_bar * p_dot;
+    const VectorXd m_p = body.m_xy.size() ? VectorXd(body.m_xy * p) : VectorXd(p);
+    f_R = body.mass * u + theta_ddot * perpendicular(moment) + S_bar * p_ddot - theta_dot * theta_dot * moment +
+          2 * theta_dot * perpendicular(S_p_dot);
+    f_theta = perpendicular(moment).dot(u) + (body.inertia + p.dot(m_p)) * theta_ddot + m_thetaf.dot(p_ddot) +
+              2 * theta_dot * m_p.dot(p_dot);
+    f_f = S_bar.transpose() * u + theta_ddot * m_thetaf + p_ddot - theta_dot * theta_dot * m_p +
+          body.stiffness.cwiseProduct(p);
+    if (body.j.size()) {
+      f_theta += 2 * body.j.dot(p) * theta_ddot + 2 * theta_dot * body.j.dot(p_dot);
+      f_f -= theta_dot * theta_dot * body.j;
+    }
+    if (body.S_tilde.size())
+      f_f -= 2 * theta_dot * (body.S_tilde * p_dot);
   }
-  if (body.S_tilde.size())
-    f_f -= 2 * theta_dot * (body.S_tilde * p_dot);
   if (body.damping.cols() == 1)
     f_f += body.damping.col(0).cwiseProduct(p_dot);
   else if (body.damping.cols() > 1)

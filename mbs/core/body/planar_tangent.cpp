@@ -22,24 +22,35 @@ struct Axes {
   Matrix2d A, A_theta;
 };
 
-// The part of K and D in which second-order displacements of the frame's rows s and h change W(p) = W - (K p)^T.
-// u: A^T (R_ddot - g) and theta_ddot, the loads of these rows.
-void add_second_order(const PlanarBody &body, const Axes &axes, const VectorMap &p_dot, const VectorMap &p_ddot,
-                      double theta_dot, const Vector3d &u, Ref<MatrixXd> D, Ref<MatrixXd> K) {
+void add_elasticity(const PlanarBody &body, Ref<MatrixXd> D, Ref<MatrixXd> K) {
   const Index n = body.modes();
-  for (const auto &[row, K_r] : body.second_order) {
-    if (row > 2)
-      continue;
-    const Eigen::RowVectorXd rate = (K_r * p_dot).transpose(), acceleration = (K_r * p_ddot).transpose();
-    if (row < 2) {
-      D.block(0, 3, 2, n) -= 2 * axes.A.col(row) * rate;
-      K.block(0, 3, 2, n) -= axes.A.col(row) * acceleration + 2 * theta_dot * axes.A_theta.col(row) * rate;
-    } else {
-      D.block(2, 3, 1, n) -= 2 * rate;
-      K.block(2, 3, 1, n) -= acceleration;
-    }
-    K.bottomRightCorner(n, n) -= u[row] * K_r;
-  }
+  K.bottomRightCorner(n, n).diagonal() += body.stiffness;
+  if (body.damping.cols() == 1)
+    D.bottomRightCorner(n, n).diagonal() += body.damping.col(0);
+  else if (body.damping.cols() > 1)
+    D.bottomRightCorner(n, n) += body.damping;
+}
+
+// With geometric stiffening: from body axes, in which u = A^T (R_ddot - g) and du/dtheta = -u_perp.
+void stiffened_tangent(const PlanarBody &body, const PlanarBodyState &s, const double *q, const double *v,
+                       const double *a, const Vector2d &gravity, Ref<MatrixXd> M, Ref<MatrixXd> D, Ref<MatrixXd> K) {
+  const Index n = body.modes();
+  const Axes axes(s);
+  const Vector2d u = axes.A.transpose() * (Vector2d(a[0], a[1]) - gravity);
+  VectorXd accelerations = VectorMap(a, 3 + n);
+  accelerations.head<2>() = u;
+  InertiaTangent local;
+  const VectorXd f = inertia_force(body.affine, s.affine, q + 3, v + 3, v[2], accelerations, &local);
+  MatrixXd to_global = MatrixXd::Identity(3 + n, 3 + n);
+  to_global.topLeftCorner<2, 2>() = axes.A;
+  M = to_global * local.by_acceleration * to_global.transpose();
+  D.leftCols<2>().setZero();
+  D.rightCols(1 + n) = to_global * local.by_velocity;
+  K.leftCols<2>().setZero();
+  K.col(2) = to_global * (local.by_acceleration.leftCols<2>() * Vector2d(u.y(), -u.x()));
+  K.block<2, 1>(0, 2) += axes.A_theta * f.head<2>();
+  K.rightCols(n) = to_global * local.by_position;
+  add_elasticity(body, D, K);
 }
 
 } // namespace
@@ -48,15 +59,15 @@ void add_second_order(const PlanarBody &body, const Axes &axes, const VectorMap 
 // du/dtheta = -u_perp.
 void tangent(const PlanarBody &body, const PlanarBodyState &s, const double *q, const double *v, const double *a,
              const Vector2d &gravity, Ref<MatrixXd> M, Ref<MatrixXd> D, Ref<MatrixXd> K) {
+  if (body.affine)
+    return stiffened_tangent(body, s, q, v, a, gravity, M, D, K);
   const Index n = body.modes();
   const VectorMap p(q + 3, n), p_dot(v + 3, n), p_ddot(a + 3, n);
   const double theta_dot = v[2], theta_ddot = a[2];
   const Axes axes(s);
   const auto S_bar = s.W.topRows<2>();
   const auto m_thetaf = s.W.row(2);
-  MatrixXd m_ff = body.m_xy.size() ? body.m_xy : MatrixXd(MatrixXd::Identity(n, n));
-  if (body.K_omega.size())
-    m_ff -= body.K_omega;
+  const MatrixXd m_ff = body.m_xy.size() ? body.m_xy : MatrixXd(MatrixXd::Identity(n, n));
   VectorXd J_p = m_ff * p;
   double inertia = body.inertia + p.dot(J_p);
   if (body.j.size()) {
@@ -65,7 +76,7 @@ void tangent(const PlanarBody &body, const PlanarBodyState &s, const double *q, 
   }
   const Vector2d moment = body.first_moment + s.displacement.head<2>(), S_p_dot = S_bar * p_dot;
   const Vector2d u = axes.A.transpose() * (Vector2d(a[0], a[1]) - gravity);
-  const Vector2d S_p_ddot = S_bar * p_ddot - s.convective.head<2>();
+  const Vector2d S_p_ddot = S_bar * p_ddot;
   const MatrixXd A_S = axes.A * S_bar, A_theta_S = axes.A_theta * S_bar;
 
   M.topLeftCorner<2, 2>() = body.mass * Matrix2d::Identity();
@@ -84,10 +95,6 @@ void tangent(const PlanarBody &body, const PlanarBodyState &s, const double *q, 
   D.topRightCorner(2, n) = 2 * theta_dot * A_theta_S;
   D.block(2, 3, 1, n) = 2 * theta_dot * J_p.transpose();
   D.bottomRightCorner(n, n).setZero();
-  if (body.damping.cols() == 1)
-    D.bottomRightCorner(n, n).diagonal() = body.damping.col(0);
-  else if (body.damping.cols() > 1)
-    D.bottomRightCorner(n, n) = body.damping;
 
   K.leftCols<2>().setZero();
   K.block<2, 1>(0, 2) = -theta_ddot * (axes.A * moment) + axes.A_theta * S_p_ddot -
@@ -97,7 +104,7 @@ void tangent(const PlanarBody &body, const PlanarBodyState &s, const double *q, 
   K.topRightCorner(2, n) = theta_ddot * A_theta_S - theta_dot * theta_dot * A_S;
   K.block(2, 3, 1, n) = (K.block(3, 2, n, 1) + 2 * theta_ddot * J_p + 2 * theta_dot * (m_ff * p_dot)).transpose();
   K.bottomRightCorner(n, n) = -theta_dot * theta_dot * m_ff;
-  K.bottomRightCorner(n, n).diagonal() += body.stiffness;
+  add_elasticity(body, D, K);
 
   if (body.S_tilde.size()) {
     const VectorXd S_rate = body.S_tilde * p_dot;
@@ -106,8 +113,6 @@ void tangent(const PlanarBody &body, const PlanarBodyState &s, const double *q, 
     K.block(2, 3, 1, n) += (body.S_tilde * p_ddot).transpose();
     K.bottomRightCorner(n, n) -= theta_ddot * body.S_tilde; // m_thetaf = h + p^T S_tilde, S_tilde skew
   }
-  if (!body.second_order.empty())
-    add_second_order(body, axes, p_dot, p_ddot, theta_dot, {u.x(), u.y(), theta_ddot}, D, K);
 }
 
 void add_marker_curvature(const PlanarBody &body, const PlanarBodyState &s, Index k, const Vector3d &wrench,

@@ -26,13 +26,6 @@ public:
   Scalar *entries() { return rows_.data(); }
   Scalar *entry(Eigen::Index row, Eigen::Index column) { return entries() + place(row, column); }
 
-  // Of the last factorisation: as many as the matrix has negative eigenvalues.
-  Eigen::Index negative_pivots() const
-    requires std::floating_point<Scalar>
-  {
-    return std::count_if(inverse_.begin(), inverse_.end(), [](Scalar pivot) { return pivot < 0; });
-  }
-
   void factorise();            // in place; unpivoted
   void solve(Scalar *x) const; // after factorise; x: right-hand side in, solution out
 

@@ -25,6 +25,7 @@ IterationMatrix<Scalar>::IterationMatrix(const System &system)
   for (const auto &body : system.bodies) {
     Body &b = bodies_.emplace_back();
     b.W = body.W;
+    b.C = body.affine.C;
     b.e_inverse = b.u = Vector::Zero(body.modes());
     b.G = Matrix::Zero(b.W.rows(), b.W.rows());
     b.Wu = b.z = Vector::Zero(b.W.rows());
@@ -35,18 +36,27 @@ IterationMatrix<Scalar>::IterationMatrix(const System &system)
   }
 }
 
+// m_ff + c D_ff + d K_ff = E^-1 + U^T C U of a body with geometric stiffening (PackedRows::reduce)
+template <class Scalar> void IterationMatrix<Scalar>::reduce(const PlanarBody &body, Body &b) {
+  const Index first = body.affine_row(), rank = body.affine.rank();
+  b.G.noalias() = (b.W.template cast<Scalar>() * b.e_inverse.asDiagonal()) * b.W.transpose();
+  const Matrix with_U = b.G.middleCols(first, rank);
+  b.S.compute(body.affine.C_inverse.template cast<Scalar>() + with_U.middleRows(first, rank));
+  b.G.noalias() -= with_U * b.S.solve(with_U.transpose());
+}
+
 template <class Scalar>
 void IterationMatrix<Scalar>::factorise_body(const PlanarBody &body, const PlanarBodyState &state, Body &b) {
   const auto update = [&](Index row) {
     b.G.row(row).noalias() = (b.W.row(row).template cast<Scalar>() * b.e_inverse.asDiagonal()) * b.W.transpose();
     b.G.col(row) = b.G.row(row).transpose();
   };
-  if (body.S_tilde.size() || !body.second_order.empty())
-    b.W = state.W.topRows(b.W.rows());
-  if (body.S_tilde.size())
+  if (body.S_tilde.size() || body.is_stiffened())
+    b.W = state.W;
+  if (body.affine)
+    reduce(body, b);
+  else if (body.S_tilde.size())
     update(2);
-  for (const auto &second : body.second_order)
-    update(second.row);
   b.cosine = state.cosine;
   b.sine = state.sine;
   Matrix3 frame = -b.G.template topLeftCorner<3, 3>();
@@ -123,6 +133,11 @@ void IterationMatrix<Scalar>::factorise(const Workspace &w, const Eigen::VectorX
 
 template <class Scalar> void IterationMatrix<Scalar>::free_response(const Scalar *r, Body &b) {
   b.u = b.e_inverse.cwiseProduct(Eigen::Map<const Vector>(r + 3, b.u.size()));
+  if (const Index rank = b.C.rows()) {
+    const auto U = b.W.middleRows(3 + 3 * static_cast<Index>(b.B.size()), rank);
+    const Vector reaction = b.S.solve(U * b.u);
+    b.u -= b.e_inverse.cwiseProduct(U.transpose() * reaction);
+  }
   b.Wu.noalias() = b.W * b.u;
   b.frame.noalias() = -b.frame_inverse * b.Wu.template head<3>();
   b.wrench.setZero();
@@ -181,6 +196,12 @@ template <class Scalar> void IterationMatrix<Scalar>::solve(const Scalar *r, con
     }
     Vector3 frame = b.frame + b.frame_inverse * force;
     b.z.template head<3>() = -frame;
+    if (const Index rank = b.C.rows()) {
+      const Index first = 3 + 3 * b.wrench.cols();
+      b.z.segment(first, rank).setZero();
+      const Vector U_z = b.G.middleRows(first, rank) * b.z;
+      b.z.segment(first, rank) = -b.C * U_z;
+    }
     Scalar *out = x + system_.first_coordinate[i];
     Eigen::Map<Vector> x_p(out + 3, b.u.size());
     x_p.noalias() = b.W.transpose() * b.z;

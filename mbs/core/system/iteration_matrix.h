@@ -2,12 +2,14 @@
 //
 // Its p-blocks are diagonal, e = 1 + damping_factor d + stiffness_factor k, so it is eliminated as the mass matrix is
 // in planar_body.h and system.h, with W e^-1 W^T in place of W W^T. Off-diagonal damping is left to the iteration.
+// Where geometric stiffening adds U^T C U to m_ff, (e + U^T C U)^-1 stands for e^-1.
 #pragma once
 
 #include "core/constraint/envelope.h"
 #include "core/system/system.h"
 
 #include <Eigen/Core>
+#include <Eigen/LU>
 
 #include <cmath>
 #include <vector>
@@ -35,7 +37,9 @@ public:
 
 private:
   struct Body {
-    Eigen::MatrixXd W; // (3 + 3 markers, n), row h as at the last factorisation
+    Eigen::MatrixXd W;             // rows of the body as at the last factorisation
+    Eigen::MatrixXd C;             // of U, the rows behind those of markers; empty without geometric stiffening
+    Eigen::PartialPivLU<Matrix> S; // C^-1 + U e^-1 U^T
     double cosine = 1, sine = 0;
     std::vector<Eigen::Vector2d> arm; // of each marker, global
     Vector e_inverse;                 // (n)
@@ -49,6 +53,7 @@ private:
     Vector z;                                        // multipliers of the rows of W in x_p
   };
 
+  static void reduce(const PlanarBody &body, Body &b);
   void factorise_body(const PlanarBody &body, const PlanarBodyState &state, Body &b);
   Matrix3 mobility(const Body &b, Eigen::Index k, Eigen::Index l) const; // global
   void free_response(const Scalar *r, Body &b);

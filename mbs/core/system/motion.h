@@ -51,8 +51,6 @@ public:
   ErrorNorm &norm() { return norm_; }
 
 private:
-  bool has_inertia() const;
-
   const System &system_;
   Workspace workspace_;
   ErrorNorm norm_;

@@ -1,0 +1,126 @@
+"""A beam link cut into pieces of equal length, each a link of its own: for deflections too large for one frame.
+
+Deflections within a piece are 1/N² of those within the link. Pieces are held simply supported, with one eigenmode and
+the static shapes of what their neighbours do to them: a frame between the ends of a piece turns with it, and leaves
+small deflections and few steps (docs/theory.md, Links in pieces).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+from ..common.errors import InputError
+from .link_file import LinkSource, LinkTable, link_path, read_link
+from .link_records import BeamLink, Link
+
+ON_A_CUT = 1e-9  # of the length
+
+
+@dataclass(frozen=True)
+class CutLink:
+    """A link in pieces.
+
+    Attributes:
+        tables: the link of each piece, from the root to the tip.
+        starts: where each begins, m from the root.
+        places: of each interface, and of "mid", the number of the piece and the name there.
+    """
+
+    tables: tuple[LinkTable, ...]
+    starts: tuple[float, ...]
+    places: Mapping[str, tuple[int, str]]
+
+
+def cut(source: LinkSource, count: int) -> CutLink:
+    """The link of `source` in `count` pieces. Raises `InputError` where it cannot be cut."""
+    link, path = read_link(source), link_path(source)
+    beam = _beam(link, path)
+    length = beam.geometry.length / count
+    starts = tuple(k * length for k in range(count))
+    positions = beam.places | {"mid": beam.geometry.length / 2}
+    places = {name: _place(x, length, count) for name, x in positions.items()}
+    places |= {name: (k, label or name) for name, (k, label) in places.items()}
+    tables = tuple(
+        LinkTable(_piece(beam, path, k, count, places), path.with_name(f"{path.name}: piece {k + 1} of {count}"))
+        for k in range(count)
+    )
+    return CutLink(tables, starts, places)
+
+
+def _beam(link: Link, path: Path) -> BeamLink:
+    if not isinstance(link, BeamLink):
+        raise InputError(f'{path}: geometry.kind: expected "beam" of a body in pieces, found "solid"')
+    if "in-plane-bending" not in link.families:
+        raise InputError(
+            f'{path}: modes.family: expected "in-plane-bending" among those of a body in pieces, found'
+            f" {', '.join(link.families)}"
+        )
+    return link
+
+
+def _place(x: float, length: float, count: int) -> tuple[int, str]:
+    """The piece in which x is, and the name of its end there; no name between its ends."""
+    nearest = round(x / length)
+    if abs(x - nearest * length) <= ON_A_CUT * length * count:
+        return (0, "root") if nearest == 0 else (nearest - 1, "tip")
+    k = min(int(x / length), count - 1)
+    return k, ""
+
+
+def _piece(link: BeamLink, path: Path, k: int, count: int, places: Mapping[str, tuple[int, str]]) -> dict[str, Any]:
+    """The keys of the link file of piece k."""
+    record = link.model_dump(mode="json", exclude_none=True)
+    length, start = link.geometry.length / count, k * link.geometry.length / count
+    families = [family for family in link.families if family in ("in-plane-bending", "axial")]
+    segments = [
+        {"until": min(segment.until, start + length) - start, "section": segment.section.model_dump(mode="json")}
+        for segment, before in zip(link.geometry.segment or (), link.geometry.breakpoints, strict=False)
+        if segment.until > start + ON_A_CUT * length and before < start + length * (1 - ON_A_CUT)
+    ]
+    if segments:
+        segments[-1]["until"] = length
+    section = {"segment": segments} if segments else {"section": record["geometry"]["section"]}
+    elements = link.mesh.elements or len(link.mesh.nodes or ()) - 1
+    return {
+        "name": f"{link.name}, piece {k + 1}",
+        "material": record["material"],
+        "geometry": {"kind": "beam", "length": length} | section,
+        "mesh": {"elements": max(2, len(segments), ceil(elements / count))},
+        "model": record["model"],
+        "reference": {"condition": "simply-supported"},
+        "modes": {"count": 1, "family": families, "attachment_modes": True},
+        "damping": {"rayleigh": [0.0, _stiffness_damping(link, path)]},
+        "interface": _interfaces(link, k, start, places),
+    }
+
+
+def _stiffness_damping(link: BeamLink, path: Path) -> float:
+    """B of D = bK, the damping that pieces and link have alike."""
+    ratio, rayleigh = link.damping.ratio, link.damping.rayleigh
+    ratios = ratio if isinstance(ratio, tuple) else (ratio or 0.0,)
+    if any(ratios) or (rayleigh is not None and rayleigh[0]):
+        raise InputError(
+            f"{path}: damping: expected none or rayleigh = [0.0, b] of a body in pieces, since ratios are those of the"
+            f" modes of the whole link, found {'ratio' if any(ratios) else 'rayleigh'} ="
+            f" {ratio if any(ratios) else list(rayleigh or ())}"
+        )
+    return rayleigh[1] if rayleigh else 0.0
+
+
+def _interfaces(link: BeamLink, k: int, start: float, places: Mapping[str, tuple[int, str]]) -> list[dict[str, Any]]:
+    """The interfaces of the link that are in piece k; masses of those on one cut are one."""
+    found: dict[str, dict[str, Any]] = {}
+    for record in link.interface:
+        piece, name = places[record.name]
+        if piece != k:
+            continue
+        entry = found.setdefault(name, {"name": name, "mass": 0.0, "inertia": [0.0, 0.0, 0.0]})
+        if name not in ("root", "tip"):
+            entry["position"] = link.places[record.name] - start
+        entry["mass"] += record.mass
+        entry["inertia"] = [a + b for a, b in zip(entry["inertia"], record.inertia, strict=True)]
+    return list(found.values())

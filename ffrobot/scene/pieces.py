@@ -1,0 +1,129 @@
+"""Scenes with links in pieces: the same scene with a body for each piece, welded to the next.
+
+Everything that computes motions gets the scene of pieces, everything that reports them the one link
+(`ffrobot.run.pieces`): in between, nothing knows of pieces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from ..common.errors import InputError
+from ..common.validation import Record
+from ..fe_models.pieces import CutLink, cut
+from ..mbs.joints.weld import WeldJoint
+from ..mbs.scene.bodies import Body
+from .scene import Scene
+
+KINDS = ("pcid", "forward", "static")
+"""Kinds of analysis that links in pieces can take part in: all others ask for the modes of a link."""
+
+
+@dataclass(frozen=True)
+class BodyInPieces:
+    """How a body of a scene is cut, and the names of its pieces as bodies, from the root to the tip."""
+
+    cut: CutLink
+    names: tuple[str, ...]
+
+    def point(self, label: str) -> str:
+        """Where one of its points is, as PIECE.POINT."""
+        piece, name = self.cut.places[label]
+        return f"{self.names[piece]}.{name}"
+
+
+def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyInPieces]:
+    """The bodies of a scene with the key `pieces` that are cut in more than one, by name; `counts` of all of them.
+
+    Raises `InputError` where a link or the scene allows no pieces.
+    """
+    found = {}
+    for body in scene.body:
+        if body.link is not None and body.name in counts:
+            names = tuple(f"{body.name}, piece {k}" for k in range(1, counts[body.name] + 1))
+            found[body.name] = BodyInPieces(cut(body.link, counts[body.name]), names)
+    problems = [f"{scene.path}: {problem}" for problem in _problems(scene, found)]
+    if problems:
+        raise InputError("\n".join(problems))
+    return {name: body for name, body in found.items() if len(body.names) > 1}
+
+
+def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
+    """The scene in which each piece is a body; points that the scene names are those of the pieces."""
+    places = {f"{name}.{label}": body.point(label) for name, body in divided.items() for label in body.cut.places}
+    keys = {name: _renamed(getattr(scene, name), places) for name in ("joint", "trajectory", "load", "payload")}
+    initial = scene.initial.model_copy(
+        update={"angles": _of_each(scene.initial.angles, divided), "rates": _of_each(scene.initial.rates, divided)}
+    )
+    bodies = tuple(piece for body in scene.body for piece in _pieces(body, divided))
+    joints = (*keys["joint"], *(weld for name, body in divided.items() for weld in _welds(name, body)))
+    return scene.model_copy(update=keys | {"body": bodies, "joint": joints, "initial": initial})
+
+
+def _pieces(body: Body, divided: Mapping[str, BodyInPieces]) -> Iterator[Body]:
+    if body.name not in divided:
+        yield body
+        return
+    pieces = divided[body.name]
+    for name, link in zip(pieces.names, pieces.cut.tables, strict=True):
+        yield body.model_copy(update={"name": name, "link": link, "pieces": None})
+
+
+def _welds(name: str, body: BodyInPieces) -> Iterator[WeldJoint]:
+    for k, (first, second) in enumerate(zip(body.names, body.names[1:], strict=False), 1):
+        yield WeldJoint(name=f"{name}, cut {k}", type="weld", between=(f"{first}.tip", f"{second}.root"))
+
+
+def _of_each(guesses: Mapping[str, float], divided: Mapping[str, BodyInPieces]) -> dict[str, float]:
+    """Guesses for frames, those of a divided body for each of its pieces."""
+    return {
+        piece: guess
+        for name, guess in guesses.items()
+        for piece in (divided[name].names if name in divided else (name,))
+    }
+
+
+T = TypeVar("T")
+
+
+def _renamed(value: T, places: Mapping[str, str]) -> T:
+    """A record, or several, with names of points replaced."""
+    new: Any = value
+    if isinstance(value, str):
+        new = places.get(value, value)
+    elif isinstance(value, tuple):
+        new = tuple(_renamed(entry, places) for entry in value)
+    elif isinstance(value, Record):
+        new = value.model_copy(update={key: _renamed(getattr(value, key), places) for key in value.model_fields_set})
+    return new  # type: ignore[no-any-return]
+
+
+def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str]:
+    """What cannot be had together with links in pieces."""
+    if not divided:
+        return
+    first = next(iter(divided))
+    for table in ("pzt", "actuation_points"):
+        for layout in getattr(scene, table):
+            yield f'{table} "{layout.body}": expected no [[{table}]] beside bodies in pieces ("{first}"), found one'
+    if scene.motors == "frame":
+        yield f'motors: expected "section" beside bodies in pieces ("{first}"), found "frame"'
+    for analysis in scene.analysis:
+        if analysis.kind not in KINDS:
+            yield (
+                f'analysis "{analysis.name}": kind: expected one of {", ".join(KINDS)} beside bodies in pieces'
+                f' ("{first}"), found "{analysis.kind}"'
+            )
+        if analysis.is_checked:
+            yield f'analysis "{analysis.name}": check: expected none beside bodies in pieces ("{first}"), found one'
+    for joint in scene.joint:
+        if joint.elastic_gear("section") is not None:
+            yield f'joint "{joint.name}": stiffness: expected none beside bodies in pieces ("{first}"), found one'
+    for reference in scene.references():
+        if reference.kind == "body" and reference.name in divided and not reference.key.startswith("initial."):
+            yield (
+                f"{reference.key}: expected a point or a joint where a body is in pieces, whose frame no piece has,"
+                f' found "{reference.name}"'
+            )

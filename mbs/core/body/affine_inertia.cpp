@@ -1,0 +1,189 @@
+#include "core/body/affine_inertia.h"
+
+#include <Eigen/LU>
+
+namespace ffrobot {
+
+using Eigen::Index;
+using Eigen::Matrix4d;
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::Vector4d;
+using Eigen::VectorXd;
+using VectorMap = Eigen::Map<const VectorXd>;
+
+namespace {
+
+constexpr std::array<Index, 4> order = {0, 2, 1, 3}; // x and stretch, those of foreshortening, first
+
+template <class Rows> auto quarter_turn(const Rows &x) {
+  Eigen::Matrix<double, 4, Rows::ColsAtCompileTime> turned(4, x.cols());
+  turned << -x.row(1), x.row(0), -x.row(3), x.row(2);
+  return turned;
+}
+
+Matrix4d mass_of_affine_fields(double m, const Vector2d &s, double J) {
+  Matrix4d N;
+  N << m, 0, s[0], -s[1], 0, m, s[1], s[0], s[0], s[1], J, 0, -s[1], s[0], 0, J;
+  return N;
+}
+
+// (K x)^T, (4, n)
+Matrix4Xd products(const AffineInertia &inertia, const VectorMap &x) {
+  Matrix4Xd K_x = Matrix4Xd::Zero(4, inertia.modes());
+  for (Index i = 0; i < 4; ++i)
+    if (const MatrixXd &K = inertia.K[static_cast<std::size_t>(i)]; K.size())
+      K_x.row(i).noalias() = (K * x).transpose();
+  return K_x;
+}
+
+} // namespace
+
+AffineInertia::AffineInertia(double mass, const Vector2d &first_moment, double J, const Matrix4Xd &F_,
+                             const MatrixXd &m_xy, const MatrixXd &S_tilde, const std::array<MatrixXd, 4> &K_)
+    : N(mass_of_affine_fields(mass, first_moment, J)), N_inverse(N.inverse()), F(F_), K(K_) {
+  const MatrixXd affine = F.transpose() * N_inverse * F;
+  m_xy_rest = m_xy - affine;
+  m_ff_rest = MatrixXd::Identity(modes(), modes()) - affine;
+  S_tilde_rest = S_tilde - quarter_turn(F).transpose() * N_inverse * F;
+
+  moving = K[1].size() || K[3].size() || first_moment.y() != 0 ? 4 : 2;
+  const auto moved = [&](const MatrixXd &x) {
+    MatrixXd chosen(moving, x.cols());
+    for (Index i = 0; i < moving; ++i)
+      chosen.row(i) = x.row(order[static_cast<std::size_t>(i)]);
+    return chosen;
+  };
+  constant = moved(F).isZero(0) ? 0 : moving;
+  const MatrixXd N_moved = moved(moved(N).transpose());
+  C = C_inverse = MatrixXd::Zero(rank(), rank());
+  C.topLeftCorner(moving, moving) = N_moved.inverse();
+  C_inverse.topLeftCorner(moving, moving) = N_moved;
+  C.bottomRightCorner(constant, constant) = -C.topLeftCorner(constant, constant);
+  C_inverse.bottomRightCorner(constant, constant) = -N_moved.topLeftCorner(constant, constant);
+}
+
+void AffineInertia::rows(const Matrix4Xd &F_p, Eigen::Ref<MatrixXd, 0, Eigen::OuterStride<>> U) const {
+  for (Index i = 0; i < 4; ++i) {
+    const Index field = order[static_cast<std::size_t>(i)];
+    if (i < moving) {
+      U.row(i) = F_p.row(field);
+      if (constant)
+        U.row(moving + i) = F.row(field);
+    } else {
+      U.row(constant + i) = F.row(field);
+    }
+  }
+}
+
+void AffineInertia::spread(const Vector4d &a, const Vector4d &b, double *x) const {
+  for (Index i = 0; i < 4; ++i) {
+    const Index field = order[static_cast<std::size_t>(i)];
+    if (i < moving) {
+      x[i] = a[field];
+      if (constant)
+        x[moving + i] = b[field];
+    } else {
+      x[constant + i] = a[field] + b[field];
+    }
+  }
+}
+
+void update(const AffineInertia &inertia, const double *p, const double *p_dot, AffineMotion &motion) {
+  const Index n = inertia.modes();
+  const VectorMap p_(p, n), p_dot_(p_dot, n);
+  motion.F_p = inertia.F * p_;
+  motion.F_p_dot = inertia.F * p_dot_;
+  motion.g = inertia.N.col(2) + motion.F_p;
+  motion.g_dot = motion.F_p_dot;
+  motion.curvature.setZero();
+  motion.F = inertia.F;
+  for (Index i = 0; i < 4; ++i) {
+    const MatrixXd &K = inertia.K[static_cast<std::size_t>(i)];
+    if (K.size() == 0)
+      continue;
+    motion.K_p.noalias() = K * p_;
+    motion.F.row(i) -= motion.K_p.transpose();
+    motion.g[i] -= 0.5 * p_.dot(motion.K_p);
+    motion.g_dot[i] -= p_dot_.dot(motion.K_p);
+    motion.K_p.noalias() = K * p_dot_;
+    motion.curvature[i] = p_dot_.dot(motion.K_p);
+  }
+  motion.u = inertia.N_inverse * motion.g;
+}
+
+// u^T g + p^T (m_xy - F^T N^-1 F) p
+double rotary_inertia(const AffineInertia &inertia, const AffineMotion &motion, double p_m_xy_p) {
+  return motion.u.dot(motion.g) + p_m_xy_p - motion.F_p.dot(inertia.N_inverse * motion.F_p);
+}
+
+// (i u)^T F(p) - (i N^-1 F p)^T F
+void coupling(const AffineInertia &inertia, const AffineMotion &motion, double *x) {
+  const Vector4d of_rest = inertia.N_inverse * motion.F_p;
+  inertia.spread(quarter_turn(motion.u), -quarter_turn(of_rest), x);
+}
+
+// On the modes F(p)^T N^-1 y + F^T N^-1 y_rest, on theta (i g)^T N^-1 y + 2 theta_dot (F p)^T N^-1 F p_dot.
+double velocity_force(const AffineInertia &inertia, const AffineMotion &motion, double w, double *x) {
+  const Vector4d y = w * w * motion.g - 2 * w * quarter_turn(motion.g_dot) + motion.curvature;
+  const Vector4d y_rest = -w * w * motion.F_p + 2 * w * quarter_turn(motion.F_p_dot);
+  inertia.spread(inertia.N_inverse * y, inertia.N_inverse * y_rest, x);
+  return quarter_turn(motion.u).dot(y) + 2 * w * motion.F_p.dot(inertia.N_inverse * motion.F_p_dot);
+}
+
+double kinetic_energy(const AffineInertia &inertia, const AffineMotion &motion, const double *p, const double *p_dot,
+                      const Vector2d &R_dot, double w) {
+  const VectorMap p_(p, inertia.modes()), p_dot_(p_dot, inertia.modes());
+  const Vector4d momentum = inertia.N.leftCols<2>() * R_dot + w * quarter_turn(motion.g) + motion.g_dot;
+  return 0.5 * (momentum.dot(inertia.N_inverse * momentum) + w * w * p_.dot(inertia.m_xy_rest * p_) +
+                p_dot_.dot(inertia.m_ff_rest * p_dot_)) +
+         w * p_.dot(inertia.S_tilde_rest * p_dot_);
+}
+
+// f = X^T N^-1 gamma + that of the rest, gamma = X a - theta_dot^2 g + 2 i theta_dot g_dot - p_dot^T K p_dot
+VectorXd inertia_force(const AffineInertia &inertia, const AffineMotion &motion, const double *p, const double *p_dot,
+                       double w, const VectorXd &a, InertiaTangent *tangent) {
+  const Index n = inertia.modes();
+  const VectorMap p_(p, n), p_dot_(p_dot, n), p_ddot(a.data() + 3, n);
+  const MatrixXd &m_rest = inertia.m_xy_rest, &S_rest = inertia.S_tilde_rest;
+  const double theta_ddot = a[2];
+  Matrix4Xd X(4, 3 + n);
+  X << inertia.N.leftCols<2>(), quarter_turn(motion.g), motion.F;
+  const Vector4d gamma = X * a - w * w * motion.g + 2 * w * quarter_turn(motion.g_dot) - motion.curvature;
+  const Vector4d y = inertia.N_inverse * gamma;
+  const VectorXd m_p = m_rest * p_, m_p_dot = m_rest * p_dot_, S_p_ddot = S_rest * p_ddot;
+
+  VectorXd f = X.transpose() * y;
+  f[2] += theta_ddot * m_p.dot(p_) + 2 * w * m_p.dot(p_dot_) + p_.dot(S_p_ddot);
+  f.tail(n) += inertia.m_ff_rest * p_ddot - w * w * m_p - S_rest * (theta_ddot * p_ + 2 * w * p_dot_);
+  if (!tangent)
+    return f;
+
+  auto &[M, D, K] = *tangent;
+  M = X.transpose() * inertia.N_inverse * X;
+  M(2, 2) += m_p.dot(p_);
+  M.bottomRightCorner(n, n) += inertia.m_ff_rest;
+  M.block(2, 3, 1, n) += p_.transpose() * S_rest;
+  M.block(3, 2, n, 1) = M.block(2, 3, 1, n).transpose();
+
+  const Matrix4Xd K_p_dot = products(inertia, p_dot_), i_F = quarter_turn(motion.F);
+  Matrix4Xd by_velocity(4, 1 + n); // of gamma
+  by_velocity << -2 * w * motion.g + 2 * quarter_turn(motion.g_dot), 2 * w * i_F - 2 * K_p_dot;
+  D = X.transpose() * inertia.N_inverse * by_velocity;
+  D(2, 0) += 2 * m_p.dot(p_dot_);
+  D.block(2, 1, 1, n) += 2 * w * m_p.transpose();
+  D.block(3, 0, n, 1) -= 2 * w * m_p + 2 * (S_rest * p_dot_);
+  D.bottomRightCorner(n, n) -= 2 * w * S_rest;
+
+  const Matrix4Xd by_position =
+      theta_ddot * i_F - w * w * motion.F - 2 * w * quarter_turn(K_p_dot) - products(inertia, p_ddot);
+  K = X.transpose() * inertia.N_inverse * by_position;
+  K.row(2) += y.transpose() * i_F + (2 * theta_ddot * m_p + 2 * w * m_p_dot + S_p_ddot).transpose();
+  K.bottomRows(n) -= w * w * m_rest + theta_ddot * S_rest;
+  for (Index i = 0; i < 4; ++i)
+    if (const MatrixXd &K_i = inertia.K[static_cast<std::size_t>(i)]; K_i.size())
+      K.bottomRows(n) -= y[i] * K_i;
+  return f;
+}
+
+} // namespace ffrobot

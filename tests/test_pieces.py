@@ -1,0 +1,214 @@
+"""Links in pieces: the same names and datasets as of the one link, and right where that is bent too far."""
+
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from ffrobot.common.errors import InputError
+from ffrobot.fe_models.pieces import cut
+from ffrobot.results.write import results_image
+from ffrobot.run.solve import solve
+from ffrobot.scene.load import make_scene
+
+sys.path.insert(0, str(Path(__file__).parent / "mbs"))
+from rod_chains import extrapolated
+
+SOFT, STIFF = 1e9, 7e10
+FALL = [{"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}]
+DRIVEN = [
+    {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
+    {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
+]
+
+
+def link(modulus=SOFT, **keys):
+    return {
+        "name": "link",
+        "material": {"youngs_modulus": modulus, "poissons_ratio": 0.3, "density": 2700.0},
+        "geometry": {"kind": "beam", "length": 1.0, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
+        "mesh": {"elements": 16},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 8, "family": "in-plane-bending"},
+    } | keys
+
+
+def pendulum(pieces, of=None, analysis=None, **keys):
+    """Two links, hinged, that fall from the horizontal."""
+    divided = {} if pieces is None else {"pieces": pieces}
+    tables = {
+        "space": "planar",
+        "gravity": [0.0, -9.81],
+        "body": [{"name": name, "link": of or link(), **divided} for name in ("link1", "link2")],
+        "joint": [
+            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"], "motor": False},
+            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"], "motor": False},
+        ],
+        "analysis": analysis
+        or [{"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}],
+    }
+    return make_scene(name="soft", **(tables | keys))
+
+
+def solved(scene, tmp_path):
+    path = tmp_path / f"{scene.body[0].pieces}.h5"
+    path.write_bytes(results_image(solve(scene)))
+    return h5py.File(path)
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return extrapolated(10, SOFT * 0.02 * 0.01**3 / 12)
+
+
+@pytest.mark.parametrize(("pieces", "bound"), [(2, 2.5e-3), (4, 4e-4)])
+def test_soft_double_pendulum(pieces, bound, truth, tmp_path):
+    """Bent by 14 % of its length; one affine frame is off by 4e-3 and a linear one by more than the length."""
+    with solved(pendulum(pieces), tmp_path) as file:
+        assert file["fall"].attrs["status"] == "completed"
+        tip = file["fall/points/link2.tip/position"][()]
+        deflection = file["fall/points/link2.tip/deflection"][()]
+    assert np.linalg.norm(tip - truth, axis=1).max() < bound
+    assert np.abs(deflection[:, 1]).max() == pytest.approx(0.136, abs=0.002)
+
+
+def test_auto_takes_as_many_as_the_deflection_needs(truth, tmp_path):
+    """Four for 14 % of the length, none for a stiff link."""
+    with solved(pendulum("auto"), tmp_path) as file:
+        assert {file[f"fall/bodies/{name}"].attrs["pieces"] for name in ("link1", "link2")} <= {3, 4, 5}
+        assert np.linalg.norm(file["fall/points/link2.tip/position"] - truth, axis=1).max() < 1e-3
+    with solved(pendulum("auto", link(STIFF)), tmp_path) as file:
+        assert "pieces" not in file["fall/bodies/link1"].attrs
+
+
+def shapes_of(group):
+    found = {}
+    group.visititems(lambda key, entry: found.update({key: getattr(entry, "shape", None)}))
+    return found
+
+
+def test_datasets_are_those_of_the_one_link(tmp_path):
+    """The same names and shapes; where the link is stiff, the same motion but for fast vibrations of the start."""
+    analysis = [{"name": "fall", "kind": "forward", "end": 0.1, "output_step": 0.05, "tolerance": 1e-5}]
+    with (
+        solved(pendulum(None, link(STIFF), analysis), tmp_path) as one,
+        solved(pendulum(3, link(STIFF), analysis), tmp_path) as three,
+    ):
+        assert shapes_of(one["fall"]) == shapes_of(three["fall"])
+        for key in ("bodies/link1/position", "bodies/link2/angle", "points/link1.mid/position"):
+            expected, found = one[f"fall/{key}"][()], three[f"fall/{key}"][()]
+            np.testing.assert_allclose(found, expected, atol=1e-3, err_msg=key)
+
+
+@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+def test_frame_and_modal_coordinates_tell_where_points_are(condition, tmp_path):
+    """R, θ and p of the one link, as found from the pieces: their rates are derivatives."""
+    stiff = link(STIFF, reference={"condition": condition})
+    analysis = [{"name": "fall", "kind": "forward", "end": 0.2, "output_step": 0.0005, "tolerance": 1e-7}]
+    with solved(pendulum(2, stiff, analysis), tmp_path) as file:
+        fall = file["fall"]
+        body = {key: fall[f"bodies/link2/{key}"][()] for key in fall["bodies/link2"]}
+        deflection = fall["points/link2.mid/deflection"][()]
+        time = fall["time"][()]
+    for key, rate in (("position", "velocity"), ("angle", "angular_velocity"), ("modal", "modal_velocity")):
+        difference = (body[key][2:] - body[key][:-2]) / (time[2] - time[0])
+        if difference.ndim == 2:
+            difference, rates = difference[:, :2], body[rate][1:-1, :2]
+        else:
+            rates = body[rate][1:-1]
+        assert np.abs(difference - rates).max() < 2e-2 * np.abs(rates).max(), key
+    if condition == "simply-supported":
+        assert np.abs(deflection).max() > 1e-4
+
+
+def test_a_path_is_followed_with_a_payload_and_named_interfaces(tmp_path):
+    """PCID: the moments of four pieces are those of the one link where that is stiff; reactions of its joints too."""
+    modes = {"count": 8, "family": "in-plane-bending", "attachment_modes": True}
+    named = link(3 * STIFF, modes=modes, interface=[{"name": "hook", "position": 0.4, "mass": 0.2}])
+    keys = {
+        "joint": DRIVEN,
+        "payload": [{"point": "link2.tip", "mass": 0.3}],
+        "load": [{"point": "link1.hook", "y": "-2.0"}],
+        "trajectory": [
+            {"name": "first", "joint": "O", "value": "0.3*(10*t**3-15*t**4+6*t**5)"},
+            {"name": "second", "joint": "A", "value": "0.5-0.4*(10*t**3-15*t**4+6*t**5)"},
+        ],
+        "initial": {"state": "static", "angles": {"link1": 0.0, "link2": 0.5}},
+    }
+    analysis = [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.01, "tolerance": 1e-6}]
+    found = []
+    for pieces in (None, 4):
+        with solved(pendulum(pieces, named, analysis, geometric_stiffening=True, **keys), tmp_path) as file:
+            found.append(
+                [file[f"inverse/joints/{joint}/{key}"][()] for joint in "OA" for key in ("moment", "reaction")]
+            )
+            assert sorted(file["inverse/joints"]) == ["A", "O"]
+    for one, four in zip(*found, strict=True):
+        assert np.abs(one - four).max() < 3e-3 * np.abs(one).max()
+
+
+def test_pieces_make_up_the_link():
+    """Lengths, steps of the section, masses at interfaces and names of points."""
+    stepped = link(
+        geometry={
+            "kind": "beam",
+            "length": 1.2,
+            "segment": [
+                {"until": 0.5, "section": {"shape": "rectangle", "height": 0.02, "width": 0.02}},
+                {"until": 1.2, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
+            ],
+        },
+        interface=[{"name": "hub", "position": 0.4, "mass": 0.3}, {"name": "eye", "position": 0.7, "mass": 0.1}],
+    )
+    scene = pendulum(3, stepped)
+    pieces = cut(scene.body[0].link, 3)
+    assert pieces.starts == pytest.approx([0.0, 0.4, 0.8])
+    assert pieces.places == {
+        "root": (0, "root"), "tip": (2, "tip"), "hub": (0, "tip"), "eye": (1, "eye"), "mid": (1, "mid")
+    }  # fmt: skip
+    first, second, third = (table.keys for table in pieces.tables)
+    assert [segment["until"] for segment in second["geometry"]["segment"]] == pytest.approx([0.1, 0.4])
+    assert [len(table["geometry"]["segment"]) for table in (first, third)] == [1, 1]
+    assert first["interface"][0] | {"inertia": None} == {"name": "tip", "mass": 0.3, "inertia": None}
+    assert second["interface"][0]["position"] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"pzt": [{"body": "link1", "count": 2, "length": 0.05, "width": 0.02, "thickness": 1e-3, "modulus": 63e9,
+                   "d31": 1e-10}]}, "no .*pzt.* beside bodies in pieces"),
+        ({"motors": "frame"}, 'motors: expected "section" beside bodies in pieces'),
+        ({"trajectory": [{"name": "turn", "angle": "link1", "value": "t"}]}, "expected a point or a joint"),
+        ({"joint": DRIVEN, "analysis": [{"name": "modes", "kind": "linear"}]}, "kind: expected one of pcid, forward"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_had_is_refused(keys, says):
+    with pytest.raises(InputError, match=says):
+        solve(pendulum(2, **keys))
+
+
+@pytest.mark.parametrize(
+    ("of", "says"),
+    [
+        (link(damping={"ratio": 0.01}), "damping: expected none or rayleigh"),
+        (link(modes={"count": 2, "family": "axial"}), 'modes.family: expected "in-plane-bending" among those'),
+        (
+            link(geometry={"kind": "solid", "length": 1.0,
+                           "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}}, mesh={}),
+            'geometry.kind: expected "beam" of a body in pieces',
+        ),
+    ],
+)  # fmt: skip
+def test_links_that_cannot_be_cut_are_refused(of, says):
+    with pytest.raises(InputError, match=says):
+        solve(pendulum(2, of))
+
+
+def test_pieces_of_a_rigid_body_are_refused():
+    rigid = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
+    bodies = [{"name": name, "rigid": rigid, "pieces": 2} for name in ("link1", "link2")]
+    with pytest.raises(InputError, match='expected "pieces" beside "link" alone, found "rigid"'):
+        pendulum(None, body=bodies)
