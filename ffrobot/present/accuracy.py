@@ -41,7 +41,8 @@ def _modes(solution: Solution) -> str:
         return NOT_ESTIMATED
     if max(known) > RESOLVED:
         return "too few: vibrations faster than the highest take part"
-    return f"{max(known):.0e} of peaks by raised masses; what missing modes do besides, under jolts above all: {NOT_ESTIMATED}"
+    besides = f"what missing modes do besides, under jolts above all: {NOT_ESTIMATED}"
+    return f"{max(known):.0e} of peaks by raised masses; {besides}"
 
 
 def _deflection(solution: Solution) -> str:

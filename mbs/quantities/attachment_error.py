@@ -14,7 +14,8 @@ def mode_error(outcome: Outcome) -> float | None:
     Attachment modes carry what the eigenmodes left out do statically. Their dynamics is wrong by the mass that was
     added, (μ − 1) p̈, that is by δp = (μ − 1) p̈/ω²: the largest √(δpᵀ K δp) of a link against the largest √(pᵀ K p).
     It knows of these masses alone: modes that are missing ring under jolts and bend under distributed inertia, which
-    `run.modal_error` sees (measured there: 1.5e-5 said of 7e-3 in forces after a jolt). Not known of links without attachment modes, nor where masses are not raised.
+    `run.modal_error` sees (measured there: 1.5e-5 said of 7e-3 in forces after a jolt). Not known of links without
+    attachment modes, nor where masses are not raised.
     """
     ratios = []
     for body in outcome.assembly.model.links:
