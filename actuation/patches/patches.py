@@ -20,6 +20,7 @@ STEP = 0.1  # of the height, from one station to the next; less is a taper
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
 MOST_CONDITION = 1e16  # what more is found of a condition number is rounding itself
 LEAST_WEIGHT = 1e-6  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
+OF_STATIC_SHAPES = 1e-3  # root of the weight of attachment modes beside modes: more patches than modes serve them last
 ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
 
 
@@ -76,6 +77,12 @@ class PatchArray:
         return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
 
     @property
+    def in_order(self) -> Array:
+        """(rows, n) roots of weights: modes first, and attachment modes with what more patches than modes are left."""
+        n, k = self.Phi_V.shape
+        return served_first(self.served, n, k)
+
+    @property
     def stiffness_in_words(self) -> str:
         """ψ and the authority, and whether the link feels the stiffness of its patches."""
         if not np.isfinite(self.authority).all():
@@ -88,6 +95,12 @@ class PatchArray:
     def surface_distance(self) -> Array:
         """(k,) from the link's axis to the outer surface of each patch, m."""
         return self.height / 2 + self.layout.layers * self.layout.thickness
+
+
+def served_first(served: int, n: int, patches: int) -> Array:
+    """(rows, n) roots of weights of the `served` first of n modes; more patches than these serve the others, too."""
+    rows = n if patches > served else served
+    return np.diag(np.where(np.arange(n) < served, 1.0, OF_STATIC_SHAPES))[:rows]
 
 
 def _span(values: Array) -> str:
@@ -241,6 +254,7 @@ def _check_edges(key: str, edges: Array, length: float) -> None:
 def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
     """W_sqrt: of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points."""
     n = planar.n_eigenmodes
+    order = served_first(n, planar.n_modes, layout.patch_count)
     if layout.mode_weights is not None:
         if len(layout.mode_weights) != n:
             raise InputError(
@@ -248,10 +262,11 @@ def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
                 f" {len(layout.mode_weights)}"
             )
         weights = np.array(layout.mode_weights) / max(layout.mode_weights)
-        root: Array = np.sqrt(weights.clip(min=LEAST_WEIGHT))
-        return root[:, None] * np.eye(n, planar.n_modes)
+        root = np.ones(len(order))
+        root[:n] = np.sqrt(weights.clip(min=LEAST_WEIGHT))
+        return root[:, None] * order
     if layout.point_weights is None:
-        return np.eye(n, planar.n_modes)
+        return order
     unknown = layout.point_weights.keys() - planar.points.keys()
     if unknown:
         raise InputError(

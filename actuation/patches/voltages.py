@@ -56,7 +56,7 @@ def voltage_gain(patches: PatchArray) -> Array:
     (n, k), served = patches.Phi_V.shape, patches.served
     if k == served and not patches.unreached_modes.size:
         return as_floats(np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n))
-    W_sqrt = patches.W_sqrt if k < served or patches.unreached_modes.size else np.eye(served, n)
+    W_sqrt = patches.W_sqrt if k < served or patches.unreached_modes.size else patches.in_order
     scale = voltage_scale(patches)
     gain: Array = scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt
     return gain

@@ -41,7 +41,7 @@ def _modes(solution: Solution) -> str:
         return NOT_ESTIMATED
     if max(known) > RESOLVED:
         return "too few: vibrations faster than the highest take part"
-    return f"{max(known):.0e} of peaks, estimated"
+    return f"{max(known):.0e} of peaks, estimated; what missing modes do after a jolt: {NOT_ESTIMATED}"
 
 
 def _deflection(solution: Solution) -> str:

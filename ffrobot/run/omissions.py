@@ -15,6 +15,8 @@ from .bodies import LoadedBody
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
 
+RIGID = 1e-9  # of the motion across: less along the axis is rounding
+
 _TERMS = {"D_ff": "damping", "S_tilde": "S̃", "j": "j"}
 
 
@@ -33,6 +35,9 @@ def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
     if rigid:
         yield f"modal coordinates of {', '.join(rigid)}, rigid"
     yield "coordinates out of the plane"
+    stiff = [name for name, body in bodies.items() if body.modal is not None and _is_rigid_along(body.planar)]
+    if stiff:
+        yield f"stretch of {', '.join(stiff)}, rigid along the axis: [modes] family without axial modes"
     for term, symbol in _TERMS.items():
         of = [name for name, body in bodies.items() if term in vanishing_terms(body.planar)]
         if of:
@@ -41,6 +46,13 @@ def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
     algebraic = [analysis.name for analysis in scene.analysis if analysis.is_algebraic]
     if algebraic:
         yield f"integration of {', '.join(algebraic)}, algebraic"
+
+
+def _is_rigid_along(planar: PlanarBody) -> bool:
+    """Whether no force at a point moves any point of the link along its axis, where joints and weight load it."""
+    along = [point.translation[0] for point in planar.points.values()]
+    across = [point.translation[1] for point in planar.points.values()]
+    return bool(np.abs(along).max(initial=0.0) <= RIGID * np.abs(across).max(initial=0.0))
 
 
 def _modes(name: str, planar: PlanarBody, modal: ModalBody) -> Iterator[str]:

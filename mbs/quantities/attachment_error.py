@@ -13,8 +13,9 @@ def mode_error(outcome: Outcome) -> float | None:
     Attachment modes carry what the eigenmodes left out do statically. What these do besides, by their inertia, is at
     most as if they vibrated at the frequency ω_k of the highest eigenmode kept: δp = (1/ω_k² − 1/ω²) p̈. The estimate
     is the largest √(δpᵀ K δp) of a link against the largest √(pᵀ K p). It is 0.3 to 3.5 times the error of the worst
-    moment of two-link arms with two to six modes, from rest and with jolts, for errors of 2e-7 to 1e-3
-    (tests/mbs/test_mode_error.py). Nothing is known of links without attachment modes.
+    moment of two-link arms with two to six modes, for errors of 2e-7 to 1e-3 (tests/mbs/test_mode_error.py). Modes that
+    ring after a jolt and are not there have no part in it: `run.modal_error` sees those, for the price of a solve.
+    Nothing is known of links without attachment modes.
     """
     ratios = []
     for body in outcome.assembly.model.links:

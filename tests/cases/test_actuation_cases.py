@@ -199,7 +199,8 @@ def test_more_patches_than_modes_saturate_as_well(solved, weights):
     assert file["limited"].attrs["status"] == "completed"
     deflection = slew_deflections(file)
     assert deflection["unlimited"] < 1e-9
-    assert 1e-3 < deflection["limited"] < 0.8 * deflection["motor"]
+    # 20 V hold a third of what they would without the patches' own stiffness, ψ = 4.4
+    assert 1e-3 < deflection["limited"] < 0.9 * deflection["motor"]
 
 
 CASE_NAMES = [
