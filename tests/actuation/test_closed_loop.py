@@ -195,8 +195,8 @@ def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_p
 @pytest.mark.parametrize(
     ("body", "error", "expected"),
     [
-        ("return np.zeros(3)", SolveError, "sample 0: expected 1 finite commands"),
-        ("return y[99]", SolveError, "sample 0: IndexError"),
+        ("return np.zeros(3)", SolveError, "sample 0, t = 0 s: expected 1 finite commands"),
+        ("return y[99]", SolveError, "sample 0, t = 0 s: IndexError"),
         ("return np.full(1, np.nan)", SolveError, "finite"),
     ],
 )

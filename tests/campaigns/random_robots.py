@@ -57,7 +57,7 @@ class Robot:
             "geometry": {"kind": "beam", "length": length, "section": section},
             "mesh": {"elements": 14},
             "reference": {"condition": str(self.rng.choice(["simply-supported", "cantilever"]))},
-            "modes": {"count": self.modes[name], "family": "in-plane-bending"},
+            "modes": {"count": self.modes[name], "family": "in-plane-bending", "attachment_modes": False},
             "damping": {"ratio": self.damping},
         }
         return {"name": name, "link": table}

@@ -32,7 +32,7 @@ def beam(name, length, section, modes, **keys):
         "geometry": {"kind": "beam", "length": length, "section": section},
         "mesh": {"elements": 14},
         "reference": {"condition": "simply-supported"},
-        "modes": {"count": modes, "family": "in-plane-bending"},
+        "modes": {"count": modes, "family": "in-plane-bending", "attachment_modes": False},
     }
     return {"name": name, "link": table | keys}
 
