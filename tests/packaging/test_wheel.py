@@ -59,7 +59,7 @@ def scene(two_link, tmp_path_factory):
 
 
 def test_wheel_is_small(wheel):
-    assert wheel.stat().st_size < 1.3e6  # 1.08 MB when this was written, 0.67 of it the core
+    assert wheel.stat().st_size < 2e6  # two compiled cores, for any x86-64 processor and for those with AVX2
 
 
 def test_nothing_of_stage_1_is_there(environment):
