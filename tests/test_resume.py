@@ -174,7 +174,7 @@ def test_input_that_has_changed(arm, file, old, new, change):
 
 
 def test_on_the_command_line(arm, ffrobot):
-    scene = arm(**{"tolerance = 1e-7": "tolerance = 1e-7\nmax_steps = 3000"})
+    scene = arm(**{"tolerance = 1e-7": "tolerance = 1e-7\nmax_steps = 4500"})
     inverse_alone(scene)
     command = ["solve", "scene.toml", "-o", "r.h5", "--resume"]
     messages = [ffrobot(*command, cwd=scene.parent) for _ in range(3)]

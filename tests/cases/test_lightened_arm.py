@@ -53,9 +53,10 @@ def test_mass_is_that_of_the_drawing(bodies, name):
 @pytest.mark.parametrize("name", MEASURES)
 def test_only_in_plane_bending_is_kept(bodies, name):
     body = bodies[name]
-    assert body.family == ("in-plane-bending",) * 4
+    assert body.family == ("in-plane-bending",) * 8  # two of them residual
     motion = np.abs(body.stations.translation).max(axis=0)  # (3, modes)
-    assert np.all(motion[2] < 1e-3 * motion[1])
+    # of eigenmodes; what is left of static shapes without them is small, and gmsh's cells are not symmetric
+    assert np.all(motion[2, :6] < 1e-3 * motion[1, :6])
 
 
 def faces(path):
@@ -130,4 +131,4 @@ def test_stress_is_that_of_bending_beside_a_hole(arm):
 
 def test_layout(arm):
     for analysis in ("inverse", "motors_alone"):
-        check_motion(arm.file[analysis], 701, {"upper_arm": 4, "forearm": 4}, {})
+        check_motion(arm.file[analysis], 701, {"upper_arm": 8, "forearm": 8}, {})

@@ -15,7 +15,7 @@ material = { youngs_modulus = 70e9, density = 2700.0 }
 geometry = { kind = "beam", length = 0.5, section = { shape = "rectangle", height = 0.01, width = 0.02 } }
 mesh = { elements = 4 }
 reference = { condition = "cantilever" }
-modes = { count = 2, family = "in-plane-bending" }
+modes = { count = 2, family = "in-plane-bending", attachment_modes = false }
 """
 SCENE = """
 name = "arm"
@@ -23,7 +23,7 @@ gravity = [0.0, -9.81]
 body = [{ name = "arm", link = "arm.toml" }]
 joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"] }]
 trajectory = [{ name = "lift", point = "arm.tip", y = "0.1*sin(t)" }]
-pzt = [{ body = "arm", count = 2, length = 0.1, width = 0.02, thickness = 1e-3, modulus = 63e9, d31 = 110e-12 }]
+pzt = [{ body = "arm", count = 2, length = 0.1, width = 0.02, thickness = 1e-3, modulus = 63e9, d31 = 110e-12, structural = false }]
 
 [[analysis]]
 name = "held"

@@ -32,7 +32,7 @@ def test_summary(two_link):
     out = two_link.stdout
     lines = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
     for name, kind in (("forward", "forward"), ("joints_only", "forward")):
-        assert lines[name][1:4] == [kind, "dop853", "1"]
+        assert lines[name][1:3] == [kind, "dop853"]
     assert "…" not in out
     assert "\x1b" not in out
     for text in ("steps", "tolerance", "constraints", "wall (s)", "largest (V)", "times limit", "cond Φ_V"):

@@ -154,7 +154,9 @@ def test_modal_body_has_its_modes_as_vectors(read, solid_arm, tmp_path):
     ((_, grid, points, data, _),) = read(tmp_path / "v" / "arm.vtkhdf")
     np.testing.assert_allclose(points, body.mesh.points, rtol=0, atol=DIGITS)
     assert grid.GetNumberOfCells() == len(body.mesh.cells)
-    assert sorted(data) == [f"mode {k + 1:02d}, {body.frequency[k]:.5g} Hz, {body.family[k]}" for k in range(len(body.family))]
+    assert sorted(data) == [
+        f"mode {k + 1:02d}, {body.frequency[k]:.5g} Hz, {body.family[k]}" for k in range(len(body.family))
+    ]
     for k, name in enumerate(sorted(data)):
         np.testing.assert_allclose(data[name], body.mesh.mode_shapes[:, :, k], rtol=0, atol=1e-6)
 
