@@ -23,7 +23,16 @@ gravity = [0.0, -9.81]
 body = [{ name = "arm", link = "arm.toml" }]
 joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"] }]
 trajectory = [{ name = "lift", point = "arm.tip", y = "0.1*sin(t)" }]
-pzt = [{ body = "arm", count = 2, length = 0.1, width = 0.02, thickness = 1e-3, modulus = 63e9, d31 = 110e-12, structural = false }]
+
+[[pzt]]
+body = "arm"
+count = 2
+length = 0.1
+width = 0.02
+thickness = 1e-3
+modulus = 63e9
+d31 = 110e-12
+structural = false
 
 [[analysis]]
 name = "held"
