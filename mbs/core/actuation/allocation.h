@@ -37,7 +37,7 @@ private:
   Eigen::VectorXd V_, u_, b_, gradient_, target_;
   std::vector<int> held_; // sign of the limit at which a voltage is held, 0 where free
   std::vector<Eigen::Index> free_, factorised_;
-  Eigen::LLT<Eigen::MatrixXd> llt_;
+  Eigen::LLT<Eigen::MatrixXd> llt_{Eigen::MatrixXd::Identity(1, 1)}; // copied before it is of anything
   unsigned long iterations_ = 0;
 };
 
