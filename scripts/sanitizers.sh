@@ -9,9 +9,9 @@ readonly CHECKED=build/sanitizers # the folder of an environment with that core,
 readonly FLAGS="-O1 -g1 -fno-omit-frame-pointer -fsanitize=address,undefined"
 
 # The packages of .venv, but not its ffrobot: path files of added folders are not read.
-.venv/bin/python -m venv --without-pip "$CHECKED/env"
+.venv/bin/python -m venv --system-site-packages --without-pip "$CHECKED/env"
 for packages in "$PWD"/.venv/lib/python3*/site-packages; do
-  printf '%s\n' "$packages" /usr/lib/python3/dist-packages >"$CHECKED/env/lib/${packages#*/.venv/lib/}/ffrobot.pth"
+  printf "%s\n" "$packages" >"$CHECKED/env/lib/${packages#*/.venv/lib/}/ffrobot.pth"
 done
 FFROBOT_NATIVE=ON CXXFLAGS=$FLAGS .venv/bin/python -m pip --python "$CHECKED/env/bin/python" install -q --no-deps --no-build-isolation --force-reinstall . \
   --config-settings=cmake.build-type=Debug --config-settings=build-dir="$CHECKED/build"
