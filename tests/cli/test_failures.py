@@ -10,6 +10,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+from loops import OWN_CONTROLLER
 
 SHORT = {"end = 1.0": "end = 0.02"}
 ENDLESS = {
@@ -206,17 +207,7 @@ def test_ctrl_c_while_results_are_written(two_link_copy, ffrobot, times):
 def test_an_error_later_keeps_the_analyses_before(two_link_copy, ffrobot):
     folder = two_link_copy({"scene.toml": SHORT})
     scene = folder / "scene.toml"
-    text = scene.read_text(encoding="utf-8")
-    text += """
-[[analysis]]
-name = "loop"
-kind = "closed-loop"
-actuation = "inverse"
-sample_time = 0.001
-controller = [{ kind = "python", python = "own.py:controller" }]
-sensor = [{ joint = "O" }]
-"""
-    scene.write_text(text, encoding="utf-8")
+    scene.write_text(scene.read_text(encoding="utf-8") + OWN_CONTROLLER, encoding="utf-8")
     (folder / "own.py").write_text("def controller(setup):\n    return lambda k, y: 1 / 0\n", encoding="utf-8")
     done = ffrobot("solve", "scene.toml", cwd=folder)
     assert done.returncode == 1

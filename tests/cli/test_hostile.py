@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 import pytest
+from loops import OWN_CONTROLLER
 
 SHORT = {"end = 1.0": "end = 0.004"}
 HIDE = "import sys; sys.modules[{!r}] = None; sys.argv[0] = 'ffrobot'; from ffrobot.cli import main; main()"
@@ -117,17 +118,6 @@ def test_arguments(two_link_copy, refused, arguments, named):
     assert named in refused(folder, *arguments)
 
 
-LOOP = """
-[[analysis]]
-name = "loop"
-kind = "closed-loop"
-actuation = "inverse"
-sample_time = 0.001
-controller = [{ kind = "python", python = "own.py:controller" }]
-sensor = [{ joint = "O" }]
-"""
-
-
 @pytest.mark.parametrize(
     ("code", "named"),
     [
@@ -143,7 +133,7 @@ sensor = [{ joint = "O" }]
 def test_controllers_that_fail(two_link_copy, ffrobot, code, named):
     folder = two_link_copy({"scene.toml": SHORT})
     with (folder / "scene.toml").open("a", encoding="utf-8") as scene:
-        scene.write(LOOP)
+        scene.write(OWN_CONTROLLER)
     (folder / "own.py").write_text(code, encoding="utf-8")
     done = ffrobot("solve", "scene.toml", cwd=folder)
     assert done.returncode in (1, 2)
