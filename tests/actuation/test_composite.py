@@ -1,49 +1,7 @@
 """Deflection of a cantilever under a voltage, against the exact Euler–Bernoulli beam with composite sections."""
 
-import numpy as np
 import pytest
-
-import ffrobot
-
-E, L, B = 70e9, 0.3, 0.02
-E_P, D31, T_P = 63e9, 110e-12, 0.5e-3
-START, END, VOLT = 0.045, 0.105, 100.0
-
-
-def tip(height, face, modes, **keys):
-    """Deflection of the tip, m."""
-    link = {
-        "name": "strip",
-        "material": {"youngs_modulus": E, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": height, "width": B}},
-        "mesh": {"elements": 40},
-        "reference": {"condition": "cantilever"},
-        "modes": {"family": "in-plane-bending"} | modes,
-    }
-    centers, on = [(START + END) / 2], {"face": face} if face else {}
-    pzt = {"body": "strip", "centers": centers, "length": END - START, "width": B, "thickness": T_P, **on, **keys}
-    scene = ffrobot.make_scene(
-        name="strip",
-        gravity=[0.0, 0.0],
-        body=[{"name": "strip", "link": link}],
-        joint=[{"name": "wall", "type": "weld", "between": ["ground", "strip.root"]}],
-        pzt=[pzt | {"modulus": E_P, "d31": D31}],
-        load=[{"pzt": "strip", "voltage": [f"{VOLT}"]}],
-        analysis=[{"name": "bent", "kind": "static"}],
-    )
-    return ffrobot.solve(scene)["bent/points/strip.tip/deflection"][0, 1]
-
-
-def exact(height, faces):
-    """Section loads of the free strain Λ in the layers, over the composite section's 2 × 2 stiffness."""
-    A, S, I = (B * np.diff([(height / 2) ** k, (height / 2 + T_P) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
-    if faces == 2:
-        A, S, I, moment = 2 * A, 0.0, 2 * I, 2 * S  # noqa: E741
-    else:
-        moment = S
-    stiffness = np.diag([E * B * height**3 / 12, E * B * height]) + E_P * np.array([[I, -S], [-S, A]])
-    free = E_P * D31 * VOLT / T_P * np.array([moment, -A if faces == 1 else 0.0])
-    return np.linalg.solve(stiffness, free)[0] * (END - START) * (L - (START + END) / 2)
+from patched_strip import D31, E_P, END, START, T_P, VOLT, B, E, L, exact, tip
 
 
 @pytest.mark.parametrize(

@@ -10,41 +10,18 @@ CalculiX thermal strain in elements C3D20R with an orthotropic coefficient of ex
 from __future__ import annotations
 
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-import ffrobot
+sys.path.append(str(Path(__file__).parents[2] / "actuation"))
 
-E, L, B = 70e9, 0.3, 0.02
-E_P, D31, T_P, VOLT = 63e9, 110e-12, 0.5e-3, 100.0
-START, END = 0.045, 0.105
+from patched_strip import D31, E_P, END, START, T_P, VOLT, B, E, L, exact, tip
+
 ELEMENTS = 120  # along the strip
 LAYERS = 4  # through its height
-
-
-def ffrobot_tip(height: float, face: str) -> float:
-    """With the modes that a link has by default; m."""
-    link = {
-        "name": "strip",
-        "material": {"youngs_modulus": E, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": height, "width": B}},
-        "mesh": {"elements": 40},
-        "reference": {"condition": "cantilever"},
-        "modes": {"family": "in-plane-bending"},
-    }
-    pzt = {"centers": [(START + END) / 2], "length": END - START, "width": B, "thickness": T_P, "face": face}
-    scene = ffrobot.make_scene(
-        name="strip",
-        gravity=[0.0, 0.0],
-        body=[{"name": "strip", "link": link}],
-        joint=[{"name": "wall", "type": "weld", "between": ["ground", "strip.root"]}],
-        pzt=[{"body": "strip", "modulus": E_P, "d31": D31} | pzt],
-        load=[{"pzt": "strip", "voltage": [f"{VOLT}"]}],
-        analysis=[{"name": "bent", "kind": "static"}],
-    )
-    return float(ffrobot.solve(scene)["bent/points/strip.tip/deflection"][0, 1])
 
 
 def calculix_tip(height: float, faces: tuple[int, ...]) -> float:
@@ -109,22 +86,12 @@ def _deck(height: float, faces: tuple[int, ...]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def exact(height: float, faces: int) -> float:
-    """The Euler–Bernoulli beam with composite sections, m."""
-    A, S, second = (B * ((height / 2 + T_P) ** k - (height / 2) ** k) / k for k in (1, 2, 3))
-    coupling, moment = (0.0, 2 * S) if faces == 2 else (-S, S)
-    stiffness = np.diag([E * B * height**3 / 12, E * B * height])
-    stiffness += E_P * np.array([[faces * second, coupling], [coupling, faces * A]])
-    free = E_P * D31 * VOLT / T_P * np.array([moment, 0.0 if faces == 2 else -A])
-    return float(np.linalg.solve(stiffness, free)[0] * (END - START) * (L - (START + END) / 2))
-
-
 def main() -> None:
     """A row for each height and face."""
     print("height (mm)  ψ      face  ffrobot  exact beam  CalculiX  ffrobot/CalculiX − 1 (%)")
     for height in (0.004, 0.002):
         for face, faces in (("both", (1, -1)), ("+y", (1,))):
-            found, peer = ffrobot_tip(height, face), calculix_tip(height, faces)
+            found, peer = tip(height, face, {}), calculix_tip(height, faces)
             values = [1e6 * value for value in (found, exact(height, len(faces)), peer)]
             psi = E * height / (E_P * T_P)
             row = "  ".join(f"{value:8.3f}" for value in values)
