@@ -58,18 +58,17 @@ def random_beam(rng, name, modes=(2, 2, 1, 1), condition="cantilever"):
     x = np.array([at.position for at, _ in sections])
     m, Phi = np.array([m for _, m in sections]), np.array([at.translation for at, _ in sections])
     phi = np.array([at.rotation[0] for at, _ in sections])
-    J2, I_bar = np.einsum("i,ik,il->kl", m, x, x), np.einsum("i,ik,iln->kln", m, x, Phi)
-    spin = np.array([I_bar[1, 2] - I_bar[2, 1], I_bar[2, 0] - I_bar[0, 2], I_bar[0, 1] - I_bar[1, 0]])
-    spin[0] += I_p * m @ phi
     return SpatialBody(
         name=name,
         mass=mass,
         first_moment=m @ x,
-        inertia=np.trace(J2) * np.eye(3) - J2 + np.diag([mass * I_p, 0, 0]),
-        inertia_slope=2 * np.einsum("ij,kkn->ijn", np.eye(3), I_bar) - I_bar - I_bar.transpose(1, 0, 2),
-        spin=spin,
+        second_moment=np.einsum("i,ik,il->kl", m, x, x),
         S_bar=np.einsum("i,ikn->kn", m, Phi),
+        I_bar=np.einsum("i,ik,iln->kln", m, x, Phi),
         S_bar_kl=np.einsum("i,ikm,iln->klmn", m, Phi, Phi),
+        J_spin=mass * I_p,
+        h_spin=I_p * m @ phi,
+        S_spin=I_p * np.einsum("i,im,in->mn", m, phi, phi),
         stiffness=np.sort(rng.uniform(1, 60, n)),
         damping=np.diag(rng.uniform(0, 0.5, n)),
         points=MappingProxyType({"root": section(0.0), "tip": section(1.0), "side": section(0.6)}),
