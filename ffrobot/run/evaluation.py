@@ -15,7 +15,7 @@ from ..actuation.points import PointForces, solve_point_forces
 from ..actuation.prediction import Unsupplied, predicted_shift, unmet_modal_forces, unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.quantities.attachment_error import mode_error
+from ..mbs.quantities.attachment_error import mode_error, start_jolt
 from ..mbs.quantities.link_loads import link_loads
 from ..mbs.quantities.observation import modes_of_file
 from ..mbs.quantities.stress import BodyStress, body_stress, has_stresses, mode_acceleration
@@ -37,7 +37,8 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
         predicted_shift=shift,
         feasibility=feasibility and replace(feasibility, unsupplied=unsupplied),
         stresses=_stresses(solution, outcome),
-        mode_error=mode_error(outcome) if outcome.analysis.is_integrated else None,
+        mode_error=mode_error(outcome.computed) if outcome.analysis.is_integrated else None,
+        start_jolt=start_jolt(outcome.computed) if outcome.analysis.is_integrated else 0.0,
     )
     result = replace(result, warnings=tuple(warnings_of(result)))
     return replace(result, seconds=result.seconds + time.perf_counter() - began)
