@@ -9,7 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from ..actuation.feasibility import Feasibility, MotorFeasibility, judge_motors, judge_patches
+from ..actuation.feasibility import Feasibility, judge_patches
+from ..actuation.motors import MotorFeasibility, judge_motors
 from ..actuation.patches.patches import with_patch_count
 from ..actuation.points import PointForces, solve_point_forces
 from ..actuation.prediction import Unsupplied, predicted_shift, unmet_modal_forces, unsupplied
