@@ -133,6 +133,8 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
     for joint in scene.joint:
         if getattr(joint, "stiffness", None) is not None:
             yield f'{joint.label}: stiffness: expected none in space = "spatial", found it: not available there yet'
+        if not joint.units and getattr(joint, "motor", False):
+            yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
         for key in ("rotor_inertia", "viscous_friction", "coulomb_friction"):
             if getattr(joint, key, 0.0):
                 yield f'{joint.label}: {key}: expected none in space = "spatial", found it: not available there yet'

@@ -10,7 +10,6 @@ from spatial_trees import TYPES, Tree, placed, random_tree
 
 from ffrobot.mbs.model.spatial_model import row_values
 
-
 UNDIRECTED = ("spherical", "weld", "free")
 
 

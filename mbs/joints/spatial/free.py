@@ -18,8 +18,8 @@ class SpatialFree(SpatialJoint):
     """
 
     type: Literal["free"]
-    motor: Literal[False] = False
-    """No motor drives it."""
+    motor: bool = False
+    """Whether forces and moments drive it."""
 
     guess_units = ("m", "m", "m", "rad", "rad", "rad")
     q_count = 7

@@ -15,8 +15,8 @@ class SpatialSpherical(SpatialJoint):
     """Two points coincide, the second side turns as it likes; [initial] gives a rotation vector, rad."""
 
     type: Literal["spherical"]
-    motor: Literal[False] = False
-    """No motor drives it."""
+    motor: bool = False
+    """Whether three moments drive it."""
 
     guess_units = ("rad", "rad", "rad")
     q_count = 4
