@@ -171,4 +171,5 @@ class SpatialMotion:
 def continuous(e: Array) -> Array:
     """Quaternions (T, 4) with signs that do not jump, the first e0 ≥ 0."""
     flips = np.sum(e[1:] * e[:-1], axis=1) < 0
-    return e * np.where(np.cumsum(np.append(False, flips)) % 2, -1.0, 1.0)[:, None]
+    signs: Array = np.where(np.cumsum(np.append(False, flips)) % 2, -1.0, 1.0)
+    return e * signs[:, None]
