@@ -20,6 +20,7 @@ from ...common.arrays import Array, Integers
 from ...mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
 from ..link_records import BeamLink
 from ..modal_body.invariants import Invariants
+from ..modal_body.unit_loads import unit_load_names
 from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
 
 # N in N at x (m), and at which cell by its middle: N may jump from cell to cell.
@@ -67,7 +68,8 @@ def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> In
 
     Euler–Bernoulli links are a line of mass on the axis, ∫y² = ∫z² = 0 in all that bends or turns as a whole. Their
     torsion modes keep their own ρI_p, booked in S̄_33: no planar invariant then holds any rotary inertia, and
-    m_ff = S̄_11 + S̄_22 + S̄_33 stays true.
+    m_ff = S̄_11 + S̄_22 + S̄_33 stays true. What such a link has of inertia about its own axis, in space, is the spin
+    inertia ½∫ρI_p (ω_1 + φ̇)² dx: J_s = ∫ρI_p, h_s = ∫ρI_p φ, S_s = ∫ρI_p φᵀφ, apart from the integrals over the axis.
 
     Args:
         link: for density and sections.
@@ -97,8 +99,11 @@ def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> In
         second_moment += np.einsum("ki,li->kl", x, W_x)
         I_bar += np.einsum("ki,lin->kln", W_x, shape)
         S_bar_kl += np.einsum("kim,lin->klmn", shape, W_shape)
-    if line_mass and "torsion" in link.families:
-        S_bar_kl[2, 2] += fields[R_X].T @ _weighted(link, stations, lambda s: s.I_p, rho) @ fields[R_X]
+    J_spin, h_spin, S_spin = 0.0, np.zeros(n), np.zeros((n, n))
+    if line_mass:
+        spin, twist = _weighted(link, stations, lambda s: s.I_p, rho), fields[R_X]
+        J_spin, h_spin, S_spin = float(one @ (spin @ one)), (spin @ one) @ twist, twist.T @ spin @ twist
+        S_bar_kl[2, 2] += S_spin
     first = float(stations.x @ (weights[0] @ one))
     symmetric = 0.5 * (S_bar_kl + S_bar_kl.transpose(1, 0, 3, 2))
     return Invariants(
@@ -108,6 +113,9 @@ def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> In
         S_bar=S_bar,
         I_bar=I_bar,
         S_bar_kl=symmetric,
+        J_spin=J_spin,
+        h_spin=h_spin,
+        S_spin=0.5 * (S_spin + S_spin.T),
     )
 
 
@@ -134,10 +142,7 @@ def geometric_stiffness(
         interfaces: position of each in m.
     """
     n = fields.shape[2]
-    names = [f"{kind}_{axis}" for kind in "tr" for axis in "xyz"]
-    names += [f"omega_{pair}" for pair in ("xx", "yy", "zz", "xy", "xz", "yz")]
-    names += [f"{kind}/{name}/{axis}" for name in interfaces for kind in ("force", "moment") for axis in "xyz"]
-    matrices: dict[str, Array] = {name: np.zeros((n, n)) for name in names}
+    matrices: dict[str, Array] = {name: np.zeros((n, n)) for name in unit_load_names(interfaces)}
     # D'Alembert: a frame that accelerates along x pushes the link together; spinning about y or z pulls it apart.
     matrices["t_x"] = _stiffness_of(stations, fields, lambda x, _: -_mass_beyond(link, x, 0))
     matrices["omega_yy"] = _stiffness_of(stations, fields, lambda x, _: _mass_beyond(link, x, 1))

@@ -57,6 +57,7 @@ def test_what_only_some_bodies_have(outcome, tmp_path):
     np.testing.assert_array_equal(read.surface_stress, surface)
     np.testing.assert_array_equal(read.surface_patches.edges, patches.edges)
     np.testing.assert_array_equal(read.surface_patches.bottom, patches.bottom)
+    assert (read.stress_loads, read.surface_static, read.stress["a"].static) == ((), None, None)
     assert read.surface_patches.top is None
     assert read.surface_patches.width == 0.02
     told = describe(path)
@@ -64,6 +65,23 @@ def test_what_only_some_bodies_have(outcome, tmp_path):
     assert "patches outlined in the mesh, bottom, 0.02 m wide: 0.1 … 0.2, 0.4 … 0.5 m" in told
     plain = read_modal_body(outcome.path)
     assert (plain.stress, plain.surface_stress, plain.surface_patches) == ({}, None, None)
+
+
+def test_static_stresses_of_unit_loads(outcome, tmp_path):
+    n, p, rng = 12, len(outcome.body.mesh.points), np.random.default_rng(1)
+    loads = ("t_y", "force/grip/x", "moment/tip/z")
+    point = StressPoint(*(rng.normal(size=shape) for shape in ((3,), (6, n), (6, n), (6, 3))))
+    surface = {"surface_stress": rng.normal(size=(p, 6, n)), "surface_static": rng.normal(size=(p, 6, 3))}
+    write_modal_body(tmp_path / "full.h5", replace(outcome.body, stress={"a": point}, stress_loads=loads, **surface))
+    read = read_modal_body(tmp_path / "full.h5")
+    assert read.stress_loads == loads
+    np.testing.assert_array_equal(read.stress["a"].static, point.static)
+    np.testing.assert_array_equal(read.surface_static, surface["surface_static"])
+    assert f"modal and static stresses on the surface, at {p} points" in describe(tmp_path / "full.h5")
+    with pytest.raises(InputError, match=r"stress/loads: expected unit loads of the link and its interfaces, found x"):
+        replace(outcome.body, stress_loads=("x",))
+    with pytest.raises(InputError, match=r"stress/points/a/static: expected shape \(6, 2\)"):
+        replace(outcome.body, stress={"a": point}, stress_loads=loads[:2])
 
 
 @pytest.mark.parametrize(
@@ -99,6 +117,9 @@ def test_datasets_of_the_interface(outcome):
             "invariants/S_bar": (3, n),
             "invariants/I_bar": (3, 3, n),
             "invariants/S_bar_kl": (3, 3, n, n),
+            "invariants/J_spin": (),
+            "invariants/h_spin": (n,),
+            "invariants/S_spin": (n, n),
             "geometric_stiffness/omega_zz": (n, n),
             "interfaces/tip/position": (3,),
             "interfaces/tip/translation": (3, n),
@@ -108,6 +129,33 @@ def test_datasets_of_the_interface(outcome):
         shapes |= {"stations/translation": (k, 3, n), "stations/rotation": (k, 3, n), "stations/height": (k,)}
         for name, shape in shapes.items():
             assert file[name].shape == shape, name
+
+
+def test_files_of_earlier_versions_have_no_spin_inertia(outcome):
+    with h5py.File(outcome.path, "r+") as file:
+        for name in ("J_spin", "h_spin", "S_spin"):
+            del file[f"invariants/{name}"]
+    seal(outcome.path)
+    read = read_modal_body(outcome.path)
+    assert read.J_spin is None
+    assert read.h_spin is None
+    assert read.S_spin is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"h_spin": None}, "h_spin: expected beside J_spin, S_spin, found none"),
+        ({"J_spin": -1.0}, "J_spin: expected a number not below 0, found -1"),
+        ({"J_spin": 0.0}, "S_spin, less h_spin.* expected no negative eigenvalue"),
+        ({"h_spin": np.ones(12)}, "S_spin, less h_spin.* expected no negative eigenvalue"),
+        ({"S_spin": 2 * np.eye(12)}, r"S_bar_kl\[2, 2\], less S_spin: expected no negative eigenvalue"),
+        ({"S_spin": np.triu(np.ones((12, 12)))}, "S_spin: expected symmetric"),
+    ],
+)
+def test_spin_inertia_that_cannot_be_is_refused(outcome, changes, message):
+    with pytest.raises(InputError, match=message):
+        replace(outcome.body, **changes)
 
 
 def test_missing_file(tmp_path):
