@@ -21,7 +21,7 @@ FFROBOT_INLINE void release_all(const Mechanism<Space> &m, const T *q, const Pac
         release_pin<by_multipliers, T, W>(m, node, q, w, y, a);
         continue;
       }
-    release<by_multipliers, Space, T, W>(m, node, q, w, y, a);
+    release<Space, T, W>(m, node, q, by_multipliers, w, y, a);
   }
 }
 
@@ -77,14 +77,10 @@ template <class F> FFROBOT_INLINE void with_columns(int columns, const F &call) 
     return call(std::integral_constant<int, 1>());
   case 3:
     return call(std::integral_constant<int, 3>());
-  case 4:
-    return call(std::integral_constant<int, 4>());
   case 7:
     return call(std::integral_constant<int, 7>());
-  case 16:
-    return call(std::integral_constant<int, 16>());
   default:
-    return call(std::integral_constant<int, 32>());
+    return call(std::integral_constant<int, 16>());
   }
 }
 

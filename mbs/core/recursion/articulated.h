@@ -17,11 +17,9 @@
 namespace ffrobot::recursion {
 
 // How far columns lie apart in memory
-constexpr int stride_of(int columns) {
-  return columns <= 1 ? 1 : columns <= 2 ? 2 : columns <= 4 ? 4 : columns <= 8 ? 8 : columns <= 16 ? 16 : 32;
-}
+constexpr int stride_of(int columns) { return static_cast<int>(std::bit_ceil(static_cast<unsigned>(columns))); }
 
-// x += y columns by columns: row r of S gains a_r b
+// Row r of S gains, or loses, a_r b
 template <class Cols, int W> FFROBOT_INLINE void gain(Cols (&S)[W], const Cols &a, const Cols &b) {
 #pragma GCC unroll 8
   for (int r = 1; r < W; ++r)
@@ -35,7 +33,7 @@ template <class Cols, int W> FFROBOT_INLINE void lose(Cols (&S)[W], const Cols &
 
 // Columns C of forces (port axes) and numbers D with Lambda = sum of D c c^T, `rank` of them
 template <class Space, class T>
-inline int factors(const Node<Space> &child, const Hinge<Space, T> &hinge, Pack<T, Space::dim> *C, T *D) {
+FFROBOT_APART int factors(const Node<Space> &child, const Hinge<Space, T> &hinge, Pack<T, Space::dim> *C, T *D) {
   constexpr int d = Space::dim;
   int kept[d], rank = 0;
   const bool full = child.rotor_inertia > 0;
@@ -84,7 +82,7 @@ inline int factors(const Node<Space> &child, const Hinge<Space, T> &hinge, Pack<
 
 // Y = C (1/D + C^T G C)^-1 C^T: sums of positive terms
 template <int d, class T>
-FFROBOT_INLINE void stiffness(int rank, Pack<T, d> *C, const T *D, const Pack<T, d> *G, bool is_soft, Pack<T, d> *Y) {
+FFROBOT_APART void stiffness(int rank, Pack<T, d> *C, const T *D, const Pack<T, d> *G, bool is_soft, Pack<T, d> *Y) {
   for (int i = 0; i < d; ++i)
     Y[i] = Pack<T, d>::zero();
   if (!is_soft) {

@@ -5,9 +5,44 @@
 
 namespace ffrobot::recursion {
 
+// The lower half of a symmetric matrix (m, m) becomes L and 1/D.
+template <class T> inline void factorise(T *M, int m) {
+  for (int j = 0; j < m; ++j) {
+    const T inverse = T(1.) / M[j * m + j];
+    for (int r = j + 1; r < m; ++r) {
+      const T x = M[r * m + j] * inverse;
+      for (int c = j + 1; c <= r; ++c)
+        M[r * m + c] -= x * M[c * m + j];
+    }
+    for (int r = j + 1; r < m; ++r)
+      M[r * m + j] *= inverse;
+    M[j * m + j] = inverse;
+  }
+}
+
+// With these factors: m numbers
+template <class T> inline void solve_again(const T *factor, int m, T *x) {
+  for (int r = 0; r < m; ++r)
+    for (int c = 0; c < r; ++c)
+      x[r] -= factor[r * m + c] * x[c];
+  for (int r = m - 1; r >= 0; --r) {
+    x[r] = x[r] * factor[r * m + r];
+    for (int k = r + 1; k < m; ++k)
+      x[r] -= factor[k * m + r] * x[k];
+  }
+}
+
 // Rows 1 … of S in the registers that the recursion has left; fewer rows than W - 1 are filled up by the caller.
 template <class T, int W> FFROBOT_INLINE void solve_multipliers(const Pack<T, W> *S, T *x, T *factor) {
   constexpr int m = W - 1;
+  if constexpr (m > 8) { // too many for registers
+    for (int r = 0; r < m; ++r)
+      for (int c = 0; c <= r; ++c)
+        factor[r * m + c] = S[r + 1][c + 1];
+    factorise(factor, m);
+    solve_again(factor, m, x);
+    return;
+  }
   T M[m][m], D[m];
 #pragma GCC unroll 8
   for (int r = 0; r < m; ++r)
@@ -41,18 +76,6 @@ template <class T, int W> FFROBOT_INLINE void solve_multipliers(const Pack<T, W>
 #pragma GCC unroll 8
     for (int k = r + 1; k < m; ++k)
       x[r] -= M[k][r] * x[k];
-  }
-}
-
-// With the factors of the last: W - 1 numbers
-template <class T> inline void solve_again(const T *factor, int m, T *x) {
-  for (int r = 0; r < m; ++r)
-    for (int c = 0; c < r; ++c)
-      x[r] -= factor[r * m + c] * x[c];
-  for (int r = m - 1; r >= 0; --r) {
-    x[r] = x[r] * factor[r * m + r];
-    for (int k = r + 1; k < m; ++k)
-      x[r] -= factor[k * m + r] * x[k];
   }
 }
 

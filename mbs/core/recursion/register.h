@@ -12,6 +12,7 @@
 #endif
 
 #define FFROBOT_INLINE [[gnu::always_inline]] inline
+#define FFROBOT_APART [[gnu::noinline]] // once, not again for every number of columns
 
 namespace ffrobot::recursion {
 

@@ -58,9 +58,9 @@ inline void release_joint(const Node<Space> &node, const T *q, const Hinge<Space
 }
 
 // Forces f on ports and their accelerations, the last eliminated first
-template <bool by_multipliers, class Space, class T, int W>
-inline void release_ports(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
-                          const Pack<T, W> &y, const T *A) {
+template <class Space, class T, int W>
+inline void release_ports(const Mechanism<Space> &m, const Node<Space> &node, bool by_multipliers,
+                          Workspace<Space, T> &w, const Pack<T, W> &y, const T *A) {
   constexpr int d = Space::dim, stride = stride_of(W);
   const int n = node.ports();
   for (int k = node.outboard - 1; k >= 0; --k) {
@@ -101,9 +101,9 @@ inline void release_ports(const Mechanism<Space> &m, const Node<Space> &node, Wo
   }
 }
 
-template <bool by_multipliers, class Space, class T, int W>
-inline void release(const Mechanism<Space> &m, const Node<Space> &node, const T *q, Workspace<Space, T> &w,
-                    const Pack<T, W> &y, T *a) {
+template <class Space, class T, int W>
+inline void release(const Mechanism<Space> &m, const Node<Space> &node, const T *q, bool by_multipliers,
+                    Workspace<Space, T> &w, const Pack<T, W> &y, T *a) {
   constexpr int d = Space::dim;
   const auto i_node = &node - m.nodes.data();
   Hinge<Space, T> &hinge = w.hinges[i_node];
@@ -144,14 +144,17 @@ inline void release(const Mechanism<Space> &m, const Node<Space> &node, const T 
   }
   for (int i = 0; i < d; ++i)
     state.A[i] = A_frame[i];
-  release_ports<by_multipliers, Space, T, W>(m, node, w, y, A_frame);
+  release_ports<Space, T, W>(m, node, by_multipliers, w, y, A_frame);
   if (node.body.n == 0)
     return;
   for (int i = 0; i < d; ++i)
     z[i] = -A_frame[i];
   for (int k = 0; k < node.outboard; ++k)
     put_force(node.body, state, k, w.ports[node.first_port + k].f, z);
-  modes<by_multipliers>(node, q + node.p_q(), z, state, a + node.p_v());
+  if (by_multipliers)
+    modes<true>(node, q + node.p_q(), z, state, a + node.p_v());
+  else
+    modes<false>(node, q + node.p_q(), z, state, a + node.p_v());
 }
 
 } // namespace ffrobot::recursion

@@ -102,7 +102,8 @@ template <class T> FFROBOT_INLINE T joint_angle(const Node<Planar> &node, const 
 template <class T> FFROBOT_INLINE T joint_angle(const Node<Spatial> &, const T *) { return T(0.); }
 
 // Of all frames: w.frames
-template <class Space, class T> inline void locate(const Mechanism<Space> &m, const T *q, Workspace<Space, T> &w) {
+template <class Space, class T>
+FFROBOT_APART void locate(const Mechanism<Space> &m, const T *q, Workspace<Space, T> &w) {
   for (std::size_t i = 0; i < m.nodes.size(); ++i) {
     const Node<Space> &node = m.nodes[i];
     const Hinge<Space, T> &hinge = w.hinges[i];
@@ -163,8 +164,8 @@ template <class T> struct RowMotion {
 
 // With positions; `n` alone matters where directions do not move and neither value nor rate is asked for.
 template <class Space, class T>
-inline void row_motion(const Mechanism<Space> &m, const Row &row, const Workspace<Space, T> &w, bool located,
-                       RowMotion<T> &to) {
+FFROBOT_APART void row_motion(const Mechanism<Space> &m, const Row &row, const Workspace<Space, T> &w, bool located,
+                              RowMotion<T> &to) {
   to.value = to.rate = to.bias = T(0.);
   for (int i = 0; i < 3; ++i)
     to.force[i] = to.moment_a[i] = to.moment_b[i] = T(0.);

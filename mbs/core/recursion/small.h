@@ -45,7 +45,7 @@ template <int d, class T> FFROBOT_INLINE void multiply(const Pack<T, d> *M, cons
 }
 
 // The inverse of a symmetric positive definite matrix, in its place (Gauss and Jordan)
-template <int d, class T> inline void invert(Pack<T, d> *M) {
+template <int d, class T> FFROBOT_APART void invert(Pack<T, d> *M) {
   for (int k = 0; k < d; ++k) {
     const T pivot = T(1.) / M[k][k];
     M[k].set(k, T(1.));

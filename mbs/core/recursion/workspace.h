@@ -9,8 +9,8 @@ namespace ffrobot::recursion {
 
 // Columns side by side: 0 is what acts without constraints, column r what a unit of multiplier r does. Sizes that are
 // compiled; where there are fewer rows the rest is zero.
-constexpr int column_counts[] = {1, 3, 4, 7, 16, 32};
-constexpr int most_rows = 31;
+constexpr int column_counts[] = {1, 3, 7, 16};
+constexpr int most_rows = 15;
 
 // A joint, in axes of the outer section
 template <class Space, class T> struct Hinge {

@@ -49,8 +49,8 @@ template <class T> FFROBOT_INLINE T section_rate(const planar::Body &b, int port
 }
 
 template <class T>
-FFROBOT_INLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T *v, const Forces<T> &forces,
-                               Workspace<Planar, T> &w) {
+FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v, const Forces<T> &forces,
+                              Workspace<Planar, T> &w) {
   const std::size_t count = m.nodes.size();
   for (std::size_t i = 0; i < count; ++i) {
     const Node<Planar> &node = m.nodes[i];
@@ -113,8 +113,8 @@ template <class T> FFROBOT_INLINE PlanarTurn<T> inboard_tilt(const Node<Planar> 
 }
 
 template <class T>
-FFROBOT_INLINE void evaluate_inertia(const Node<Planar> &node, const T *p, const T *v, planar::State<T> &s,
-                                     Pack<T, 3> *M, T *b) {
+FFROBOT_APART void evaluate_inertia(const Node<Planar> &node, const T *p, const T *v, planar::State<T> &s,
+                                    Pack<T, 3> *M, T *b) {
   const planar::Inertia<T> I = inertia(node.body, p, v, s);
   const T rows[3][3] = {{I.xx, I.xy, I.xa}, {I.xy, I.yy, I.ya}, {I.xa, I.ya, I.aa}};
   for (int i = 0; i < 3; ++i) {
@@ -126,15 +126,14 @@ FFROBOT_INLINE void evaluate_inertia(const Node<Planar> &node, const T *p, const
 }
 
 template <class T>
-FFROBOT_INLINE void port_gram(const planar::Body &b, const planar::State<T> &, int i, int j, Pack<T, 3> *G) {
+FFROBOT_APART void port_gram(const planar::Body &b, const planar::State<T> &, int i, int j, Pack<T, 3> *G) {
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c)
       G[r].set(c, T(b.gram(b.ports[i].row + r, b.ports[j].row + c)));
 }
 
 template <class T>
-FFROBOT_INLINE void port_rows(const planar::Body &b, int i, planar::State<T> &s, Pack<T, 3> *X, T *beta,
-                              Pack<T, 3> *G) {
+FFROBOT_APART void port_rows(const planar::Body &b, int i, planar::State<T> &s, Pack<T, 3> *X, T *beta, Pack<T, 3> *G) {
   const planar::Port &port = b.ports[i];
   const T *u = s.u.data() + port.row, *u_dot = s.u_dot.data() + port.row, *Q = s.Q.data() + port.row;
   const T ww = s.omega * s.omega, w2 = 2. * s.omega;
@@ -159,7 +158,7 @@ FFROBOT_INLINE void put_force(const planar::Body &b, const planar::State<T> &, i
 }
 
 template <bool by_multipliers, class T>
-FFROBOT_INLINE void modes(const Node<Planar> &node, const T *p, const T *z, planar::State<T> &s, T *a) {
+FFROBOT_APART void modes(const Node<Planar> &node, const T *p, const T *z, planar::State<T> &s, T *a) {
   modal_accelerations<by_multipliers>(node.body, p, z, s, a);
 }
 

@@ -313,7 +313,7 @@ template <class T> FFROBOT_INLINE void place_port(const Body &b, int i, State<T>
 
 // A_port = T A + beta + G f of a port, in axes of the undeformed section; f: force and moment on it
 template <class T>
-inline void port_rows(const Body &b, int i, State<T> &s, Pack<T, 6> *T_rows, T *beta, Pack<T, 6> *G) {
+FFROBOT_APART void port_rows(const Body &b, int i, State<T> &s, Pack<T, 6> *T_rows, T *beta, Pack<T, 6> *G) {
   const Port &port = b.ports[i];
   const PortMotion<T> &m = s.ports[i];
   const T *w = s.omega;
@@ -366,7 +366,7 @@ inline void port_rows(const Body &b, int i, State<T> &s, Pack<T, 6> *T_rows, T *
 }
 
 // G of forces on port j by accelerations of port i: H_i Phi_i Phi_j^T H_j^T, H = diag(I, J_l)
-template <class T> inline void port_gram(const Body &b, const State<T> &s, int i, int j, Pack<T, 6> *G) {
+template <class T> FFROBOT_APART void port_gram(const Body &b, const State<T> &s, int i, int j, Pack<T, 6> *G) {
   const auto &X = s.ports[i].excess, &Y = s.ports[j].excess;
   T g[6][6], left[3][6];
   for (int r = 0; r < 6; ++r)

@@ -91,8 +91,8 @@ inline void turn_any(const Node<Spatial> &node, const InnerSection<T> &inner, co
 } // namespace spatial
 
 template <class T>
-FFROBOT_INLINE void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v, const Forces<T> &forces,
-                               Workspace<Spatial, T> &w) {
+FFROBOT_APART void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v, const Forces<T> &forces,
+                              Workspace<Spatial, T> &w) {
   for (std::size_t i = 0; i < m.nodes.size(); ++i) {
     const Node<Spatial> &node = m.nodes[i];
     spatial::State<T> &s = w.bodies[i];
@@ -141,15 +141,15 @@ template <class T> FFROBOT_INLINE SpatialTurn<T> inboard_tilt(const Node<Spatial
 }
 
 template <class T>
-FFROBOT_INLINE void evaluate_inertia(const Node<Spatial> &node, const T *p, const T *v, spatial::State<T> &s,
-                                     Pack<T, 6> *M, T *b) {
+FFROBOT_APART void evaluate_inertia(const Node<Spatial> &node, const T *p, const T *v, spatial::State<T> &s,
+                                    Pack<T, 6> *M, T *b) {
   inertia(node.body, p, v, s);
   for (int i = 0; i < 6; ++i)
     M[i] = s.M[i], b[i] = s.b[i];
 }
 
 template <bool by_multipliers, class T>
-FFROBOT_INLINE void modes(const Node<Spatial> &node, const T *, const T *z, spatial::State<T> &s, T *a) {
+FFROBOT_APART void modes(const Node<Spatial> &node, const T *, const T *z, spatial::State<T> &s, T *a) {
   modal_accelerations<by_multipliers>(node.body, z, s, a);
 }
 
