@@ -39,6 +39,8 @@ _DATASETS = {
     "I_bar": "invariants/I_bar",
     "S_bar_kl": "invariants/S_bar_kl",
 }
+# Those that files of earlier versions lack.
+_SPIN = {name: f"invariants/{name}" for name in ("J_spin", "h_spin", "S_spin")}
 _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": "kg m2", "modes/frequency": "Hz"}
 
 
@@ -113,8 +115,8 @@ def _body(file: h5py.File) -> ModalBody:
 
 
 def _optional(file: h5py.File) -> dict[str, Any]:
-    """What not all files have: modal stresses, patches outlined in the mesh; marks of attachment modes, in old ones."""
-    found: dict[str, Any] = {}
+    """What not all files have: modal stresses, outlined patches; in old ones, attachment modes and spin inertia."""
+    found: dict[str, Any] = {name: _array(file, dataset) for name, dataset in _SPIN.items() if dataset in file}
     points = file.get("stress/points", {})
     found["stress"] = {name: StressPoint(**_arrays(points[name], StressPoint)) for name in points}
     if "stress/surface" in file:
@@ -164,7 +166,7 @@ def _image(body: ModalBody) -> bytes:
             file.attrs[name] = getattr(body, name)
         if body.modes_hash:
             file.attrs["modes_hash"] = body.modes_hash
-        _write_arrays(file, {dataset: getattr(body, name) for name, dataset in _DATASETS.items()})
+        _write_arrays(file, {dataset: getattr(body, name) for name, dataset in (_DATASETS | _SPIN).items()})
         for dataset, unit in _UNITS.items():
             file[dataset].attrs["unit"] = unit
         file["modes"].create_dataset("family", data=list(body.family), dtype=h5py.string_dtype(), track_times=False)

@@ -67,7 +67,8 @@ def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> In
 
     Euler–Bernoulli links are a line of mass on the axis, ∫y² = ∫z² = 0 in all that bends or turns as a whole. Their
     torsion modes keep their own ρI_p, booked in S̄_33: no planar invariant then holds any rotary inertia, and
-    m_ff = S̄_11 + S̄_22 + S̄_33 stays true.
+    m_ff = S̄_11 + S̄_22 + S̄_33 stays true. What such a link has of inertia about its own axis, in space, is the spin
+    inertia ½∫ρI_p (ω_1 + φ̇)² dx: J_s = ∫ρI_p, h_s = ∫ρI_p φ, S_s = ∫ρI_p φᵀφ, apart from the integrals over the axis.
 
     Args:
         link: for density and sections.
@@ -97,8 +98,11 @@ def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> In
         second_moment += np.einsum("ki,li->kl", x, W_x)
         I_bar += np.einsum("ki,lin->kln", W_x, shape)
         S_bar_kl += np.einsum("kim,lin->klmn", shape, W_shape)
-    if line_mass and "torsion" in link.families:
-        S_bar_kl[2, 2] += fields[R_X].T @ _weighted(link, stations, lambda s: s.I_p, rho) @ fields[R_X]
+    J_spin, h_spin, S_spin = 0.0, np.zeros(n), np.zeros((n, n))
+    if line_mass:
+        spin, twist = _weighted(link, stations, lambda s: s.I_p, rho), fields[R_X]
+        J_spin, h_spin, S_spin = float(one @ (spin @ one)), (spin @ one) @ twist, twist.T @ spin @ twist
+        S_bar_kl[2, 2] += S_spin
     first = float(stations.x @ (weights[0] @ one))
     symmetric = 0.5 * (S_bar_kl + S_bar_kl.transpose(1, 0, 3, 2))
     return Invariants(
@@ -108,6 +112,9 @@ def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> In
         S_bar=S_bar,
         I_bar=I_bar,
         S_bar_kl=symmetric,
+        J_spin=J_spin,
+        h_spin=h_spin,
+        S_spin=0.5 * (S_spin + S_spin.T),
     )
 
 

@@ -151,6 +151,10 @@ class ModalBody:
         S_bar: (3, n) ∫ρ Φ dV.
         I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
         S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
+        J_spin: J_s = ∫ρI_p dx in kg·m² of a link that is a line of mass (Euler–Bernoulli): its inertia about its own
+            axis, which `second_moment` lacks; 0 of all others; None where not known (files of earlier versions).
+        h_spin: (n,) h_s = ∫ρI_p φ dx, with φ the twist of the modes.
+        S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx; `S_bar_kl` holds it once more at [2, 2], where the plane needs it.
         geometric_stiffness: (n, n) for each unit load, by its name.
         interfaces: by name; `root` and `tip` always.
         stations: along the axis.
@@ -190,6 +194,9 @@ class ModalBody:
     surface_patches: OutlinedPatches | None = None
     residual: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     damping_of: str = "link"
+    J_spin: float | None = None
+    h_spin: Array | None = None
+    S_spin: Array | None = None
     input_hash: str = ""
     modes_hash: str = ""
     ffrobot_version: str = ""
@@ -324,6 +331,7 @@ def _check(body: ModalBody) -> None:
         _fail(body, "damping_ratio: expected numbers not below 0")
     _check_identities(body, np.eye(n))
     _check_inertia(body)
+    _check_spin(body)
     _check_interfaces(body)
 
 
@@ -336,6 +344,27 @@ def _check_inertia(body: ModalBody) -> None:
     for name, matrix in matrices.items():
         lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
         if lowest < -POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0):
+            _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
+
+
+def _check_spin(body: ModalBody) -> None:
+    """Spin inertia is known whole or not at all; its energy is positive, and S_bar_33 holds that of the modes."""
+    parts = {name: getattr(body, name) for name in ("J_spin", "h_spin", "S_spin")}
+    missing = [name for name, value in parts.items() if value is None]
+    if missing:
+        if len(missing) < len(parts):
+            _fail(body, f"{missing[0]}: expected beside {', '.join(parts.keys() - set(missing))}, found none")
+        return
+    J, h, S = parts.values()
+    if not J >= 0:
+        _fail(body, f"J_spin: expected a number not below 0, found {J}")
+    matrices = {
+        "S_spin, less h_spinᵀ h_spin / J_spin": S - (np.outer(h, h) / J if J else np.abs(S) + np.outer(h, h)),
+        "S_bar_kl[2, 2], less S_spin": body.S_bar_kl[2, 2] - S,
+    }
+    for name, matrix in matrices.items():
+        lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
+        if lowest < -IDENTITY_TOLERANCE * np.abs(body.S_bar_kl[2, 2]).max(initial=0.0):
             _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
 
 
@@ -365,6 +394,8 @@ def _check_identities(body: ModalBody, unit: Array) -> None:
         ("S_bar_kl", "a sum S_bar_11 + S_bar_22 + S_bar_33 equal to modal_mass", total, body.modal_mass),
         *((f"geometric_stiffness/{k}", "symmetric", v, v.T) for k, v in body.geometric_stiffness.items()),
     ]
+    if body.S_spin is not None:
+        identities.append(("S_spin", "symmetric", body.S_spin, body.S_spin.T))
     for name, expected, left, right in identities:
         error = np.max(np.abs(left - right), initial=0.0)
         if error > IDENTITY_TOLERANCE * np.max(np.abs(right), initial=0.0):
@@ -401,6 +432,12 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         shapes.append((f"stress/points/{name}/position", point.position, (3,)))
         shapes.append((f"stress/points/{name}/stress", point.stress, (6, n)))
         shapes.append((f"stress/points/{name}/strain", point.strain, (6, n)))
+    if body.J_spin is not None:
+        shapes.append(("J_spin", body.J_spin, ()))
+    if body.h_spin is not None:
+        shapes.append(("h_spin", body.h_spin, (n,)))
+    if body.S_spin is not None:
+        shapes.append(("S_spin", body.S_spin, (n, n)))
     if body.stations.rigidity is not None:
         shapes.append(("stations.rigidity", body.stations.rigidity, (k, 2)))
     if body.mesh.edges is not None:

@@ -17,3 +17,6 @@ class Invariants:
     S_bar: Array
     I_bar: Array
     S_bar_kl: Array
+    J_spin: float
+    h_spin: Array
+    S_spin: Array

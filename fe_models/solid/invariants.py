@@ -20,7 +20,7 @@ PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "
 
 
 def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
-    """Integrals of the part alone, of modes (3 owned, n); collective."""
+    """Integrals of the part alone, of modes (3 owned, n); collective. Over its volume: no spin inertia is left out."""
     n, x = modes.shape[1], model.x
     Phi = modes.reshape(-1, 3, n)
     M_Phi = (model.mass @ modes).reshape(-1, 3, n)
@@ -35,6 +35,9 @@ def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
         S_bar=model.total(M_Phi.sum(axis=0)),
         I_bar=model.total(np.einsum("ak,aln->kln", x, M_Phi, optimize=True)),
         S_bar_kl=0.5 * (S_bar_kl + S_bar_kl.transpose(1, 0, 3, 2)),
+        J_spin=0.0,
+        h_spin=np.zeros(n),
+        S_spin=np.zeros((n, n)),
     )
 
 

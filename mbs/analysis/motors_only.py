@@ -26,9 +26,7 @@ from ..fields.waypoints import spline
 from ..joints.measure import Measure
 from ..model.model import Model
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
-from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice
-from ..solve.reach import check_reach
 from ..solve.servo import SINGULAR, Servo, is_unstable, make_servo
 from ..solve.stable_inversion import Inversion, Linearisation, invert, linearise
 from .context import Context
@@ -113,7 +111,6 @@ def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> O
     """
     began = time.perf_counter()
     servo, linear = _output(model, analysis)
-    check_reach(servo.path, undeformed_state(servo.path), analysis.times)
     needs_future = bool(is_unstable(linear.zeros[0]).any())
     _check_rest(servo, analysis, needs_future)
     pre, post = _durations(analysis, linear, needs_future)
@@ -143,8 +140,9 @@ def _output(model: Model, analysis: MotorsOnly) -> tuple[Servo, Linearisation]:
                 f' {describe_zeros(linear)}; use a smaller factor, leave it out, or use output = "tip"'
             )
         return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, linear)
+    joints = make_servo(model, end, 0.0)
     for k in range(round(1 / FACTOR_STEP) + 1):
-        servo = make_servo(model, end, max(0.0, 1.0 - k * FACTOR_STEP))
+        servo = replace(joints, factor=max(0.0, 1.0 - k * FACTOR_STEP))
         linear = linearise(servo, end)
         if is_minimum_phase(linear):
             return _with_expected_deflections(replace(servo, factor=MARGIN * servo.factor), linear)
@@ -219,6 +217,21 @@ def _durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) 
     return tuple(math.ceil(value / step - 1e-9) * step for value in chosen)  # type: ignore[return-value]
 
 
+def _cause(inversion: Inversion) -> str:
+    """Whether the zeros explain that no motion was found: where their sides change, no bounded one need exist."""
+    linear = inversion.linearisation
+    count = is_unstable(linear.zeros).sum(axis=1)
+    changed = np.flatnonzero(count != count[0])
+    if inversion.status != "inversion not converged" or not len(changed):
+        return ""
+    k = changed[0]
+    return (
+        f"zeros change sides along the path: {count[0]} of them are in the right half plane at t = 0,"
+        f" {count[k]} at t = {linear.times[k]:.4g} s, and no bounded motion need exist then: leave out axial and high"
+        ' modes (modes.family = "in-plane-bending" and fewer of them in the link files), or use output = "redefined"'
+    )
+
+
 def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> Outcome:
     inversion, servo = found.inversion, found.inversion.servo
     times = output_times(analysis.end, analysis.output_step, found.pre_actuation, found.post_actuation)
@@ -238,6 +251,7 @@ def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> Outco
             evaluations=inversion.iterations,
             wall_seconds=seconds,
             time_reached=None if run.reached else float(inversion.curve.x[0]),
+            cause=_cause(inversion),
         ),
         details=found,
     )

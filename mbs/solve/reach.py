@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ...common.arrays import Array
+import numpy as np
+
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ..model.model import Constraint
 from ..model.system import MechanismSystem
@@ -24,24 +26,33 @@ class _Passed(NamedTuple):
     ratio: float
 
 
-def check_reach(assembly: MechanismSystem, start: State, times: Array) -> None:
+class Followed(NamedTuple):
+    """The undeformed robot along its trajectories: `times` (N,), s, and coordinates `q` (N, coordinates)."""
+
+    times: Array
+    q: Array
+
+
+def check_reach(assembly: MechanismSystem, start: State, times: Array) -> Followed:
     """Raise `InputError` with the first of `times` (T,), s, at which the undeformed robot cannot follow.
 
     A flexible arm would stretch its small-deformation modes beyond all sense instead of failing; better to say so.
     Configurations are looked at `REACH_CHECKS` times, and between them where they come close to a singular one.
+    Returns those looked at, of which there is the first alone where nothing has to be followed.
     """
     if not any(assembly.is_trajectory) or len(assembly.constraints) > len(assembly.frame_coordinates):
-        return
-    q, passed = start.q, list[_Passed]()
+        return Followed(as_floats(times[:1]), start.q[None])
+    q, followed = start.q, list[_Passed]()
     for t in map(float, times[:: max(1, len(times) // REACH_CHECKS)]):
         following = solve_positions(assembly, t, q)
         if following is None:
             raise InputError(unreachable(assembly, t, q))
-        passed = [*passed[-2:], _Passed(t, following, rank_ratio(assembly, t, following))]
-        least, at = _least_ratio(assembly, passed)
+        followed.append(_Passed(t, following, rank_ratio(assembly, t, following)))
+        least, at = _least_ratio(assembly, followed[-3:])
         if least < SINGULAR:
             raise InputError(unreachable(assembly, at, q))
         q = following
+    return Followed(np.array([one.t for one in followed]), np.array([one.q for one in followed]))
 
 
 def _least_ratio(assembly: MechanismSystem, passed: Sequence[_Passed]) -> tuple[float, float]:

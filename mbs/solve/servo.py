@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, ComplexArray, as_list
+from ...common.arrays import Array, Booleans, ComplexArray, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
@@ -18,6 +18,7 @@ from ..joints.measure import Measure
 from ..model.model import ZERO, Constraint, Model
 from ..model.system import MechanismSystem
 from .initial_state import undeformed_state
+from .reach import REACH_CHECKS, Followed, check_reach
 
 MOST_ITERATIONS = 50
 TOLERANCE = 1e-12  # of an equilibrium's last Newton step
@@ -36,7 +37,7 @@ class Servo:
     path: MechanismSystem
     driven: MechanismSystem
     factor: float
-    guess: Array  # coordinates (R, θ, p) that pick the branch
+    near: Followed  # coordinates (R, θ, p) along the path, without deflections, that positions are found from
     loads: tuple[tuple[Measure, TimeFunction], ...]  # of the scene, held before and after the path as it is
     offset: tuple[TimeFunction, ...] = ()  # one for each mode of all bodies, or none
 
@@ -46,7 +47,7 @@ class Servo:
         numbers = [order.index(motor_owner(name)) for name in self.path.model.motors]
         return _core.ServoConstraint(
             self.path.system, self.path.motor_measures, self.driven.system, numbers, self.factor, list(self.offset),
-            self.guess,
+            as_list(self.near.times), self.near.q,
         )  # fmt: skip
 
     def resolver(self) -> _core.ActuatorForces:
@@ -72,7 +73,8 @@ def motor_owner(joint: str) -> str:
 def make_servo(model: Model, end: float, factor: float) -> Servo:
     """The equations for a path that is held before 0 and after `end`.
 
-    Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes.
+    Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes, and
+    for a path that the undeformed robot cannot follow.
     """
     for found, what in ((len(model.motors), "motors"), (len(model.trajectories), "trajectory components")):
         if found != model.degrees_of_freedom:
@@ -91,7 +93,8 @@ def make_servo(model: Model, end: float, factor: float) -> Servo:
     loads = tuple((row, size.held(0.0, end)) for row, size in model.loads)
     path = MechanismSystem(model, [*model.joints, *held], loads, rows)
     driven = MechanismSystem(model, [*model.joints, *motors], loads, rows)
-    return Servo(path, driven, factor, undeformed_state(path).q, loads)
+    near = check_reach(path, undeformed_state(path), as_floats(np.linspace(0.0, end, REACH_CHECKS)))
+    return Servo(path, driven, factor, near, loads)
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,15 @@ def lump():
 
 def test_integrals_are_those_of_material_points(lump):
     zeros = Invariants(
-        0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 4)), np.zeros((3, 3, 4)), np.zeros((3, 3, 4, 4))
+        mass=0.0,
+        first_moment=np.zeros(3),
+        second_moment=np.zeros((3, 3)),
+        S_bar=np.zeros((3, 4)),
+        I_bar=np.zeros((3, 3, 4)),
+        S_bar_kl=np.zeros((3, 3, 4, 4)),
+        J_spin=0.0,
+        h_spin=np.zeros(4),
+        S_spin=np.zeros((4, 4)),
     )
     found = with_lumped_masses(zeros, [lump])
     masses, offsets = cloud(lump)

@@ -99,6 +99,9 @@ def test_datasets_of_the_interface(outcome):
             "invariants/S_bar": (3, n),
             "invariants/I_bar": (3, 3, n),
             "invariants/S_bar_kl": (3, 3, n, n),
+            "invariants/J_spin": (),
+            "invariants/h_spin": (n,),
+            "invariants/S_spin": (n, n),
             "geometric_stiffness/omega_zz": (n, n),
             "interfaces/tip/position": (3,),
             "interfaces/tip/translation": (3, n),
@@ -108,6 +111,33 @@ def test_datasets_of_the_interface(outcome):
         shapes |= {"stations/translation": (k, 3, n), "stations/rotation": (k, 3, n), "stations/height": (k,)}
         for name, shape in shapes.items():
             assert file[name].shape == shape, name
+
+
+def test_files_of_earlier_versions_have_no_spin_inertia(outcome):
+    with h5py.File(outcome.path, "r+") as file:
+        for name in ("J_spin", "h_spin", "S_spin"):
+            del file[f"invariants/{name}"]
+    seal(outcome.path)
+    read = read_modal_body(outcome.path)
+    assert read.J_spin is None
+    assert read.h_spin is None
+    assert read.S_spin is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"h_spin": None}, "h_spin: expected beside J_spin, S_spin, found none"),
+        ({"J_spin": -1.0}, "J_spin: expected a number not below 0, found -1"),
+        ({"J_spin": 0.0}, "S_spin, less h_spin.* expected no negative eigenvalue"),
+        ({"h_spin": np.ones(12)}, "S_spin, less h_spin.* expected no negative eigenvalue"),
+        ({"S_spin": 2 * np.eye(12)}, r"S_bar_kl\[2, 2\], less S_spin: expected no negative eigenvalue"),
+        ({"S_spin": np.triu(np.ones((12, 12)))}, "S_spin: expected symmetric"),
+    ],
+)
+def test_spin_inertia_that_cannot_be_is_refused(outcome, changes, message):
+    with pytest.raises(InputError, match=message):
+        replace(outcome.body, **changes)
 
 
 def test_missing_file(tmp_path):

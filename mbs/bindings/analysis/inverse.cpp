@@ -45,8 +45,8 @@ void bind_servo(nb::module_ &m) {
 
   nb::class_<ServoConstraint>(m, "ServoConstraint", "Inverse dynamics of a path with joint motors alone.")
       .def(nb::init<const System &, std::vector<Measure>, const System &, std::vector<std::size_t>, double,
-                    std::vector<TimeFunction>, Eigen::VectorXd>(),
-           "path"_a, "motors"_a, "driven"_a, "motor_constraint"_a, "factor"_a, "offset"_a, "guess"_a,
+                    std::vector<TimeFunction>, std::vector<double>, RowMajorMatrix>(),
+           "path"_a, "motors"_a, "driven"_a, "motor_constraint"_a, "factor"_a, "offset"_a, "near_times"_a, "near"_a,
            nb::keep_alive<1, 2>(), nb::keep_alive<1, 4>())
       .def("residuals", &servo_residuals, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a,
            "Modal forces r (N, n) that motors do not supply; NaN where no position is found.")

@@ -1,6 +1,7 @@
 #include "core/analysis/servo.h"
 
-#include <limits>
+#include <algorithm>
+#include <cmath>
 
 namespace ffrobot {
 
@@ -9,14 +10,31 @@ using Eigen::VectorXd;
 
 ServoConstraint::ServoConstraint(const System &path, std::vector<Measure> motors, const System &driven,
                                  std::vector<std::size_t> motor_constraint, double factor,
-                                 std::vector<TimeFunction> offset, VectorXd guess)
+                                 std::vector<TimeFunction> offset, std::vector<double> near_times, RowMajorMatrix near)
     : path_system_(path), driven_system_(driven), motors_(std::move(motors)),
       motor_constraint_(std::move(motor_constraint)), factor_(factor), offset_(std::move(offset)),
-      guess_(std::move(guess)), path_(path, guess_), driven_(driven, guess_) {
+      near_times_(std::move(near_times)), near_(std::move(near)), path_(path, near_.row(0)),
+      driven_(driven, near_.row(0)) {
   residual_ = p_ = p_dot_ = p_ddot_ = VectorXd::Zero(path.n_modes());
 }
 
-void ServoConstraint::restart() { path_.start_at(guess_); }
+bool ServoConstraint::move(double t) {
+  const auto away = [t](double time) { return std::abs(time - t); };
+  const auto nearest = std::min_element(near_times_.begin(), near_times_.end(),
+                                        [&](double one, double other) { return away(one) < away(other); });
+  const bool goes_on = away(found_at_) <= away(*nearest);
+  if (!goes_on)
+    path_.start_at(near_.row(nearest - near_times_.begin()));
+  bool found = path_.move(t);
+  if (!found && !goes_on && std::isfinite(found_at_)) { // links that are bent far are nearer to the last position
+    path_.start_at(last_);
+    found = path_.move(t);
+  }
+  found_at_ = found ? t : std::nan("");
+  if (found)
+    last_ = path_.q();
+  return found;
+}
 
 bool ServoConstraint::solve(double t, const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
   output_p_ = factor_ * p;
@@ -30,7 +48,7 @@ bool ServoConstraint::solve(double t, const VectorXd &p, const VectorXd &p_dot, 
     output_p_ddot_[i] += offset.acceleration;
   }
   path_.set_shape(output_p_, output_p_dot_, output_p_ddot_);
-  if (!path_.move(t))
+  if (!move(t))
     return false;
   const Workspace &w = path_.workspace();
   MeasureMotion motion;
@@ -70,8 +88,7 @@ namespace {
 VectorXd residual(ServoConstraint &servo, double t, const VectorXd &p, const VectorXd &p_dot, const VectorXd &p_ddot) {
   if (servo.solve(t, p, p_dot, p_ddot))
     return servo.residual();
-  servo.restart();
-  return VectorXd::Constant(servo.modes(), std::numeric_limits<double>::quiet_NaN());
+  return VectorXd::Constant(servo.modes(), std::nan(""));
 }
 
 } // namespace

@@ -16,6 +16,7 @@
 #include "core/analysis/replay.h"
 #include "core/analysis/run.h"
 
+#include <limits>
 #include <vector>
 
 namespace ffrobot {
@@ -24,28 +25,37 @@ class ServoConstraint {
 public:
   // path: under C_m and the specified trajectories; motors: their rows in it. driven: the same bodies under C_m and the
   // motors' rows, motor i being constraint motor_constraint[i]. offset: one function per mode of all bodies, or empty.
-  // guess: coordinates the first position is found from. Both systems must outlive this.
+  // near: rows q at near_times along the path: a position at t is found from the one found last where that
+  // is no further away in time, else from the nearest of these. Both systems must outlive this.
   ServoConstraint(const System &path, std::vector<Measure> motors, const System &driven,
                   std::vector<std::size_t> motor_constraint, double factor, std::vector<TimeFunction> offset,
-                  Eigen::VectorXd guess);
+                  std::vector<double> near_times, RowMajorMatrix near);
 
   Eigen::Index modes() const { return residual_.size(); }
 
   // False where no position is found.
   bool solve(double t, const Eigen::VectorXd &p, const Eigen::VectorXd &p_dot, const Eigen::VectorXd &p_ddot);
   bool solve(double t, const std::vector<ModalShape> &shape);
-  void restart(); // the next position is found from the guess
+  void restart() { found_at_ = NaN; } // the next position is found from those near it
 
   const Eigen::VectorXd &residual() const { return residual_; } // r: modal forces that nobody supplies
   const FullyConstrained &motion() const { return driven_; }    // of the robot; its lambda: nu and -tau
 
 private:
+  static constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
+
+  bool move(double t);
+
   const System &path_system_, &driven_system_;
   std::vector<Measure> motors_;
   std::vector<std::size_t> motor_constraint_;
   double factor_;
   std::vector<TimeFunction> offset_;
-  Eigen::VectorXd guess_, residual_, p_, p_dot_, p_ddot_, output_p_, output_p_dot_, output_p_ddot_;
+  std::vector<double> near_times_;
+  RowMajorMatrix near_;
+  double found_at_ = NaN; // time of the last position
+  Eigen::VectorXd last_;  // that position
+  Eigen::VectorXd residual_, p_, p_dot_, p_ddot_, output_p_, output_p_dot_, output_p_ddot_;
   FullyConstrained path_, driven_;
 };
 

@@ -1,0 +1,155 @@
+"""What a scene in space needs of a body: invariants of the (R, e, p) equations and the sections where things attach."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ...fe_models.modal_body import ModalBody
+from ...fe_models.modal_body.tensors import LEVI_CIVITA
+
+
+@dataclass(frozen=True)
+class SpatialPoint:
+    """A section of a body: position (3,) m, Φ as `translation` (3, n), Φ_r as `rotation` (3, n), in body axes."""
+
+    position: Array
+    translation: Array
+    rotation: Array
+
+
+@dataclass(frozen=True)
+class SpatialBody:
+    """Constants of one body in the equations of motion in space (Shabana, Dynamics of Multibody Systems, ch. 5).
+
+    Arrays are over all n modes of the link; `m_ff` is the identity. Twist φ of a line of mass counts by the last three.
+
+    Attributes:
+        name: of the body.
+        mass: m in kg.
+        first_moment: s0 (3,) = ∫ρ x dV in kg·m, body axes.
+        second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
+        S_bar: (3, n) ∫ρ Φ dV.
+        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
+        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀΦ_l dV at [k, l], without S_spin, which files book at [2, 2].
+        J_spin: J_s = ∫ρI_p dx in kg·m², where x is the axis of a line of mass.
+        h_spin: (n,) ∫ρI_p φ dx.
+        S_spin: (n, n) ∫ρI_p φᵀφ dx.
+        stiffness: K_ff (n,) in rad²/s².
+        damping: D_ff (n, n) in 1/s.
+        points: its sections by name.
+        length: of a link in m; None of a rigid body.
+    """
+
+    name: str
+    mass: float
+    first_moment: Array
+    second_moment: Array
+    S_bar: Array
+    I_bar: Array
+    S_bar_kl: Array
+    J_spin: float
+    h_spin: Array
+    S_spin: Array
+    stiffness: Array
+    damping: Array
+    points: Mapping[str, SpatialPoint]
+    length: float | None = None
+
+    @property
+    def n_modes(self) -> int:
+        """Number n of modal coordinates in the equations."""
+        return len(self.stiffness)
+
+    @property
+    def inertia(self) -> Array:
+        """J0 (3, 3) about the origin of the frame, kg·m²: tr(J2) I − J2, and J_s about the axis of a line of mass."""
+        J: Array = np.trace(self.second_moment) * np.eye(3) - self.second_moment
+        J[0, 0] += self.J_spin
+        return J
+
+    @property
+    def inertia_slope(self) -> Array:
+        """J1 (3, 3, n): J1_ij = 2δ_ij tr Ī − Ī_ij − Ī_ji."""
+        slope: Array = 2 * np.einsum("ij,kkn->ijn", np.eye(3), self.I_bar) - self.I_bar - self.I_bar.transpose(1, 0, 2)
+        return slope
+
+    @property
+    def spin(self) -> Array:
+        """h0 (3, n): h0_a = ε_abc Ī_bc, and h_s about the axis of a line of mass."""
+        h: Array = np.einsum("abc,bcn->an", LEVI_CIVITA, self.I_bar)
+        h[0] += self.h_spin
+        return h
+
+
+def from_modal_body(name: str, body: ModalBody) -> SpatialBody:
+    """All modes of a modal body.
+
+    Raises:
+        InputError: the file of a beam does not say what inertia it has about its own axis.
+    """
+    J_spin, h_spin, S_spin = _spin_inertia(name, body)
+    S_bar_kl = body.S_bar_kl.copy()
+    S_bar_kl[2, 2] -= S_spin
+    omega = 2 * np.pi * body.frequency
+    sections = dict(body.interfaces)
+    sections.setdefault("mid", body.interpolate(body.length / 2))
+    return SpatialBody(
+        name=name,
+        mass=body.mass,
+        first_moment=body.first_moment,
+        second_moment=body.second_moment,
+        S_bar=body.S_bar,
+        I_bar=body.I_bar,
+        S_bar_kl=S_bar_kl,
+        J_spin=J_spin,
+        h_spin=h_spin,
+        S_spin=S_spin,
+        stiffness=np.diag(body.stiffness).copy(),
+        damping=np.diag(2 * body.damping_ratio * omega),
+        points=MappingProxyType(
+            {label: SpatialPoint(at.position, at.translation, at.rotation) for label, at in sections.items()}
+        ),
+        length=body.length,
+    )
+
+
+def rigid_body(name: str, mass: float, center: Array, inertia: Array, points: Mapping[str, Array]) -> SpatialBody:
+    """A body without modes, of `mass` (kg) at `center` (3,) (m) with `inertia` (3, 3) about it (kg·m²); body axes."""
+    places = {label: np.asarray(position, dtype=float) for label, position in points.items()}
+    if "mid" not in places and {"root", "tip"} <= places.keys():
+        places["mid"] = (places["root"] + places["tip"]) / 2
+    none, center = np.zeros((3, 0)), np.asarray(center, dtype=float)
+    return SpatialBody(
+        name=name,
+        mass=mass,
+        first_moment=mass * center,
+        second_moment=0.5 * np.trace(inertia) * np.eye(3) - inertia + mass * np.outer(center, center),
+        S_bar=none,
+        I_bar=np.zeros((3, 3, 0)),
+        S_bar_kl=np.zeros((3, 3, 0, 0)),
+        J_spin=0.0,
+        h_spin=np.zeros(0),
+        S_spin=np.zeros((0, 0)),
+        stiffness=np.zeros(0),
+        damping=np.zeros((0, 0)),
+        points=MappingProxyType({label: SpatialPoint(position, none, none) for label, position in places.items()}),
+    )
+
+
+def _spin_inertia(name: str, body: ModalBody) -> tuple[float, Array, Array]:
+    """J_s, h_s, S_s; files of earlier versions lack them, which matters for beams alone."""
+    if body.J_spin is not None and body.h_spin is not None and body.S_spin is not None:
+        return body.J_spin, body.h_spin, body.S_spin
+    if body.kind != "beam":
+        return 0.0, np.zeros(body.mode_count), np.zeros((body.mode_count, body.mode_count))
+    raise InputError(
+        f'body "{name}": expected a modal body file with the inertia of the beam about its own axis (invariants/J_spin,'
+        ' h_spin, S_spin), which space = "spatial" needs, found one of an earlier version without: make it again from'
+        " its link file with `ffrobot link`"
+    )

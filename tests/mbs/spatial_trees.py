@@ -1,0 +1,215 @@
+"""Random mechanisms in space: trees and loops with every type of joint, of rigid bodies, solids and beams.
+
+Beams are lines of mass with polynomial modes (Ritz) of all four families; solids have modes without any order.
+"""
+
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+from material_points import random_cloud
+from numpy.polynomial import Legendre, Polynomial
+from rotations import quaternion, random_rotation, rotation, rotation_about
+from spatial_oracle import Mechanism
+from spatial_rows import Ground, Joint, Section
+
+from ffrobot.mbs.model.spatial_body import SpatialBody, SpatialPoint, from_modal_body, rigid_body
+
+TYPES = ("revolute", "prismatic", "screw", "cylindrical", "universal", "spherical", "planar", "weld", "free")
+G = np.array([0.4, -1.1, -9.5])
+
+
+def random_rigid(rng, name):
+    """Mass, center, inertia, and sections "root", "tip", "side" anywhere within a meter."""
+    half = rng.uniform(0.2, 1.0, 3)
+    turn = random_rotation(rng)
+    inertia = turn @ np.diag(half[[1, 2, 0]] + half[[2, 0, 1]]) @ turn.T * 0.1
+    points = {label: rng.uniform(-0.5, 0.5, 3) for label in ("root", "tip", "side")}
+    return rigid_body(name, rng.uniform(0.5, 2.0), rng.uniform(-0.3, 0.3, 3), inertia, points)
+
+
+def random_solid(rng, name, n=4):
+    """A cloud of points with modes in all directions (dense S_kl, all of J1 and h), dense damping, turning sections.
+
+    Modes move and turn the root as well: as free interfaces do.
+    """
+    cloud = random_cloud(rng, name, n=n)
+    body = from_modal_body(name, cloud.modal_body())
+    points = {label: replace(at, rotation=rng.standard_normal((3, n))) for label, at in body.points.items()}
+    return replace(body, damping=cloud.damping, points=MappingProxyType(points))
+
+
+def random_beam(rng, name, modes=(2, 2, 1, 1), condition="cantilever"):
+    """A uniform line of mass along x: in-plane and out-of-plane bending, axial motion and twist, `modes` of each."""
+    length, mass, I_p = rng.uniform(0.5, 1.5), rng.uniform(0.5, 2.0), rng.uniform(0.001, 0.01)
+    bending = Polynomial([0, 0, 1]) if condition == "cantilever" else Polynomial([0, 1, -1])
+    factors, densities = (bending, bending, Polynomial([0, 1]), Polynomial([0, 1])), (mass, mass, mass, mass * I_p)
+    i, o, a, t = (_shapes(*of) for of in zip(factors, modes, densities, strict=True))
+    n, (u, v, w, twist) = sum(modes), np.split(np.arange(sum(modes)), np.cumsum([modes[2], modes[0], modes[1]]))
+
+    def section(xi):
+        Phi, Phi_r = np.zeros((3, n)), np.zeros((3, n))
+        Phi[0, u], Phi[1, v], Phi[2, w], Phi_r[0, twist] = a(xi), i(xi), o(xi), t(xi)
+        Phi_r[2, v], Phi_r[1, w] = i.slope(xi) / length, -o.slope(xi) / length
+        return SpatialPoint(np.array([xi * length, 0.0, 0.0]), Phi, Phi_r)
+
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    sections = [(section((node + 1) / 2), 0.5 * weight * mass) for node, weight in zip(nodes, weights, strict=True)]
+    x = np.array([at.position for at, _ in sections])
+    m, Phi = np.array([m for _, m in sections]), np.array([at.translation for at, _ in sections])
+    phi = np.array([at.rotation[0] for at, _ in sections])
+    return SpatialBody(
+        name=name,
+        mass=mass,
+        first_moment=m @ x,
+        second_moment=np.einsum("i,ik,il->kl", m, x, x),
+        S_bar=np.einsum("i,ikn->kn", m, Phi),
+        I_bar=np.einsum("i,ik,iln->kln", m, x, Phi),
+        S_bar_kl=np.einsum("i,ikm,iln->klmn", m, Phi, Phi),
+        J_spin=mass * I_p,
+        h_spin=I_p * m @ phi,
+        S_spin=I_p * np.einsum("i,im,in->mn", m, phi, phi),
+        stiffness=np.sort(rng.uniform(1, 60, n)),
+        damping=np.diag(rng.uniform(0, 0.5, n)),
+        points=MappingProxyType({"root": section(0.0), "tip": section(1.0), "side": section(0.6)}),
+        length=length,
+    )
+
+
+class _shapes:  # noqa: N801 (reads as a function of x/length)
+    """Polynomials that are orthonormal under `density` on 0 … 1: (count,) values, and slopes by x/length."""
+
+    def __init__(self, factor, count, density):
+        basis = [factor * Legendre.basis(k, [0, 1]).convert(kind=Polynomial) for k in range(count)]
+        products = np.array([[(p * q).integ()(1.0) - (p * q).integ()(0.0) for q in basis] for p in basis])
+        self._basis = basis
+        self._T = np.linalg.inv(np.linalg.cholesky(density * products)) if count else np.zeros((0, 0))
+
+    def __call__(self, xi):
+        return self._T @ np.array([f(xi) for f in self._basis])
+
+    def slope(self, xi):
+        return self._T @ np.array([f.deriv()(xi) for f in self._basis])
+
+
+@dataclass
+class JointState:
+    """Pose of triad b on a: way d (3,) and axes C (3, 3) in the axes of a; `coordinates` as its type defines them."""
+
+    coordinates: np.ndarray
+    d: np.ndarray
+    C: np.ndarray
+
+
+def random_pose(rng, joint):
+    """A pose that the joint allows, far from singular ones."""
+    angle, other, way, beside = rng.uniform(-1.2, 1.2, 4)
+    zero, none = np.zeros(3), np.eye(3)
+    turn = rotation_about(2, angle)
+    along = np.array([0, 0, way])
+    return {
+        "revolute": JointState(np.array([angle]), zero, turn),
+        "prismatic": JointState(np.array([way]), along, none),
+        "screw": JointState(np.array([angle]), np.array([0, 0, joint.h * angle]), turn),
+        "cylindrical": JointState(np.array([angle, way]), along, turn),
+        "universal": JointState(np.array([angle, other]), zero, rotation_about(0, angle) @ rotation_about(1, other)),
+        "spherical": JointState(np.zeros(0), zero, random_rotation(rng)),
+        "planar": JointState(np.array([way, beside, angle]), np.array([way, beside, 0]), turn),
+        "weld": JointState(np.zeros(0), zero, none),
+        "free": JointState(np.zeros(0), rng.uniform(-1, 1, 3), random_rotation(rng)),
+    }[joint.type]
+
+
+@dataclass
+class Tree:
+    """Bodies, the joints that carry them (joint k carries body k, on its second side), joints that close loops.
+
+    `q` and `v` meet all joints; `poses` by joint. Joints without a partner stand on the ground.
+    """
+
+    bodies: list
+    joints: list
+    loops: list = field(default_factory=list)
+    poses: dict = field(default_factory=dict)
+    q: np.ndarray | None = None
+    v: np.ndarray | None = None
+
+    def mechanism(self, constraints=(), **keys):
+        """With the rows of all joints, and further `constraints` (row, target) behind them."""
+        rows = [(row, None) for joint in (*self.joints, *self.loops) for row in joint.rows()]
+        return Mechanism(self.bodies, keys.pop("gravity", G), rows + list(constraints), **keys)
+
+
+def random_body(rng, name, kinds=("rigid", "solid", "beam", "supported beam")):
+    kind = kinds[rng.integers(len(kinds))]
+    return {
+        "rigid": lambda: random_rigid(rng, name),
+        "solid": lambda: random_solid(rng, name),
+        "beam": lambda: random_beam(rng, name),
+        "supported beam": lambda: random_beam(rng, name, (2, 1, 0, 1), "simply-supported"),
+    }[kind]()
+
+
+def random_tree(rng, types, kinds=("rigid", "solid", "beam", "supported beam"), chain=False, loops=0, size=0.1):
+    """Bodies b1, b2, … on joints j1, j2, … of `types` in this order, each on the ground or an earlier body.
+
+    Modal coordinates are about `size`, velocities of order one. Each of `loops` joins the last body to the ground or an
+    earlier body by a joint of any type but weld and free, where it happens to be.
+    """
+    tree = Tree([], [])
+    for k, type_ in enumerate(types, 1):
+        body = random_body(rng, f"b{k}", kinds)
+        parent = k - 1 if chain else int(rng.integers(k))
+        a = Ground(rng.uniform(-0.5, 0.5, 3), random_rotation(rng))
+        if parent:
+            a = Section(f"b{parent}", ("tip", "side")[rng.integers(2)], random_rotation(rng))
+        b = Section(body.name, "root", random_rotation(rng))
+        tree.bodies.append(body)
+        tree.joints.append(Joint(f"j{k}", type_, a, b, 0.15 if type_ == "screw" else 0.0))
+        tree.poses[f"j{k}"] = random_pose(rng, tree.joints[-1])
+    tree.q = placed(tree, [size * rng.standard_normal(body.n_modes) for body in tree.bodies])
+    for k in range(1, loops + 1):
+        _close_loop(rng, tree, f"loop{k}")
+    tree.v = admissible(tree, rng.standard_normal(tree.mechanism().size))
+    return tree
+
+
+def placed(tree, p):
+    """Q with every body where its joint's pose says, bent by p (one array per body)."""
+    mechanism = Mechanism(tree.bodies, G)
+    q, rest = np.zeros(mechanism.coordinates.n_q), np.zeros(mechanism.size)
+    for body, joint, own in zip(tree.bodies, tree.joints, p, strict=True):
+        R, e, bent = mechanism.coordinates.parts(q, body.name)
+        e[:], bent[:] = [1, 0, 0, 0], own
+        pose, a, b = tree.poses[joint.name], mechanism.marker(joint.a, q, rest), mechanism.marker(joint.b, q, rest)
+        A = a.F @ pose.C @ b.F.T
+        e[:] = quaternion(A)
+        R[:] = a.r + a.F @ pose.d - rotation(e) @ b.r
+    return q
+
+
+def admissible(tree, v):
+    """The velocity nearest to v that all joints allow."""
+    C_v = tree.mechanism().constraint_values(0.0, tree.q, v)[2]
+    return v - np.linalg.pinv(C_v, rcond=1e-10) @ (C_v @ v)
+
+
+def _close_loop(rng, tree, name):
+    """A joint from the last body to the ground or another: its section there is made where the loop closes."""
+    mechanism, last = Mechanism(tree.bodies, G), tree.bodies[-1]
+    types = [type_ for type_ in TYPES if type_ not in ("weld", "free")]
+    joint = Joint(name, types[rng.integers(len(types))], None, None, 0.1)
+    pose, n = random_pose(rng, joint), last.n_modes
+    a = Ground(rng.uniform(-0.5, 0.5, 3), random_rotation(rng))
+    if len(tree.bodies) > 1 and rng.integers(2):
+        a = Section(tree.bodies[int(rng.integers(len(tree.bodies) - 1))].name, "side", random_rotation(rng))
+    at = mechanism.marker(a, tree.q, np.zeros(mechanism.size))
+    R, e, p = mechanism.coordinates.parts(tree.q, last.name)
+    Phi, Phi_r = 0.3 * rng.standard_normal((3, n)), 0.3 * rng.standard_normal((3, n))
+    u = rotation(e).T @ (at.r + at.F @ pose.d - R)
+    points = dict(last.points) | {name: SpatialPoint(u - Phi @ p, Phi, Phi_r)}
+    tree.bodies[-1] = replace(last, points=MappingProxyType(points))
+    section = Mechanism(tree.bodies, G).marker(Section(last.name, name), tree.q, np.zeros(mechanism.size))
+    b = Section(last.name, name, section.F.T @ at.F @ pose.C)
+    tree.loops.append(replace(joint, a=a, b=b))
+    tree.poses[name] = pose
