@@ -74,6 +74,7 @@ FFROBOT_APART int factors(const Node<Space> &child, const Hinge<Space, T> &hinge
     }
     Space::template Turn<T>::add_moment(hinge.r, c);
     hinge.turn.apply(c, turned);
+    C[j] = Pack<T, d>::zero(); // lanes beyond d are summed up, too
     for (int i = 0; i < d; ++i)
       C[j].set(i, turned[i]);
   }

@@ -78,7 +78,10 @@ template <class T> struct PortMotion {
 template <class T> struct State {
   explicit State(const Body &b)
       : u(b.width, T(0.)), u_dot(u), W(b.W.begin(), b.W.end()), change(b.blocks * b.n + 8, T(0.)), rate(change),
-        Q_f(b.n + 8, T(0.)), Q(b.width, T(0.)), Wdh{Q, Q, Q}, ports(b.ports.size()) {}
+        Q_f(b.n + 8, T(0.)), Q(b.width, T(0.)), Wdh{Q, Q, Q}, ports(b.ports.size()) {
+    for (auto &row : M)
+      row = Pack<T, 6>::zero(); // lanes beyond 6 are summed up, too
+  }
 
   T absolute[3][3];        // body axes to global ones
   T omega[3];              // body axes
