@@ -21,14 +21,20 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       target_time_(std::numeric_limits<double>::quiet_NaN()) {
   keep_independent_rows(mechanism, q, v, workspace_);
   int groups = 2; // ways of joints, angles of joints
+  pace_ = {1e-3, 1e-3};
   const Index n = mechanism.n_v;
   group_.assign(static_cast<std::size_t>(2 * n), 0);
   for (const Node<Space> &node : mechanism.nodes) {
     for (int k = 0; k < node.shape.freedoms.count; ++k)
       group_[static_cast<std::size_t>(node.v + k)] = node.shape.freedoms.component[k] < Space::linear ? 0 : 1;
-    for (int k = 0; k < node.n(); ++k)
+    double lowest = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < node.n(); ++k) {
       group_[static_cast<std::size_t>(node.p_v() + k)] = groups;
+      lowest = std::min(lowest, std::sqrt(node.body.K[static_cast<std::size_t>(k)]));
+    }
     groups += node.n() > 0 ? 1 : 0;
+    if (node.n() > 0)
+      pace_.push_back(lowest);
     for (int k = 0; k < node.n(); ++k)
       fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)]));
   }
@@ -135,6 +141,9 @@ template <class Space> void RecursiveMotion<Space>::accepted(double, const doubl
     peak_[g] = std::max(peak_[g], std::sqrt(size_[g]));
   // Rotation vectors start at zero in every step: an angle is compared with one radian at least.
   peak_[1] = std::max(peak_[1], 1.0);
+  // At rest, as in equilibrium, all rates are zero: their errors are then compared with rates that would be slow.
+  for (std::size_t g = 0; g < pace_.size(); ++g)
+    peak_[pace_.size() + g] = std::max(peak_[pace_.size() + g], pace_[g] * peak_[g]);
 }
 
 template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z) const {

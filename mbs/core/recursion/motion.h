@@ -66,6 +66,7 @@ private:
   // Errors are judged against the largest values so far of what is alike: all joints' ways, angles, each body's modes.
   std::vector<int> group_; // of each of 2 n_v entries of z
   std::vector<double> peak_;
+  std::vector<double> pace_; // 1/s, of each group: a rate counts as small below this times the peak of what it is of
   mutable std::vector<double> size_;
 };
 

@@ -14,10 +14,21 @@ namespace {
 
 constexpr double negligible = 1e-12; // as in mbs/model/planar_body.py
 
-// I_bar with that of spin: h gains h_s along the axis
+MatrixXd I_bar_of(const SpatialData &data) {
+  return data.I_bar.size() ? data.I_bar : MatrixXd::Zero(9, data.modes());
+}
+
+// With that of spin: h_s along the axis is half of it on either side of the diagonal, h_a = eps_abc I_bar_bc. What is
+// symmetric stays, so that all that is made of I_bar, gyroscopic moments included, has h_s as it has the rest of h.
 MatrixXd complete_I_bar(const SpatialData &data) {
-  const Index n = data.modes();
-  return data.I_bar.size() ? data.I_bar : MatrixXd::Zero(9, n);
+  MatrixXd I_bar = I_bar_of(data);
+  if (data.h_spin.size() > 0)
+    for (int c = 0; c < 3; ++c) {
+      const int a = (c + 1) % 3, b = (c + 2) % 3;
+      I_bar.row(3 * a + b) += 0.5 * data.spin_axis[c] * data.h_spin.transpose();
+      I_bar.row(3 * b + a) -= 0.5 * data.spin_axis[c] * data.h_spin.transpose();
+    }
+  return I_bar;
 }
 
 } // namespace
@@ -34,7 +45,7 @@ SpatialData moved(const SpatialData &data, const Vector3d &position, const Matri
   to.spin_axis = R * data.spin_axis, to.spin_booked = R * data.spin_booked;
   if (n) {
     to.S_bar = R * data.S_bar;
-    MatrixXd I_bar = complete_I_bar(data);
+    MatrixXd I_bar = I_bar_of(data);
     for (int k = 0; k < 3; ++k)
       I_bar.middleRows<3>(3 * k) -= position[k] * data.S_bar;
     to.I_bar.setZero(9, n);
@@ -80,8 +91,6 @@ Body::Body(const SpatialData &data, const std::vector<int> &used) : n(static_cas
   if (n) {
     rows.topRows<3>() = data.S_bar;
     rows.row(h) = I.row(5) - I.row(7), rows.row(h + 1) = I.row(6) - I.row(2), rows.row(h + 2) = I.row(1) - I.row(3);
-    if (data.h_spin.size())
-      rows.middleRows<3>(h) += data.spin_axis * data.h_spin.transpose();
   }
   for (int i = 0; i < port_count; ++i) {
     const SpatialMarker &marker = data.markers[static_cast<std::size_t>(used[static_cast<std::size_t>(i)])];
