@@ -95,10 +95,14 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     from .results.write import write_results
     from .run.inputs import files_of
     from .run.solve import solve as solve_scene
+    from .scene.spatial import is_spatial
 
     path = output or scene_file.with_suffix(".results.h5")
     _protect(files_of(scene_file))
     check_output(path, FORMAT)
+    if is_spatial(scene_file):
+        _solve_spatial(scene_file, path, resume=resume, strict=strict)
+        return
     writing = 0.0
 
     def keep(solution: Solution) -> None:
@@ -125,6 +129,29 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
         raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
     for name, result in solution.analyses.items() if strict else ():
         for text in result.warnings:
+            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
+
+
+def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) -> None:
+    """The same for a scene in space."""
+    from .common.errors import InputError, SolveError
+    from .present.progress import Display
+    from .present.spatial import print_spatial_summary
+    from .present.summary import summary_console
+    from .results.spatial import write_spatial_results
+    from .run.spatial import solve_spatial
+
+    if resume:
+        raise InputError(f'{scene_file}: --resume: expected a planar scene, found space = "spatial": not available yet')
+    with Display() as display:
+        solution = solve_spatial(scene_file, display)
+    began = time.perf_counter()
+    write_spatial_results(solution, path)
+    seconds = {**solution.seconds, "writing": time.perf_counter() - began}
+    print_spatial_summary(solution, path, seconds, summary_console())
+    for name, result in solution.analyses.items():
+        result.run.check_completed(scene_file)
+        for text in result.run.warnings if strict else ():
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
