@@ -194,6 +194,9 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
   for (Row &row : rows)
     if (row.model.kind != RowKind::coordinate) {
       const bool moment = row.model.kind != RowKind::point;
+      row.moves = row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
+      if (row.model.kind == RowKind::point)
+        row.lift = gravity.dot(row.model.f.head(Space::linear)) * ((row.a.node < 0) - (row.b.node < 0));
       needs_positions = needs_positions || row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
       finish(row.a, moment), finish(row.b, moment);
     }
@@ -207,14 +210,16 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
       if (const int port = nodes[i].first_port + k; cleared[static_cast<std::size_t>(port)]) {
         Actions found{static_cast<int>(i), k, port, {}};
         for (std::size_t r = 0; r < rows.size(); ++r) {
-          if (rows[r].b.global_port == port)
-            found.list.push_back({static_cast<int>(r), -1, 1});
-          if (rows[r].a.global_port == port)
-            found.list.push_back({static_cast<int>(r), -1, -1});
+          for (const double sign : {1., -1.})
+            if ((sign > 0 ? rows[r].b : rows[r].a).global_port == port) {
+              const Eigen::Vector3d f = sign * rows[r].model.f;
+              found.list.push_back(
+                  {static_cast<int>(r), -1, sign, rows[r].model.kind == RowKind::point, {f[0], f[1], f[2]}});
+            }
         }
         for (std::size_t k_wrench = 0; k_wrench < wrenches.size(); ++k_wrench)
           if (wrenches[k_wrench].global_port == port)
-            found.list.push_back({-1, static_cast<int>(k_wrench), -1});
+            found.list.push_back({-1, static_cast<int>(k_wrench), -1, false, {}});
         actions.push_back(found);
       }
   if constexpr (in_plane)

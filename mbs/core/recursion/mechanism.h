@@ -50,12 +50,16 @@ struct Attachment {
 struct Action {
   int row, wrench;
   double sign;
+  bool is_point = false; // of a row: a force of constant direction, global axes
+  double force[3] = {};  // it, with the sign
 };
 
 struct Row {
   RowModel model;
   Attachment a, b;
   int node = -1, freedom = 0; // of a row that is a joint coordinate
+  bool moves = false;         // its direction does
+  double lift = 0;            // what it measures of gravity, one end being on the ground
 };
 
 template <class Space> struct Mechanism {

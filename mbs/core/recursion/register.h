@@ -7,7 +7,7 @@
 #include <cstring>
 #include <new>
 #include <vector>
-#if defined(__AVX512F__)
+#if defined(__AVX__)
 #include <immintrin.h>
 #endif
 
@@ -121,8 +121,35 @@ FFROBOT_INLINE Eight load_part(const double *x, long count) {
 FFROBOT_INLINE void store_part(double *x, const Eight &v, long count) {
   _mm512_mask_storeu_pd(x, static_cast<__mmask8>((1u << count) - 1), (__m512d)v.v);
 }
+#elif defined(__AVX__)
+// Not by masked moves: their stores are microcode on some processors.
+FFROBOT_INLINE Register<4> load_four(const double *x, long count) {
+  using V = Register<4>::V;
+  if (count >= 4)
+    return Register<4>::load(x);
+  if (count == 3)
+    return {(V)_mm256_insertf128_pd(_mm256_zextpd128_pd256(_mm_loadu_pd(x)), _mm_load_sd(x + 2), 1)};
+  if (count == 2)
+    return {(V)_mm256_zextpd128_pd256(_mm_loadu_pd(x))};
+  return count == 1 ? Register<4>{(V)_mm256_zextpd128_pd256(_mm_load_sd(x))} : Register<4>::zero();
+}
+FFROBOT_INLINE void store_four(double *x, const Register<4> &v, long count) {
+  if (count >= 4)
+    return v.store(x);
+  if (count >= 2)
+    _mm_storeu_pd(x, _mm256_castpd256_pd128((__m256d)v.v));
+  if (count == 3)
+    x[2] = v[2];
+  if (count == 1)
+    x[0] = v[0];
+}
+FFROBOT_INLINE Eight load_part(const double *x, long count) {
+  return {load_four(x, count), load_four(x + 4, count - 4)};
+}
+FFROBOT_INLINE void store_part(double *x, const Eight &v, long count) {
+  store_four(x, v.low, count), store_four(x + 4, v.high, count - 4);
+}
 #else
-// Not by masked stores: they are microcode on some processors.
 FFROBOT_INLINE Eight load_part(const double *x, long count) {
   if (count >= 8)
     return Eight::load(x);

@@ -220,6 +220,20 @@ inline void row_motion(const Mechanism<Space> &m, const Row &row, const Workspac
 
 // A force and a moment (global axes) in axes of a port
 template <class T>
+FFROBOT_INLINE void force_in_port_axes(const planar::Body &, int, const planar::State<T> &s, const double *force,
+                                       T *to) {
+  const T c = s.absolute_cosine, n = s.absolute_sine;
+  to[0] = force[0] * c + force[1] * n, to[1] = force[1] * c - force[0] * n;
+}
+template <class T>
+FFROBOT_INLINE void force_in_port_axes(const spatial::Body &body, int port, const spatial::State<T> &s,
+                                       const double *force, T *to) {
+  T local[3];
+  for (int i = 0; i < 3; ++i)
+    local[i] = force[0] * s.absolute[0][i] + force[1] * s.absolute[1][i] + force[2] * s.absolute[2][i];
+  turn_back(body.ports[port].R, local, to);
+}
+template <class T>
 FFROBOT_INLINE void in_port_axes(const planar::Body &, int, const planar::State<T> &s, const T *force, const T *moment,
                                  T *to) {
   const T c = s.absolute_cosine, n = s.absolute_sine;
@@ -231,17 +245,6 @@ FFROBOT_INLINE void in_port_axes(const spatial::Body &body, int port, const spat
   T axes[3][3];
   product(s.absolute, body.ports[port].R, axes);
   turn_back(axes, force, to), turn_back(axes, moment, to + 3);
-}
-
-template <class Space, class T>
-FFROBOT_INLINE void find_motion(const Mechanism<Space> &m, const Row &row, const Workspace<Space, T> &w,
-                                RowMotion<T> &to) {
-  if (row.model.kind == RowKind::point) { // all there is of most rows
-    for (int i = 0; i < 3; ++i)
-      to.force[i] = T(row.model.f[i]), to.moment_a[i] = to.moment_b[i] = T(0.);
-    to.bias = T(0.);
-  } else
-    row_motion(m, row, w, row.model.kind != RowKind::rotation, to);
 }
 
 // What acts on ports before anything that hangs there: rows in their columns, wrenches in column 0. Of rows, S gets
@@ -260,16 +263,19 @@ FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &force
     const auto &body = m.nodes[actions.node].body;
     const auto &state = w.bodies[actions.node];
     for (const Action &action : actions.list) {
-      int column = 0;
+      const int column = action.row >= 0 ? w.column[action.row] : 0;
+      if (action.row >= 0 ? W == 1 || column == 0 : !forces.wrench)
+        continue;
+      if (action.is_point) {
+        force_in_port_axes(body, actions.port, state, action.force, x);
+        for (int i = 0; i < Space::linear; ++i)
+          P[i].add(column, x[i]);
+        continue;
+      }
       if (action.row >= 0) {
-        column = w.column[action.row];
-        if (W == 1 || column == 0)
-          continue;
-        find_motion(m, m.rows[action.row], w, motion);
+        row_motion(m, m.rows[action.row], w, m.rows[action.row].moves, motion);
         in_port_axes(body, actions.port, state, motion.force, action.sign > 0 ? motion.moment_b : motion.moment_a, x);
       } else {
-        if (!forces.wrench)
-          continue;
         const T *from = forces.wrench + action.wrench * d;
         T force[3] = {from[0], from[1], d == 3 ? T(0.) : from[2]}, moment[3] = {T(0.), T(0.), from[d - 1]};
         if constexpr (d == 6)
@@ -288,15 +294,14 @@ FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &force
     const Row &row = m.rows[w.active[k]];
     if (row.model.kind == RowKind::coordinate)
       continue;
-    const bool a_on_ground = row.a.node < 0, b_on_ground = row.b.node < 0;
-    const bool moves = row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
-    if (!moves && a_on_ground == b_on_ground)
-      continue;
-    find_motion(m, row, w, motion);
-    T along(0.);
-    for (int i = 0; i < Space::linear; ++i)
-      along += m.gravity[i] * motion.force[i];
-    S[k + 1].add(0, -motion.bias - (double(a_on_ground) - double(b_on_ground)) * along);
+    if (row.moves) {
+      row_motion(m, row, w, true, motion);
+      T along(0.);
+      for (int i = 0; i < Space::linear; ++i)
+        along += m.gravity[i] * motion.force[i];
+      S[k + 1].add(0, -(motion.bias + double((row.a.node < 0) - (row.b.node < 0)) * along));
+    } else if (row.lift != 0)
+      S[k + 1].add(0, T(-row.lift));
   }
 }
 
