@@ -132,6 +132,14 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
+def _planar(*paths: Path) -> None:
+    """Raise `InputError` for results in space, of which only `info` and `Results` can tell anything yet."""
+    from .results.file import refuse_spatial
+
+    for path in paths:
+        refuse_spatial(path)
+
+
 def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) -> None:
     """The same for a scene in space."""
     from .common.errors import InputError, SolveError
@@ -175,6 +183,7 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
     from .present.feasibility import print_feasibility
     from .present.summary import summary_console
 
+    _planar(results_file)
     with reading(results_file):
         print_feasibility(results_file, analysis, summary_console())
 
@@ -192,6 +201,7 @@ def plot(file: Path, output: Path | None, formats: str, only: tuple[str, ...]) -
     from .common.hdf5 import reading
     from .pictures.figures.plot import plot_file
 
+    _planar(file)
     with reading(file):
         paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","), only)
     for path in paths:
@@ -214,6 +224,7 @@ def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN4
     from .common.hdf5 import reading
     from .pictures.view import Options, view_file
 
+    _planar(file)
     with reading(file):
         viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
     for path in viewed.paths:
@@ -234,6 +245,7 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
+    _planar(*results_files)
     with reading(*results_files):
         write_report(results_files, path)
     click.echo(path)
@@ -249,6 +261,7 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
     from .results.file import Results
 
     path = output or results_file.with_suffix(".npz")
+    _planar(results_file)
     with reading(results_file), Results(results_file) as results:
         name = results.export_linear(analysis, path)
     click.echo(f"{path}: linear model of {name}")
@@ -314,9 +327,9 @@ def sweep(
 
 
 @cli.command()
-@click.argument("kind", type=click.Choice(["link", "scene", "figures"]))
+@click.argument("kind", type=click.Choice(["link", "scene", "spatial", "figures"]))
 def schema(kind: str) -> None:
-    """Print the JSON schema of link, scene or figures files, for editors.
+    """Print the JSON schema of link, scene or figures files, or of scenes in space, for editors.
 
     \b
     ffrobot schema scene > scene.schema.json

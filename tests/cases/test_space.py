@@ -10,6 +10,8 @@ import pytest
 import scene_of
 from spatial_checkpoints import load
 
+from ffrobot import Results
+
 FOLDER = Path(scene_of.__file__).parent
 SOLVED = (
     "arm3_line_undeformed",
@@ -96,6 +98,20 @@ def test_bodies_and_points(solved):
                 close(group[key], [each[key] for each in of_body])
     for name in samples[0]["points"]:
         close(file[f"inverse/points/{name}/deflection"], [sample["points"][name]["deflection"] for sample in samples])
+
+
+@pytest.mark.parametrize("command", ["plot", "report", "view", "feasibility", "linear"])
+def test_readers_of_planar_results_say_so(solved, ffrobot, command):
+    done = ffrobot(command, solved[1].filename)
+    assert done.returncode == 2
+    assert 'expected results of a planar scene, found space = "spatial"' in done.stderr
+
+
+def test_info_and_python_read_them(solved, ffrobot):
+    done = ffrobot("info", solved[1].filename)
+    assert done.returncode == 0, done.stderr
+    with Results(solved[1].filename) as results:
+        np.testing.assert_array_equal(results["inverse/time"], solved[1]["inverse/time"])
 
 
 @pytest.mark.parametrize("name", TURNED)
