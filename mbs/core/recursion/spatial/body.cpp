@@ -14,9 +14,7 @@ namespace {
 
 constexpr double negligible = 1e-12; // as in mbs/model/planar_body.py
 
-MatrixXd I_bar_of(const SpatialData &data) {
-  return data.I_bar.size() ? data.I_bar : MatrixXd::Zero(9, data.modes());
-}
+MatrixXd I_bar_of(const SpatialData &data) { return data.I_bar.size() ? data.I_bar : MatrixXd::Zero(9, data.modes()); }
 
 // With that of spin: h_s along the axis is half of it on either side of the diagonal, h_a = eps_abc I_bar_bc. What is
 // symmetric stays, so that all that is made of I_bar, gyroscopic moments included, has h_s as it has the rest of h.
