@@ -288,7 +288,5 @@ def test_progress_in_a_log_is_a_line_now_and_then(capsys, monkeypatch):
         display.stage('analysis "inverse"')
         display.advance(0.25, 1.0)
     lines = capsys.readouterr().err.splitlines()
-    assert [line.split(" (")[0] for line in lines] == [
-        'ffrobot: analysis "inverse"',
-        'ffrobot: analysis "inverse", 0.25 of 1',
-    ]
+    told = [line.partition(" (")[0] for line in lines]
+    assert told == ['ffrobot: analysis "inverse"', 'ffrobot: analysis "inverse", 0.25 of 1']

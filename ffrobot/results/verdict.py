@@ -233,7 +233,7 @@ def _advice(
     for body, need in patches.items():
         if need.factor > 1.0:
             yield (
-                f"patches of {body}: a limit of {need.limit:.4g} V would do; what layers, thickness or number would:"
+                f"patches of {body}: a limit of {_number(need.limit)} V would do; what layers, thickness or number would:"
                 " ffrobot feasibility"
             )
     if asked and read_unsupplied(group["feasibility"]) is not None:
@@ -251,6 +251,11 @@ def _motor(motor: MotorFeasibility, unit: str) -> str:
     ]
     share = f"; beyond a limit for {100 * motor.share_beyond:.3g} % of the time" if motor.share_beyond > 0.0 else ""
     return ", ".join(parts) + share
+
+
+def _number(value: float) -> str:
+    """Four digits, large ones in full."""
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
 
 
 def _of(peak: float, limit: float) -> str:
