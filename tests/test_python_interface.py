@@ -290,3 +290,12 @@ def test_progress_in_a_log_is_a_line_now_and_then(capsys, monkeypatch):
     lines = capsys.readouterr().err.splitlines()
     told = [line.partition(" (")[0] for line in lines]
     assert told == ['ffrobot: analysis "inverse"', 'ffrobot: analysis "inverse", 0.25 of 1']
+
+
+def test_verdict_of_a_run_that_ended_early_judges_nothing(folder, tmp_path):
+    few = {"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.001, "max_steps": 3}
+    with pytest.raises(ffrobot.SolveError):
+        ffrobot.solve(swing(folder, analysis=[few]), tmp_path / "r.h5")
+    with ffrobot.Results(tmp_path / "r.h5") as results:
+        assert str(results.verdict) == "inverse: ended early (too many steps)"
+        assert results.verdict["inverse"].feasible is None

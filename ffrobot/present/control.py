@@ -19,7 +19,7 @@ UNDAMPED = 1e-9  # ratios below are rounding
 
 LOOP_COLUMNS = (
     "closed loop", "verdict", "rms (m)", "max (m)", "settled (s)", "vibration (m)", "at end (m)", "work (J)",
-    "moment (N·m)", "voltage (V)", "at limits",
+    "moment\n(N·m)", "voltage\n(V)", "at\nlimits",
 )  # fmt: skip
 
 

@@ -121,8 +121,8 @@ def _judge(name: str, group: h5py.Group, joints: Sequence[Mapping[str, str | flo
         motors=motors,
         units=units,
         patches=patches,
-        deflection=_deflection(group),
-        stress=_stress(group),
+        deflection=None if _ended_early(group) else _deflection(group),
+        stress=None if _ended_early(group) else _stress(group),
         warnings=tuple(map(str, about.get("warnings", ()))),
         advice=tuple(_advice(group, motors, units, patches)),
     )
@@ -151,13 +151,13 @@ def _patches(entry: h5py.Group) -> PatchNeed:
 def _answer(
     group: h5py.Group, motors: Mapping[str, MotorFeasibility], patches: Mapping[str, PatchNeed]
 ) -> tuple[str, bool | None]:
-    """Whether it can be done, in words and as such."""
+    """Whether it can be done, in words and as such; of a run that ended early nothing is known of that."""
     if "control" in group:
         about = group["control"].attrs
         held = f", {100 * about['saturated']:.2g} % of the samples at a limit" if about["saturated"] else ""
         error = f"tip off by {1e3 * about['tip_error_max']:.4g} mm at most, {1e3 * about['tip_error_rms']:.4g} mm RMS"
         return f"loop {about['verdict']}: {error}{held}", None
-    if "feasibility" not in group:
+    if "feasibility" not in group or _ended_early(group):
         return "", None
     short = dict(_short(motors, patches))
     if short:
@@ -171,6 +171,10 @@ def _answer(
         means = "motors and patches" if missed.with_patches else "motors alone"
         return f"{means} cannot do it: see the warning ({within})", False
     return f"motors{' and patches' if patches else ''} can do it, {within}", True
+
+
+def _ended_early(group: h5py.Group) -> bool:
+    return bool(group.attrs["status"] != "completed")
 
 
 def _of_patches(group: h5py.Group) -> Iterator[h5py.Group]:
@@ -220,7 +224,7 @@ def _advice(
     patches: Mapping[str, PatchNeed],
 ) -> Iterator[str]:
     """What to try next, the nearest thing first."""
-    asked = "feasibility" in group
+    asked = "feasibility" in group and not _ended_early(group)
     beyond = [name for name, motor in motors.items() if motor.factor > 1.0]
     for name, motor in motors.items() if asked else ():
         if (motor.jump or motor.moment > motor.moment_limit) and (text := motor.spike_in_words(units[name])):
@@ -230,11 +234,11 @@ def _advice(
             f"a slower path (fastest = true seeks the least stretch of its times), or another motor or gear for"
             f" {', '.join(beyond)}"
         )
-    for body, need in patches.items():
+    for body, need in patches.items() if asked else ():
         if need.factor > 1.0:
             yield (
-                f"patches of {body}: a limit of {_number(need.limit)} V would do; what layers, thickness or number would:"
-                " ffrobot feasibility"
+                f"patches of {body}: a limit of {_number(need.limit)} V would do; what layers, thickness or number"
+                " would: ffrobot feasibility"
             )
     if asked and read_unsupplied(group["feasibility"]) is not None:
         yield 'kind = "motors-only", or patches ([[pzt]]) on the links'

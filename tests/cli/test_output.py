@@ -1,5 +1,6 @@
 """Help texts, summaries, what `info` tells, and what is loaded to say it."""
 
+import re
 import subprocess
 import sys
 

@@ -45,7 +45,7 @@ FOLDS = (
 
 def folded(charts: Sequence[Chart]) -> list[tuple[str, list[Chart]]]:
     """Charts by the part of the page that they are in; parts without any are left out."""
-    parts: dict[str, list[Chart]] = {title: [] for title, _ in FOLDS} | {"Bodies and energies": []}
+    parts: dict[str, list[Chart]] = {title: [] for title in (*(title for title, _ in FOLDS), "Bodies and energies")}
     for chart in charts:
         fits = (title for title, starts in FOLDS if chart.name.startswith(starts))
         parts[next(fits, "Bodies and energies")].append(chart)
