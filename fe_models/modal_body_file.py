@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -115,12 +115,16 @@ def _body(file: h5py.File) -> ModalBody:
 
 
 def _optional(file: h5py.File) -> dict[str, Any]:
-    """What not all files have: modal stresses, outlined patches; in old ones, attachment modes and spin inertia."""
+    """What not all files have: stresses, outlined patches; in old ones, attachment modes and spin inertia."""
     found: dict[str, Any] = {name: _array(file, dataset) for name, dataset in _SPIN.items() if dataset in file}
     points = file.get("stress/points", {})
     found["stress"] = {name: StressPoint(**_arrays(points[name], StressPoint)) for name in points}
     if "stress/surface" in file:
         found["surface_stress"] = _array(file, "stress/surface")
+    if "stress/loads" in file:
+        found["stress_loads"] = tuple(_text(name) for name in read(file["stress/loads"]))
+    if "stress/surface_static" in file:
+        found["surface_static"] = _array(file, "stress/surface_static")
     if "modes/residual" in file:
         found["residual"] = np.asarray(file["modes/residual"][()], dtype=np.int64)
     if "damping_of" in file["modes"].attrs:
@@ -169,7 +173,7 @@ def _image(body: ModalBody) -> bytes:
         _write_arrays(file, {dataset: getattr(body, name) for name, dataset in (_DATASETS | _SPIN).items()})
         for dataset, unit in _UNITS.items():
             file[dataset].attrs["unit"] = unit
-        file["modes"].create_dataset("family", data=list(body.family), dtype=h5py.string_dtype(), track_times=False)
+        _write_names(file, "modes/family", body.family)
         _write_arrays(file, {"modes/residual": body.residual})
         if body.damping_of != "link":
             file["modes"].attrs["damping_of"] = body.damping_of
@@ -180,7 +184,9 @@ def _image(body: ModalBody) -> bytes:
         _write_arrays(file.create_group("mesh"), vars(body.mesh))
         for name, point in sorted(body.stress.items()):
             _write_arrays(file.create_group(f"stress/points/{name}"), vars(point))
-        _write_arrays(file, {"stress/surface": body.surface_stress})
+        _write_arrays(file, {"stress/surface": body.surface_stress, "stress/surface_static": body.surface_static})
+        if body.stress_loads:
+            _write_names(file, "stress/loads", body.stress_loads)
         if body.surface_patches is not None:
             _write_arrays(file.create_group("surface_patches"), vars(body.surface_patches))
         file.flush()
@@ -192,3 +198,7 @@ def _write_arrays(group: h5py.Group, arrays: Mapping[str, NDArray[np.generic] | 
     for name, array in arrays.items():
         if array is not None:
             group.create_dataset(name, data=array, track_times=False)
+
+
+def _write_names(group: h5py.Group, name: str, names: Sequence[str]) -> None:
+    group.create_dataset(name, data=list(names), dtype=h5py.string_dtype(), track_times=False)

@@ -61,35 +61,34 @@ def _digest(record: Mapping[str, Any]) -> str:
 def restated(body: ModalBody, link: Link) -> ModalBody | None:
     """The modal body of `link` from one with the same modes; None where that has not all that `link` asks for."""
     stress = _stresses(body, link)
-    if stress is None or (link.stress.surface and body.surface_stress is None):
+    if stress is None or (link.stress.surface and body.surface_static is None):
         return None
+    points, loads = stress
     return replace(
         body,
         name=link.name,
         damping_ratio=damping_ratio(link, np.sqrt(np.diag(body.stiffness))),
         damping_of=link.damping.of,
-        stress=stress,
+        stress=points,
+        stress_loads=loads if points or link.stress.surface else (),
         surface_stress=body.surface_stress if link.stress.surface else None,
+        surface_static=body.surface_static if link.stress.surface else None,
         input_hash=input_hash(link),
     )
 
 
-def _stresses(body: ModalBody, link: Link) -> dict[str, StressPoint] | None:
-    """Of a beam they follow from its stations; of a solid, which needs its mesh for them, those there are."""
-    if not link.stress.points:
-        return {}
-    if isinstance(link, BeamLink):
-        from .beam.stress import beam_stresses  # loads SciPy
+def _stresses(body: ModalBody, link: Link) -> tuple[dict[str, StressPoint], tuple[str, ...]] | None:
+    """Of a beam they follow from its stations; of a solid, which needs its mesh for them, those there are.
 
-        return beam_stresses(
-            link,
-            body.stations,
-            np.diag(body.stiffness),
-            lumps(link.interface, body.interfaces),
-            body.residual,
-            body.interfaces,
-        )
-    known = {tuple(point.position): point for point in body.stress.values()}
+    With the names of the loads whose static stresses they have.
+    """
+    if isinstance(link, BeamLink):
+        from .beam.stress import beam_stresses, stress_loads  # loads SciPy
+
+        attached = lumps(link.interface, body.interfaces)
+        of_modes = np.diag(body.stiffness), attached, body.residual, body.interfaces
+        return beam_stresses(link, body.stations, *of_modes), stress_loads(link, body.interfaces)
+    known = {tuple(point.position): point for point in body.stress.values() if point.static is not None}
     if not known.keys() >= set(link.stress.points.values()):
         return None
-    return {name: known[position] for name, position in link.stress.points.items()}
+    return {name: known[position] for name, position in link.stress.points.items()}, body.stress_loads

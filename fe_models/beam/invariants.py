@@ -20,6 +20,7 @@ from ...common.arrays import Array, Integers
 from ...mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
 from ..link_records import BeamLink
 from ..modal_body.invariants import Invariants
+from ..modal_body.unit_loads import unit_load_names
 from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
 
 # N in N at x (m), and at which cell by its middle: N may jump from cell to cell.
@@ -141,10 +142,7 @@ def geometric_stiffness(
         interfaces: position of each in m.
     """
     n = fields.shape[2]
-    names = [f"{kind}_{axis}" for kind in "tr" for axis in "xyz"]
-    names += [f"omega_{pair}" for pair in ("xx", "yy", "zz", "xy", "xz", "yz")]
-    names += [f"{kind}/{name}/{axis}" for name in interfaces for kind in ("force", "moment") for axis in "xyz"]
-    matrices: dict[str, Array] = {name: np.zeros((n, n)) for name in names}
+    matrices: dict[str, Array] = {name: np.zeros((n, n)) for name in unit_load_names(interfaces)}
     # D'Alembert: a frame that accelerates along x pushes the link together; spinning about y or z pulls it apart.
     matrices["t_x"] = _stiffness_of(stations, fields, lambda x, _: -_mass_beyond(link, x, 0))
     matrices["omega_yy"] = _stiffness_of(stations, fields, lambda x, _: _mass_beyond(link, x, 1))

@@ -26,7 +26,7 @@ from .beam import R_X, FamilyModel, family_model
 from .eigen import lowest_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
 from .section_outline import section_outlines
-from .stress import beam_stresses, segments
+from .stress import beam_stresses, segments, stress_loads
 
 # Elements are not cut closer to their ends than this fraction of their length.
 SLIVER = 0.01
@@ -100,6 +100,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         interfaces=interfaces,
         stations=kept,
         stress=beam_stresses(link, kept, omega**2, attached, residual, interfaces),
+        stress_loads=stress_loads(link, interfaces),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         ffrobot_version=program_version(),
     )

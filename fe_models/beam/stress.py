@@ -1,15 +1,16 @@
-"""Modal stresses of a beam at given points. NumPy only.
+"""Stresses of a beam at given points: of its modes, and static ones of unit loads. NumPy only.
 
 The part of the beam beyond a section is in equilibrium under its inertia, the lumps and the support on it, and what the
 section carries. In mode k the inertia is ω_k² ρA u per unit of length, so the section forces follow by integration of
 the mode itself and are as accurate as displacements; derivatives of the finite element functions lose two orders. In
-attachment modes it is that of eigenmodes, beside the loads at interfaces that they are the residual of.
+attachment modes it is that of eigenmodes, beside the loads at interfaces that they are the residual of. A unit load's
+section forces are those of statics: the link, held isostatically, has no others.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import roots_legendre
@@ -19,16 +20,17 @@ from ..link_records import BeamLink
 from ..modal_body import Interface, Stations, StressPoint
 from ..modal_body.attachment_modes import interface_loads
 from ..modal_body.lumped_masses import Lump
+from ..modal_body.unit_loads import inertia_wrenches, unit_load_names
 from .section_stress import section_stress
 
 
 @dataclass(frozen=True)
-class ModalLoads:
-    """Inertia of each mode as loads on the beam, divided over Gauss points, lumps and the support at the tip.
+class SectionLoads:
+    """Loads on the beam: n cases, such as the inertia of each mode, at Gauss points, lumps, interfaces and supports.
 
     Attributes:
         x: (q,) where they act, m from the root.
-        force: (q, 3, n) in N per unit of modal coordinate.
+        force: (q, 3, n) in N per unit of the case, a modal coordinate or a unit load.
         moment: (q, 3, n) in N·m.
     """
 
@@ -36,12 +38,12 @@ class ModalLoads:
     force: Array
     moment: Array
 
-    def beside(self, others: Sequence[tuple[float, Array]]) -> ModalLoads:
+    def beside(self, others: Sequence[tuple[float, Array]]) -> SectionLoads:
         """These and others: x, and force and moment there (6, n)."""
         if not others:
             return self
         load = np.array([both for _, both in others])
-        return ModalLoads(
+        return SectionLoads(
             np.concatenate([self.x, [x for x, _ in others]]),
             np.concatenate([self.force, load[:, :3]]),
             np.concatenate([self.moment, load[:, 3:]]),
@@ -56,6 +58,45 @@ class ModalLoads:
         return force.sum(axis=0), moment
 
 
+@dataclass(frozen=True)
+class Material:
+    """The mass of a beam and of what is attached to it, at q places, with what its modes do there.
+
+    Attributes:
+        x: (q,) m from the root.
+        mass: (q,) kg.
+        inertia: (q, 3) about the axes of the section, kg·m².
+        translation: (q, 3, n), as in `Interface`.
+        rotation: (q, 3, n).
+    """
+
+    x: Array
+    mass: Array
+    inertia: Array
+    translation: Array
+    rotation: Array
+
+    def with_lumps(self, attached: Sequence[Lump]) -> Material:
+        """With lumps."""
+        return Material(
+            np.concatenate([self.x, [lump.at.position[0] for lump in attached]]),
+            np.concatenate([self.mass, [lump.mass for lump in attached]]),
+            np.concatenate([self.inertia, *(lump.inertia[None] for lump in attached)]),
+            np.concatenate([self.translation, *(lump.at.translation[None] for lump in attached)]),
+            np.concatenate([self.rotation, *(lump.at.rotation[None] for lump in attached)]),
+        )
+
+    def times_modes(self, W: Array) -> SectionLoads:
+        """Mass times motion times W (n, n)."""
+        force = self.mass[:, None, None] * self.translation
+        return SectionLoads(self.x, force @ W, (self.inertia[:, :, None] * self.rotation) @ W)
+
+    def under_unit_motions(self) -> SectionLoads:
+        """D'Alembert forces of unit motions of the frame, in the order of `unit_load_names`."""
+        wrench = np.stack([*inertia_wrenches(_on_axis(self.x), self.mass, self.inertia).values()], axis=2)
+        return SectionLoads(self.x, wrench[:, :3], wrench[:, 3:])
+
+
 def beam_stresses(
     link: BeamLink,
     stations: Stations,
@@ -64,7 +105,7 @@ def beam_stresses(
     residual: Integers,
     interfaces: Mapping[str, Interface],
 ) -> dict[str, StressPoint]:
-    """Modal stresses and strains at the points that the link file names, which lie in the beam.
+    """Stresses and strains of modes, and static stresses of unit loads, at the points that the link file names.
 
     Bending, axial force, torque and transverse shear: see `section_stress`. Strains by Hooke's law. At a step of the
     section, the section beyond it counts; at a lump, what the beam carries just beyond it.
@@ -77,39 +118,62 @@ def beam_stresses(
         residual: (n,) 1 of residual attachment modes.
         interfaces: likewise, where loads act in these.
     """
-    inertia, at_interfaces = interface_loads(omega2, residual, interfaces)
-    point_loads = [(interfaces[name].position[0], load) for name, load in at_interfaces.items()]
+    W, at_interfaces = interface_loads(omega2, residual, interfaces)
+    n = len(W)
+    of_modes = [(interfaces[name].position[0], load) for name, load in at_interfaces.items()]
     E, nu = link.material.youngs_modulus, link.material.poissons_ratio
     points = {}
     for name, position in link.stress.points.items():
         assert nu is not None  # the link file has been checked for it
         x, y, z = position
-        F, M = _section_forces(link, stations, inertia, attached, point_loads, x)
+        material = _material(link, stations, x)
+        inertia = material.with_lumps(attached).times_modes(W).beside(of_modes)
+        static = _unit_loads(link, material, attached, interfaces)
+        F, M = np.concatenate([_section_forces(link, inertia, x), _section_forces(link, static, x)], axis=2)
         segment = int(segments(link, np.array(x)))
         stress = section_stress(link.shapes[segment], link.sections[segment], F, M, y, z)
-        strain = stress * (2 * (1 + nu) / E)
-        strain[:3] = np.outer([1.0, -nu, -nu], stress[0] / E)
-        points[name] = StressPoint(np.array(position), stress, strain)
+        modal, static_stress = stress[:, :n], stress[:, n:]
+        strain = modal * (2 * (1 + nu) / E)
+        strain[:3] = np.outer([1.0, -nu, -nu], modal[0] / E)
+        points[name] = StressPoint(np.array(position), modal, strain, static_stress)
     return points
 
 
-def _section_forces(
-    link: BeamLink,
-    stations: Stations,
-    inertia: Array,
-    attached: Sequence[Lump],
-    point_loads: Sequence[tuple[float, Array]],
-    x: float,
-) -> tuple[Array, Array]:
-    """Force (3, n) in N and moment (3, n) in N·m that the part beyond x exerts on the section there, in each mode."""
+def stress_loads(link: BeamLink, interfaces: Mapping[str, Interface]) -> tuple[str, ...]:
+    """Names of the unit loads of static stresses; none where no point is asked for."""
+    return tuple(unit_load_names(interfaces)) if link.stress.points else ()
+
+
+def _unit_loads(
+    link: BeamLink, material: Material, attached: Sequence[Lump], interfaces: Mapping[str, Interface]
+) -> SectionLoads:
+    """All unit loads, (q, 3, l), in the order of `unit_load_names`."""
+    if link.model.theory == "euler-bernoulli":  # a line of mass, as in the invariants
+        material = replace(material, inertia=np.zeros_like(material.inertia))
+    moving = material.with_lumps(attached).under_unit_motions()
+    places, motions = len(interfaces), moving.force.shape[2]
+    loads = np.zeros((places, 6, motions + 6 * places))
+    for k in range(places):
+        loads[k, :, motions + 6 * k : motions + 6 * (k + 1)] = np.eye(6)
+    at_interfaces = np.zeros((moving.x.size, 3, 6 * places))
+    widened = SectionLoads(
+        moving.x,
+        np.concatenate([moving.force, at_interfaces], axis=2),
+        np.concatenate([moving.moment, at_interfaces], axis=2),
+    )
+    return widened.beside([(at.position[0], load) for at, load in zip(interfaces.values(), loads, strict=True)])
+
+
+def _section_forces(link: BeamLink, loads: SectionLoads, x: float) -> Array:
+    """Force in N and moment in N·m (2, 3, n) that the part beyond x exerts on the section there, of each load."""
     length = link.geometry.length
-    loads = _with_support(link, _inertia(link, stations, inertia, attached, x).beside(point_loads))
+    loads = _with_support(link, loads)
     # A load at the tip counts even for the section there: its stress is the one just before the end.
-    return loads.beyond(x, (loads.x > x) | (loads.x == length))
+    return np.stack(loads.beyond(x, (loads.x > x) | (loads.x == length)))
 
 
-def _inertia(link: BeamLink, stations: Stations, W: Array, attached: Sequence[Lump], x: float) -> ModalLoads:
-    """Mass times motion times W (n, n): of the beam at Gauss points of its elements, one ending at x; of the lumps."""
+def _material(link: BeamLink, stations: Stations, x: float) -> Material:
+    """The beam at Gauss points of its elements, one ending at x."""
     assert stations.element is not None
     nodes = stations.position[stations.element, 0]
     starts, ends = nodes[:, 0], nodes[:, 3]
@@ -124,19 +188,19 @@ def _inertia(link: BeamLink, stations: Stations, W: Array, attached: Sequence[Lu
     translation = np.einsum("egi,eikn->egkn", shapes, stations.translation[stations.element[element]])
     rotation = np.einsum("egi,eikn->egkn", shapes, stations.rotation[stations.element[element]])
     mass, inertia = _line_inertia(link, segments(link, 0.5 * (start + end)))
+    n = translation.shape[3]
     scale = half * weights
-    force = (scale * mass[:, None])[:, :, None, None] * translation
-    moment = scale[:, :, None, None] * inertia[:, None, :, None] * rotation
-    n = len(W)
-    at = [lump.at for lump in attached]
-    return ModalLoads(
-        np.concatenate([s.ravel(), [place.position[0] for place in at]]),
-        np.concatenate([force.reshape(-1, 3, n), *(lump.mass * lump.at.translation[None] for lump in attached)]) @ W,
-        np.concatenate(
-            [moment.reshape(-1, 3, n), *((lump.inertia[:, None] * lump.at.rotation)[None] for lump in attached)]
-        )
-        @ W,
+    return Material(
+        s.ravel(),
+        (scale * mass[:, None]).ravel(),
+        (scale[:, :, None] * inertia[:, None]).reshape(-1, 3),
+        translation.reshape(-1, 3, n),
+        rotation.reshape(-1, 3, n),
     )
+
+
+def _on_axis(x: Array) -> Array:
+    return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)
 
 
 def _line_inertia(link: BeamLink, segments: Integers) -> tuple[Array, Array]:
@@ -154,14 +218,14 @@ def segments(link: BeamLink, x: Array) -> Integers:
     return np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")
 
 
-def _with_support(link: BeamLink, loads: ModalLoads) -> ModalLoads:
+def _with_support(link: BeamLink, loads: SectionLoads) -> SectionLoads:
     """The loads, with the transverse forces that hold the tip of a simply supported link: its root takes no moment."""
     if link.reference.condition == "cantilever":
         return loads
     length = link.geometry.length
     moment = loads.beyond(0.0, np.full(loads.x.size, True))[1]
     reaction = np.stack([np.zeros_like(moment[0]), -moment[2] / length, moment[1] / length])
-    return ModalLoads(
+    return SectionLoads(
         np.append(loads.x, length),
         np.concatenate([loads.force, reaction[None]]),
         np.concatenate([loads.moment, np.zeros_like(reaction)[None]]),

@@ -130,7 +130,10 @@ class Damping(Record):
 
 
 class StressRecovery(Record):
-    """Where modal stresses are kept: named `points` (m, link frame), and on the whole `surface` of a solid."""
+    """Where stresses are wanted: at named `points` (m, link frame), and on the whole `surface` of a solid.
+
+    The file keeps those of its modes and the static ones of unit loads (docs/theory.md, Stresses).
+    """
 
     points: dict[Name, Vector3] = Field(default_factory=dict)
     """Places (m, link axes) by name where stresses are kept."""

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ..link_records import FAMILIES, Family
-from .body import Interface
+from .parts import Interface
 
 # Of the energy (its square root) of the static shape of a load, what a combination of residuals must have to be kept.
 TOLERANCE = 1e-3

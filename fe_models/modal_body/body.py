@@ -2,129 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
+from .parts import Interface, OutlinedPatches, PictureMesh, Stations, StressPoint, freeze
+from .unit_loads import unit_load_names
 
 # m_ff = I and the identities between invariants must hold to this.
 IDENTITY_TOLERANCE = 1e-8
 POSITIVE_TOLERANCE = 1e-6  # of matrices that rounding, or a mesh, may leave indefinite
 INTERFACE_TOLERANCE = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class Interface:
-    """What the modes do at one point of the axis, in the link's frame.
-
-    Attributes:
-        position: (3,) in m, undeformed.
-        translation: (3, n) displacement of mode l in column l, in m per unit of its modal coordinate.
-        rotation: (3, n) small rotation of the cross section, in rad per unit of modal coordinate.
-    """
-
-    position: Array
-    translation: Array
-    rotation: Array
-
-    def __post_init__(self) -> None:
-        _freeze(self)
-
-
-@dataclass(frozen=True, eq=False)
-class Stations:
-    """Points along the axis, ascending in x, at which the modes are known.
-
-    Attributes:
-        position: (k, 3) in m.
-        translation: (k, 3, n), as in `Interface`.
-        rotation: (k, 3, n), as in `Interface`.
-        height: (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a
-            taper, the height in the middle between the two).
-        element: (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known.
-        outline: (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not
-            known.
-        rigidity: (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known.
-    """
-
-    position: Array
-    translation: Array
-    rotation: Array
-    height: Array
-    element: Integers | None = None
-    outline: Array | None = None
-    rigidity: Array | None = None
-
-    def __post_init__(self) -> None:
-        _freeze(self)
-
-
-@dataclass(frozen=True, eq=False)
-class PictureMesh:
-    """What a picture of the link needs.
-
-    Attributes:
-        points: (p, 3) in m.
-        cells: (c, v) points of each cell.
-        mode_shapes: (p, 3, n) displacement per unit of modal coordinate.
-        edges: (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture.
-    """
-
-    points: Array
-    cells: Integers
-    mode_shapes: Array
-    edges: Integers | None = None
-
-    def __post_init__(self) -> None:
-        _freeze(self)
-
-
-@dataclass(frozen=True, eq=False)
-class StressPoint:
-    """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy.
-
-    Attributes:
-        position: (3,) in m, undeformed.
-        stress: (6, n) in Pa per unit of modal coordinate.
-        strain: (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain.
-    """
-
-    position: Array
-    stress: Array
-    strain: Array
-
-    def __post_init__(self) -> None:
-        _freeze(self)
-
-
-@dataclass(frozen=True, eq=False)
-class OutlinedPatches:
-    """Piezoelectric patches whose outlines are edges of the mesh, on the faces at largest (top) and smallest y.
-
-    Attributes:
-        edges: (k, 2) begin and end of each patch, m from the root.
-        width: along z, in m.
-        top: (k, n) ∫ t·ε(Φ)t ds over each patch, with t the link's direction: modal forces per unit of membrane force
-            (N/m, positive in tension), in m² per unit of modal coordinate; None where no patches are on that face.
-        bottom: (k, n) likewise.
-    """
-
-    edges: Array
-    width: float
-    top: Array | None = None
-    bottom: Array | None = None
-
-    def __post_init__(self) -> None:
-        _freeze(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +43,7 @@ class ModalBody:
         S_bar: (3, n) ∫ρ Φ dV.
         I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
         S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
-        J_spin: J_s = ∫ρI_p dx in kg·m² of a link that is a line of mass (Euler–Bernoulli): its inertia about its own
-            axis, which `second_moment` lacks; 0 of all others; None where not known (files of earlier versions).
+        J_spin: J_s = ∫ρI_p dx in kg·m² of lines of mass about their axis, not in `second_moment`; None: unknown.
         h_spin: (n,) h_s = ∫ρI_p φ dx, with φ the twist of the modes.
         S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx; `S_bar_kl` holds it once more at [2, 2], where the plane needs it.
         geometric_stiffness: (n, n) for each unit load, by its name.
@@ -161,6 +52,8 @@ class ModalBody:
         mesh: for pictures.
         stress: modal stresses by the name of their point, where the link file asks for them.
         surface_stress: (p, 6, n) stress at the points of `mesh`, as in `StressPoint`; None where not asked for.
+        stress_loads: names of the l unit loads (`unit_loads`) whose static stresses are known; none in old files.
+        surface_static: (p, 6, l) likewise, as `static` in `StressPoint`.
         surface_patches: modal forces of patches outlined in the mesh; None where there are none.
         input_hash: of the link file's content.
         modes_hash: of that part of it on which the modes depend; empty where not known.
@@ -191,6 +84,8 @@ class ModalBody:
     geometric_stiffness: Mapping[str, Array] = field(default_factory=dict)
     stress: Mapping[str, StressPoint] = field(default_factory=dict)
     surface_stress: Array | None = None
+    stress_loads: tuple[str, ...] = ()
+    surface_static: Array | None = None
     surface_patches: OutlinedPatches | None = None
     residual: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     damping_of: str = "link"
@@ -204,7 +99,7 @@ class ModalBody:
     def __post_init__(self) -> None:
         if not np.size(self.residual):
             object.__setattr__(self, "residual", np.zeros(len(self.family), dtype=np.int64))
-        _freeze(self)
+        freeze(self)
         _check(self)
 
     def __repr__(self) -> str:
@@ -285,29 +180,10 @@ def _hermite(stations: Stations, x: float) -> Interface:
     return Interface(near.position, translation, rotation)
 
 
-def _freeze(record: DataclassInstance) -> None:
-    """Own read-only copies of all arrays of a frozen dataclass, and read-only views of its mappings."""
-    for item in fields(record):
-        value = getattr(record, item.name)
-        if isinstance(value, Mapping):
-            value = MappingProxyType({key: _frozen(entry) for key, entry in value.items()})
-        object.__setattr__(record, item.name, _frozen(value))
-
-
-def _frozen(value: object) -> object:
-    if not isinstance(value, np.ndarray):
-        return value
-    if value.ndim == 0:
-        return float(value)
-    copy = np.array(value, dtype=np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64)
-    copy.setflags(write=False)
-    return copy
-
-
 def _check(body: ModalBody) -> None:
     """All that must hold of a modal body, in one place."""
     n, k, p = body.mode_count, body.stations.position.shape[0], body.mesh.points.shape[0]
-    for name, array, shape in _expected_shapes(body, n, k, p):
+    for name, array, shape in [*_expected_shapes(body, n, k, p), *_expected_stresses(body, n, p)]:
         if np.shape(array) != shape:
             _fail(body, f"{name}: expected shape {shape}, found {np.shape(array)}")
         if not np.all(np.isfinite(array)):
@@ -325,6 +201,9 @@ def _check(body: ModalBody) -> None:
         _fail(body, "stations.element: expected four ascending stations for each element, from the first to the last")
     if np.any((body.residual != 0) & (body.residual != 1)) or np.any(np.diff(body.residual) < 0):
         _fail(body, "residual: expected 0 of each eigenmode, then 1 of each residual attachment mode")
+    unknown = [load for load in body.stress_loads if load not in unit_load_names(body.interfaces)]
+    if unknown:
+        _fail(body, f"stress/loads: expected unit loads of the link and its interfaces, found {', '.join(unknown)}")
     if np.any(body.frequency <= 0):
         _fail(body, "frequency: expected positive numbers")
     if np.any(body.damping_ratio < 0):
@@ -428,10 +307,6 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         shapes.append((f"interfaces/{name}/position", interface.position, (3,)))
         shapes.append((f"interfaces/{name}/translation", interface.translation, (3, n)))
         shapes.append((f"interfaces/{name}/rotation", interface.rotation, (3, n)))
-    for name, point in body.stress.items():
-        shapes.append((f"stress/points/{name}/position", point.position, (3,)))
-        shapes.append((f"stress/points/{name}/stress", point.stress, (6, n)))
-        shapes.append((f"stress/points/{name}/strain", point.strain, (6, n)))
     if body.J_spin is not None:
         shapes.append(("J_spin", body.J_spin, ()))
     if body.h_spin is not None:
@@ -444,8 +319,6 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         shapes.append(("mesh.edges", body.mesh.edges, (len(body.mesh.edges), 2)))
     if (outline := body.stations.outline) is not None:
         shapes.append(("stations.outline", outline, (k, *outline.shape[1:2], 2)))
-    if body.surface_stress is not None:
-        shapes.append(("stress/surface", body.surface_stress, (p, 6, n)))
     if body.surface_patches is not None:
         patches = np.shape(body.surface_patches.edges)[0]
         shapes.append(("surface_patches/edges", body.surface_patches.edges, (patches, 2)))
@@ -453,6 +326,20 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
             if (values := getattr(body.surface_patches, face)) is not None:
                 shapes.append((f"surface_patches/{face}", values, (patches, n)))
     return shapes
+
+
+def _expected_stresses(body: ModalBody, n: int, p: int) -> Iterator[tuple[str, Any, tuple[int, ...]]]:
+    loads = len(body.stress_loads)
+    for name, point in body.stress.items():
+        yield f"stress/points/{name}/position", point.position, (3,)
+        yield f"stress/points/{name}/stress", point.stress, (6, n)
+        yield f"stress/points/{name}/strain", point.strain, (6, n)
+        if point.static is not None or loads:
+            yield f"stress/points/{name}/static", point.static, (6, loads)
+    if body.surface_stress is not None:
+        yield "stress/surface", body.surface_stress, (p, 6, n)
+        if body.surface_static is not None or loads:
+            yield "stress/surface_static", body.surface_static, (p, 6, loads)
 
 
 def _is_chain(element: Integers, stations: int) -> bool:

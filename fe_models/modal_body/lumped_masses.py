@@ -14,9 +14,10 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..link_records import InterfaceRecord
-from .body import Interface
 from .invariants import Invariants
+from .parts import Interface
 from .tensors import LEVI_CIVITA
+from .unit_loads import inertia_wrenches, interface_load_names
 
 
 @dataclass(frozen=True)
@@ -80,42 +81,20 @@ def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invar
     return integrals
 
 
-def with_lumped_loads(geometric_stiffness: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:
-    """Geometric stiffness of unit frame motions, the inertia of the lumps included.
+def with_lumped_loads(of_loads: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:
+    """What is linear in the loads of a link (geometric stiffness, static stress), the inertia of the lumps included.
 
-    A lump loads the link by its inertia force and moment at its interface, whose unit loads `force/NAME/x` …,
-    `moment/NAME/x` … have a geometric stiffness of their own: all is linear in the load.
+    A lump loads the link by its inertia force and moment at its interface, which are among the loads themselves.
 
     Args:
-        geometric_stiffness: (n, n) by load, of the bare link. `omega_xy` belongs to the product ω_x ω_y, once.
+        of_loads: an array of the same shape for each unit load (`unit_loads`), of the bare link.
         attached: lumps; their interfaces are among the loads.
     """
-    total = dict(geometric_stiffness)
+    total = dict(of_loads)
     for lump in attached:
-        for load, (force, moment) in _inertia_loads(lump).items():
-            for kind, components in (("force", force), ("moment", moment)):
-                for axis, size in zip("xyz", components, strict=True):
-                    if size:
-                        total[load] = total[load] + size * geometric_stiffness[f"{kind}/{lump.name}/{axis}"]
+        wrenches = inertia_wrenches(lump.at.position[None], np.array([lump.mass]), lump.inertia[None])
+        for load, wrench in wrenches.items():
+            for unit, size in zip(interface_load_names([lump.name]), wrench[0], strict=True):
+                if size:
+                    total[load] = total[load] + size * of_loads[unit]
     return total
-
-
-def _inertia_loads(lump: Lump) -> dict[str, tuple[Array, Array]]:
-    """D'Alembert force (3,) and moment (3,) about its center of a lump, for each unit motion of the frame.
-
-    Frame acceleration a, angular acceleration α and angular velocity ω (Newton and Euler): force
-    −m [a + α × x + ω × (ω × x)], moment −J α − ω × J ω.
-    """
-    m, x, J = lump.mass, lump.at.position, np.diag(lump.inertia)
-    e = np.eye(3)
-    loads: dict[str, tuple[Array, Array]] = {}
-    for k, axis in enumerate("xyz"):
-        loads[f"t_{axis}"] = (-m * e[k], np.zeros(3))
-        loads[f"r_{axis}"] = (-m * np.cross(e[k], x), -J @ e[k])
-    for k, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
-        pairs = [(k, j)] if k == j else [(k, j), (j, k)]
-        loads[f"omega_{'xyz'[k]}{'xyz'[j]}"] = (
-            -m * sum((np.cross(e[a], np.cross(e[b], x)) for a, b in pairs), np.zeros(3)),
-            -sum((np.cross(e[a], J @ e[b]) for a, b in pairs), np.zeros(3)),
-        )
-    return loads

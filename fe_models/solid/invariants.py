@@ -12,11 +12,10 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..modal_body.invariants import Invariants
+from ..modal_body.unit_loads import PAIRS, interface_load_names
 from .elasticity import SolidModel
 from .strain_energy import geometric_stiffness, internal_forces
 from .supports import Flexibility
-
-PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 
 def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
@@ -62,17 +61,15 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, 
     forces = model.mass @ np.stack([field.reshape(-1) for field in fields.values()], axis=1)
     loads = dict(zip(fields, forces.T, strict=True))
     for name, B in interfaces.items():
-        rows = [(kind, axis) for kind in ("force", "moment") for axis in "xyz"]
-        loads |= {f"{kind}/{name}/{axis}": row for (kind, axis), row in zip(rows, B, strict=True)}
+        loads |= dict(zip(interface_load_names([name]), B, strict=True))
     return loads
 
 
-def prestressed(flexibility: Flexibility, modes: Array, interfaces: Mapping[str, Array]) -> dict[str, Array]:
-    """(n, n) geometric stiffness by unit load, the body held by its reference condition; collective.
+def static_shapes(flexibility: Flexibility, interfaces: Mapping[str, Array]) -> dict[str, Array]:
+    """(3 owned,) displacements under each unit load, the body held by its reference condition; collective.
 
     Args:
         flexibility: of the held body.
-        modes: (3 owned, n).
         interfaces: as in `unit_loads`.
     """
     model = flexibility.model
@@ -81,5 +78,17 @@ def prestressed(flexibility: Flexibility, modes: Array, interfaces: Mapping[str,
     displacements = flexibility @ forces
     # Bending stresses cancel over a section: the rounding errors of an assembled K, small as they are, would show.
     displacements += flexibility @ (forces - internal_forces(model, model.with_ghosts(displacements)))
+    return dict(zip(loads, displacements.T, strict=True))
+
+
+def prestressed(model: SolidModel, modes: Array, shapes: Mapping[str, Array]) -> dict[str, Array]:
+    """(n, n) geometric stiffness by unit load; collective.
+
+    Args:
+        model: of the solid.
+        modes: (3 owned, n).
+        shapes: as `static_shapes` finds them.
+    """
+    displacements = np.stack(list(shapes.values()), axis=1)
     matrices = geometric_stiffness(model, model.with_ghosts(modes), model.with_ghosts(displacements))
-    return dict(zip(loads, matrices, strict=True))
+    return dict(zip(shapes, matrices, strict=True))

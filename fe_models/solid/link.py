@@ -29,9 +29,9 @@ from .eigen import Mass
 from .elasticity import MaterialMap, SolidModel, material_map, solid_model
 from .families import section_motion
 from .functionals import Averages, face_averages, section_averages
-from .invariants import prestressed, shape_integrals
+from .invariants import prestressed, shape_integrals, static_shapes
 from .modes import wanted_modes
-from .stress import point_stresses, surface_stresses
+from .stress import recovered_stresses
 from .supports import Flexibility, RigidFace
 from .surface_patches import outlined_patches
 
@@ -111,9 +111,9 @@ def solid_modal_body(
     attached = lumps(link.interface, interfaces)
     integrals = with_lumped_masses(shape_integrals(model, X), attached)
     omega = np.sqrt(modes.omega2)
-    stresses = prestressed(flexibility, X, places.rows)
+    shapes = static_shapes(flexibility, places.rows)
     mesh = _picture(solid, model, seen)
-    C = model.materials.C[model.materials.of_cell]
+    recovered = recovered_stresses(link, model, seen, with_lumped_loads(shapes, attached), mesh.points, path)
     return ModalBody(
         name=link.name,
         kind=link.geometry.kind,
@@ -127,12 +127,11 @@ def solid_modal_body(
         damping_of=link.damping.of,
         family=tuple(modes.families),
         residual=np.repeat([0, 1], [count, omega.size - count]),
-        geometric_stiffness=with_lumped_loads(stresses, attached),
+        geometric_stiffness=with_lumped_loads(prestressed(model, X, shapes), attached),
         interfaces=interfaces,
         stations=_stations(link, sections, x, element, translation * signs, rotation * signs),
         mesh=mesh,
-        stress=point_stresses(model.V, C, seen, link.stress.points, path) if link.stress.points else {},
-        surface_stress=surface_stresses(model.V, C, seen, mesh.points) if link.stress.surface else None,
+        **recovered,
         surface_patches=(
             outlined_patches(
                 model.V, solid.facet_tags, solid.faces, link.surface_patch, link.geometry.length, seen, path

@@ -1,4 +1,4 @@
-"""Modal stresses of a solid at points and on its surface. Importing this loads dolfinx.
+"""Stresses of a solid at points and on its surface: of modes, and static ones of unit loads. Loads dolfinx.
 
 All functions are collective over the mesh's communicator and return the same on every process. At a point that several
 cells share, their strains and stresses are averaged: across elements they jump by the discretisation error, and a
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,11 +18,45 @@ from mpi4py import MPI
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ..link_records import SolidLink
 from ..modal_body import StressPoint
+from .elasticity import SolidModel
 from .strains import locate, modal_strains
 
 # Fractions of a cell's size: rounding, and how far a point on a curved face may be off the mesh of that face.
 INSIDE, ON_CURVED_FACE = 1e-6, 0.02
+
+
+def recovered_stresses(
+    link: SolidLink, model: SolidModel, modes: Array, shapes: Mapping[str, Array], surface: Array, path: Path
+) -> dict[str, Any]:
+    """What a link file asks for: `stress` … `surface_static` of its `ModalBody`.
+
+    Args:
+        link: for the points.
+        model: of the solid.
+        modes: (3 (owned + ghosts), n).
+        shapes: (3 owned,) static displacements by unit load.
+        surface: (p, 3) points of the surface.
+        path: of the link file, for errors.
+    """
+    if not (link.stress.points or link.stress.surface):
+        return {}
+    n, C = modes.shape[1], model.materials.C[model.materials.of_cell]
+    fields = np.concatenate([modes, model.with_ghosts(np.stack(list(shapes.values()), axis=1))], axis=1)
+    found: dict[str, Any] = {"stress_loads": tuple(shapes)}
+    if link.stress.points:
+        points = point_stresses(model.V, C, fields, link.stress.points, path)
+        found["stress"] = {name: _split(point, n) for name, point in points.items()}
+    if link.stress.surface:
+        both = surface_stresses(model.V, C, fields, surface)
+        found |= {"surface_stress": both[..., :n], "surface_static": both[..., n:]}
+    return found
+
+
+def _split(point: StressPoint, n: int) -> StressPoint:
+    """The first n fields are modes, the others static shapes."""
+    return StressPoint(point.position, point.stress[:, :n], point.strain[:, :n], point.stress[:, n:])
 
 
 def point_stresses(

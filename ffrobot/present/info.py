@@ -68,12 +68,17 @@ def _place(body: ModalBody, position: Array) -> str:
     return f"({x:.6g}, {y:.6g}, {z:.6g}) m"
 
 
+def _and_static(body: ModalBody) -> str:
+    """What else than modal stresses the file holds."""
+    return " and static" if body.stress_loads else ""
+
+
 def _optional(body: ModalBody) -> Iterator[str]:
     """Lines on what only some modal bodies have."""
     for name, point in body.stress.items():
-        yield f"modal stresses at {name}, {_place(body, point.position)}"
+        yield f"modal{_and_static(body)} stresses at {name}, {_place(body, point.position)}"
     if body.surface_stress is not None:
-        yield f"modal stresses on the surface, at {len(body.surface_stress)} points"
+        yield f"modal{_and_static(body)} stresses on the surface, at {len(body.surface_stress)} points"
     if (patches := body.surface_patches) is not None:
         faces = " and ".join(face for face in ("top", "bottom") if getattr(patches, face) is not None)
         places = ", ".join(f"{start:g} … {end:g}" for start, end in patches.edges)

@@ -182,11 +182,13 @@ def _voltages(solution: Solution) -> Table:
 
 
 def _stresses(solution: Solution) -> Table:
-    table = plain_table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)")
+    table = plain_table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)", "by")
     for name, result in solution.analyses.items():
         for body, stress in result.stresses.items():
             value, k, place = stress.largest()
-            table.add_row(name, body, f"{value / 1e6:.4g}", place, f"{result.outcome.time[k]:g}")
+            table.add_row(
+                name, body, f"{value / 1e6:.4g}", place, f"{result.outcome.time[k]:g}", stress.recovery.method
+            )
     return table
 
 

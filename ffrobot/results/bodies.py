@@ -10,7 +10,7 @@ from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.observation import body_motion, energies, point_motion, stored_coordinates
-from ..mbs.quantities.stress import BodyStress
+from ..mbs.quantities.stress import BodyStress, Recovery, mode_displacement
 from ..mbs.quantities.validity import Bending
 
 
@@ -60,8 +60,21 @@ def read_modal(group: h5py.Group, body: str) -> Array:
     return p @ entry["modal_transform"][()].T if "modal_transform" in entry else p
 
 
+def read_recovery(group: h5py.Group, body: str) -> Recovery:
+    """What stresses of a flexible body of an analysis are computed from; in old files modal coordinates alone."""
+    if f"stress/{body}/modal" not in group:
+        return mode_displacement(read_modal(group, body))
+    entry = group[f"stress/{body}"]
+    names = tuple(str(name) for name in entry["loads"].attrs["columns"])
+    return Recovery(str(entry.attrs["method"]), entry["modal"][()], names, entry["loads"][()])
+
+
 def write_stress(group: h5py.Group, stress: BodyStress) -> None:
-    """Of one body, at its stress points and on its surface."""
+    """Of one body, at its stress points and on its surface, and what they were computed from."""
+    group.attrs["method"] = stress.recovery.method
+    group["modal"] = stress.recovery.modal
+    group["loads"] = stress.recovery.sizes
+    group["loads"].attrs.create("columns", list(stress.recovery.loads), dtype=h5py.string_dtype())
     for name, point in stress.points.items():
         for key, values in vars(point).items():
             group[f"points/{name}/{key}"] = values

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from ..actuation.control.linear_model import LinearModel
+    from ..mbs.quantities.stress import Recovery
     from .verdict import Verdict
 
 FORMAT = "ffrobot-results"
@@ -208,6 +209,13 @@ class Results:
 
         self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none
         return read_modal(self._file[analysis], body)
+
+    def stress_recovery(self, analysis: str, body: str) -> Recovery:
+        """What stresses of a flexible body are computed from, for `mbs.quantities.stress`."""
+        from .bodies import read_recovery
+
+        self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none
+        return read_recovery(self._file[analysis], body)
 
     def linear(self, analysis: str) -> tuple[LinearModel, ...]:
         """The linear models of an analysis, one for each of its times. Raises `InputError` where it has none."""

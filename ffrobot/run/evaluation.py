@@ -16,9 +16,10 @@ from ..actuation.points import PointForces, solve_point_forces
 from ..actuation.prediction import Unsupplied, predicted_shift, unmet_modal_forces, unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.quantities.attachment_error import mode_error
+from ..mbs.quantities.attachment_error import mode_error, start_jolt
+from ..mbs.quantities.link_loads import link_loads
 from ..mbs.quantities.observation import modes_of_file
-from ..mbs.quantities.stress import BodyStress, body_stress
+from ..mbs.quantities.stress import BodyStress, body_stress, has_stresses, mode_acceleration
 from .solution import AnalysisResult, Solution
 from .warnings import warnings_of
 
@@ -37,7 +38,8 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
         predicted_shift=shift,
         feasibility=feasibility and replace(feasibility, unsupplied=unsupplied),
         stresses=_stresses(solution, outcome),
-        mode_error=mode_error(outcome) if outcome.analysis.is_integrated else None,
+        mode_error=mode_error(outcome.computed) if outcome.analysis.is_integrated else None,
+        start_jolt=start_jolt(outcome.computed) if outcome.analysis.is_integrated else 0.0,
     )
     result = replace(result, warnings=tuple(warnings_of(result)))
     return replace(result, seconds=result.seconds + time.perf_counter() - began)
@@ -103,10 +105,13 @@ def _judge_motors(solution: Solution, outcome: Outcome) -> dict[str, MotorFeasib
 
 
 def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
-    """Of the bodies whose files hold modal stresses."""
-    found = {
-        name: body_stress(body.modal, modes_of_file(outcome, body.planar))
-        for name, body in solution.bodies.items()
-        if body.modal is not None
-    }
-    return {name: stress for name, stress in found.items() if stress is not None}
+    """Of the bodies whose files hold modal stresses; by mode acceleration where files and loads allow it."""
+    links = {name: link for name, link in solution.links.items() if has_stresses(link)}
+    known = [name for name, link in links.items() if link.stress_loads]
+    loads = link_loads(outcome, known) if known else {}
+    found = {}
+    for name, link in links.items():
+        planar = solution.bodies[name].planar
+        p = modes_of_file(outcome, planar)
+        found[name] = body_stress(link, mode_acceleration(link, planar.modal_transform, p, loads.get(name, {})))
+    return found

@@ -138,6 +138,23 @@ class MechanismSystem:
                     wrench[:, :2] += (sign * multiplier)[:, None] * self.force_direction(measure, q)
         return wrenches
 
+    def marker_wrenches(
+        self, time: Array, q: Array, v: Array, a: Array, multipliers: Array
+    ) -> dict[str, dict[str, Array]]:
+        """Force (N, global axes) and moment (N·m), (T, 3), on points of bodies, of all that acts there.
+
+        Constraints with `multipliers` (T, constraints), drives, friction, springs and the inertia of rotors, in a
+        motion q, v, a (T, coordinates). A load on a body's frame has the point FRAME.
+        """
+        x = (np.ascontiguousarray(values) for values in (q, v, a, multipliers))
+        columns = self.system.marker_wrenches(time, *x)
+        wrenches: dict[str, dict[str, Array]] = {}
+        first = 0
+        for body, points in zip(self.model.bodies, self._markers, strict=True):
+            wrenches[body.name] = {name: columns[:, first + 3 * k :][:, :3] for k, name in enumerate(points)}
+            first += 3 * len(points)
+        return wrenches
+
     def _core_measure(self, measure: Measure) -> _core.Measure:
         a, b = self._marker(measure.a), self._marker(measure.b)
         direction, ratios = np.array(measure.direction), np.array(measure.gear_ratios)

@@ -1,4 +1,12 @@
-"""Stress histories of flexible bodies: modal stresses times modal coordinates (mode displacement method)."""
+"""Stress histories of flexible bodies by mode acceleration: static stresses of all loads, and what modes add.
+
+    σ(t) = Σ_j s_j f_j(t) + Σ_k σ_k (p_k − p_s,k),    p_s = K⁻¹ Φᵀ Σ_j b_j f_j
+
+with the static stress s_j of each unit load b_j, of the whole finite element model, its size f_j, and what statics
+alone make of the modal coordinates. The modes, however few, have only inertia and damping to add (D. Williams, R.A.E.
+Report SME 3309, 1945; Craig, Structural Dynamics, 1981, ch. 15). Where static stresses or loads are not known p_s = 0:
+the mode displacement method.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Indices
 from ...fe_models.modal_body import ModalBody
+from ...fe_models.modal_body.unit_loads import work_on_modes
 
 CHUNK_BYTES = 32e6  # of surface stresses at a time; more leaves the cache
 
@@ -31,10 +40,11 @@ class SurfaceStress:
 
 @dataclass(frozen=True)
 class BodyStress:
-    """Stresses of one body in one analysis, as far as its modal body file has modal stresses."""
+    """Stresses of one body in one analysis, as far as its modal body file has modal stresses, and what of."""
 
     points: Mapping[str, PointStress]
     surface: SurfaceStress | None
+    recovery: Recovery
 
     def largest(self) -> tuple[float, int, str]:
         """Largest von Mises stress in Pa, at which output, and where: a point's name or a position on the surface."""
@@ -49,18 +59,85 @@ class BodyStress:
         return max(found, key=lambda entry: entry[0])
 
 
-def body_stress(body: ModalBody, p: Array) -> BodyStress | None:
-    """Stresses under modal coordinates p (T, n) of the file; None where it holds no modal stresses."""
-    if not body.stress and body.surface_stress is None:
-        return None
+@dataclass(frozen=True)
+class Recovery:
+    """What stresses of a body are computed from, one row per output.
+
+    Attributes:
+        method: "mode acceleration" or "mode displacement".
+        modal: (T, n) p − p_s, in the modes of the modal body file.
+        loads: names of the unit loads beside it that are not zero; none in the mode displacement method.
+        sizes: (T, l) of these.
+    """
+
+    method: str
+    modal: Array
+    loads: tuple[str, ...]
+    sizes: Array
+
+    def at(self, rows: Indices) -> Recovery:
+        """These outputs alone."""
+        return Recovery(self.method, self.modal[rows], self.loads, self.sizes[rows])
+
+
+def mode_displacement(p: Array) -> Recovery:
+    """From modal coordinates p (T, n) of the file alone."""
+    return Recovery("mode displacement", p, (), np.zeros((len(p), 0)))
+
+
+def mode_acceleration(body: ModalBody, T: Array, p: Array, loads: Mapping[str, Array]) -> Recovery:
+    """With the static stresses of loads, as far as the file has them.
+
+    Args:
+        body: as its file has it.
+        T: (n, m) what makes its modal coordinates of those in the equations.
+        p: (outputs, n) modal coordinates of the file.
+        loads: sizes (outputs,) of unit loads by name.
+    """
+    known = [name for name in loads if name in body.stress_loads]
+    if not known:
+        return mode_displacement(p)
+    names = tuple(name for name in known if np.any(loads[name]))
+    work = work_on_modes(body.S_bar, body.I_bar, body.interfaces)
+    sizes = np.array([loads[name] for name in names]).reshape(-1, len(p)).T
+    forces = sizes @ np.array([work[name] for name in names]).reshape(-1, body.mode_count)
+    static = forces @ T @ np.linalg.solve(T.T @ body.stiffness @ T, T.T)
+    return Recovery("mode acceleration", p - static, names, sizes)
+
+
+def has_stresses(body: ModalBody) -> bool:
+    """Whether its file holds stresses of modes anywhere."""
+    return bool(body.stress) or body.surface_stress is not None
+
+
+def body_stress(body: ModalBody, found: Recovery) -> BodyStress:
+    """Stresses over a motion wherever the file of `body` has those of modes."""
+    both = np.concatenate([found.modal, found.sizes], axis=1)
     points = {}
     for name, point in body.stress.items():
-        stress = p @ point.stress.T
+        stress = both @ _cases(body, found, point.stress, point.static).T
         points[name] = PointStress(stress, von_mises(stress))
     surface = None
     if body.surface_stress is not None:
-        surface = _surface(body.surface_stress, body.mesh.points, p)
-    return BodyStress(points, surface)
+        cases = _cases(body, found, body.surface_stress, body.surface_static)
+        surface = _surface(cases, body.mesh.points, both)
+    return BodyStress(points, surface, found)
+
+
+def surface_stress(body: ModalBody, found: Recovery) -> Array:
+    """(T, p, 6) everywhere on the surface of a body whose file has stresses there, Pa, in the body frame."""
+    assert body.surface_stress is not None
+    cases = _cases(body, found, body.surface_stress, body.surface_static)
+    both = np.concatenate([found.modal, found.sizes], axis=1)
+    return np.asarray(np.einsum("pin,tn->tpi", cases, both, optimize=True))
+
+
+def _cases(body: ModalBody, found: Recovery, modal: Array, static: Array | None) -> Array:
+    """(…, n + l): stresses of modes, and of the unit loads of `found`."""
+    if static is None or not found.loads:
+        return modal
+    columns = [body.stress_loads.index(name) for name in found.loads]
+    return np.concatenate([modal, static[..., columns]], axis=-1)
 
 
 def von_mises(stress: Array) -> Array:
@@ -81,7 +158,7 @@ def _distortion() -> Array:
 
 
 def _surface(modal: Array, positions: Array, p: Array) -> SurfaceStress:
-    """From modal stresses (p, 6, n) at positions (p, 3) and modal coordinates (T, n), some outputs at a time."""
+    """From stresses (p, 6, n) of n cases at positions (p, 3) and their sizes (T, n), some outputs at a time."""
     count, _, n = modal.shape
     rows = np.einsum("ab,pbn->apn", _distortion(), modal).reshape(-1, n)
     largest, place = np.zeros(len(p)), np.zeros(len(p), dtype=np.int64)

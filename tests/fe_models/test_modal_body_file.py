@@ -57,6 +57,7 @@ def test_what_only_some_bodies_have(outcome, tmp_path):
     np.testing.assert_array_equal(read.surface_stress, surface)
     np.testing.assert_array_equal(read.surface_patches.edges, patches.edges)
     np.testing.assert_array_equal(read.surface_patches.bottom, patches.bottom)
+    assert (read.stress_loads, read.surface_static, read.stress["a"].static) == ((), None, None)
     assert read.surface_patches.top is None
     assert read.surface_patches.width == 0.02
     told = describe(path)
@@ -64,6 +65,23 @@ def test_what_only_some_bodies_have(outcome, tmp_path):
     assert "patches outlined in the mesh, bottom, 0.02 m wide: 0.1 … 0.2, 0.4 … 0.5 m" in told
     plain = read_modal_body(outcome.path)
     assert (plain.stress, plain.surface_stress, plain.surface_patches) == ({}, None, None)
+
+
+def test_static_stresses_of_unit_loads(outcome, tmp_path):
+    n, p, rng = 12, len(outcome.body.mesh.points), np.random.default_rng(1)
+    loads = ("t_y", "force/grip/x", "moment/tip/z")
+    point = StressPoint(*(rng.normal(size=shape) for shape in ((3,), (6, n), (6, n), (6, 3))))
+    surface = {"surface_stress": rng.normal(size=(p, 6, n)), "surface_static": rng.normal(size=(p, 6, 3))}
+    write_modal_body(tmp_path / "full.h5", replace(outcome.body, stress={"a": point}, stress_loads=loads, **surface))
+    read = read_modal_body(tmp_path / "full.h5")
+    assert read.stress_loads == loads
+    np.testing.assert_array_equal(read.stress["a"].static, point.static)
+    np.testing.assert_array_equal(read.surface_static, surface["surface_static"])
+    assert f"modal and static stresses on the surface, at {p} points" in describe(tmp_path / "full.h5")
+    with pytest.raises(InputError, match=r"stress/loads: expected unit loads of the link and its interfaces, found x"):
+        replace(outcome.body, stress_loads=("x",))
+    with pytest.raises(InputError, match=r"stress/points/a/static: expected shape \(6, 2\)"):
+        replace(outcome.body, stress={"a": point}, stress_loads=loads[:2])
 
 
 @pytest.mark.parametrize(

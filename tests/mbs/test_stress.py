@@ -7,7 +7,7 @@ import pytest
 
 from ffrobot.fe_models.modal_body import StressPoint
 from ffrobot.mbs.quantities import stress
-from ffrobot.mbs.quantities.stress import body_stress, von_mises
+from ffrobot.mbs.quantities.stress import body_stress, has_stresses, mode_displacement, von_mises
 
 
 def textbook(s):
@@ -35,6 +35,8 @@ def part(points=(), surface=0, modes=4):
     return SimpleNamespace(
         stress=named,
         surface_stress=rng.normal(size=(surface, 6, modes)) if surface else None,
+        surface_static=None,
+        stress_loads=(),
         mesh=SimpleNamespace(points=rng.normal(size=(surface, 3))),
     )
 
@@ -44,7 +46,7 @@ P = np.random.default_rng(2).normal(size=(23, 4))
 
 def test_points():
     body = part(["a", "b"])
-    found = body_stress(body, P)
+    found = body_stress(body, mode_displacement(P))
     assert found.surface is None
     for name, point in found.points.items():
         for t in range(len(P)):
@@ -59,12 +61,14 @@ def test_points():
 def test_surface_whatever_the_chunks(chunk, monkeypatch):
     monkeypatch.setattr(stress, "CHUNK_BYTES", chunk)
     body = part(surface=31)
-    surface = body_stress(body, P).surface
+    surface = body_stress(body, mode_displacement(P)).surface
     for t in range(len(P)):
         everywhere = [textbook(modal @ P[t]) for modal in body.surface_stress]
         assert surface.von_mises_max[t] == pytest.approx(max(everywhere))
         np.testing.assert_array_equal(surface.position_of_max[t], body.mesh.points[np.argmax(everywhere)])
 
 
-def test_nothing_asked_for_is_nothing_computed():
-    assert body_stress(part(), P) is None
+def test_nothing_asked_for_is_nothing_known():
+    assert not has_stresses(part())
+    assert has_stresses(part(["a"]))
+    assert has_stresses(part(surface=3))

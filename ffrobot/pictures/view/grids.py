@@ -10,7 +10,7 @@ from ...common.arrays import Array, Indices, Integers
 from ...common.errors import InputError
 from ...common.plane import rotated
 from ...fe_models.modal_body import ModalBody
-from ...mbs.quantities.stress import von_mises
+from ...mbs.quantities.stress import surface_stress, von_mises
 from ...results.file import Results
 from ..body_surface import body_surface
 from ..motion import BodyMotion, body_motion, carried, ordered_bodies
@@ -57,7 +57,7 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
     """
     motions = [body_motion(results, analysis, name, frames) for name in ordered_bodies(results.scene)]
     shift = carried(motions, results.scene)
-    pieces = [_piece(results, motion, notes) for motion in motions]
+    pieces = [_piece(results, analysis, motion, frames, notes) for motion in motions]
     points, deflection, exaggeration = zip(*(_placed(piece, shift[piece.motion.name]) for piece in pieces), strict=True)
     data = {"deflection": deflection, "exaggeration": exaggeration}
     if any(piece.von_mises is not None for piece in pieces):
@@ -94,7 +94,7 @@ def _in_space(vectors: Array) -> Array:
     return np.concatenate([vectors, np.zeros_like(vectors[..., :1])], axis=-1)
 
 
-def _piece(results: Results, motion: BodyMotion, notes: list[str]) -> Piece:
+def _piece(results: Results, analysis: str, motion: BodyMotion, frames: Indices, notes: list[str]) -> Piece:
     """A flexible body's surface; lines through the points of a rigid one, or of one whose modal body is not found."""
     if motion.modal is not None:
         try:
@@ -104,7 +104,8 @@ def _piece(results: Results, motion: BodyMotion, notes: list[str]) -> Piece:
         else:
             mesh, stress = body_surface(body), None
             if body.surface_stress is not None:
-                stress = von_mises(np.einsum("pin,tn->tpi", body.surface_stress, motion.modal, optimize=True))
+                recovery = results.stress_recovery(analysis, motion.name).at(frames)
+                stress = von_mises(surface_stress(body, recovery))
             return Piece(motion, mesh.points, mesh.mode_shapes, motion.modal, mesh.cells, stress)
     names = [label.removeprefix(f"{motion.name}.") for label in motion.point_names]
     line = points_outline(names, motion.points, motion.deflection)

@@ -1,6 +1,7 @@
 #include "core/system/motion.h"
 
 #include <tuple>
+#include <vector>
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
@@ -80,6 +81,78 @@ VectorXd force_at_rest(const System &system, double t, const VectorXd &q) {
   VectorXd Q(system.n_v());
   static_force(system, t, q.data(), w, Q.data());
   return Q;
+}
+
+void check_motions(const System &system, const VectorXd &times, const RowMajorMatrix &q, const RowMajorMatrix &v,
+                   const RowMajorMatrix &a) {
+  check_size("q columns", q.cols(), system.n_q());
+  check_size("v columns", v.cols(), system.n_v());
+  check_size("a columns", a.cols(), system.n_v());
+  for (const RowMajorMatrix *values : {&q, &v, &a})
+    check_size("rows of q, v and a", values->rows(), times.size());
+}
+
+// f = M a - Q of state i, with the inertia of rotors; leaves kinematics and the wrenches of drives in w.
+void force_at(const System &system, double t, const VectorXd &q, const VectorXd &v, const VectorXd &a, Workspace &w,
+              VectorXd &f, std::vector<Eigen::Matrix3Xd> &wrench) {
+  required_force(system, t, q.data(), v.data(), a.data(), w, f.data());
+  wrench = w.wrench;
+  MeasureMotion motion;
+  VectorXd gradient(system.n_v());
+  for (const Rotor &rotor : system.rotors) {
+    evaluate(rotor.row, w.bodies, motion);
+    const double force = row_acceleration(system, rotor.row, motion, q.data(), a.data(), w) / rotor.compliance;
+    gradient.setZero();
+    jacobian(rotor.row, motion, system.bodies, w.bodies, system.first_coordinate, gradient);
+    f += force * gradient;
+    add_wrench(rotor.row, motion, -force, wrench);
+  }
+}
+
+// f (T, n_v) of motions
+RowMajorMatrix required_forces(const System &system, const VectorXd &times, const RowMajorMatrix &q,
+                               const RowMajorMatrix &v, const RowMajorMatrix &a) {
+  check_motions(system, times, q, v, a);
+  Workspace w(system);
+  RowMajorMatrix result(times.size(), system.n_v());
+  VectorXd f(system.n_v());
+  std::vector<Eigen::Matrix3Xd> wrench;
+  for (Eigen::Index i = 0; i < times.size(); ++i) {
+    force_at(system, times[i], q.row(i), v.row(i), a.row(i), w, f, wrench);
+    result.row(i) = f;
+  }
+  return result;
+}
+
+// (T, 3 markers of all bodies) of drives, springs, rotors and of multipliers (T, constraints)
+RowMajorMatrix marker_wrenches(const System &system, const VectorXd &times, const RowMajorMatrix &q,
+                               const RowMajorMatrix &v, const RowMajorMatrix &a, const RowMajorMatrix &multipliers) {
+  check_motions(system, times, q, v, a);
+  const auto held = static_cast<Eigen::Index>(system.n_bilateral());
+  check_size("multipliers rows", multipliers.rows(), times.size());
+  check_size("multipliers columns", multipliers.cols(), held);
+  Workspace w(system);
+  Eigen::Index columns = 0;
+  for (const auto &body : system.bodies)
+    columns += 3 * body.markers();
+  RowMajorMatrix result(times.size(), columns);
+  VectorXd f(system.n_v());
+  std::vector<Eigen::Matrix3Xd> wrench;
+  MeasureMotion motion;
+  for (Eigen::Index i = 0; i < times.size(); ++i) {
+    force_at(system, times[i], q.row(i), v.row(i), a.row(i), w, f, wrench);
+    for (Eigen::Index r = 0; r < held; ++r) {
+      const Measure &row = system.rows[static_cast<std::size_t>(r)];
+      evaluate(row, w.bodies, motion);
+      add_wrench(row, motion, -multipliers(i, r), wrench);
+    }
+    Eigen::Index first = 0;
+    for (const auto &of_body : wrench) {
+      result.row(i).segment(first, of_body.size()) = of_body.reshaped().transpose();
+      first += of_body.size();
+    }
+  }
+  return result;
 }
 
 // (kinetic, strain, gravitational, dissipated power) of the system, one row per state
@@ -164,6 +237,10 @@ void bind_evaluations(nb::module_ &m, nb::class_<System> &system) {
       .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, n_v) at q (T, n_q).")
       .def("rotor_rows", &rotor_rows, "q"_a, "Gradients (rotors, n_v) of the rotors' angles and inertias (rotors,).")
       .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces (n_v,) of gravity, elasticity, drives.")
+      .def("required_forces", &required_forces, "times"_a, "q"_a, "v"_a, "a"_a,
+           "f = M a - Q (T, n_v), with the inertia of rotors: what constraints and actuators supply in a motion.")
+      .def("marker_wrenches", &marker_wrenches, "times"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a,
+           "Force and moment (T, 3 markers of all bodies), global axes, of drives, springs, rotors and multipliers.")
       .def("energies", &energies, "q"_a, "v"_a, "Kinetic, strain, gravitational energy and dissipated power (T, 4).");
   m.def("time_evaluations", &time_evaluations, "system"_a, "t"_a, "q"_a, "v"_a, "repetitions"_a,
         "Evaluates the accelerations many times, for benchmarks.");

@@ -1,0 +1,142 @@
+"""What a modal body is made of: interfaces, stations, what pictures and stresses need; read-only. NumPy only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...common.arrays import Array, Integers
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """What the modes do at one point of the axis, in the link's frame.
+
+    Attributes:
+        position: (3,) in m, undeformed.
+        translation: (3, n) displacement of mode l in column l, in m per unit of its modal coordinate.
+        rotation: (3, n) small rotation of the cross section, in rad per unit of modal coordinate.
+    """
+
+    position: Array
+    translation: Array
+    rotation: Array
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """Points along the axis, ascending in x, at which the modes are known.
+
+    Attributes:
+        position: (k, 3) in m.
+        translation: (k, 3, n), as in `Interface`.
+        rotation: (k, 3, n), as in `Interface`.
+        height: (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a
+            taper, the height in the middle between the two).
+        element: (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known.
+        outline: (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not
+            known.
+        rigidity: (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known.
+    """
+
+    position: Array
+    translation: Array
+    rotation: Array
+    height: Array
+    element: Integers | None = None
+    outline: Array | None = None
+    rigidity: Array | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class PictureMesh:
+    """What a picture of the link needs.
+
+    Attributes:
+        points: (p, 3) in m.
+        cells: (c, v) points of each cell.
+        mode_shapes: (p, 3, n) displacement per unit of modal coordinate.
+        edges: (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture.
+    """
+
+    points: Array
+    cells: Integers
+    mode_shapes: Array
+    edges: Integers | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class StressPoint:
+    """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy.
+
+    Attributes:
+        position: (3,) in m, undeformed.
+        stress: (6, n) in Pa per unit of modal coordinate.
+        strain: (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain.
+        static: (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link held by its reference
+            condition; None where not known.
+    """
+
+    position: Array
+    stress: Array
+    strain: Array
+    static: Array | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class OutlinedPatches:
+    """Piezoelectric patches whose outlines are edges of the mesh, on the faces at largest (top) and smallest y.
+
+    Attributes:
+        edges: (k, 2) begin and end of each patch, m from the root.
+        width: along z, in m.
+        top: (k, n) ∫ t·ε(Φ)t ds over each patch, with t the link's direction: modal forces per unit of membrane force
+            (N/m, positive in tension), in m² per unit of modal coordinate; None where no patches are on that face.
+        bottom: (k, n) likewise.
+    """
+
+    edges: Array
+    width: float
+    top: Array | None = None
+    bottom: Array | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+def freeze(record: DataclassInstance) -> None:
+    """Own read-only copies of all arrays of a frozen dataclass, and read-only views of its mappings."""
+    for item in fields(record):
+        value = getattr(record, item.name)
+        if isinstance(value, Mapping):
+            value = MappingProxyType({key: _frozen(entry) for key, entry in value.items()})
+        object.__setattr__(record, item.name, _frozen(value))
+
+
+def _frozen(value: object) -> object:
+    if not isinstance(value, np.ndarray):
+        return value
+    if value.ndim == 0:
+        return float(value)
+    copy = np.array(value, dtype=np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64)
+    copy.setflags(write=False)
+    return copy

@@ -1,0 +1,90 @@
+"""Loads on links: what joints, motors and loads are found to do at the points of a body is what moves it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import zoo
+from links import arm, arm_links
+from mechanisms import always, forward, pcid
+from oracle import elastic_forces, gravity_forces, mass_matrix, quadratic_velocity_forces
+
+from ffrobot.common.plane import rotated
+from ffrobot.mbs.analysis.forward import run_forward
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.quantities.link_loads import link_loads
+from ffrobot.mbs.quantities.observation import joint_forces
+
+MECHANISMS = (
+    *("chain of 3", "backwards", "mixed", "four-bar", "slider-crank", "tree"),
+    *("mixed, as built", "slider-crank, as built"),
+)
+LOADS = (
+    {"point": "link2.mid", "x": "3*cos(4*t)", "y": "2", "moment": "0.3*t"},
+    {"joint": "A", "moment": "4*sin(5*t)"},
+)
+
+
+def at_point(loads, point):
+    """Force and moment (T, 3) in body axes; zero where nothing acts."""
+    return np.stack([loads.get(name, 0.0 * loads["t_x"]) for name in _names(point)], axis=1)
+
+
+def _names(point):
+    return f"force/{point}/x", f"force/{point}/y", f"moment/{point}/z"
+
+
+def missing(outcome, name):
+    """(T, 3 + n) what M a − Q of a body needs beside its loads at points, and the largest of what it needs."""
+    body, loads = outcome.assembly.model.body(name), link_loads(outcome, [name])[name]
+    motion = (x[:, outcome.coordinates(name)] for x in (outcome.q, outcome.v, outcome.a))
+    gravity = np.array(outcome.assembly.model.scene.gravity)
+    needed, given = np.zeros((2, len(outcome.time), 3 + body.n_modes))
+    for k, (q, v, a) in enumerate(zip(*motion, strict=True)):
+        forces = quadratic_velocity_forces(body, q, v) + elastic_forces(body, q, v) + gravity_forces(body, q, gravity)
+        needed[k] = mass_matrix(body, q) @ a - forces
+        for point, at in body.points.items():
+            *force, moment = at_point(loads, point)[k]
+            x = at.position + at.translation @ q[3:]
+            given[k, :2] += rotated(q[2], np.array(force))
+            given[k, 2] += x[0] * force[1] - x[1] * force[0] + moment
+            given[k, 3:] += at.translation.T @ force + at.rotation * moment
+    return needed - given, np.abs(needed).max()
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_loads_at_points_move_the_bodies(name):
+    """Every joint type, closed loops, rotors, friction, given loads; frames and modes alike."""
+    model = zoo.build(name, trajectory=[], load=zoo.LOADS)
+    outcome = run_forward(model, forward(end=0.05, output_step=0.01), None, {}, always)
+    for body in model.links:
+        left, largest = missing(outcome, body.name)
+        assert np.abs(left).max() < 1e-9 * largest
+
+
+def test_inverse_dynamics_counts_what_motors_and_patches_do():
+    """Not the force on the trajectory that stands for them: what is left to the modes is F_p."""
+    outcome = run_pcid(arm(arm_links(damping_ratio=0.02), load=LOADS[:1]), pcid(output_step=0.05), False, always)
+    for body in outcome.assembly.model.links:
+        left, largest = missing(outcome, body.name)
+        np.testing.assert_allclose(left[:, :3], 0.0, atol=1e-9 * largest)
+        np.testing.assert_allclose(left[:, 3:], outcome.F_p[:, outcome.modal_columns(body.name)], atol=1e-9 * largest)
+    np.testing.assert_allclose(at_point(link_loads(outcome, ["link2"])["link2"], "tip"), 0.0, atol=1e-9)
+    assert np.abs(outcome.lambda_[:, outcome.assembly.is_trajectory]).max() > 1.0
+
+
+def test_forces_in_joints_are_those_of_the_multipliers():
+    """Of a forward run, whose multipliers are the reactions themselves; moments of the motors come with the loads."""
+    outcome = run_forward(arm(trajectory=[], load=LOADS), forward(output_step=0.1), None, {}, always)
+    loads, columns = link_loads(outcome, ["link2"])["link2"], outcome.coordinates("link2")
+    reaction = rotated(-outcome.q[:, columns][:, 2], joint_forces(outcome, "A").reaction)
+    found = at_point(loads, "root")
+    np.testing.assert_allclose(found[:, :2], reaction, rtol=1e-8, atol=1e-9 * np.abs(reaction).max())
+    np.testing.assert_allclose(found[:, 2], 4 * np.sin(5 * outcome.time), atol=1e-9 * np.abs(reaction).max())
+
+
+def test_forces_at_actuation_points_are_not_taken_for_those_of_joints():
+    outcome = run_forward(arm(trajectory=[]), forward(end=0.1, output_step=0.1), None, {}, always)
+    points = SimpleNamespace(analysis=SimpleNamespace(apply="points"), in_pieces=None)
+    assert link_loads(outcome, ["link2"])
+    assert link_loads(points, ["link2"]) == {}
