@@ -89,7 +89,7 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     from .common.files import check_output
     from .present.progress import Display
     from .present.summary import print_summary, summary_console
-    from .results.file import FORMAT
+    from .results.file import FORMAT, Results
     from .results.resume import how_to_go_on, left_out
     from .results.resume import resume as resume_scene
     from .results.write import write_results
@@ -116,7 +116,9 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     if solution is None:
         click.echo(f"{path}: complete, nothing to go on with")
         return
-    print_summary(solution, path, {**solution.seconds, "writing": writing}, summary_console())
+    with Results(path) as results:
+        verdict = results.verdict
+    print_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
     where = f" -o {output}" if output else ""
     go_on = how_to_go_on(solution, f"ffrobot solve {scene_file}{where} --resume")
     try:
