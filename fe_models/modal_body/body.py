@@ -28,7 +28,7 @@ class ModalBody:
     Attributes:
         name: of the link.
         kind: "beam" or "solid".
-        reference_condition: "cantilever" or "simply-supported".
+        reference_condition: "cantilever", "simply-supported" or "craig-bampton".
         length: in m.
         mass: m in kg.
         first_moment: (3,) ∫ρ x dV in kg·m.
@@ -43,8 +43,7 @@ class ModalBody:
         S_bar: (3, n) ∫ρ Φ dV.
         I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
         S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
-        J_spin: J_s = ∫ρI_p dx in kg·m² of a link that is a line of mass (Euler–Bernoulli): its inertia about its own
-            axis, which `second_moment` lacks; 0 of all others; None where not known (files of earlier versions).
+        J_spin: J_s = ∫ρI_p dx in kg·m² of a line of mass (Euler–Bernoulli), not in `second_moment`; else 0; or None.
         h_spin: (n,) h_s = ∫ρI_p φ dx, with φ the twist of the modes.
         S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx; `S_bar_kl` holds it once more at [2, 2], where the plane needs it.
         geometric_stiffness: (n, n) for each unit load, by its name.
@@ -122,7 +121,8 @@ class ModalBody:
     def modes_in_words(self) -> str:
         """How many modes there are."""
         static = self.mode_count - self.eigenmode_count
-        return f"{self.eigenmode_count} modes" + (f" and {static} attachment modes" if static else "")
+        kind = "constraint" if self.reference_condition == "craig-bampton" else "attachment"
+        return f"{self.eigenmode_count} modes" + (f" and {static} {kind} modes" if static else "")
 
     def interpolate(self, x: float) -> Interface:
         """What the modes do at `x` (m from the root) on the axis.

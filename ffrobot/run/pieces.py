@@ -15,6 +15,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.plane import perpendicular, rotated
+from ..fe_models.link_records import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.outcome import Forces, Motion, Outcome
 from ..mbs.model.model import Constraint, Model
@@ -111,7 +112,7 @@ def _motion_of_link(outcome: Outcome, link: LoadedBody, body: BodyInPieces, piec
     root, tip = r[np.argmin(x)], r[np.argmax(x)]
     theta = (
         _section_angle(outcome, body, pieces)
-        if modal.reference_condition == "cantilever"
+        if modal.reference_condition in HOLDING_ROOT
         else _chord(outcome, body, root, tip)
     )
     y = _in_frame(r - root, theta)
