@@ -1,15 +1,19 @@
-"""Robots of links by Craig and Bampton: the motion, forces and frequencies of the same robots in other frames."""
+"""Robots of links by Craig and Bampton: the motion, forces and frequencies of the same robots in other frames.
+
+Steel a hundred times as stiff: what equations leave out of the foreshortening of a bent link depends on where its frame
+is, and with steel itself (sag 1.6 %) makes 2e-3 of a moment between any frame on the root and one along the chord.
+"""
 
 import numpy as np
 import pytest
 
 import ffrobot
 
-E, H, B = 2.0e11, 0.015, 0.025
+E, H, B = 2.0e13, 0.015, 0.025
 CONDITIONS = ("craig-bampton", "cantilever", "simply-supported")
 
 
-def link(name, condition, length, count=8):
+def link(name, condition, length, count=6):
     """A steel link."""
     return {
         "name": name,
@@ -55,32 +59,38 @@ def chain(folder, conditions, payload=1.5):
         initial={"state": "static"},
         trajectory=[{"name": f"t{k}", "joint": f"j{k}", "value": law(0.4 / k, 0.8 - 0.3 * k)} for k in range(1, n + 1)],
         analysis=[
-            {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.005, "tolerance": 1e-8},
-            {"name": "models", "kind": "linear", "times": [0.0]},
+            {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.005, "tolerance": 1e-6},
+            {"name": "models", "kind": "linear", "about": "inverse", "times": [0.0]},
         ],
     )
 
 
+@pytest.fixture(scope="module")
+def chains(tmp_path_factory):
+    """Two and three links under each condition."""
+    folder = tmp_path_factory.mktemp("chains")
+    return {links: [chain(folder, (condition,) * links) for condition in CONDITIONS] for links in (2, 3)}
+
+
 @pytest.mark.parametrize("links", [2, 3])
-def test_chain_along_its_laws(tmp_path, links):
-    """Motor moments to 1e-4 of their peaks, deflected tips to 1e-3 of the deflection, frequencies to 1e-4."""
-    found, *others = (chain(tmp_path, (condition,) * links) for condition in CONDITIONS)
+def test_chain_along_its_laws(chains, links):
+    """Motor moments to 1e-6 of their peaks in the same frame, to 1e-4 in the other; the tip, of what links bend."""
+    found, *others = chains[links]
     moments = [f"inverse/joints/j{k}/moment" for k in range(1, links + 1)]
     tip = f"inverse/points/l{links}.tip/position"
-    rigid = chain(tmp_path, ("craig-bampton",) * links, payload=1e-9)  # all that a payload bends
-    for other in others:
-        assert difference(found, other, moments) < 1e-4
-        bent = np.abs(other[tip] - rigid[tip]).max()
-        assert np.abs(found[tip] - other[tip]).max() < 1e-3 * bent
+    bent = sum(np.abs(found[f"inverse/points/l{k}.tip/deflection"]).max() for k in range(1, links + 1))
+    for other, bound in zip(others, (1e-6, 1e-4), strict=True):
+        assert difference(found, other, moments) < bound
+        assert np.abs(found[tip] - other[tip]).max() < 10 * bound * bent
 
 
-def test_frequencies_of_the_assembled_robot(tmp_path):
-    """Two links with free joints: the first eight of sixteen elastic modes, beside attachment or constraint modes."""
-    models = [chain(tmp_path, (condition,) * 2).linear("models")[0] for condition in CONDITIONS]
+def test_frequencies_of_the_assembled_robot(chains):
+    """Two links with free joints: the first six of twelve elastic modes, beside attachment or constraint modes."""
+    models = [results.linear("models")[0] for results in chains[2]]
     found, *others = (np.sort(np.abs(np.linalg.eigvals(model.A).imag))[::2] for model in models)
-    assert len(found) == 2 + 2 * (8 + 2)
+    assert len(found) == 2 + 2 * (6 + 2)
     for other in others:
-        np.testing.assert_allclose(found[2:10], other[2:10], rtol=2e-4)
+        np.testing.assert_allclose(found[2:8], other[2:8], rtol=5e-4)
 
 
 def test_sag_under_loads_at_interfaces_is_exact(tmp_path):
@@ -117,13 +127,12 @@ def slider_crank(folder, condition):
         joint=joints,
         initial={"state": "static", "angles": {"l1": 0.5, "l2": -0.18}},
         trajectory=[{"name": "turn", "joint": "main", "value": law(0.5, 2.0)}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.005, "tolerance": 1e-8}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.005, "tolerance": 1e-6}],
     )
 
 
 def test_slider_crank(tmp_path):
-    """To 2e-4 of peaks; what the equations leave out of foreshortening differs between frames by as much as 1e-4."""
     found, *others = (slider_crank(tmp_path, condition) for condition in CONDITIONS)
     names = ["inverse/joints/main/moment", "inverse/joints/pin/reaction", "inverse/points/slider.center/position"]
     for other in others:
-        assert difference(found, other, names) < 2e-4
+        assert difference(found, other, names) < 1e-5

@@ -95,7 +95,7 @@ def test_free_in_space(bar, kind):
     kept = [k for k, name in enumerate(found.coordinates) if name not in ("root/z", "root/rx", "root/ry")]
     omega2 = eigh(found.stiffness[np.ix_(kept, kept)], found.mass[np.ix_(kept, kept)], eigvals_only=True)
     other, _ = bar(kind, "cantilever", count=12, more=GRIP)
-    np.testing.assert_allclose(np.sqrt(omega2[3:6]), free_frequencies(other)[:3], rtol=5e-4)
+    np.testing.assert_allclose(np.sqrt(omega2[3:5]), free_frequencies(other)[:2], rtol=5e-4)
 
 
 def free_frequencies(body):
