@@ -2,17 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.context import Context
+from ..mbs.analysis.outcome import Outcome
+from ..mbs.model.divided_link import DividedLink
+from ..mbs.model.model import Model
 from .patches.patches import PatchArray
 
 
 @dataclass(frozen=True)
+class WholeLinks:
+    """Of a model in which links are in pieces: the robot with the whole links, as scenes and controllers name it.
+
+    Attributes:
+        model: with one body for each link; `patches` of these.
+        divided: the links in pieces by name.
+        places: which point of which piece "BODY.POINT" of such a link is.
+        told: an outcome of the pieces, as one of the links.
+    """
+
+    model: Model
+    patches: Mapping[str, PatchArray]
+    divided: Mapping[str, DividedLink]
+    places: Mapping[str, str]
+    told: Callable[[Outcome], Outcome]
+
+
+Point = TypeVar("Point", str, str | None)
+
+
+def place_of(whole: WholeLinks | None, point: Point) -> Point:
+    """Where a point of the scene is in the model, of whose links some are in pieces where there are `whole` ones."""
+    return point if whole is None or point is None else whole.places.get(point, point)
+
+
+@dataclass(frozen=True)
 class ActuatedContext(Context):
-    """With the `patches` and the modal bodies of `links`, both by body."""
+    """With the `patches` on bodies of the model by link, the modal bodies of `links`, and `whole` links if divided."""
 
     patches: Mapping[str, PatchArray] = field(default_factory=dict)
     links: Mapping[str, ModalBody] = field(default_factory=dict)
+    whole: WholeLinks | None = None

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..common.arrays import Array, Booleans
+from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.joints.joint import JointRecord
-from ..mbs.quantities.joint_space import motor_rates
+from .motors import MotorFeasibility, first_time
 from .patches.patches import PatchArray
 from .patches.voltages import Voltages, voltage_gain
 from .prediction import Unsupplied
@@ -75,24 +74,6 @@ class PatchFeasibility:
 
 
 @dataclass(frozen=True)
-class MotorFeasibility:
-    """Peaks of one motor against its limits (infinite where none): N·m, rad/s, W; N and m/s where prismatic."""
-
-    moment: float
-    moment_limit: float
-    speed: float
-    speed_limit: float
-    power: float
-    power_limit: float
-    saturation_time: float
-
-    @property
-    def factor(self) -> float:
-        """The largest ratio of a peak to its limit."""
-        return max(self.moment / self.moment_limit, self.speed / self.speed_limit, self.power / self.power_limit)
-
-
-@dataclass(frozen=True)
 class Feasibility:
     """Everything that one analysis asks of the actuators: motors by joint, patches by body.
 
@@ -153,7 +134,7 @@ def judge_patches(
     return PatchFeasibility(
         required_moment=np.abs(patches.moment_per_volt) * required,
         available_moment=np.abs(patches.moment_per_volt) * patches.limit,
-        saturation_time=_first_time(outcome.time, np.abs(voltages.required) > patches.limit),
+        saturation_time=first_time(outcome.time, np.abs(voltages.required) > patches.limit),
         field=required / patches.layout.thickness,
         limited_field=np.abs(voltages.within_limit).max(axis=0) / patches.layout.thickness,
         strain=patches.surface_distance * curvature,
@@ -161,28 +142,6 @@ def judge_patches(
         mode_available=np.abs(patches.Phi_V[: patches.served]) @ patches.limit,
         remedies=_remedies(patches, required, F_p, with_count),
     )
-
-
-def judge_motors(outcome: Outcome, joints: Mapping[str, JointRecord]) -> dict[str, MotorFeasibility]:
-    """Peaks of every motor against its limits."""
-    moments = outcome.motor_moments
-    assert moments is not None
-    rates = motor_rates(outcome)
-    judged = {}
-    for k, name in enumerate(outcome.assembly.model.motors):
-        limits, moment, speed = joints[name].motor_limits, np.abs(moments[:, k]), np.abs(rates[:, k])
-        power = np.abs(moments[:, k] * rates[:, k])
-        beyond = (moment > limits.moment) | (speed > limits.speed) | (power > limits.power)
-        judged[name] = MotorFeasibility(
-            float(moment.max()), limits.moment, float(speed.max()), limits.speed, float(power.max()), limits.power,
-            float(_first_time(outcome.time, beyond[:, None])[0]),
-        )  # fmt: skip
-    return judged
-
-
-def _first_time(time: Array, beyond: Booleans) -> Array:
-    """The first of the times (T,) at which each column of `beyond` (T, k) holds; NaN where it never does."""
-    return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 
 
 def _remedies(

@@ -106,17 +106,19 @@ def read_modal_body(path: AnyPath) -> ModalBody:
     return read_modal_body(Path(path))
 
 
-def plot_results(results: AnyPath | Results, folder: AnyPath, formats: Sequence[str] = ("png", "pdf")) -> list[Path]:
+def plot_results(
+    results: AnyPath | Results, folder: AnyPath, formats: Sequence[str] = ("png", "pdf"), *, only: Sequence[str] = ()
+) -> list[Path]:
     """Draw the figures of results into `folder`: `ffrobot plot`. Returns the files written.
 
-    `formats` are "png", "pdf", "svg".
+    `formats` are "png", "pdf", "svg"; `only` names of figures that are wanted, or patterns such as "moment_*".
     """
     from .common.extras import extras
 
     with extras(), _files(results) as (path,):
         from .pictures.figures.plot import plot_results
 
-        return plot_results(path, Path(folder), formats)
+        return plot_results(path, Path(folder), formats, only)
 
 
 def write_report(results: AnyPath | Results | Sequence[AnyPath | Results], path: AnyPath) -> None:

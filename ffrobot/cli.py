@@ -156,7 +156,8 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
 @click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several [png,pdf].")
-def plot(file: Path, output: Path | None, formats: str) -> None:
+@click.option("--only", metavar="NAME", multiple=True, help='Figures of this name, or like "moment_*"; repeatable.')
+def plot(file: Path, output: Path | None, formats: str, only: tuple[str, ...]) -> None:
     """Draw the figures of a results file, or mesh and modes of a modal body file.
 
     Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn.
@@ -165,7 +166,7 @@ def plot(file: Path, output: Path | None, formats: str) -> None:
     from .pictures.figures.plot import plot_file
 
     with reading(file):
-        paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","))
+        paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","), only)
     for path in paths:
         click.echo(path)
 

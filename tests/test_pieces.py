@@ -178,11 +178,12 @@ def test_pieces_make_up_the_link():
 @pytest.mark.parametrize(
     ("keys", "says"),
     [
-        ({"pzt": [{"body": "link1", "count": 2, "length": 0.05, "width": 0.02, "thickness": 1e-3, "modulus": 63e9,
-                   "d31": 1e-10}]}, "no .*pzt.* beside bodies in pieces"),
+        ({"actuation_points": [{"body": "link1"}]}, "expected none beside bodies in pieces"),
         ({"motors": "frame"}, 'motors: expected "section" beside bodies in pieces'),
         ({"trajectory": [{"name": "turn", "angle": "link1", "value": "t"}]}, "expected a point or a joint"),
-        ({"joint": DRIVEN, "analysis": [{"name": "modes", "kind": "linear"}]}, "kind: expected one of pcid, forward"),
+        ({"joint": DRIVEN, "trajectory": [{"name": "turn", "joint": "O", "value": "t"}],
+          "analysis": [{"name": "held", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.1}]},
+         "kind: expected one of pcid, forward"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_had_is_refused(keys, says):

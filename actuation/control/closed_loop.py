@@ -19,12 +19,12 @@ from ...mbs.analysis.replay import motor_limits, replay_times
 from ...mbs.fields.field_types import NotNegative, PointReference, Positive
 from ...mbs.fields.references import Reference, under
 from ...mbs.model.model import ZERO, Model, load_measures
-from ...mbs.model.raised_mass import by_body, coordinate_factors, integrated, modal_factors
+from ...mbs.model.raised_mass import coordinate_factors, factors_of, integrated, modal_factors
 from ...mbs.model.system import MechanismSystem
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
 from ...mbs.scene.loads import Load
 from ...mbs.solve.state import State
-from ..context import ActuatedContext
+from ..context import ActuatedContext, WholeLinks, place_of
 from ..patches.patches import PatchArray, with_factors
 from ..patches.voltages import allocation
 from .choice import make_controller, needed_sensors
@@ -123,7 +123,7 @@ class ClosedLoop(ActuatedAnalysis):
         """Motion and commands."""
         source = context.source(self.actuation)
         assert source is not None
-        return run_closed_loop(context.model, self, source, context.patches, context.progress)
+        return run_closed_loop(context.model, self, source, context.patches, context.progress, context.whole)
 
 
 @dataclass(frozen=True)
@@ -157,50 +157,65 @@ def run_closed_loop(
     source: Outcome,
     patches: Mapping[str, PatchArray],
     progress: Progress,
+    whole: WholeLinks | None = None,
 ) -> Outcome:
     """The closed loop of `analysis` about the motion of the inverse analysis `source`, from its initial state.
+
+    Controllers know the `whole` links of a robot in which some are in pieces, sensors and patches act on the pieces.
 
     The outcome's details are a `LoopRecord`. A run that diverges ends there and is kept. Raises `InputError` for
     controllers that do not fit the robot, `SolveError` where a user's function fails.
     """
     built = with_compliance(model)
-    moved, read = with_rotors(source, built), _read(model, built, analysis, patches)
-    assembly = _assembly(model, built, analysis, source, read)
+    moved, read = with_rotors(source, built), _read(model, built, analysis, patches, whole)
+    assembly = _assembly(model, built, analysis, source, read, whole)
     sensor, outputs = sensing(assembly, read), replay_times(source, analysis)
     setup = _setup(model, analysis, source, patches, read, outputs, sensor.read(*_states(moved)))
+    if whole is not None:
+        setup = replace(setup, model=whole.model, patches=whole.patches, source=whole.told(source))
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     limit = np.concatenate([motor_limits(model), *(array.limit for array in patches.values())])
     limit = np.full_like(limit, np.inf) if analysis.unlimited else limit
     loop = Loop(setup, read, acting, limit, analysis.seed)
     start, driven = _start(assembly, analysis, moved, model), assembly
     if (raised := integrated(built)) is not built:  # the same in other coordinates
-        factors, all_factors = by_body(built), coordinate_factors(built)
-        patches = {body: with_factors(array, factors[body]) for body, array in patches.items()}
-        read = tuple(replace(s, vector=s.vector / factors[s.body]) if s.row is None else s for s in read)
+        all_factors = coordinate_factors(built)
+        patches = {body: with_factors(array, factors_of(built, array.carriers)) for body, array in patches.items()}
+        read = tuple(s if s.row else replace(s, vector=s.vector / factors_of(built, s.bodies)) for s in read)
         start = State(start.q * all_factors, start.v * all_factors)
-        driven = _assembly(model, raised, analysis, source, read)
+        driven = _assembly(model, raised, analysis, source, read, whole)
         sensor = sensing(driven, read)
-    voltages = [(driven.index[body], array.Phi_V) for body, array in patches.items()]
+    voltages = [(driven.index[array.carriers[0]], array.Phi_V) for array in patches.values()]
     control = SampledControl(len(model.motors), voltages, loop.first, sensor, setup.times, analysis.delay, loop)
     outcome = drive(driven, analysis, start, progress, reported=assembly, times=outputs, control=control)
-    return _recorded(outcome, source, setup, loop, acting)
+    return _recorded(outcome, source, setup, loop, acting, place_of(whole, analysis.tip))
 
 
-def _read(model: Model, built: Model, analysis: ClosedLoop, patches: Mapping[str, PatchArray]) -> tuple[Signal, ...]:
+def _read(
+    model: Model, built: Model, analysis: ClosedLoop, patches: Mapping[str, PatchArray], whole: WholeLinks | None
+) -> tuple[Signal, ...]:
     """The readings that the scene asks for, and those that its controllers need."""
-    needed = [
-        s for sensor in needed_sensors(model, analysis.controller, patches) for s in signals(built, patches, sensor)
-    ]
-    return merged([s for sensor in analysis.sensor for s in signals(built, patches, sensor)], needed)
+    needed = needed_sensors(model if whole is None else whole.model, analysis.controller, patches)
+    given, more = (
+        [s for sensor in sensors for s in signals(built, patches, sensor, whole)]
+        for sensors in (analysis.sensor, needed)
+    )
+    return merged(given, more)
 
 
 def _assembly(
-    model: Model, built: Model, analysis: ClosedLoop, source: Outcome, read: Sequence[Signal]
+    model: Model,
+    built: Model,
+    analysis: ClosedLoop,
+    source: Outcome,
+    read: Sequence[Signal],
+    whole: WholeLinks | None,
 ) -> MechanismSystem:
     """The robot with its motors, loads and disturbances, and the rows along which sensors read."""
     loads = model.loads if source.details.loads is None else source.details.loads
     drives = [*((row, ZERO) for row in built.motors.values()), *loads]
-    drives += load_measures(built.scene, analysis.disturbance)
+    placed = [load.model_copy(update={"point": place_of(whole, load.point)}) for load in analysis.disturbance]
+    drives += load_measures(built.scene, placed)
     return MechanismSystem(built, built.joints, drives, [signal.row for signal in read if signal.row is not None])
 
 
@@ -234,15 +249,15 @@ def _start(assembly: MechanismSystem, analysis: ClosedLoop, source: Outcome, rig
     return rotors_like(assembly.model, start, source)
 
 
-def _recorded(outcome: Outcome, source: Outcome, setup: Setup, loop: Loop, acting: Sequence[Controller]) -> Outcome:
+def _recorded(
+    outcome: Outcome, source: Outcome, setup: Setup, loop: Loop, acting: Sequence[Controller], tip: str | None
+) -> Outcome:
     """`outcome` with the moments that were commanded, and the record of its samples."""
     analysis, taken = outcome.analysis, slice(loop.taken)
     assert isinstance(analysis, ClosedLoop)
     held = _held(outcome.time, setup.times[taken] + setup.delay, loop.commands[taken], loop.first)
     outcome = replace(outcome, forces=Forces(tau=held[:, : len(setup.model.motors)]))
-    tip_error, metrics = measure(
-        outcome, source, analysis.tip, setup, loop, held, is_disturbed=bool(analysis.disturbance)
-    )
+    tip_error, metrics = measure(outcome, source, tip, setup, loop, held, is_disturbed=bool(analysis.disturbance))
     warnings = tuple(_warnings(analysis, acting, metrics, bool(outcome.assembly.model.gears)))
     record = LoopRecord(
         setup.inputs, setup.outputs, setup.times[taken], loop.readings[taken], setup.reference[taken],
@@ -273,9 +288,9 @@ def _feed_forward(
         if analysis.feed_forward == "joints+pzt" and F_p is not None:
             voltages = [
                 allocation(array, limited=not analysis.unlimited).solve(
-                    np.ascontiguousarray(F_p[:, source.modal_columns(body)])
+                    np.ascontiguousarray(F_p[:, source.modal_columns(*array.carriers)])
                 )
-                for body, array in patches.items()
+                for array in patches.values()
             ]
     return np.hstack([moments, *voltages])
 

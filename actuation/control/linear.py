@@ -10,8 +10,9 @@ from ...mbs.analysis.operating_points import InstantAnalysis, operating_points
 from ...mbs.analysis.outcome import Details, Outcome
 from ...mbs.fields.field_types import PointReference
 from ...mbs.fields.references import Reference
+from ...mbs.model.model import Model
 from ...mbs.solve.linearisation import Linearisation
-from ..context import ActuatedContext
+from ..context import ActuatedContext, place_of
 from ..patches.patches import PatchArray
 from .linear_model import LinearModel, linear_model
 from .modes import Reach, RobotModes, controllability, observability, robot_modes
@@ -38,7 +39,10 @@ class Linear(InstantAnalysis):
     def run(self, context: ActuatedContext) -> Outcome:
         """The operating points, with `LinearModels` about them."""
         outcome = operating_points(context.model, self, context.source(self.source))
-        return replace(outcome, details=analyse(linear_models(outcome, context.patches, self.points)))
+        whole = context.whole
+        points = self.points or default_points(context.model if whole is None else whole.model)
+        places = {point: place_of(whole, point) for point in points}
+        return replace(outcome, details=analyse(linear_models(outcome, context.patches, places)))
 
 
 @dataclass(frozen=True)
@@ -58,11 +62,14 @@ class LinearModels(Details):
 
 
 def linear_models(
-    outcome: Outcome, patches: Mapping[str, PatchArray], points: Sequence[str] | None = None
+    outcome: Outcome, patches: Mapping[str, PatchArray], points: Sequence[str] | Mapping[str, str] | None = None
 ) -> tuple[LinearModel, ...]:
-    """The linear models about the rows of `outcome`, which know of the `points`, or of those of trajectories."""
+    """The linear models about the rows of `outcome`, which know of the `points`, or of those of trajectories.
+
+    `points` are as `Linearisation` takes them.
+    """
     model = outcome.assembly.model
-    linearisation = Linearisation(model, outcome.q[0], tuple(points or default_points(outcome)))
+    linearisation = Linearisation(model, outcome.q[0], points or default_points(model))
     rows = zip(outcome.time, outcome.q, outcome.v, outcome.a, strict=True)
     return tuple(linear_model(linearisation.at(float(t), q, v, a), patches) for t, q, v, a in rows)
 
@@ -81,9 +88,8 @@ def analyse(models: tuple[LinearModel, ...]) -> LinearModels:
     )
 
 
-def default_points(outcome: Outcome) -> tuple[str, ...]:
+def default_points(model: Model) -> tuple[str, ...]:
     """The points of trajectories; where there are none, the tips of all bodies that have one."""
-    model = outcome.assembly.model
     points = [trajectory.point for trajectory in model.scene.trajectory if trajectory.point is not None]
     tips = [f"{body.name}.tip" for body in model.bodies if "tip" in body.points]
     return tuple(dict.fromkeys(points or tips))

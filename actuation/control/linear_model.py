@@ -100,7 +100,7 @@ def linear_model(mechanism: LinearMechanism, patches: Mapping[str, PatchArray]) 
     motors = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
     forces = {name: column for name, column in mechanism.inputs.items() if name not in motors}
     voltages = {
-        f"pzt/{body}/{k}": _spread(f, mechanism.modal(body), column)
+        f"pzt/{body}/{k}": _spread(f, [i for carrier in array.carriers for i in mechanism.modal(carrier)], column)
         for body, array in patches.items()
         for k, column in enumerate(array.Phi_V.T, 1)
     }

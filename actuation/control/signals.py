@@ -12,6 +12,7 @@ from ...mbs import _core
 from ...mbs.joints.measure import Marker, Measure
 from ...mbs.model.model import Model
 from ...mbs.model.system import MechanismSystem
+from ..context import WholeLinks, place_of
 from ..patches.patches import PatchArray
 from .records import PERMITTIVITY, Sensor
 
@@ -23,8 +24,8 @@ class Signal:
     """One reading.
 
     `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y, "pzt/BODY/k", "modal/BODY/k" (k from 1), with
-    "/rate" or "/acceleration" behind it where that is read. Either `row` is read, or `vector` . p of `body`; `order`
-    counts derivatives, `resolution` and `noise` are those of `Sensor`.
+    "/rate" or "/acceleration" behind it where that is read. Either `row` is read, or `vector` . p of the `bodies`, p of
+    one beside that of the next; `order` counts derivatives, `resolution` and `noise` are those of `Sensor`.
     """
 
     name: str
@@ -32,7 +33,7 @@ class Signal:
     resolution: float
     noise: float
     row: Measure | None = None
-    body: str = ""
+    bodies: tuple[str, ...] = ()
     vector: Array = field(default_factory=lambda: np.zeros(0))
 
 
@@ -42,8 +43,10 @@ def input_names(model: Model, patches: Mapping[str, PatchArray]) -> tuple[str, .
     return tuple([f"joint/{name}" for name in model.motors] + voltages)
 
 
-def signals(model: Model, patches: Mapping[str, PatchArray], sensor: Sensor) -> Iterator[Signal]:
-    """The readings of one sensor of the scene."""
+def signals(
+    model: Model, patches: Mapping[str, PatchArray], sensor: Sensor, whole: WholeLinks | None = None
+) -> Iterator[Signal]:
+    """The readings of one sensor of the scene, of whose links some are in pieces where there are `whole` ones."""
     order, ending = ORDERS[sensor.measure], "" if sensor.measure == "value" else f"/{sensor.measure}"
     quality = sensor.resolution, sensor.noise
     if sensor.joint is not None:
@@ -51,7 +54,7 @@ def signals(model: Model, patches: Mapping[str, PatchArray], sensor: Sensor) -> 
     elif sensor.motor is not None:
         yield Signal(f"motor/{sensor.motor}{ending}", order, *quality, model.motors[sensor.motor])
     elif sensor.point is not None:
-        body, _, point = sensor.point.partition(".")
+        body, _, point = place_of(whole, sensor.point).partition(".")
         for axis in ("x", "y"):
             row = Measure(
                 f'sensor on "{sensor.point}"', getattr(_core.MeasureKind, axis), Marker(None), Marker(body, point)
@@ -59,10 +62,19 @@ def signals(model: Model, patches: Mapping[str, PatchArray], sensor: Sensor) -> 
             yield Signal(f"point/{sensor.point}/{axis}{ending}", order, *quality, row)
     elif sensor.pzt is not None:
         for k, vector in enumerate(volts_per_modal_coordinate(patches[sensor.pzt], sensor.capacitance), 1):
-            yield Signal(f"pzt/{sensor.pzt}/{k}", order, *quality, body=sensor.pzt, vector=vector)
+            carriers = patches[sensor.pzt].carriers
+            yield Signal(f"pzt/{sensor.pzt}/{k}", order, *quality, bodies=carriers, vector=vector)
     elif sensor.modal is not None:
-        for k, vector in enumerate(np.eye(model.body(sensor.modal).n_modes), 1):
-            yield Signal(f"modal/{sensor.modal}/{k}{ending}", order, *quality, body=sensor.modal, vector=vector)
+        bodies, rows = _modal_coordinates(model, sensor.modal, whole)
+        for k, vector in enumerate(rows, 1):
+            yield Signal(f"modal/{sensor.modal}/{k}{ending}", order, *quality, bodies=bodies, vector=vector)
+
+
+def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> tuple[tuple[str, ...], Array]:
+    """The bodies whose modes make up those of a link, and p of the link (n, …) in theirs."""
+    if whole is None or link not in whole.divided:
+        return (link,), np.eye(model.body(link).n_modes)
+    return whole.divided[link].bodies, whole.divided[link].gathered
 
 
 def volts_per_modal_coordinate(patches: PatchArray, capacitance: float | None = None) -> Array:
@@ -88,5 +100,5 @@ def sensing(assembly: MechanismSystem, read: Sequence[Signal]) -> _core.Sensing:
     """What reads these signals in the core; the motor rows of `assembly` are those of the signals along rows."""
     orders = [signal.order for signal in read if signal.row is not None]
     along = list(zip(assembly.motor_measures, orders, strict=True))
-    modal = [(assembly.index[s.body], s.vector, s.order) for s in read if s.row is None]
+    modal = [(assembly.index[s.bodies[0]], s.vector, s.order) for s in read if s.row is None]
     return _core.Sensing(assembly.system, along, modal)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,8 +12,9 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
+from ...mbs.model.divided_link import DividedLink, Piece
 from ...mbs.model.planar_body import PlanarBody
-from .composite import composite, stiffness_ratios
+from .composite import SLIVER, composite, stiffness_ratios
 from .layers import moment_per_volt, pull_per_volt
 from .records import PztLayout
 
@@ -42,7 +44,9 @@ class PatchArray:
         stiffness_ratio: (k,) ψ of link to patch, and `authority`, the part of c V that bends the link: see
             `composite.stiffness_ratios`.
         of_all_modes: where the `PlanarBody` has not all modes, but the patches reach all: the same patches
-            on all modes, and (n_all, n) the modal forces on these from those on the `PlanarBody`.
+            on all modes, and (n_all, n) the modal forces on these from those on the `PlanarBody`. Of a link in pieces:
+            the patches on the link, and its modal forces from those on the pieces.
+        pieces: names of the pieces of a link in pieces, whose modes, side by side, are the n modes; else empty.
     """
 
     layout: PztLayout
@@ -58,11 +62,17 @@ class PatchArray:
     stiffness_ratio: Array
     authority: Array
     of_all_modes: tuple[PatchArray, Array] | None = None
+    pieces: tuple[str, ...] = ()
 
     @property
     def body(self) -> str:
-        """Name of the body."""
+        """Name of the link."""
         return self.layout.body
+
+    @property
+    def carriers(self) -> tuple[str, ...]:
+        """The bodies of the model whose modes, side by side, the n modes are."""
+        return self.pieces or (self.body,)
 
     @property
     def condition_number(self) -> float:
@@ -120,6 +130,22 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     key = f'{scene_path}: pzt "{layout.body}"'
     edges = patch_edges(layout, body.length)
     _check_edges(key, edges, body.length)
+    if planar.reduction is not None:
+        whole = patch_array(scene_path, layout, body, planar.reduction.whole)
+        return _on_fewer_modes(whole, planar)
+    height, c, turn, Phi_V = _effects(key, layout, body, planar, edges)
+    limit = np.full(len(edges), np.inf if layout.limit is None else layout.limit)
+    weights, frequency = _weights(key, layout, planar), np.sqrt(planar.stiffness) / (2 * np.pi)
+    return PatchArray(
+        layout, edges, height, c, turn, Phi_V, limit, weights, frequency, planar.n_eigenmodes,
+        *stiffness_ratios(layout, body, edges),
+    )  # fmt: skip
+
+
+def _effects(
+    key: str, layout: PztLayout, body: ModalBody, planar: PlanarBody, edges: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Height (k,), moment per volt (k,), `turn` (n, k) and `Phi_V` (n, k) of the patches between `edges` (k, 2)."""
     pieces = [_pieces(key, body, k, start, end) for k, (start, end) in enumerate(edges, 1)]
     height = np.array([np.average(heights, weights=np.diff(x)) for x, heights in pieces])
     moments = [moment_per_volt(layout, heights) for _, heights in pieces]
@@ -132,17 +158,39 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
         per_volt += _pull(layout, body, edges)
     if layout.adds_stiffness:
         per_volt -= composite(layout, body, edges).shortfall
-    if planar.reduction is not None:
-        whole = patch_array(scene_path, layout, body, planar.reduction.whole)
-        return _on_fewer_modes(whole, planar)
     T = planar.modal_transform
-    turn, Phi_V = (np.array([turn.sum(axis=0) for turn in turns]) @ T).T, (per_volt @ T).T
-    limit = np.full(len(edges), np.inf if layout.limit is None else layout.limit)
-    weights, frequency = _weights(key, layout, planar), np.sqrt(planar.stiffness) / (2 * np.pi)
-    return PatchArray(
-        layout, edges, height, c, turn, Phi_V, limit, weights, frequency, planar.n_eigenmodes,
-        *stiffness_ratios(layout, body, edges),
-    )  # fmt: skip
+    return height, c, (np.array([turn.sum(axis=0) for turn in turns]) @ T).T, (per_volt @ T).T
+
+
+def on_pieces(scene_path: Path, whole: PatchArray, link: DividedLink, pieces: Sequence[Piece]) -> PatchArray:
+    """The patches of `whole`, those of a link, on its `pieces`: a patch across a cut acts on both sides of it.
+
+    Voltages are those that serve the modes of the link.
+    """
+    key = f'{scene_path}: pzt "{whole.body}"'
+    turn, Phi_V = np.zeros((2, len(link.spread), len(whole.edges)))
+    first = 0
+    for piece in pieces:
+        rows = slice(first, first + piece.planar.n_modes)
+        which, edges = edges_on_piece(whole.layout, whole.edges, piece)
+        if which.size:
+            _, _, turn[rows, which], Phi_V[rows, which] = _effects(key, whole.layout, piece.modal, piece.planar, edges)
+        first = rows.stop
+    return replace(
+        whole,
+        turn=turn,
+        Phi_V=Phi_V,
+        W_sqrt=whole.W_sqrt @ link.spread.T,
+        of_all_modes=(whole, link.spread.T),
+        pieces=link.bodies,
+    )
+
+
+def edges_on_piece(layout: PztLayout, edges: Array, piece: Piece) -> tuple[Indices, Array]:
+    """Numbers (from 0) of the patches between `edges` (k, 2) that are on a piece, and where on it they are, m."""
+    clipped = (edges - piece.start).clip(0.0, piece.modal.length)
+    which = np.flatnonzero(np.diff(clipped, axis=1)[:, 0] > SLIVER * layout.length)
+    return which, clipped[which]
 
 
 def with_factors(patches: PatchArray, factors: Array) -> PatchArray:

@@ -31,12 +31,13 @@ class StructureEffect:
     frequency: Array
 
 
-def with_patches(planar: PlanarBody, body: ModalBody, layout: PztLayout) -> PlanarBody:
+def with_patches(planar: PlanarBody, body: ModalBody, layout: PztLayout, edges: Array | None = None) -> PlanarBody:
     """The link with mass and stiffness of its patches, as far as the layout says so; it keeps its number of modes.
 
-    Mass lies on the axis, like that of a beam. The stiffness is that of the `composite` section.
+    Mass lies on the axis, like that of a beam. The stiffness is that of the `composite` section. `edges` (k, 2), m, say
+    where patches are if not where the layout has them: on a piece of a link.
     """
-    edges = patch_edges(layout, body.length)
+    edges = patch_edges(layout, body.length) if edges is None else edges
     T = planar.modal_transform
     points: list[PlanarPoint] = []
     masses: list[float] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..mbs.quantities.attachment_error import JOLT
 from ..mbs.quantities.validity import largest
 from ..run.solution import AnalysisResult, Solution
 
@@ -35,13 +36,15 @@ def _modes(solution: Solution) -> str:
     if solution.mode_choice is not None:
         known = [error for of in solution.mode_choice.errors.values() for error in of.values()]
         return f"{max(known):.0e} of peaks, against all modes of the files" if any(known) else NOT_ESTIMATED
+    if any(result.start_jolt >= JOLT for result in integrated(solution)):
+        return f"{NOT_ESTIMATED}: the motion starts with a jolt, in which missing modes take part"
     found = [result.mode_error for result in integrated(solution)]
     known = [error for error in found if error is not None]
     if not found or len(known) < len(found):
         return NOT_ESTIMATED
     if max(known) > RESOLVED:
         return "too few: vibrations faster than the highest take part"
-    return f"{max(known):.0e} of peaks, estimated; what missing modes do after a jolt: {NOT_ESTIMATED}"
+    return f"{max(known):.0e} of peaks, estimated"
 
 
 def _deflection(solution: Solution) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import h5py
@@ -10,9 +11,11 @@ import numpy as np
 from rich.console import Console, Group
 from rich.table import Table
 
+from ..actuation.motors import MotorFeasibility
 from ..common.errors import InputError
 from ..common.hdf5 import open_checked
 from ..common.validation import quoted
+from ..mbs.joints.joints import JOINT_TYPES
 
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:
@@ -37,11 +40,13 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
 
 
 def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
-    from ..results.actuators import read_unsupplied
+    from ..results.actuators import read_motors, read_unsupplied
 
     yield f'analysis "{name}" ({group.attrs["kind"]})'
-    if "joints" in group["feasibility"]:
-        yield _motors(group["feasibility/joints"])
+    types = {joint["name"]: joint["type"] for joint in tomllib.loads(group.file.attrs["scene"])["joint"]}
+    if motors := read_motors(group["feasibility"], list(types)):
+        yield _motors(motors, {name: JOINT_TYPES[types[name]].force_unit for name in motors})
+        yield from (f"motor of {name}: {text}" for name, motor in motors.items() if (text := motor.spike_in_words))
     if (missed := read_unsupplied(group["feasibility"])) is not None:
         yield missed.in_words
     for body, judged in group["feasibility"].get("pzt", {}).items():
@@ -51,14 +56,23 @@ def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
     yield ""
 
 
-def _motors(group: h5py.Group) -> Table:
-    table = _table(
-        "motor of", "moment", "limit", "speed", "limit", "power (W)", "limit", "factor", "from t (s)", "within?"
-    )
-    keys = ("moment", "moment_limit", "speed", "speed_limit", "power", "power_limit")
-    for name, motor in group.items():
-        peaks = [_number(motor.attrs[key]) for key in keys]
-        table.add_row(name, *peaks, *_verdict(motor.attrs["factor"], motor.attrs["saturation_time"]))
+def _motors(motors: Mapping[str, MotorFeasibility], units: Mapping[str, str]) -> Table:
+    """At the joint, a line for each quantity; the RMS over the run is what heats a motor."""
+    table = _table("motor of", "at the joint", "peak", "limit", "times limit", "RMS", "beyond", "from t (s)", "within?")
+    for name, motor in motors.items():
+        unit = units[name]
+        force, speed = ("moment", "rad/s") if unit == "N·m" else ("force", "m/s")
+        share = f"{_number(100 * motor.share_beyond)} %" if motor.share_beyond else ""
+        since, can = _verdict(motor.factor, motor.saturation_time)[1:]
+        rows = (
+            (f"{force} ({unit})", motor.moment, motor.moment_limit, _number(motor.rms_moment)),
+            (f"speed ({speed})", motor.speed, motor.speed_limit, ""),
+            ("power (W)", motor.power, motor.power_limit, ""),
+        )
+        for k, (what, peak, limit, rms) in enumerate(rows):
+            ends = ("", "", "") if k else (share, since, can)
+            times = "" if np.isinf(limit) else _number(peak / limit)
+            table.add_row("" if k else name, what, _number(peak), _number(limit), times, rms, *ends)
     return table
 
 
@@ -125,7 +139,8 @@ def _number(value: float) -> str:
 def _table(*headers: str) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for k, header in enumerate(headers):
-        table.add_column(header, justify="right" if k else "left", no_wrap=True)
+        is_text = k == 0 or header == "at the joint"
+        table.add_column(header, justify="left" if is_text else "right", no_wrap=True)
     return table
 
 

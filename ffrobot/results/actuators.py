@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import MISSING, fields
+
 import h5py
 import numpy as np
 
 from ..actuation.control.placement import Placed
 from ..actuation.feasibility import Feasibility
+from ..actuation.motors import MotorFeasibility
 from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointForces, PointSet
@@ -57,6 +61,22 @@ def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibilit
         entry.attrs["depoling_field"] = layout.depoling_field or np.inf
         entry.attrs["strain_limit"] = layout.strain_limit or np.inf
         entry.create_group("remedies").attrs.update(vars(patches.remedies))
+
+
+def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeasibility]:
+    """Of the feasibility of an analysis: what every motor has to do, in the order of `joints`."""
+    entries = group.get("joints", {})
+    return {
+        name: MotorFeasibility(
+            **{
+                key.name: entries[name].attrs[key.name]
+                for key in fields(MotorFeasibility)
+                if key.default is MISSING or key.name in entries[name].attrs
+            }
+        )
+        for name in joints
+        if name in entries
+    }
 
 
 def read_unsupplied(group: h5py.Group) -> Unsupplied | None:

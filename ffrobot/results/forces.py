@@ -7,6 +7,7 @@ import numpy as np
 
 from ..mbs.analysis.motors_only import InvertedPath, is_minimum_phase, path_error
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.quantities.joint_motion import joint_motions
 from ..mbs.quantities.observation import joint_forces, motor_angle, trajectory_force, trajectory_target
 from ..mbs.scene.trajectories import Trajectory
 
@@ -21,10 +22,13 @@ def write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["target"] = trajectory_target(outcome, trajectory.name)
             entry.attrs["components"] = list(trajectory.components)
             _write_path(entry, trajectory)
+    motions = joint_motions(outcome)
     for joint in outcome.assembly.model.scene.joint:
         forces = joint_forces(outcome, joint.name)
         entry = group.create_group(f"joints/{joint.name}")
         entry.attrs["type"] = joint.type
+        if joint.name in motions:
+            entry["coordinate"], entry["rate"] = motions[joint.name].coordinate, motions[joint.name].rate
         entry["reaction"] = forces.reaction
         if forces.reaction_moment is not None:
             entry["reaction_moment"] = forces.reaction_moment

@@ -75,6 +75,8 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     outcome, name = result.outcome, result.outcome.analysis.name
     _write_attributes(group, outcome)
     group.attrs["stiffening_effect"] = result.stiffening_effect
+    if outcome.analysis.is_integrated:
+        group.attrs["start_jolt"] = result.start_jolt
     if result.mode_error is not None:
         group.attrs["mode_error"] = result.mode_error
     group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())

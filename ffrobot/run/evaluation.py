@@ -9,7 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from ..actuation.feasibility import Feasibility, MotorFeasibility, judge_motors, judge_patches
+from ..actuation.feasibility import Feasibility, judge_patches
+from ..actuation.motors import MotorFeasibility, judge_motors
 from ..actuation.patches.composite import section_loads
 from ..actuation.patches.patches import with_patch_count
 from ..actuation.patches.voltages import voltage_gain
@@ -17,7 +18,7 @@ from ..actuation.points import PointForces, solve_point_forces
 from ..actuation.prediction import Unsupplied, predicted_shift, unmet_modal_forces, unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.quantities.attachment_error import mode_error
+from ..mbs.quantities.attachment_error import mode_error, start_jolt
 from ..mbs.quantities.link_loads import LinkLoads, link_loads
 from ..mbs.quantities.observation import modes_of_file
 from ..mbs.quantities.stress import (
@@ -46,7 +47,8 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
         predicted_shift=shift,
         feasibility=feasibility and replace(feasibility, unsupplied=unsupplied),
         stresses=_stresses(solution, outcome),
-        mode_error=mode_error(outcome) if outcome.analysis.is_integrated else None,
+        mode_error=mode_error(outcome.computed) if outcome.analysis.is_integrated else None,
+        start_jolt=start_jolt(outcome.computed) if outcome.analysis.is_integrated else 0.0,
     )
     result = replace(result, warnings=tuple(warnings_of(result)))
     return replace(result, seconds=result.seconds + time.perf_counter() - began)

@@ -9,25 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import ceil, sqrt
 
 import numpy as np
 
-from ..common.arrays import Array
+from ..actuation.control.linear import LinearModels
+from ..common.arrays import Array, as_floats
+from ..common.errors import InputError
 from ..common.plane import perpendicular, rotated
 from ..fe_models.link_records import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.outcome import Forces, Motion, Outcome
+from ..mbs.analysis.outcome import Details, Forces, Motion, Outcome
 from ..mbs.model.model import Constraint, Model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.system import MechanismSystem
 from ..mbs.quantities.stiffening import shortenings
-from ..mbs.quantities.validity import Bending
-from ..scene.pieces import BodyInPieces
+from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces
+from ..scene.pieces import BodyInPieces, bodies_in_pieces, places_on_pieces
+from ..scene.scene import Scene
 from .bodies import LoadedBody
+from .divided import as_divided
 from .solution import Solution
 
-ENOUGH = 1e-3  # shortening of a piece by bending, b: tips are then right to some 1e-4 of the length (docs/theory.md)
 MOST = 64
 
 
@@ -48,8 +50,8 @@ def wanted_pieces(solution: Solution) -> dict[str, int]:
             divided = solution.divided.get(body.name)
             names = divided.names if divided else (body.name,)
             worst = max(largest.get(name, 0.0) for name in names)
-            count = min(MOST, ceil(len(names) * sqrt(worst / ENOUGH)))
-            wanted[body.name] = max(count, len(names))
+            count = enough_pieces(worst, len(names)) if worst > ENOUGH else 1
+            wanted[body.name] = max(min(MOST, count), len(names))
     now = {name: len(solution.divided[name].names) if name in solution.divided else 1 for name in wanted}
     return {} if wanted == now else wanted
 
@@ -61,8 +63,23 @@ def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyIn
     for piece, found in bending.items():
         name = link_of.get(piece, piece)
         if name not in worst or found.position_error > worst[name].position_error:
-            worst[name] = found
+            worst[name] = replace(found, pieces=len(divided[name].names)) if name in divided else found
     return worst
+
+
+def with_advice(bending: Mapping[str, Bending], scene: Scene) -> dict[str, Bending]:
+    """How far links bend, those beyond small deformations with whether the scene lets them be divided."""
+    return {
+        name: replace(found, is_divisible=_is_divisible(scene, name)) if found.is_beyond else found
+        for name, found in bending.items()
+    }
+
+
+def _is_divisible(scene: Scene, name: str) -> bool:
+    try:
+        return bool(bodies_in_pieces(scene, {name: 2}))
+    except InputError:
+        return False
 
 
 def as_one_link(
@@ -81,22 +98,86 @@ def as_one_link(
         divided: how some of them are cut.
         pieces: the bodies that were computed with.
     """
+    q, v, a = _motions(outcome, whole, links, divided, pieces)
+    held = any(outcome.assembly.is_trajectory)
+    assembly = MechanismSystem(whole, (*whole.joints, *(whole.trajectories if held else ())))
+    places = {_key(c): i for i, c in enumerate(outcome.assembly.constraints)}
+    columns = [places[_key(c)] for c in assembly.constraints]
+    motion = Motion(outcome.time, q, v, a, outcome.lambda_[:, columns], outcome.residual)
+    forces = Forces(outcome.tau, _modal_forces(outcome, whole, links, divided, pieces))
+    return replace(
+        outcome, assembly=assembly, motion=motion, forces=forces, in_pieces=outcome,
+        point_names=places_on_pieces(divided), details=_details(outcome, whole, links, divided, pieces),
+    )  # fmt: skip
+
+
+def _modal_forces(
+    outcome: Outcome,
+    whole: Model,
+    links: Mapping[str, LoadedBody],
+    divided: Mapping[str, BodyInPieces],
+    pieces: Mapping[str, LoadedBody],
+) -> Array | None:
+    """F_p on the modes of the links: by virtual work, from those on their pieces."""
+    F_p = outcome.F_p
+    if F_p is None:
+        return None
+    forces = []
+    for body in whole.bodies:
+        if body.name in divided:
+            link = as_divided(links[body.name], divided[body.name], pieces)
+            forces.append(F_p[:, outcome.modal_columns(*link.bodies)] @ link.spread)
+        else:
+            forces.append(F_p[:, outcome.modal_columns(body.name)])
+    return as_floats(np.concatenate(forces, axis=1))
+
+
+def _details(
+    outcome: Outcome,
+    whole: Model,
+    links: Mapping[str, LoadedBody],
+    divided: Mapping[str, BodyInPieces],
+    pieces: Mapping[str, LoadedBody],
+) -> Details:
+    """Linear models tell how the links move; their coordinates stay those of the pieces."""
+    details = outcome.details
+    if not isinstance(details, LinearModels):
+        return details
+
+    def turned(k: int, delta_q: Array) -> Array:
+        """δq (f, coordinates) of the pieces, about output k, as δq of the links: rates are linear in rates."""
+        rows = [k] * len(delta_q)
+        about = Motion(
+            outcome.time[rows], outcome.q[rows], delta_q, np.zeros_like(delta_q), outcome.lambda_[rows],
+            outcome.residual[rows],
+        )  # fmt: skip
+        return as_floats(_motions(replace(outcome, motion=about), whole, links, divided, pieces)[1])
+
+    models = tuple(
+        replace(model, transformation=turned(k, model.transformation.T).T) for k, model in enumerate(details.models)
+    )
+    modes = tuple(
+        replace(of, motion=turned(k, of.motion.real) + 1j * turned(k, of.motion.imag))
+        for k, of in enumerate(details.modes)
+    )
+    return replace(details, models=models, modes=modes)
+
+
+def _motions(
+    outcome: Outcome,
+    whole: Model,
+    links: Mapping[str, LoadedBody],
+    divided: Mapping[str, BodyInPieces],
+    pieces: Mapping[str, LoadedBody],
+) -> Array:
+    """(q, v, a) (3, T, coordinates) of the model without pieces."""
     states = [
         _motion_of_link(outcome, links[body.name], divided[body.name], pieces)
         if body.name in divided
         else np.array([x[:, outcome.coordinates(body.name)] for x in (outcome.q, outcome.v, outcome.a)])
         for body in whole.bodies
     ]
-    q, v, a = np.concatenate(states, axis=2)
-    held = any(outcome.assembly.is_trajectory)
-    assembly = MechanismSystem(whole, (*whole.joints, *(whole.trajectories if held else ())))
-    places = {_key(c): i for i, c in enumerate(outcome.assembly.constraints)}
-    columns = [places[_key(c)] for c in assembly.constraints]
-    names = {f"{name}.{label}": body.point(label) for name, body in divided.items() for label in body.cut.places}
-    motion = Motion(outcome.time, q, v, a, outcome.lambda_[:, columns], outcome.residual)
-    return replace(
-        outcome, assembly=assembly, motion=motion, forces=Forces(outcome.tau), in_pieces=outcome, point_names=names
-    )
+    return as_floats(np.concatenate(states, axis=2))
 
 
 def _key(constraint: Constraint) -> tuple[bool, str, str]:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..actuation.patches.patches import PatchArray, check_reach, patch_array
+from ..actuation.patches.patches import check_reach, patch_array
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.points import point_set, with_points
 from ..common.errors import InputError, of_file
-from ..mbs.model.model import ModalLoad, Model, build_model
+from ..mbs.model.model import Model, build_model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.solve.robot_damping import with_robot_damping
 from ..scene.load import load_scene
 from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody, add_patches, load_bodies
+from .divided import patched_pieces, patches_on_pieces, voltage_loads
 from .mode_choice import truncation_levels, whole_bodies
 from .omissions import omissions
 from .solution import Solution
@@ -54,10 +55,15 @@ def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher)
     divided = bodies_in_pieces(solution.scene, counts)
     whole = solution if solution.whole is None else replace(solution, model=solution.whole)
     if not divided:
-        return replace(whole, analyses={}, divided={}, parts={}, whole=None)
+        return replace(whole, analyses={}, divided={}, parts={}, whole=None, on_pieces={})
     scene = scene_of_pieces(solution.scene, divided)
     loaded = load_bodies(scene, watcher.stage)
     parts = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
+    parts |= {name: body for name, body in whole.bodies.items() if name in parts}  # with their patches
+    for layout in solution.scene.pzt:
+        if layout.body in divided:
+            length = whole.bodies[layout.body].planar.length or 0.0
+            parts |= patched_pieces(layout, length, divided[layout.body], parts)
     return _in_pieces(replace(whole, analyses={}), divided, parts)
 
 
@@ -66,8 +72,10 @@ def _in_pieces(whole: Solution, divided: Mapping[str, BodyInPieces], parts: Mapp
     if not divided:
         return whole
     planar = [_equations_of(part, whole.stiffened) for part in parts.values()]
-    model = _damped(build_model(scene_of_pieces(whole.scene, divided), planar), parts)
-    return replace(whole, model=model, whole=whole.model, divided=divided, parts=parts)
+    arrays = patches_on_pieces(whole.scene.path, whole.patches, whole.bodies, divided, parts)
+    loads = list(voltage_loads(whole.scene, {**whole.patches, **arrays}, {body.name: body for body in planar}))
+    model = _damped(build_model(scene_of_pieces(whole.scene, divided), planar, loads), parts)
+    return replace(whole, model=model, whole=whole.model, divided=divided, parts=parts, on_pieces=arrays)
 
 
 def _equations_of(body: LoadedBody, stiffened: bool) -> PlanarBody:
@@ -118,9 +126,10 @@ def _assembled(
         for name, body in bodies.items()
     }
     planar = [_equations_of(body, stiffened) for body in bodies.values()]
+    loads = list(voltage_loads(scene, patches, {body.name: body for body in planar}))
     return Solution(
         scene=scene,
-        model=_damped(build_model(scene, planar, list(_voltage_loads(scene, patches))), bodies),
+        model=_damped(build_model(scene, planar, loads), bodies),
         bodies=bodies,
         patches=patches,
         points=points,
@@ -149,10 +158,3 @@ def _check_stiffening(scene: Scene, bodies: Mapping[str, LoadedBody], stiffened:
                 f"{scene.path}: geometric_stiffening: expected modal bodies with geometric stiffness, found none in"
                 f' that of "{name}"'
             )
-
-
-def _voltage_loads(scene: Scene, patches: Mapping[str, PatchArray]) -> Iterator[ModalLoad]:
-    for load in scene.load:
-        if load.pzt is not None:
-            for k, function in enumerate(load.components.values()):
-                yield ModalLoad(load.pzt, patches[load.pzt].Phi_V[:, k], function)

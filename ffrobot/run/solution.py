@@ -74,7 +74,8 @@ class AnalysisResult:
         predicted_shift: by point, (T, 2) m: what voltages within their limits leave undone.
         feasibility: whether motors and patches can do it; None where nothing is asked of them.
         stresses: by body, where modal body files hold modal stresses.
-        mode_error: estimated for too few modes, of peaks; None where it is not known.
+        mode_error: estimated for too few modes, of peaks; None where it is not known. It does not see what a jolt does.
+        start_jolt: see `attachment_error`.
         check: what a replay on finer links found, where that is asked for.
         warnings: why results may be wrong, or not mean what they seem to, a text each.
     """
@@ -88,6 +89,7 @@ class AnalysisResult:
     feasibility: Feasibility | None = None
     stresses: Mapping[str, BodyStress] = field(default_factory=dict)
     mode_error: float | None = None
+    start_jolt: float = 0.0
     check: FinerCheck | None = None
     warnings: tuple[str, ...] = ()
 
@@ -115,7 +117,7 @@ class Solution:
         mode_choice: where `modes = "auto"`.
         stiffened: whether geometric stiffening is in the equations.
         divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`, and `whole` the
-            one without them.
+            one without them. `on_pieces` are the patches of such bodies on the pieces.
         earlier: runs of analyses to go on with, from a results file: see `results.resume`.
         path_notes: what was found of paths before the analyses, one line each.
         failure: what ended the run, where that was an error after analyses that are worth keeping.
@@ -138,11 +140,17 @@ class Solution:
     divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
     parts: Mapping[str, LoadedBody] = field(default_factory=dict)
     whole: Model | None = None
+    on_pieces: Mapping[str, PatchArray] = field(default_factory=dict)
 
     @property
     def outcomes(self) -> Mapping[str, Outcome]:
         """The outcome of each analysis, by its name."""
         return {name: result.outcome for name, result in self.analyses.items()}
+
+    @property
+    def acting_patches(self) -> Mapping[str, PatchArray]:
+        """The patches of each link on the bodies of `model`."""
+        return {**self.patches, **self.on_pieces}
 
     @property
     def links(self) -> dict[str, ModalBody]:

@@ -6,13 +6,14 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from ..actuation.context import ActuatedContext
+from ..actuation.context import ActuatedContext, WholeLinks
 from ..actuation.patches.patches import with_factors as patches_with
-from ..actuation.patches.voltages import allocation, solve_voltages
+from ..actuation.patches.voltages import Voltages, allocation, solve_voltages
 from ..actuation.points import with_factors as points_with
 from ..common.errors import of_file
 from ..mbs.analysis.outcome import Outcome
@@ -21,12 +22,14 @@ from ..mbs.model.raised_mass import by_body
 from ..mbs.quantities.stiffening import NOTABLE, stiffness_changes
 from ..mbs.quantities.validity import bending
 from ..scene.kinds import AnyKind
+from ..scene.pieces import places_on_pieces
 from ..scene.scene import Scene
+from .divided import as_divided
 from .evaluation import evaluated
 from .finer import check_on, finer_scene
 from .mode_choice import ModeSearch
 from .paths import with_paths
-from .pieces import as_one_link, wanted_pieces, worst_of_pieces
+from .pieces import as_one_link, wanted_pieces, with_advice, worst_of_pieces
 from .prepare import prepare, stiffened, with_bodies, with_pieces
 from .solution import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
@@ -85,12 +88,21 @@ def _evaluated(solution: Solution) -> Solution:
 
 
 def told_of_links(solution: Solution, result: AnalysisResult) -> AnalysisResult:
-    """The result of links in pieces as that of the one link each."""
+    """The result of links in pieces as that of the one link each, and whether links that bend far can be divided."""
     if solution.whole is None:
-        return result
-    links, pieces = solution.bodies, solution.parts
-    outcome = as_one_link(result.outcome, solution.whole, links, solution.divided, pieces)
-    return replace(result, outcome=outcome, bending=worst_of_pieces(result.bending, solution.divided))
+        return replace(result, bending=with_advice(result.bending, solution.scene))
+    outcome = _told(solution, result.outcome)
+    bent = with_advice(worst_of_pieces(result.bending, solution.divided), solution.scene)
+    voltages = {name: _unmet_of_link(solution, name, of_pieces) for name, of_pieces in result.voltages.items()}
+    return replace(result, outcome=outcome, bending=bent, voltages=voltages)
+
+
+def _unmet_of_link(solution: Solution, name: str, voltages: Voltages) -> Voltages:
+    """Voltages with the modal forces that they leave of a link in place of those of its pieces."""
+    if name not in solution.divided:
+        return voltages
+    link = as_divided(solution.bodies[name], solution.divided[name], solution.parts)
+    return replace(voltages, unmet=voltages.unmet @ link.spread)
 
 
 def _checked(solution: Solution, watcher: Watcher) -> Solution:
@@ -164,8 +176,8 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         if automatic and max(changes.values(), default=0.0) > NOTABLE and outcome.status != "interrupted":
             return None
         voltages = {} if outcome.F_p is None else {
-            body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(body)])
-            for body, array in solution.patches.items()
+            body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(*array.carriers)])
+            for body, array in solution.acting_patches.items()
         }  # fmt: skip
         bent = bending(outcome, links, changes, solution.stiffened)
         results[analysis.name] = AnalysisResult(outcome, bent, time.perf_counter() - began, voltages)
@@ -195,15 +207,36 @@ def _context(
         is_replayed=analysis.is_checked
         or any(other.takes_actuation and other.source == analysis.name for other in later),
         earlier=solution.earlier.get(analysis.name),
-        patches=solution.patches,
+        patches=solution.acting_patches,
         links=solution.links,
+        whole=_whole_links(solution),
     )
+
+
+def _whole_links(solution: Solution) -> WholeLinks | None:
+    """What analyses have to know of the links beside their pieces; None where no link is in pieces."""
+    if solution.whole is None:
+        return None
+    links = {name: as_divided(solution.bodies[name], body, solution.parts) for name, body in solution.divided.items()}
+    return WholeLinks(
+        solution.whole, solution.patches, links, places_on_pieces(solution.divided), partial(_told, solution)
+    )
+
+
+def _told(solution: Solution, outcome: Outcome) -> Outcome:
+    """An outcome of the pieces as that of the links."""
+    assert solution.whole is not None
+    return as_one_link(outcome, solution.whole, solution.bodies, solution.divided, solution.parts)
 
 
 def _actuator_set(solution: Solution, *, raised: bool) -> ActuatorSet:
     """The actuators of the scene, fresh for one run."""
-    factors = by_body(solution.model) if raised else {body.name: np.ones(1) for body in solution.model.bodies}
-    patches = {name: patches_with(array, factors[name]) for name, array in solution.patches.items()}
+    factors = {body.name: np.ones(body.n_modes) for body in solution.model.bodies}
+    factors |= by_body(solution.model) if raised else {}
+    patches = {
+        array.carriers[0]: patches_with(array, np.concatenate([factors[name] for name in array.carriers]))
+        for array in solution.acting_patches.values()
+    }
     points = {name: points_with(one, factors[name]) for name, one in solution.points.items()}
     return ActuatorSet(
         {name: allocation(array, limited=False) for name, array in patches.items()},

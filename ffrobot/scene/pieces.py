@@ -15,10 +15,12 @@ from ..common.validation import Record
 from ..fe_models.pieces import CutLink, cut
 from ..mbs.joints.weld import WeldJoint
 from ..mbs.scene.bodies import Body
+from ..mbs.scene.mechanism import MechanismKeys
 from .scene import Scene
 
-KINDS = ("pcid", "forward", "static")
-"""Kinds of analysis that links in pieces can take part in: all others ask for the modes of a link."""
+KINDS = ("pcid", "forward", "static", "linear", "closed-loop")
+"""Kinds of analysis that links in pieces can take part in: the others prescribe the modes of a link, or place patches
+for these."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +54,20 @@ def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyI
 
 def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
     """The scene in which each piece is a body; points that the scene names are those of the pieces."""
-    places = {f"{name}.{label}": body.point(label) for name, body in divided.items() for label in body.cut.places}
+    places = places_on_pieces(divided)
     keys = {name: _renamed(getattr(scene, name), places) for name in ("joint", "trajectory", "load", "payload")}
     initial = scene.initial.model_copy(
         update={"angles": _of_each(scene.initial.angles, divided), "rates": _of_each(scene.initial.rates, divided)}
     )
     bodies = tuple(piece for body in scene.body for piece in _pieces(body, divided))
     joints = (*keys["joint"], *(weld for name, body in divided.items() for weld in _welds(name, body)))
-    return scene.model_copy(update=keys | {"body": bodies, "joint": joints, "initial": initial})
+    alone = {"pzt": (), "analysis": ()}  # of the whole links
+    return scene.model_copy(update=keys | alone | {"body": bodies, "joint": joints, "initial": initial})
+
+
+def places_on_pieces(divided: Mapping[str, BodyInPieces]) -> dict[str, str]:
+    """Where each point "BODY.POINT" of the bodies in pieces is, as PIECE.POINT."""
+    return {f"{name}.{label}": body.point(label) for name, body in divided.items() for label in body.cut.places}
 
 
 def _pieces(body: Body, divided: Mapping[str, BodyInPieces]) -> Iterator[Body]:
@@ -105,9 +113,8 @@ def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str
     if not divided:
         return
     first = next(iter(divided))
-    for table in ("pzt", "actuation_points"):
-        for layout in getattr(scene, table):
-            yield f'{table} "{layout.body}": expected no [[{table}]] beside bodies in pieces ("{first}"), found one'
+    for points in scene.actuation_points:
+        yield f'actuation_points "{points.body}": expected none beside bodies in pieces ("{first}"), found these'
     if scene.motors == "frame":
         yield f'motors: expected "section" beside bodies in pieces ("{first}"), found "frame"'
     for analysis in scene.analysis:
@@ -121,7 +128,7 @@ def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str
     for joint in scene.joint:
         if joint.elastic_gear("section") is not None:
             yield f'joint "{joint.name}": stiffness: expected none beside bodies in pieces ("{first}"), found one'
-    for reference in scene.references():
+    for reference in MechanismKeys.references(scene):
         if reference.kind == "body" and reference.name in divided and not reference.key.startswith("initial."):
             yield (
                 f"{reference.key}: expected a point or a joint where a body is in pieces, whose frame no piece has,"

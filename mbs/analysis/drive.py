@@ -39,7 +39,7 @@ class SampledControl:
 
     Attributes:
         motors: how many there are; the first loads of the system are theirs.
-        voltages: body number and Φ_V (n, k) of its patches.
+        voltages: body number and Φ_V (n, k) of its patches; more rows are those of the bodies after it.
         first: (inputs,) commands before those of the first sample act.
         sensing: what is read of the state.
         times: (K,) s, of the samples; the commands of each act `delay` (s) later.

@@ -244,11 +244,11 @@ class Outcome:
         first = int(self.assembly.first[i])
         return slice(first, first + 3 + self.assembly.model.bodies[i].n_modes)
 
-    def modal_columns(self, body: str) -> slice:
-        """Columns of a body in `F_p`."""
-        i = self.assembly.index[body]
-        first = int(self.assembly.first[i]) - 3 * i
-        return slice(first, first + self.assembly.model.bodies[i].n_modes)
+    def modal_columns(self, *bodies: str) -> slice:
+        """Columns of a body in `F_p`, or of several that follow each other."""
+        first, last = (self.assembly.index[name] for name in (bodies[0], bodies[-1]))
+        begin, end = (int(self.assembly.first[i]) - 3 * i for i in (first, last))
+        return slice(begin, end + self.assembly.model.bodies[last].n_modes)
 
     @property
     def motor_moments(self) -> Array | None:

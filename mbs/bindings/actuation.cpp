@@ -64,7 +64,7 @@ void bind_actuators(nb::module_ &m) {
       .def(nb::init<std::size_t>(), "first_drive"_a);
   nb::class_<Motors, Actuator>(m, "Motors", "Motor forces, each cut at its limit.")
       .def(nb::init<std::size_t, VectorXd>(), "first_drive"_a, "limit"_a);
-  nb::class_<Patches, Actuator>(m, "Patches", "Modal forces of one body, as far as its patches go.")
+  nb::class_<Patches, Actuator>(m, "Patches", "Modal forces of a link, as far as its patches go.")
       .def(nb::init<std::size_t, Allocation>(), "body"_a, "allocation"_a);
   nb::class_<PointForces, Actuator>(m, "PointForces", "Generalized forces of one body at its actuation points.")
       .def(nb::init<std::size_t, std::size_t, ActuationPoints>(), "first_drive"_a, "body"_a, "points"_a);

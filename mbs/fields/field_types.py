@@ -14,6 +14,7 @@ from ...common.numbers import NotNegative as NotNegative
 from ...common.numbers import PatchCount as PatchCount
 from ...common.numbers import Positive as Positive
 from ...common.numbers import Vector2 as Vector2
+from ...common.numbers import Vector3 as Vector3
 from ...common.tables import LARGEST, shown
 from ...common.validation import Record, existing_file, quoted
 from .._core import TimeFunction

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, Literal, Self, get_args
 
 from pydantic import model_validator
 
@@ -20,12 +20,8 @@ MotorSide = Literal["section", "frame"]
 """What motors and joint coordinates turn: the sections at the joint, or the frames of the bodies."""
 
 
-class JointRecord(Record, ABC):
-    """A joint between two points, or a point and the ground; `at` (m) is where it sits on the ground.
-
-    A type of joint is a subclass with its own keys, which says what it constrains (`constraints`) and what its
-    coordinate is (`coordinate`); `joints.Joint` lists all types.
-    """
+class JointKeys(Record, ABC):
+    """What joints in the plane and in space have in common: a name, a type, two sides."""
 
     name: Name
     """Of the joint, unique in the scene."""
@@ -33,16 +29,12 @@ class JointRecord(Record, ABC):
     """How it moves."""
     between: tuple[Side, Side]
     """Its two sides, "BODY.POINT" or "ground"; coordinate, moment and reaction are the second's on the first."""
-    at: Vector2 = (0.0, 0.0)
-    """Where it sits on the ground, m, global axes."""
 
     locates: ClassVar[bool] = True
     """Whether it fixes the place of one body on the other; the initial guess goes along such joints first."""
-    force_unit: ClassVar[str] = "N·m"
-    """Unit of the force along its coordinate."""
 
     @model_validator(mode="after")
-    def _fits_two_bodies(self) -> JointRecord:
+    def _fits_two_bodies(self) -> Self:
         points = [side for side in self.between if side != GROUND]
         if not points:
             raise ValueError('expected at most one "ground" in between, found two')
@@ -61,27 +53,13 @@ class JointRecord(Record, ABC):
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[RecordType]) -> str:
         """What to say of a key that only joints of other types have."""
-        having = " or ".join(other.type_name() for other in others if issubclass(other, JointRecord))
+        having = " or ".join(other.type_name() for other in others if issubclass(other, JointKeys))
         return f'expected the key "{key}" only in {having} joints, found it in a {cls.type_name()} joint'
-
-    @abstractmethod
-    def constraints(self, angle: float) -> tuple[Measure, ...]:
-        """Measures that it keeps at 0 (C_m); `angle` (rad) of the second body on the first in the initial guess."""
-
-    @abstractmethod
-    def coordinate(self, motors: MotorSide) -> Measure | None:
-        """The joint's own coordinate, of the second side on the first; None where the joint cannot move."""
 
     @property
     def label(self) -> str:
         """What messages call it."""
         return f'joint "{self.name}"'
-
-    @property
-    def markers(self) -> tuple[Marker, Marker]:
-        """Where it sits on its two sides."""
-        first, second = self.between
-        return marker_at(first, self.at), marker_at(second, self.at)
 
     @property
     def bodies(self) -> tuple[str, str]:
@@ -93,6 +71,34 @@ class JointRecord(Record, ABC):
         """The points it joins."""
         for k, side in enumerate(self.between):
             yield from marker_reference(f"between[{k}]", side, loaded=True)
+
+
+class JointRecord(JointKeys):
+    """A joint between two points, or a point and the ground; `at` (m) is where it sits on the ground.
+
+    A type of joint is a subclass with its own keys, which says what it constrains (`constraints`) and what its
+    coordinate is (`coordinate`); `joints.Joint` lists all types.
+    """
+
+    at: Vector2 = (0.0, 0.0)
+    """Where it sits on the ground, m, global axes."""
+
+    force_unit: ClassVar[str] = "N·m"
+    """Unit of the force along its coordinate."""
+
+    @abstractmethod
+    def constraints(self, angle: float) -> tuple[Measure, ...]:
+        """Measures that it keeps at 0 (C_m); `angle` (rad) of the second body on the first in the initial guess."""
+
+    @abstractmethod
+    def coordinate(self, motors: MotorSide) -> Measure | None:
+        """The joint's own coordinate, of the second side on the first; None where the joint cannot move."""
+
+    @property
+    def markers(self) -> tuple[Marker, Marker]:
+        """Where it sits on its two sides."""
+        first, second = self.between
+        return marker_at(first, self.at), marker_at(second, self.at)
 
     # What a motor and a gear add; joints that can have them override this.
 

@@ -14,6 +14,7 @@ Statics, linear models and results keep p: motion goes to p' before an integrati
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -64,6 +65,11 @@ def raised_in_words(model: Model) -> str:
 def by_body(model: Model) -> dict[str, Array]:
     """√μ (n,) of each body's modal coordinates."""
     return {body.name: np.sqrt(mass_factors(body)) for body in model.bodies}
+
+
+def factors_of(model: Model, bodies: Sequence[str]) -> Array:
+    """√μ of the modal coordinates of some bodies, side by side."""
+    return np.concatenate([np.sqrt(mass_factors(model.body(name))) for name in bodies])
 
 
 def coordinate_factors(model: Model) -> Array:

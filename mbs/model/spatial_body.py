@@ -43,6 +43,7 @@ class SpatialBody:
         stiffness: K_ff (n,) in rad²/s².
         damping: D_ff (n, n) in 1/s.
         points: its sections by name.
+        modal_transform: (n_file, n) p of the modal file is this times p.
         length: of a link in m; None of a rigid body.
     """
 
@@ -59,6 +60,7 @@ class SpatialBody:
     stiffness: Array
     damping: Array
     points: Mapping[str, SpatialPoint]
+    modal_transform: Array
     length: float | None = None
 
     @property
@@ -115,6 +117,7 @@ def from_modal_body(name: str, body: ModalBody) -> SpatialBody:
         points=MappingProxyType(
             {label: SpatialPoint(at.position, at.translation, at.rotation) for label, at in sections.items()}
         ),
+        modal_transform=np.eye(len(omega)),
         length=body.length,
     )
 
@@ -139,6 +142,7 @@ def rigid_body(name: str, mass: float, center: Array, inertia: Array, points: Ma
         stiffness=np.zeros(0),
         damping=np.zeros((0, 0)),
         points=MappingProxyType({label: SpatialPoint(position, none, none) for label, position in places.items()}),
+        modal_transform=np.zeros((0, 0)),
     )
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import ceil, sqrt
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from .stiffening import NOTABLE
 DEFLECTION_LIMIT = {False: 0.02, True: 0.05}  # of the length, from the chord; without and with geometric stiffening
 SHORTENING_LIMIT = {False: 1e-3, True: 1e-2}  # of the length: a half wave at 2 %; where the second order ends
 USELESS = 0.1  # of the length, in the position of points
+ENOUGH = 1e-3  # shortening of a piece by bending: tips are then right to some 1e-4 of the length (docs/theory.md)
 
 # Estimates are 0.4 to 5 times the errors of falling double pendulums with deflections of 0.1 to 10 %, and the errors
 # of cantilevers under tip forces: tests/test_large_deflections.py; docs/theory.md, Limits.
@@ -42,6 +44,8 @@ class Bending:
         stiffness_change: of a mode by the loads of the run, relative; 0 where the modal body file does not tell.
         length: m, of the link.
         is_stiffened: whether geometric stiffening is in the equations.
+        pieces: into how many it is divided; the values are then those of its worst piece.
+        is_divisible: whether the scene lets it be divided.
     """
 
     deflection: float
@@ -51,6 +55,8 @@ class Bending:
     stiffness_change: float
     length: float
     is_stiffened: bool
+    pieces: int = 1
+    is_divisible: bool = False
 
     @property
     def shortening(self) -> float:
@@ -102,9 +108,21 @@ class Bending:
     @property
     def advice(self) -> str:
         """What to do about it."""
-        if self.is_stiffened or self.shortening > SHORTENING_LIMIT[True]:
+        if not self.is_stiffened and self.shortening <= SHORTENING_LIMIT[True]:
+            return "consider geometric_stiffening = true"
+        if not self.is_divisible:
             return "divide the link into shorter ones, welded"
-        return "consider geometric_stiffening = true"
+        if self.position_error > USELESS:  # it does not really bend as far as this run says
+            return 'divide the link: pieces = "auto" in its [[body]]'
+        return f"divide the link: pieces = {enough_pieces(self.shortening, self.pieces)} in its [[body]]"
+
+
+def enough_pieces(shortening: float, count: int) -> int:
+    """Into how many pieces to divide a link, of which now `count` lose that part of their length by bending.
+
+    It goes down with the square of their number.
+    """
+    return max(2, ceil(count * sqrt(shortening / ENOUGH)))
 
 
 def bending(

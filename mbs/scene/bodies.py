@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
@@ -51,7 +51,23 @@ def _link(value: object, info: ValidationInfo) -> LinkSource:
 LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | BeamLink | SolidLink)]
 
 
-class Body(Record):
+class BodyKeys(Record):
+    """What bodies in the plane and in space have in common; beside it each has the record of a rigid one, `rigid`."""
+
+    name: Name
+    """Of the body, unique in the scene."""
+    link: LinkInput | None = None
+    """Link file, or a table with its keys; stage 1 runs where needed."""
+    modal: InputFile | None = None
+    """Modal body file, as stage 1 writes it."""
+
+    @model_validator(mode="after")
+    def _is_one_of_three(self) -> Self:
+        one_of(self, ("link", "modal", "rigid"))
+        return self
+
+
+class Body(BodyKeys):
     """A link file or a table of its keys (stage 1 runs when needed), a modal body file, or a rigid body.
 
     The `name` in a table of a link's keys is the body's where it is left out.
@@ -63,12 +79,6 @@ class Body(Record):
     are those of the one link, and geometric stiffening is on.
     """
 
-    name: Name
-    """Of the body, unique in the scene."""
-    link: LinkInput | None = None
-    """Link file, or a table with its keys; stage 1 runs where needed."""
-    modal: InputFile | None = None
-    """Modal body file, as stage 1 writes it."""
     rigid: RigidBody | None = None
     """A body that does not deform."""
     modes: Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)] | None = None
@@ -78,7 +88,6 @@ class Body(Record):
 
     @model_validator(mode="after")
     def _consistent(self) -> Body:
-        one_of(self, ("link", "modal", "rigid"))
         if self.rigid is not None and self.modes is not None:
             raise ValueError(f'expected the key "modes" only in flexible bodies, found it in a rigid one: {self.modes}')
         if self.pieces is not None and (self.link is None or self.modes is not None):

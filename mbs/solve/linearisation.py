@@ -64,17 +64,19 @@ class Linearisation:
 
     `independent` rows are the motors' where these fit the mechanism. Where they do not, as many of them as are
     independent, then other joint coordinates, then angles and places of frames make up the number, those first that
-    the constraints determine worst at `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs.
+    the constraints determine worst at `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs; a mapping
+    says where each is in the model, where that is another body's point (of a link in pieces).
     """
 
-    def __init__(self, model: Model, q: Array, points: Sequence[str] = ()) -> None:
+    def __init__(self, model: Model, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:
         joints = {f"joint/{name}": measure for name, measure in _joint_coordinates(model).items()}
         elastic = {gear.joint for gear in model.gears}
         motors = {
             f"{'motor' if name in elastic else 'joint'}/{name}": measure for name, measure in model.motors.items()
         }
         candidates = [motors, {name: joint for name, joint in joints.items() if name not in motors}, _frames(model)]
-        places = {f"{point}/{axis}": _place(point, axis) for point in points for axis in "xy"}
+        where = points if isinstance(points, Mapping) else {point: point for point in points}
+        places = {f"{point}/{axis}": _place(place, axis) for point, place in where.items() for axis in "xy"}
         measures = [measure for group in (*candidates, joints, places) for measure in group.values()]
         self.model = model
         self.assembly = MechanismSystem(model, model.joints, model.loads, measures)

@@ -9,7 +9,7 @@ E_P, D31, T_P = 63e9, 110e-12, 0.5e-3
 START, END, VOLT = 0.045, 0.105, 100.0
 
 
-def tip(height, face, modes, **keys):
+def tip(height, face, modes, pieces=1, **keys):
     """Deflection of the tip, m."""
     return solved(height, face, modes, **keys)["bent/points/strip.tip/deflection"][0, 1]
 
@@ -30,7 +30,7 @@ def solved(height, face, modes, places=(), **keys):
     scene = ffrobot.make_scene(
         name="strip",
         gravity=[0.0, 0.0],
-        body=[{"name": "strip", "link": link}],
+        body=[{"name": "strip", "link": link, "pieces": pieces}],
         joint=[{"name": "wall", "type": "weld", "between": ["ground", "strip.root"]}],
         pzt=[pzt | {"modulus": E_P, "d31": D31}],
         load=[{"pzt": "strip", "voltage": [f"{VOLT}"]}],

@@ -25,3 +25,11 @@ def test_without_the_stiffness_it_is_the_paper_s_formula():
     curvature = c * VOLT / (E * B * 0.004**3 / 12)
     expected = curvature * (END - START) * (L - (START + END) / 2)
     assert tip(0.004, "both", {}, structural=False) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("face", ["both", "-y"])
+@pytest.mark.parametrize("pieces", [2, 4])
+def test_composite_section_of_a_link_in_pieces(pieces, face):
+    """A cut at 75 mm, under the patch. What is left is the foreshortening of pieces, which always have stiffening."""
+    expected = exact(0.004, 2 if face == "both" else 1)
+    assert tip(0.004, face, {}, pieces) == pytest.approx(expected, rel=1e-6)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from ffrobot.actuation.feasibility import judge_motors
+import ffrobot
+from ffrobot.actuation.motors import judge_motors, path_jump
 from ffrobot.actuation.patches.patches import patch_array, with_patch_count
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.actuation.prediction import predicted_shift, unmet_modal_forces
@@ -210,3 +211,81 @@ def test_predicted_shift_of_an_inclined_tip(arm):
     shift = predicted_shift(outcome, unmet)["link.tip"]
     np.testing.assert_allclose(shift, expected, atol=1e-9 * np.abs(expected).max())
     np.testing.assert_array_equal(shift, solution.analyses["motion"].predicted_shift["link.tip"])
+
+
+def test_rms_and_shares_of_time_by_hand(arm):
+    """τ = m g L/2 + J θ̈ at θ ≈ 0 over whole periods; speed 0.2 |cos 2t| against a limit of 0.1: beyond for 2/3."""
+    solution = arm(
+        times='shape = "zero"\nend = 3.141592653589793\noutput_step = 0.0015707963267948967',
+        trajectory='joint = "O"\nvalue = "1e-3*sin(2*t)"',
+    )
+    joint = solution.scene.joint[0].model_copy(update={"moment_limit": None, "power_limit": None, "speed_limit": 1e-3})
+    motor = judge_motors(solution.outcomes["motion"], {"O": joint})["O"]
+    m = 7850.0 * 0.025 * 0.015
+    swing = m / 3 * 4e-3  # amplitude of J θ̈; the weight's moment changes by θ²/2 only
+    assert motor.rms_moment == pytest.approx(np.hypot(m * 9.81 / 2, swing / np.sqrt(2)), rel=1e-6)
+    assert motor.share_beyond == pytest.approx(2 / 3, abs=2e-3)
+    assert not motor.has_spike
+
+
+@pytest.mark.parametrize(
+    ("value", "jump"),
+    [
+        ("0.1*t**2", "acceleration"),  # from rest at t = 0 with 0.2 rad/s² at once
+        ("0.1*sin(2*t)**2*t**2", ""),
+    ],
+)
+def test_jump_of_a_path_is_seen(arm, value, jump):
+    outcome = arm(times='shape = "zero"\nend = 0.5\noutput_step = 0.01', trajectory=f'joint = "O"\nvalue = "{value}"')
+    assert path_jump(outcome.outcomes["motion"], 0) == jump
+
+
+def test_short_peaks_of_motors_only_are_laid_to_the_jerk():
+    """Three links with rotors along a quintic, whose jerk jumps at both ends, and along a path whose jerk does not."""
+    u = "(t/0.5)"
+    quintic = f"(10*{u}**3 - 15*{u}**4 + 6*{u}**5)"
+    smooth = f"(126*{u}**5 - 420*{u}**6 + 540*{u}**7 - 315*{u}**8 + 70*{u}**9)"
+    spikes = []
+    for law in (quintic, smooth):
+        results = ffrobot.solve(three_links(law))
+        about = dict(results.attributes("motors/feasibility/joints/shoulder"))
+        spikes.append((about["moment"] > 1.1 * about["usual_moment"], about["jump"]))
+        peak = np.abs(results["motors/joints/shoulder/moment"]).argmax()
+        assert about["moment_time"] == results.time("motors")[peak]
+    assert spikes == [(True, "jerk"), (False, "")]
+
+
+def three_links(law):
+    """Upper arm, forearm and hand, their tip and their hand's angle led along a law of motion from 0 to 1."""
+    link = {
+        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+        "geometry": {
+            "kind": "beam",
+            "length": 0.5,
+            "section": {"shape": "tube", "outer": 0.04, "inner": 0.034},
+        },
+        "mesh": {"elements": 10},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 4, "attachment_modes": False, "family": "in-plane-bending"},
+        "damping": {"ratio": 0.01},
+    }
+    hand = link | {"geometry": link["geometry"] | {"length": 0.15}}
+    rotor = {"type": "revolute", "gear_ratio": 100.0}
+    small = rotor | {"gear_ratio": 50.0, "rotor_inertia": 1e-5}
+    return ffrobot.make_scene(
+        name="three links",
+        gravity=[0.0, -9.81],
+        body=[{"name": "upper", "link": link}, {"name": "fore", "link": link}, {"name": "hand", "link": hand}],
+        payload=[{"point": "hand.tip", "mass": 1.0}],
+        initial={"state": "static", "angles": {"upper": "60*deg", "fore": "-20*deg", "hand": "-30*deg"}},
+        joint=[
+            rotor | {"name": "shoulder", "between": ["ground", "upper.root"], "rotor_inertia": 6e-5},
+            rotor | {"name": "elbow", "between": ["upper.tip", "fore.root"], "rotor_inertia": 2e-5},
+            small | {"name": "wrist", "between": ["fore.tip", "hand.root"]},
+        ],
+        trajectory=[
+            {"name": "tip", "point": "hand.tip", "x": f"0.85 - 0.2*{law}", "y": f"0.2 + 0.2*{law}"},
+            {"name": "grip", "angle": "hand", "value": f"-0.5 + 0.3*{law}"},
+        ],
+        analysis=[{"name": "motors", "kind": "motors-only", "end": 0.5, "output_step": 0.0005}],
+    )

@@ -5,12 +5,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ffrobot.cli import cli
 from ffrobot.common.errors import InputError
-from ffrobot.pictures.figures.figure_file import load_figures
+from ffrobot.mbs.joints.transmission import MotorLimits
+from ffrobot.pictures.figures.figure_file import Curve, load_figures
 from ffrobot.pictures.figures.plot import plot_results
+from ffrobot.pictures.figures.reading import curve_points
+from ffrobot.pictures.torque_speed import limit_curves
+from ffrobot.results.file import Results
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -113,3 +118,33 @@ def test_matplotlib_is_loaded_for_plotting_only():
     program = "import sys, ffrobot.cli, ffrobot.run.solution; print('matplotlib' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"
+
+
+def test_only_the_figures_asked_for(results, tmp_path):
+    written = plot_results(results, tmp_path / "some", ["png"], ["reaction_*", "path_slider"])
+    assert stems(written) == {"path_slider", *(f"reaction_{joint}" for joint in ("O", "A", "B", "guide"))}
+    with pytest.raises(InputError, match=r'--only: expected the name of a figure.*found "reactoin_A" \(did you mean'):
+        plot_results(results, tmp_path / "none", ["png"], ["reactoin_A"])
+    assert not (tmp_path / "none").exists()
+
+
+def test_limits_of_a_motor_over_its_speed():
+    """Every point of the curve is at one limit and within the others; without limits there is none."""
+    limits = MotorLimits(moment=20.0, speed=5.0, power=40.0)
+    points = limit_curves(limits, 4.0, 18.0)
+    speed, moment = np.abs(points[~np.isnan(points).any(axis=1)]).T
+    shares = np.array([moment / 20.0, speed / 5.0, speed * moment / 40.0])
+    np.testing.assert_allclose(shares.max(axis=0), 1.0, rtol=1e-12)
+    assert {tuple(sign) for sign in np.sign(points[~np.isnan(points).any(axis=1)])} >= {(1, 1), (-1, 1), (1, -1)}
+    assert len(limit_curves(MotorLimits(), 4.0, 18.0)) == 0
+    power_alone = limit_curves(MotorLimits(power=40.0), 4.0, 18.0)
+    drawn = power_alone[~np.isnan(power_alone).any(axis=1)]
+    np.testing.assert_allclose(np.abs(drawn).prod(axis=1), 40.0, rtol=1e-12)
+
+
+def test_magnitude_scale_and_x_of_a_curve(results):
+    name = "inverse/joints/A/reaction"
+    with Results(results) as held:
+        x, values = curve_points(held, Curve(data=name, label="", magnitude=True, x="inverse/joints/O/rate"), 1e3)
+        np.testing.assert_allclose(values[:, 0], 1e3 * np.hypot(*held[name].T), rtol=1e-12)
+        np.testing.assert_array_equal(x, held["inverse/joints/O/rate"])

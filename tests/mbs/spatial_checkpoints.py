@@ -1,12 +1,12 @@
 """Mechanisms and states of tests/checkpoints/spatial, numbers of an independent code, for the oracle and the core."""
 
 import json
-import sys
 import tomllib
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+import scene_of
 from rotations import exponential, left_jacobian, left_jacobian_rate, rotation_about
 from spatial_oracle import Mechanism
 from spatial_rows import UNIT, About, Along, Dot, Driven, Ground, Joint, Section
@@ -15,9 +15,7 @@ from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.model.spatial_body import from_modal_body, rigid_body
 
-FOLDER = Path(__file__).parents[1] / "checkpoints" / "spatial"
-sys.path.insert(0, str(FOLDER))
-import scene_of  # noqa: E402 (stands beside the data)
+FOLDER = Path(scene_of.__file__).parent
 
 CASES = sorted(path.stem for path in FOLDER.glob("*.json") if "scene" in json.loads(path.read_text()))
 

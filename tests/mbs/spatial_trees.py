@@ -72,6 +72,7 @@ def random_beam(rng, name, modes=(2, 2, 1, 1), condition="cantilever"):
         stiffness=np.sort(rng.uniform(1, 60, n)),
         damping=np.diag(rng.uniform(0, 0.5, n)),
         points=MappingProxyType({"root": section(0.0), "tip": section(1.0), "side": section(0.6)}),
+        modal_transform=np.eye(n),
         length=length,
     )
 

@@ -62,3 +62,10 @@ def test_estimate_is_about_the_error_of_moments(payload, rise, state):
 
 def test_nothing_is_known_without_attachment_modes():
     assert solve(arm(4, 1.5, attachment_modes=False)).analyses["inverse"].mode_error is None
+
+
+def test_a_jolt_at_the_start_is_told_from_a_start_in_equilibrium():
+    """Undeformed under gravity all of the sag begins to ring; from equilibrium on a smooth path nothing does."""
+    jolts = [solve(arm(4, 1.5, state=state)).analyses["inverse"].start_jolt for state in ("static", "undeformed")]
+    assert jolts[0] < 1e-4
+    assert 0.1 < jolts[1] < 1.5

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from spatial_checkpoints import modal_body
+from spatial_oracle import body_mass_matrix, no_stiffening
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.spatial_body import from_modal_body, rigid_body
+from ffrobot.mbs.model.spatial_masses import with_payload
 
 
 def test_straight_line_of_mass_has_inertia_about_its_axis():
@@ -47,3 +49,26 @@ def test_rigid_body_about_its_origin():
     np.testing.assert_allclose(body.inertia, inertia + 2.0 * (c @ c * np.eye(3) - np.outer(c, c)), rtol=1e-14)
     np.testing.assert_allclose(body.points["mid"].position, [0.2, 0, 0])
     assert body.n_modes == 0
+
+
+def test_payload_has_the_energy_of_a_body_on_the_section():
+    """½ m |v_c|² + ½ Ωᵀ J Ω more than without, at any velocity of the straight link; modes are uncoupled again."""
+    rng = np.random.default_rng(4)
+    bare = from_modal_body("upper", modal_body("links/upper.toml"))
+    center, J, m = np.array([0.03, -0.02, 0.05]), np.diag([2e-3, 3e-3, 4e-3]), 0.6
+    loaded = with_payload(bare, "tip", m, center, J)
+    v = rng.standard_normal(6 + bare.n_modes)
+    p_dot = loaded.modal_transform @ v[6:]
+    A = np.eye(3)
+
+    def energy(body, v):
+        return 0.5 * v @ body_mass_matrix(body, A, np.zeros(body.n_modes), no_stiffening(body)) @ v
+
+    at = bare.points["tip"]
+    Omega = v[3:6] + at.rotation @ p_dot
+    v_c = v[:3] + np.cross(v[3:6], at.position) + at.translation @ p_dot + np.cross(Omega, center)
+    expected = energy(bare, np.concatenate([v[:6], p_dot])) + 0.5 * m * v_c @ v_c + 0.5 * Omega @ J @ Omega
+    assert energy(loaded, v) == pytest.approx(expected, rel=1e-12)
+    K = loaded.modal_transform.T @ np.diag(bare.stiffness) @ loaded.modal_transform
+    np.testing.assert_allclose(K, np.diag(loaded.stiffness), atol=1e-9 * loaded.stiffness.max())
+    assert np.all(loaded.stiffness < bare.stiffness * (1 + 1e-12))

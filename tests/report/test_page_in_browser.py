@@ -139,7 +139,7 @@ def test_histories_show_what_the_file_holds(paused, two_link):
     curve = "document.querySelector('[data-chart=\"deflection_link2.tip\"]').data.find((d) => d.name === 'inverse')"
     # Plotly decodes the binary text into a typed array of its own.
     drawn = np.array(paused.value(f"Array.from({curve}._inputArray || {curve}.y._inputArray || {curve}.y)"))
-    expected = two_link.file["inverse/points/link2.tip/deflection"][:, 1]
+    expected = 1e3 * two_link.file["inverse/points/link2.tip/deflection"][:, 1]  # in mm
     np.testing.assert_allclose(drawn, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 

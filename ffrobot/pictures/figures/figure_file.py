@@ -36,6 +36,10 @@ class Curve(Record):
     name of its column."""
     label: str
     """In the legend."""
+    x: str | None = None
+    """Dataset of the horizontal axis in place of the time, or one of its columns: "inverse/joints/A/rate"."""
+    magnitude: bool = False
+    """Length of the vectors of the dataset in place of their components."""
     file: InputFile | None = None
     """CSV file whose first column is the time (s), drawn as separate points."""
 
@@ -44,16 +48,17 @@ class FigureRecord(Record):
     """One figure. Axes without a range take that of the data; units stand in the labels of the axes.
 
     Kinds: "time" draws its curves over time; "path" draws (x, y) datasets against each other; "configurations" draws
-    the bodies of `analysis` at `times` (s), and its curves as paths. Of a linear `analysis`, at the first of `times`:
-    "bode" draws the frequency responses of `transfers` [input, output], "modes" the mode shapes of the robot;
-    "placement" the patches that an analysis of that kind found.
+    the bodies of `analysis` at `times` (s), and its curves as paths; "torque-speed" draws its curves over their `x`,
+    and the limits of the motor of `joint`. Of a linear `analysis`, at the first of `times`: "bode" draws the frequency
+    responses of `transfers` [input, output], "modes" the mode shapes of the robot; "placement" the patches that an
+    analysis of that kind found.
     """
 
     name: FileName
     """Of the files, without suffix."""
     title: str = ""
     """Above the axes."""
-    kind: Literal["time", "path", "configurations", "bode", "modes", "placement"] = "time"
+    kind: Literal["time", "path", "configurations", "torque-speed", "bode", "modes", "placement"] = "time"
     """What is drawn; see above."""
     transfers: tuple[tuple[str, str], ...] = ()
     """Pairs [input, output] of the linear model for kind = "bode"."""
@@ -61,16 +66,22 @@ class FigureRecord(Record):
     """What is drawn over time or as paths."""
     analysis: str | None = None
     """Of which the robot, its modes, responses or patches are drawn."""
+    joint: str | None = None
+    """Whose motor has the limits of kind = "torque-speed"."""
     times: tuple[float, ...] = ()
     """Instants of the configurations, s."""
+    x_label: str = "time (s)"
+    """Of the horizontal axis, with its unit, in kind = "time" and "torque-speed"."""
     y_label: str = ""
     """Of the vertical axis, with its unit."""
+    scale: float = 1.0
+    """What values are multiplied by, in kind = "time" and "torque-speed": 1000 for mm."""
     x_range: Range | None = None
     """Of the horizontal axis; by default that of the data."""
     y_range: Range | None = None
     """Of the vertical axis; by default that of the data."""
     limits: tuple[float, ...] = Field(default=())
-    """Values at which horizontal lines are drawn, such as a voltage limit."""
+    """Values at which horizontal lines are drawn, such as a voltage limit; in units of the axis."""
 
     @model_validator(mode="after")
     def _consistent(self) -> FigureRecord:
@@ -82,8 +93,10 @@ class FigureRecord(Record):
             raise ValueError(
                 f'expected the key "transfers" in kind = "bode" and only there, found kind = "{self.kind}"'
             )
-        if self.kind in ("time", "path") and not self.curves:
+        if self.kind in ("time", "path", "torque-speed") and not self.curves:
             raise ValueError(f'expected the key "curves" in kind = "{self.kind}", found none')
+        if self.kind == "torque-speed" and (self.joint is None or any(curve.x is None for curve in self.curves)):
+            raise ValueError('expected the key "joint", and "x" in every curve, in kind = "torque-speed"')
         return self
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import fnmatch
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from typing import TypeVar
 
 from matplotlib.figure import Figure
 
 from ...common.errors import InputError, of_file
 from ...common.files import check_folder, write_atomically
+from ...common.validation import did_you_mean, quoted
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from .body_shape import draw_mesh, draw_modes
@@ -23,12 +26,14 @@ from .placement import draw_placement
 from .standard import standard_figures
 from .style import literal, new_axes, style
 from .time_history import draw_time_history
+from .torque_speed import draw_torque_speed
 
 DRAW = {
     "time": draw_time_history,
     "path": draw_path,
     "configurations": draw_configurations,
     "placement": draw_placement,
+    "torque-speed": draw_torque_speed,
 }
 
 DRAW_WHOLE = {"bode": draw_bode, "modes": draw_robot_modes}  # with axes of their own
@@ -42,14 +47,14 @@ METADATA = {
 FORMATS = ("png", "pdf")  # unless asked for otherwise
 
 
-def plot_file(path: Path, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+def plot_file(path: Path, folder: Path, formats: Sequence[str] = FORMATS, only: Sequence[str] = ()) -> list[Path]:
     """Draw the figures of a results file or of a modal body file, whichever it is, into `folder`: see the two."""
     plot = plot_modal_body if is_modal_body_file(path) else plot_results
-    return plot(path, folder, formats)
+    return plot(path, folder, formats, only)
 
 
-def plot_modal_body(path: Path, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """Draw mesh and lowest modes of a modal body file into `folder`, which is made when absent.
+def plot_modal_body(path: Path, folder: Path, formats: Sequence[str] = FORMATS, only: Sequence[str] = ()) -> list[Path]:
+    """Draw mesh and lowest modes of a modal body file into `folder`, which is made when absent; see `plot_results`.
 
     Returns the files written, each figure in all `formats`: "png", "pdf", "svg". Raises `InputError` where the file
     cannot be read, or for another format.
@@ -58,16 +63,21 @@ def plot_modal_body(path: Path, folder: Path, formats: Sequence[str] = FORMATS) 
     _check_formats(formats)
     body = read_modal_body(path)
     with style():
+        wanted = chosen({"mesh": draw_mesh, "modes": draw_modes}, only)
         return [
-            *write_figure(literal(draw_mesh(body)), folder, "mesh", formats),
-            *write_figure(literal(draw_modes(body)), folder, "modes", formats),
+            path
+            for name, draw_it in wanted.items()
+            for path in write_figure(literal(draw_it(body)), folder, name, formats)
         ]
 
 
-def plot_results(results_path: Path, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+def plot_results(
+    results_path: Path, folder: Path, formats: Sequence[str] = FORMATS, only: Sequence[str] = ()
+) -> list[Path]:
     """Draw the figures of a results file into `folder`, which is made when absent.
 
     A file `figures.toml` beside the results says which figures and how; without one, the standard figures are drawn.
+    `only` are names of those that are wanted, or patterns such as "moment_*"; all are where there are none.
     Returns the files written, each figure in all `formats`: "png", "pdf", "svg". Raises `InputError` where the results
     or `figures.toml` cannot be read, or name what is not there, or for another format.
     """
@@ -77,14 +87,42 @@ def plot_results(results_path: Path, folder: Path, formats: Sequence[str] = FORM
     written: list[Path] = []
     with Results(results_path) as results, style():
         if figure_file.is_file():
-            for record in load_figures(figure_file).figure:
+            for record in _records(load_figures(figure_file).figure, only):
                 label = f'{figure_file}: figure "{record.name}"'
                 with of_file(label), _formulas(label):
                     written += write_figure(draw(record, results), folder, record.name, formats)
         else:
-            for record in standard_figures(results):
+            for record in _records(standard_figures(results), only):
                 written += write_figure(literal(draw(record, results)), folder, record.name, formats)
     return written
+
+
+T = TypeVar("T")
+
+
+def _records(figures: Sequence[FigureRecord], only: Sequence[str]) -> list[FigureRecord]:
+    """Those that are wanted, names that come twice included."""
+    names = chosen(dict.fromkeys(figure.name for figure in figures), only)
+    return [figure for figure in figures if figure.name in names]
+
+
+def chosen(figures: Mapping[str, T], only: Sequence[str]) -> dict[str, T]:
+    """The figures whose name is one of `only`, or like one; all without.
+
+    Raises `InputError` for a pattern that none is like.
+    """
+    for pattern in only:
+        if not any(fnmatch.fnmatchcase(name, pattern) for name in figures):
+            raise InputError(
+                f"--only: expected the name of a figure, or a pattern that fits one ({quoted(figures)}), found"
+                f' "{pattern}"{did_you_mean(pattern, figures)}'
+            )
+    patterns = only or ["*"]
+    return {
+        name: figure
+        for name, figure in figures.items()
+        if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+    }
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Reading the points that a figure compares results with."""
+"""Reading what a figure draws: curves of results, and points that they are compared with."""
 
 from __future__ import annotations
 
@@ -9,6 +9,22 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...results.file import Results
+from .figure_file import Curve
+
+
+def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, Array]:
+    """Of a curve over time (s), or over its `x`: x (T,), and `scale` times its values (T, columns)."""
+    values = results.data(curve.data)
+    if curve.magnitude:
+        values = np.linalg.norm(values, axis=1)[:, None]
+    x = results.time(curve.data) if curve.x is None else results.data(curve.x)[:, 0]
+    if len(x) != len(values):
+        raise InputError(
+            f'{results.path}: expected as many values in "{curve.x}" as in "{curve.data}" ({len(values)}), found'
+            f" {len(x)}"
+        )
+    return x, scale * values
 
 
 def read_points(path: Path, column: str) -> tuple[Array, Array]:

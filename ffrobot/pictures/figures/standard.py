@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...results.file import Results
+from ..torque_speed import coordinate_unit, force_unit, motor_limits
 from .figure_file import Curve, FigureRecord
 
 SNAPSHOTS = 5
@@ -21,9 +22,8 @@ def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
             *_paths(results),
             *_angles(results),
             *_deflections(results),
-            *_over_time(results, "trajectories", "force", "force (N), moment (N·m)", "force along trajectory"),
-            *_over_time(results, "joints", "moment", "moment (N·m), force (N)", "motor of joint"),
-            *_over_time(results, "joints", "reaction", "reaction (N)", "reaction of joint"),
+            *_trajectory_forces(results),
+            *_joints(results),
             *_voltages(results),
             *_tip_errors(results),
             *_linear(results),
@@ -32,7 +32,9 @@ def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
 
 
 def _configurations(results: Results) -> Iterator[FigureRecord]:
-    for analysis in results.analyses:
+    """Of the first analysis that goes through time, else the first: in others the robot is hardly elsewhere."""
+    moving = [analysis for analysis in results.analyses if len(results.time(analysis)) > 1]
+    for analysis in [*moving, *results.analyses][:1]:
         times = results.time(f"{analysis}/time")
         snapshots = np.linspace(times[0], times[-1], SNAPSHOTS if len(times) > 1 else 1)
         yield FigureRecord(
@@ -83,25 +85,74 @@ def _deflections(results: Results) -> Iterator[FigureRecord]:
             curves = tuple(Curve(data=name, label=name.split("/")[0]) for name in datasets)
             title = f"transverse deflection of {point}"
             yield FigureRecord(
-                name=file_name("deflection", point), title=title, curves=curves, y_label="deflection (m)"
+                name=file_name("deflection", point), title=title, curves=curves, y_label="deflection (mm)", scale=1e3
             )
 
 
-def _over_time(results: Results, group: str, dataset: str, y_label: str, title: str) -> Iterator[FigureRecord]:
-    for member in _members(results, group):
-        curves: list[Curve] = []
+def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
+    """What holds points and angles on their paths; along a joint it is what its motor does, which is drawn anyway."""
+    for trajectory in results.scene.get("trajectory", []):
+        name, joint = trajectory["name"], trajectory.get("joint")
+        curves = []
         for analysis in results.analyses:
-            name = f"{analysis}/{group}/{member}/{dataset}"
-            if not results.has(name):
+            group = f"{analysis}/trajectories/{name}"
+            if not results.has(f"{group}/force") or (joint and results.has(f"{analysis}/joints/{joint}/moment")):
                 continue
-            columns = results.data(name).shape[1]
+            components = [str(each) for each in results.attributes(group)["components"]]
+            several = len(components) > 1
             curves += [
-                Curve(data=f"{name}[{k}]", label=analysis + (f", {'xy'[k]}" if columns == 2 else ""))
-                for k in range(columns)
+                Curve(data=f"{group}/force[{k}]", label=analysis + (f", {component}" if several else ""))
+                for k, component in enumerate(components)
             ]
         if curves:
-            name = file_name(dataset, member)
-            yield FigureRecord(name=name, title=f"{title} {member}", curves=tuple(curves), y_label=y_label)
+            is_force = "point" in trajectory or (joint is not None and force_unit(results, joint) == "N")
+            y_label, title = "force (N)" if is_force else "moment (N·m)", f"force along trajectory {name}"
+            yield FigureRecord(name=file_name("force", name), title=title, curves=tuple(curves), y_label=y_label)
+
+
+def _joints(results: Results) -> Iterator[FigureRecord]:
+    """Coordinate, moment, moment over speed, and size of the reaction, of every joint."""
+    for joint in _members(results, "joints"):
+        unit, coordinate = force_unit(results, joint), coordinate_unit(results, joint)
+        force = "moment" if unit == "N·m" else "force"
+        moved = _curves(results, f"joints/{joint}/coordinate")
+        if any(np.ptp(results.data(curve.data)) for curve in moved):
+            title, y_label = f"joint {joint}", f"{'angle' if coordinate == 'rad' else 'way'} ({coordinate})"
+            yield FigureRecord(name=file_name("coordinate", joint), title=title, curves=moved, y_label=y_label)
+        if driven := _curves(results, f"joints/{joint}/moment"):
+            limit = motor_limits(results, joint).moment
+            title, lines = f"motor of joint {joint}", _both_ways(limit) if np.isfinite(limit) else ()
+            yield FigureRecord(
+                name=file_name("moment", joint), title=title, curves=driven, y_label=f"{force} ({unit})", limits=lines
+            )
+            yield from _torque_speed(results, joint, f"{force} ({unit})", f"speed ({coordinate}/s)")
+        if held := _curves(results, f"joints/{joint}/reaction", magnitude=True):
+            title = f"size of the reaction of joint {joint}"
+            yield FigureRecord(name=file_name("reaction", joint), title=title, curves=held, y_label="reaction (N)")
+
+
+def _torque_speed(results: Results, joint: str, y_label: str, x_label: str) -> Iterator[FigureRecord]:
+    curves = []
+    for analysis in results.analyses:
+        moment, rate = (f"{analysis}/joints/{joint}/{dataset}" for dataset in ("moment", "rate"))
+        if results.has(moment) and results.has(rate) and len(results.time(analysis)) > 1:
+            curves.append(Curve(data=moment, x=rate, label=analysis))
+    if curves:
+        yield FigureRecord(
+            name=file_name("torque_speed", joint),
+            title=f"motor of joint {joint} over its speed",
+            kind="torque-speed",
+            joint=joint,
+            curves=tuple(curves),
+            x_label=x_label,
+            y_label=y_label,
+        )
+
+
+def _curves(results: Results, dataset: str, *, magnitude: bool = False) -> tuple[Curve, ...]:
+    """That dataset of every analysis that has it."""
+    names = ((analysis, f"{analysis}/{dataset}") for analysis in results.analyses)
+    return tuple(Curve(data=name, label=a, magnitude=magnitude) for a, name in names if results.has(name))
 
 
 def _voltages(results: Results) -> Iterator[FigureRecord]:
@@ -123,7 +174,9 @@ def _tip_errors(results: Results) -> Iterator[FigureRecord]:
     """Of all closed loops in one figure."""
     curves = tuple(Curve(data=f"{a}/tip_error", label=a) for a in results.analyses if results.has(f"{a}/tip_error"))
     if curves:
-        yield FigureRecord(name="tip_error", title="tip, distance from its place", curves=curves, y_label="error (m)")
+        yield FigureRecord(
+            name="tip_error", title="tip, distance from its place", curves=curves, y_label="error (mm)", scale=1e3
+        )
 
 
 def _linear(results: Results) -> Iterator[FigureRecord]:
@@ -154,8 +207,10 @@ def _linear(results: Results) -> Iterator[FigureRecord]:
 
 
 def _members(results: Results, group: str) -> list[str]:
-    """Names in a group of any analysis, each once."""
-    return list(dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/{group}")))
+    """Names in a group of any analysis, each once, in the order of the scene."""
+    order = [keys["name"] for table in ("body", "joint") for keys in results.scene.get(table, [])]
+    names = dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/{group}"))
+    return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
 
 
 def _both_ways(limit: float | list[float]) -> tuple[float, ...]:

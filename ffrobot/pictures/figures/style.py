@@ -53,8 +53,13 @@ def new_axes(title: str) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def line_style(k: int, points: int) -> dict[str, Any]:
-    """Style of the k-th curve, of so many `points`: sparse markers and dashes keep curves that coincide apart."""
+def line_style(k: int, points: int, *, alone: bool = False) -> dict[str, Any]:
+    """Style of the k-th curve, of so many `points`: sparse markers and dashes keep curves that coincide apart.
+
+    A curve that is `alone` has none: on one that rings they look like samples.
+    """
+    if alone and points > 1:
+        return {"color": COLORS[k % len(COLORS)]}
     every = max(1, points // MARKERS_A_CURVE)
     return {
         "color": COLORS[k % len(COLORS)],
@@ -85,8 +90,11 @@ def literal(figure: Figure) -> Figure:
 
 
 def legend(axes: Axes) -> None:
-    """A legend below the axes, where it hides nothing, in as many columns as its texts leave room for."""
+    """A legend below the axes, where it hides nothing, in as many columns as its texts leave room for.
+
+    One curve needs none.
+    """
     labels = axes.get_legend_handles_labels()[1]
-    if labels:
+    if len(labels) > 1:
         columns = max(1, min(len(labels), LEGEND_CHARACTERS // (max(map(len, labels)) + 6)))
         axes.figure.legend(loc="outside lower center", ncols=columns, handlelength=1.8, columnspacing=1.0)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from ...results.file import Results
 from .figure_file import Curve, FigureRecord
 from .palette import COLORS
-from .reading import read_points
+from .reading import curve_points, read_points
 from .style import legend, line_style, shades
 
 
@@ -18,19 +18,19 @@ def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> Non
             time, values = read_points(curve.file, curve.data)
             axes.plot(time, values, "x", color="black", markersize=5, zorder=4, label=curve.label)
         else:
-            _draw_columns(axes, curve, k, results)
+            _draw_columns(axes, curve, k, figure, results)
     for k, limit in enumerate(figure.limits):
-        axes.axhline(limit, color=COLORS[1], linestyle=":", label="limit" if k == 0 else None)
-    axes.set_xlabel("time (s)")
+        axes.axhline(limit, color=COLORS[1], linestyle="--", label="limit" if k == 0 else None)
+    axes.set_xlabel(figure.x_label)
     axes.set_ylabel(figure.y_label)
     legend(axes)
 
 
-def _draw_columns(axes: Axes, curve: Curve, k: int, results: Results) -> None:
-    time, values = results.time(curve.data), results.data(curve.data)
+def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, results: Results) -> None:
+    time, values = curve_points(results, curve, figure.scale)
     axes.margins(x=0)
     if values.shape[1] == 1:
-        axes.plot(time, values[:, 0], label=curve.label, **line_style(k, len(values)))
+        axes.plot(time, values[:, 0], label=curve.label, **line_style(k, len(values), alone=len(figure.curves) == 1))
         return
     for column, color in enumerate(shades(values.shape[1])):
         axes.plot(time, values[:, column], color=color, linewidth=0.7, label=f"{curve.label} {column + 1}")

@@ -45,6 +45,8 @@ class Chart:
         """Add a curve y(x)."""
         mode = "lines" if len(y) > 1 else "markers"
         self.traces.append({"type": "scatter", "mode": mode, "name": plain(label), **_coordinates(x, y), **style})
+        if mode == "lines":  # else Plotly leaves out points that it takes for straight: corners on smooth curves
+            self.traces[-1]["line"] = {**self.traces[-1].get("line", {}), "simplify": False}
 
     @property
     def layout(self) -> dict[str, Any]:
@@ -52,7 +54,7 @@ class Chart:
         lines = [
             {
                 "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": limit, "y1": limit,
-                "line": {"color": COLORS[1], "dash": "dot"},
+                "line": limit_style(),
             }
             for limit in self.limits
         ]  # fmt: skip
@@ -85,6 +87,11 @@ def encoded(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
     return entry
 
 
+def limit_style() -> dict[str, Any]:
+    """Of lines that say what a motor or a patch can do."""
+    return {"color": COLORS[1], "dash": "dash", "width": 1.5}
+
+
 def style(k: int) -> dict[str, Any]:
     """Colour, dashes and width of the k-th curve of a chart: thinner and thinner, so that none hides another."""
     width = max(1.2, 3.6 * 0.75**k)
@@ -100,7 +107,7 @@ def shades(count: int) -> list[str]:
 
 def kept_outputs(values: Array) -> np.ndarray[Any, np.dtype[np.intp]]:
     """Which of many points (T,) a curve is drawn through: all, or the least and the largest of each stretch."""
-    if len(values) <= MAX_POINTS:
+    if len(values) <= MAX_POINTS or np.isnan(values).any():
         return np.arange(len(values))
     edges = np.linspace(0, len(values), MAX_POINTS // 2, dtype=np.intp)
     stretches = [np.arange(a, b) for a, b in pairwise(edges)]

@@ -9,8 +9,10 @@ import numpy as np
 from ...common.arrays import Array
 from ...results.file import Results
 from ..figures.figure_file import Curve, FigureRecord
+from ..figures.reading import curve_points
 from ..figures.standard import file_name, standard_figures
-from .charts import DASHES, Chart, shades, style
+from ..torque_speed import limit_curves, motor_limits
+from .charts import DASHES, Chart, limit_style, shades, style
 from .runs import Run, Target, runs, sources, targets
 
 ENERGIES = ("kinetic", "strain", "gravitational")
@@ -21,32 +23,46 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
     charts = {chart.name: chart for chart in _path_errors(files)}
     for number, (results, source) in enumerate(zip(files, sources(files), strict=True)):
         for record in (*standard_figures(results), *_energy_figures(results)):
-            if record.kind == "configurations":  # the mechanism moves instead
+            if record.kind == "configurations" or not record.curves:  # the mechanism moves instead; no histories
                 continue
             chart = charts.setdefault(record.name, _empty(record))
             for curve in record.curves:
                 _add(chart, results, record, curve, source, DASHES[number % len(DASHES)])
+            if record.joint is not None:
+                _add_limits(chart, results, record, source)
     return list(charts.values())
 
 
 def _empty(record: FigureRecord) -> Chart:
     if record.kind == "path":
         return Chart(record.name, record.title, record.y_label or "y (m)", x_label="x (m)", equal_axes=True)
-    return Chart(record.name, record.title, record.y_label, limits=record.limits)
+    return Chart(record.name, record.title, record.y_label, record.x_label, limits=record.limits)
 
 
 def _add(chart: Chart, results: Results, record: FigureRecord, curve: Curve, source: str, dash: str) -> None:
     """Add what `curve` draws: one line, or a shade for each column of its dataset."""
     label = f"{source}: {curve.label}" if source else curve.label
-    values = results.data(curve.data)
     if record.kind == "path":
+        values = results.data(curve.data)
         chart.add(label, values[:, 0], values[:, 1], **style(len(chart.traces)))
-    elif values.shape[1] == 1:
-        chart.add(label, results.time(curve.data), values[:, 0], **style(len(chart.traces)))
+        return
+    x, values = curve_points(results, curve, record.scale)
+    if values.shape[1] == 1:
+        chart.add(label, x, values[:, 0], **style(len(chart.traces)))
     else:
         for k, color in enumerate(shades(values.shape[1])):
             line = {"color": color, "width": 1, "dash": dash}
-            chart.add(f"{label} {k + 1}", results.time(curve.data), values[:, k], line=line)
+            chart.add(f"{label} {k + 1}", x, values[:, k], line=line)
+
+
+def _add_limits(chart: Chart, results: Results, record: FigureRecord, source: str) -> None:
+    """What the motor of the joint of a torque-speed diagram can do."""
+    assert record.joint is not None
+    points = [curve_points(results, curve, record.scale) for curve in record.curves]
+    speed, moment = (max(float(abs(pair[i]).max()) for pair in points) for i in (0, 1))
+    limits = limit_curves(motor_limits(results, record.joint), speed, moment)
+    if len(limits):
+        chart.add(f"{source}: limits" if source else "limits", *limits.T, line=limit_style())
 
 
 def _energy_figures(results: Results) -> Iterator[FigureRecord]:
@@ -68,9 +84,9 @@ def _path_errors(files: Sequence[Results]) -> list[Chart]:
         time = run.results.time(run.analysis)
         for target in targets(run):
             name, title = target.trajectory, f"distance of {target.point} from its path"
-            chart = charts.setdefault(name, Chart(file_name("error", name), title, "distance (m)"))
+            chart = charts.setdefault(name, Chart(file_name("error", name), title, "distance (mm)"))
             error = path_error(run, target)
-            chart.add(run.label, time[: len(error)], error, **style(len(chart.traces)))
+            chart.add(run.label, time[: len(error)], 1e3 * error, **style(len(chart.traces)))
     return list(charts.values())
 
 

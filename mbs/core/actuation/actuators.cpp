@@ -1,5 +1,7 @@
 #include "core/actuation/actuators.h"
 
+#include "core/actuation/side_by_side.h"
+
 #include <algorithm>
 
 namespace ffrobot {
@@ -22,7 +24,10 @@ void Motors::act(const ActuationSource &source, Workspace &forward) {
 
 void Patches::act(const ActuationSource &source, Workspace &forward) {
   forward.has_external_modal = true;
-  forward.external_modal[body_].noalias() = allocation_.Phi() * allocation_.solve(source.modal_force()[body_]);
+  collect(source.modal_force(), body_, force_);
+  const Eigen::VectorXd &V = allocation_.solve(force_);
+  force_.noalias() = allocation_.Phi() * V;
+  distribute(force_, body_, forward.external_modal);
 }
 
 void PointForces::act(const ActuationSource &source, Workspace &forward) {

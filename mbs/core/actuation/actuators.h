@@ -41,15 +41,18 @@ private:
   Eigen::VectorXd limit_;
 };
 
-// The modal forces of one body, as far as its patches can produce them within their limits.
+// The modal forces of one link, as far as its patches can produce them within their limits. The link is one body, or in
+// pieces: the bodies from `body` on whose modes the allocation has, side by side.
 class Patches final : public Actuator {
 public:
-  Patches(std::size_t body, Allocation allocation) : body_(body), allocation_(std::move(allocation)) {}
+  Patches(std::size_t body, Allocation allocation)
+      : body_(body), allocation_(std::move(allocation)), force_(allocation_.Phi().rows()) {}
   void act(const ActuationSource &source, Workspace &forward) override;
 
 private:
   std::size_t body_;
   Allocation allocation_;
+  Eigen::VectorXd force_;
 };
 
 // Q_a of one body as forces at its actuation points: two drives (global x and y) per component.

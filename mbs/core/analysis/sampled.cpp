@@ -1,5 +1,7 @@
 #include "core/analysis/sampled.h"
 
+#include "core/actuation/side_by_side.h"
+
 #include <algorithm>
 
 namespace ffrobot {
@@ -25,8 +27,17 @@ const VectorXd &Sensing::read(const double *q, const double *v, const double *a)
                      : order == 1 ? motion.rate
                                   : row_acceleration(system_, row, motion, q, a, workspace_);
   }
-  for (const auto &[body, vector, order] : modes_)
-    readings_[i++] = vector.dot(VectorMap((order == 0 ? q : v) + system_.first_coordinate[body] + 3, vector.size()));
+  for (const auto &[first, vector, order] : modes_) {
+    double reading = 0;
+    std::size_t body = first;
+    for (Index row = 0; row < vector.size(); ++body) {
+      const Index n = system_.bodies[body].modes();
+      const VectorMap p((order == 0 ? q : v) + system_.first_coordinate[body] + 3, n);
+      reading += vector.segment(row, n).dot(p);
+      row += n;
+    }
+    readings_[i++] = reading;
+  }
   return readings_;
 }
 
@@ -50,7 +61,7 @@ void HeldCommands::apply(double, Workspace &workspace) {
   std::copy(drive_.begin(), drive_.end(), workspace.external_drive.begin());
   workspace.has_external_modal = !patches_.empty();
   for (std::size_t i = 0; i < patches_.size(); ++i)
-    workspace.external_modal[patches_[i].first] = modal_[i];
+    distribute(modal_[i], patches_[i].first, workspace.external_modal);
 }
 
 namespace {

@@ -18,7 +18,7 @@ public:
   };
   struct OfModes {
     std::size_t body;
-    Eigen::VectorXd vector; // (n) reading = vector . p
+    Eigen::VectorXd vector; // reading = vector . p, p of the body, and of those after it where the vector is longer
     int order;              // 0 or 1
   };
 
@@ -42,7 +42,8 @@ private:
 // Motor forces on the first drives, in their order, and voltages of patches, all as they were last set.
 class HeldCommands final : public ExternalLoads {
 public:
-  using Patches = std::pair<std::size_t, Eigen::MatrixXd>; // body, Phi_V (n, k)
+  // body, Phi_V (n, k): n modes of that body, or of it and those after it
+  using Patches = std::pair<std::size_t, Eigen::MatrixXd>;
 
   HeldCommands(std::size_t motors, std::vector<Patches> patches);
 

@@ -1,0 +1,106 @@
+"""Rotations in space: rotation vectors, matrices (…, 3, 3), quaternions (…, 4) with the scalar first; angles in rad.
+
+φ~ is the matrix of the cross product. A section turns by exp φ~ (docs/theory.md), with Ω = J_l φ̇.
+"""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+
+from .arrays import Array
+
+TERMS = 20  # of the series below: rounding for |φ| up to 2π
+# Σ (−x)ᵏ/(2k + m)! by m, the highest power of x = φ² first: sin φ/φ, (1 − cos φ)/φ², (φ − sin φ)/φ³.
+_SERIES = {m: np.array([(-1) ** k / factorial(2 * k + m) for k in reversed(range(TERMS))]) for m in (1, 2, 3)}
+
+
+def skew(vectors: Array) -> Array:
+    """The matrices (…, 3, 3) of the cross product with `vectors` (…, 3)."""
+    x, y, z = np.moveaxis(np.asarray(vectors, dtype=float), -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def exponential(vectors: Array) -> Array:
+    """Exp φ~ (…, 3, 3) of rotation vectors φ (…, 3)."""
+    return np.eye(3) + _of_skew(vectors, 1, 2)
+
+
+def left_jacobian(vectors: Array) -> Array:
+    """J_l (…, 3, 3): exp(φ + δφ) = exp(J_l δφ) exp(φ) to first order."""
+    return np.eye(3) + _of_skew(vectors, 2, 3)
+
+
+def series(m: int, x: Array) -> tuple[Array, Array]:
+    """Σ (−x)ᵏ/(2k + m)! of x = φ² and its derivative: (1 − cos φ)/φ² for m = 2, (φ − sin φ)/φ³ for m = 3."""
+    coefficients = _SERIES[m]
+    return np.polyval(coefficients, x), np.polyval(coefficients[:-1] * np.arange(TERMS - 1, 0, -1), x)
+
+
+def _of_skew(vectors: Array, first: int, second: int) -> Array:
+    """The sum a φ~ + b φ~² with the series a and b of φ²."""
+    S, x = skew(vectors), np.sum(np.square(vectors), axis=-1)[..., None, None]
+    found: Array = np.polyval(_SERIES[first], x) * S + np.polyval(_SERIES[second], x) * (S @ S)
+    return found
+
+
+def of_quaternion(e: Array) -> Array:
+    """The matrices (…, 3, 3) of unit quaternions e (…, 4)."""
+    e0, v = e[..., 0, None, None], e[..., 1:]
+    outer = v[..., :, None] * v[..., None, :]
+    found: Array = (e0**2 - np.sum(v * v, axis=-1)[..., None, None]) * np.eye(3) + 2 * outer + 2 * e0 * skew(v)
+    return found
+
+
+def quaternions(C: Array) -> Array:
+    """Unit quaternions (…, 4), e0 ≥ 0, of matrices (…, 3, 3), from their largest component (Shepperd 1978)."""
+    trace = np.trace(C, axis1=-2, axis2=-1)
+    diagonal = np.diagonal(C, axis1=-2, axis2=-1)
+    squares = np.concatenate([1 + trace[..., None], 1 - trace[..., None] + 2 * diagonal], axis=-1)
+    axial = np.stack([C[..., 2, 1] - C[..., 1, 2], C[..., 0, 2] - C[..., 2, 0], C[..., 1, 0] - C[..., 0, 1]], axis=-1)
+    products = np.empty((*C.shape[:-2], 4, 4))  # 4 e eᵀ
+    products[..., 0, 0] = squares[..., 0]
+    products[..., 0, 1:] = products[..., 1:, 0] = axial
+    products[..., 1:, 1:] = C + np.swapaxes(C, -1, -2)
+    products[..., (1, 2, 3), (1, 2, 3)] = squares[..., 1:]
+    largest = squares.argmax(axis=-1)[..., None, None]
+    row = np.take_along_axis(products, np.broadcast_to(largest, (*C.shape[:-2], 1, 4)), axis=-2)[..., 0, :]
+    row = row / np.linalg.norm(row, axis=-1)[..., None]
+    found: Array = np.where(row[..., :1] < 0, -row, row)
+    return found
+
+
+def logarithm(C: Array) -> Array:
+    """The rotation vectors (…, 3) of matrices, of length π at most."""
+    e = quaternions(C)
+    size = np.linalg.norm(e[..., 1:], axis=-1)
+    angle = 2 * np.arctan2(size, e[..., 0])
+    factor = np.divide(angle, size, out=np.full_like(size, 2.0), where=size > 0)
+    found: Array = e[..., 1:] * factor[..., None]
+    return found
+
+
+def about(axis: int, angles: Array | float) -> Array:
+    """Rotations (…, 3, 3) about coordinate axis 0, 1 or 2 by `angles` (…)."""
+    return exponential(np.asarray(angles)[..., None] * np.eye(3)[axis])
+
+
+def of_rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """R_z(yaw) R_y(pitch) R_x(roll): about fixed axes x, y, z in this order, as in URDF."""
+    return about(2, yaw) @ about(1, pitch) @ about(0, roll)
+
+
+def smallest_turn(axis: Array) -> Array:
+    """The triad (3, 3), columns its axes, whose z is along `axis`: the smallest rotation that brings z there.
+
+    Of −z, a half turn about x.
+    """
+    z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    across = np.cross([0.0, 0.0, 1.0], z)
+    size = float(np.linalg.norm(across))
+    if size == 0.0:
+        return np.diag([1.0, np.sign(z[2]), np.sign(z[2])])
+    return exponential(across / size * np.arctan2(size, z[2]))

@@ -1,0 +1,169 @@
+"""A scene in space as a whole: its keys, what it refers to, and the one list of what space does not have yet."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+
+from ..common.errors import InputError
+from ..common.toml_files import load_toml, read_text
+from ..common.validation import did_you_mean, quoted, validate
+from ..fe_models.link_file import LinkTable, read_link
+from ..mbs.fields.derivatives import check_derivatives
+from ..mbs.fields.field_types import GROUND, NotEmpty
+from ..mbs.fields.functions import check_domain
+from ..mbs.fields.references import Reference, under
+from ..mbs.scene.analysis import Surroundings
+from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys, SpatialMechanismScene
+from .kinds import KINDS, Analysis
+
+AVAILABLE_KINDS = ("pcid",)
+
+# Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
+UNAVAILABLE = {
+    "": ("geometric_stiffening", "pzt", "actuation_points"),
+    "body": ("modes", "pieces"),
+    "trajectory": ("via", "profile", "shaper"),
+    "load": ("pzt", "voltage", "force"),
+}
+
+
+class SpatialSceneKeys(SpatialMechanismKeys):
+    """Everything a scene file in space may contain."""
+
+    analysis: Annotated[tuple[Analysis, ...], NotEmpty]
+    """What is computed, in this order."""
+
+    def references(self) -> Iterator[Reference]:
+        """All that records of the scene refer to, with their full keys."""
+        yield from super().references()
+        for analysis in self.analysis:
+            yield from under(f'analysis "{analysis.name}"', analysis.references())
+
+
+class SpatialScene(SpatialSceneKeys, SpatialMechanismScene):
+    """A validated scene in space, with the absolute `path` of its file and the raw `text` that results files carry."""
+
+
+def load_spatial_scene(path: Path) -> SpatialScene:
+    """Read and validate the scene file at `path`; paths in it come out relative to its folder.
+
+    Raises `InputError` with one line for each wrong key: file, key, expected, found.
+    """
+    return spatial_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
+
+
+def spatial_scene(data: dict[str, object], path: Path, text: str) -> SpatialScene:
+    """The validated scene of `data`, which was read from `path` as `text`."""
+    refused = [f"{path}: {problem}" for problem in _unavailable_keys(data)]
+    if refused:
+        raise InputError("\n".join(refused))
+    keys = validate(SpatialSceneKeys, data, path)
+    found = [f"{path}: {problem}" for problem in _problems(keys)]
+    if found:
+        raise InputError("\n".join(found))
+    for link in (body.link for body in keys.body):
+        if isinstance(link, LinkTable):
+            read_link(link)
+    _check_functions(keys, path)
+    return SpatialScene(**dict(keys), path=path.absolute(), text=text)
+
+
+def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
+    """Keys that only planar scenes have so far, before they are called unknown."""
+    for table, keys in UNAVAILABLE.items():
+        entries = [data] if not table else data.get(table, [])
+        for entry in entries if isinstance(entries, list) else []:
+            for key in keys:
+                if isinstance(entry, dict) and key in entry:
+                    of = f'{table} "{entry.get("name", "?")}": ' if table else ""
+                    yield f'{of}{key}: expected no such key in space = "spatial", found it: not available there yet'
+
+
+def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
+    """Everything in the scene that refers to something that does not exist or does not fit, a line each."""
+    for kind in ("body", "joint", "trajectory", "analysis"):
+        for name, count in Counter(record.name for record in getattr(scene, kind)).items():
+            if count > 1:
+                yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
+    yield from _reference_problems(scene)
+    yield from _not_available(scene)
+    for k, analysis in enumerate(scene.analysis):
+        for problem in analysis.problems(Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS)):
+            yield f'analysis "{analysis.name}": {problem}'
+        for need in analysis.needs():
+            if not getattr(scene, need.table, ()):
+                label = f'analysis "{analysis.name}": {need.key}'
+                yield f'{label}: expected at least one [[{need.table}]] for "{need.value}", found none'
+
+
+def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
+    bodies, joints = [body.name for body in scene.body], {joint.name: joint for joint in scene.joint}
+    if GROUND in bodies:
+        yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
+    for reference in scene.references():
+        name = reference.name
+        if reference.kind == "joint":
+            if name not in joints:
+                yield f'{reference.key}: expected one of the joints {quoted(joints)}, found "{name}"' + did_you_mean(
+                    name, joints
+                )
+            elif not (joints[name].units or joints[name].guess_units):
+                yield f'{reference.key}: expected a joint that moves, found "{name}", a {joints[name].type}'
+        elif (body := name.partition(".")[0]) not in bodies:
+            yield f'{reference.key}: expected one of the bodies {quoted(bodies)}, found "{body}"' + did_you_mean(
+                body, bodies
+            )
+
+
+def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
+    """The list of what the records can say and the program cannot do yet."""
+    for analysis in scene.analysis:
+        if analysis.kind not in AVAILABLE_KINDS:
+            yield (
+                f'analysis "{analysis.name}": kind: expected {quoted(AVAILABLE_KINDS)} in space = "spatial", found'
+                f' "{analysis.kind}", which is not available there yet'
+            )
+        elif analysis.is_checked:
+            yield f'analysis "{analysis.name}": check: expected none in space = "spatial", found it: not available yet'
+    for joint in scene.joint:
+        if getattr(joint, "stiffness", None) is not None:
+            yield f'{joint.label}: stiffness: expected none in space = "spatial", found it: not available there yet'
+        if not joint.units and getattr(joint, "motor", False):
+            yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
+        for key in ("rotor_inertia", "viscous_friction", "coulomb_friction"):
+            if getattr(joint, key, 0.0):
+                yield f'{joint.label}: {key}: expected none in space = "spatial", found it: not available there yet'
+    for k, load in enumerate(scene.load, 1):
+        loaded = next((joint for joint in scene.joint if joint.name == load.joint), None)
+        if loaded is not None and len(loaded.units) != 1:
+            yield f'load no. {k}: joint: expected one with a single coordinate, found "{loaded.name}", a {loaded.type}'
+
+
+def _check_functions(scene: SpatialSceneKeys, path: Path) -> None:
+    """Raise `InputError` for a function of time without a value at an output time at which it is needed."""
+    for analysis in scene.analysis:
+        times = np.clip(analysis.times, 0.0, analysis.last_time)
+        for trajectory in scene.trajectory:
+            label = f'{path}: trajectory "{trajectory.name}"'
+            functions = [(f"{label}: {component}", function) for component, function in trajectory.components.items()]
+            law = trajectory.orientation
+            functions += [] if law is None else [(f"{label}: {law.kind}", function) for function in law.functions]
+            for key, function in functions:
+                check_domain(function, times, key, 2)
+                if len(times) > 1:
+                    check_derivatives(function, float(times[-1]), key)
+            if law is not None and law.kind == "direction":
+                sizes = np.linalg.norm([function.sample(times)[0] for function in law.functions], axis=0)
+                if sizes.min() < 1e-9:
+                    raise InputError(
+                        f"{label}: direction: expected a direction at all times, found none at t ="
+                        f" {times[sizes.argmin()]:.9g} s"
+                    )
+        for k, load in enumerate(scene.load, 1):
+            for component, function in load.components.items():
+                check_domain(function, times, f"{path}: load no. {k}: {component}", 0)

@@ -1,0 +1,127 @@
+"""What all types of joints in space have in common: two triads, and how the outer one stands on the inner one.
+
+Triads coincide where the coordinates are zero. Motion is along and about z, of universal joints about x of the inner
+triad and y of the outer one. `q` (…, q_count) and `v` (…, freedoms) are the core's (mbs/core/recursion/joint): of
+single coordinates these themselves, of free orientations a quaternion, and the angular velocity in outer axes.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from ....common.arrays import Array
+from ....common.rotations import of_rpy, smallest_turn
+from ...fields.field_types import Quantity, Vector3
+from ..joint import JointKeys
+from ..transmission import Friction, MotorLimits
+
+Angles = tuple[Quantity, Quantity, Quantity]
+
+
+class Place(NamedTuple):
+    """The outer triad on the inner one: way d (…, 3) and axes C (…, 3, 3), columns, in axes of the inner one."""
+
+    d: Array
+    C: Array
+
+
+class Held(NamedTuple):
+    """One of what a joint holds where it closes a loop; axes 0, 1, 2 of the inner triad (`f`) and the outer one (`g`).
+
+    "point": three components of the way; "slide": the way along f; "dot": f and g are square.
+    """
+
+    kind: Literal["point", "slide", "dot"]
+    f: int = 0
+    g: int = 0
+
+
+POINT = Held("point")
+ALIGNED = (Held("dot", 0, 2), Held("dot", 1, 2))  # the axes z
+GUIDED = (Held("slide", 0), Held("slide", 1), *ALIGNED)
+NOT_TURNED = Held("dot", 0, 1)  # beside ALIGNED
+
+
+class SpatialJoint(JointKeys):
+    """A joint between two points, or a point and the ground, in space."""
+
+    at: Vector3 = (0.0, 0.0, 0.0)
+    """Where it sits on the ground, m, global axes."""
+    rpy: Angles = (0.0, 0.0, 0.0)
+    """Orientation of the second side's axes in the first's where the coordinate is zero: roll, pitch, yaw about fixed
+    axes, rad (or such as "90*deg")."""
+
+    units: ClassVar[tuple[str, ...]] = ()  # of its coordinates, "rad" or "m"
+    guess_units: ClassVar[tuple[str, ...]] = ()  # of the numbers by which [initial] gives its place, where those differ
+    q_count: ClassVar[int] = 0
+    freedoms: ClassVar[int] = 0
+    held: ClassVar[tuple[Held, ...] | None] = None  # None where it cannot close a loop
+
+    @property
+    def orientation(self) -> Array:
+        """R (3, 3): the second side's axes in those of the first where the coordinate is zero."""
+        return of_rpy(*self.rpy)
+
+    def triads(self) -> tuple[Array, Array]:
+        """Columns (3, 3): axes of the joint on its first side and on its second one, in the axes of the sections."""
+        return np.eye(3), self.orientation.T
+
+    def outward_triads(self, backwards: bool) -> tuple[Array, Array]:
+        """The triads on the inner side and on the outer one, which is the first of `between` if `backwards`."""
+        first, second = self.triads()
+        return (second, first) if backwards else (first, second)
+
+    @abstractmethod
+    def place(self, q: Array) -> Place:
+        """Where q (…, q_count) puts the outer triad."""
+
+    @abstractmethod
+    def motion(self, q: Array) -> Array:
+        """(…, 6, freedoms): velocity and angular velocity of the outer triad by v, in axes of the inner one."""
+
+    def turned_around(self, coordinates: Array) -> Array:
+        """Coordinates (…, k) with the sides exchanged: of the first on the second; done twice, the same again."""
+        return -coordinates
+
+    def state(self, coordinates: Array) -> Array:
+        """Q (q_count,) from the numbers by which the scene gives its place."""
+        return coordinates
+
+    def coordinates(self, q: Array) -> Array:
+        """Its coordinates (…, k) in the scene's order, from q (…, q_count); likewise rates from v."""
+        return q
+
+    # What a motor and a gear add; joints that can have them override this.
+
+    def has_motor(self, default: bool) -> bool:
+        """Whether a motor drives it; `default` where the scene leaves that open."""
+        return False
+
+    @property
+    def asks_for_motor(self) -> bool:
+        """Whether the scene says in so many words that it has a motor."""
+        return False
+
+    @property
+    def motor_limits(self) -> tuple[MotorLimits, ...]:
+        """What its motor can do, for each coordinate."""
+        return ()
+
+    @property
+    def position_limits(self) -> tuple[tuple[float, float], ...]:
+        """Least and largest value of each coordinate; infinite where the scene gives none."""
+        return ((-np.inf, np.inf),) * len(self.units)
+
+    @property
+    def frictions(self) -> tuple[Friction, ...]:
+        """Friction along each coordinate; empty where there is none."""
+        return ()
+
+
+def with_axis(axis: Vector3, orientation: Array) -> tuple[Array, Array]:
+    """Triads whose z is along `axis`, by the smallest turn on the first side; equal at zero coordinates."""
+    first = smallest_turn(np.array(axis))
+    return first, orientation.T @ first

@@ -1,0 +1,31 @@
+"""The types of joints that a scene in space may have."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from .cylindrical import SpatialCylindrical
+from .free import SpatialFree
+from .planar_joint import SpatialPlanar
+from .prismatic import SpatialPrismatic
+from .revolute import SpatialRevolute
+from .screw import SpatialScrew
+from .spherical import SpatialSpherical
+from .universal import SpatialUniversal
+from .weld import SpatialWeld
+
+AnySpatialJoint = Annotated[
+    SpatialRevolute
+    | SpatialPrismatic
+    | SpatialScrew
+    | SpatialCylindrical
+    | SpatialUniversal
+    | SpatialSpherical
+    | SpatialPlanar
+    | SpatialWeld
+    | SpatialFree,
+    Field(discriminator="type"),
+]
+"""The list of all types, told apart by the key `type`: a new one is a file beside this one and an entry here."""

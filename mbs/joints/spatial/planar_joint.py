@@ -1,0 +1,42 @@
+"""Planar joints: the second point moves in a plane of the first side, and the second side turns about its normal."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ....common.arrays import Array
+from ....common.rotations import about
+from .joint import ALIGNED, Held, Place
+from .moving_joint import AxialJoint
+
+
+class SpatialPlanar(AxialJoint):
+    """The second point moves in the plane across `axis`, the second side turns about it.
+
+    Coordinates: two ways (m) and the angle (rad). The ways are along the axes x and y that come with z along `axis` by
+    the smallest turn.
+    """
+
+    type: Literal["planar"]
+
+    units = ("m", "m", "rad")
+    q_count = 3
+    freedoms = 3
+    held = (Held("slide", 2), *ALIGNED)
+
+    def place(self, q: Array) -> Place:
+        """By q[0], q[1] along x, y, turned by q[2] about z."""
+        d = np.concatenate([q[..., :2], np.zeros((*q.shape[:-1], 1))], axis=-1)
+        return Place(d, about(2, q[..., 2]))
+
+    def motion(self, q: Array) -> Array:
+        """Along x and y, about z."""
+        return np.broadcast_to(np.eye(6)[:, [0, 1, 5]], (*q.shape[:-1], 6, 3))
+
+    def turned_around(self, coordinates: Array) -> Array:
+        """The way from the second side to the first, in the axes of the second."""
+        x, y, angle = np.moveaxis(coordinates, -1, 0)
+        c, s = np.cos(angle), np.sin(angle)
+        return np.stack([-(c * x + s * y), s * x - c * y, -angle], axis=-1)

@@ -1,0 +1,44 @@
+"""Revolute joints: two points coincide, the second side turns about an axis of the first."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ....common.arrays import Array
+from ....common.rotations import about
+from ...fields.field_types import NotNegative, Positive
+from .joint import ALIGNED, POINT, Place
+from .moving_joint import AxialJoint
+
+
+class SpatialRevolute(AxialJoint):
+    """Two points coincide, the second side turns about `axis` by its coordinate, rad.
+
+    As it is built: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body, its axis that of the joint, and
+    turns `gear_ratio` times as fast as the second side does on the first.
+    """
+
+    type: Literal["revolute"]
+    gear_ratio: Positive = 1.0
+    """Rotor turns per turn of the joint."""
+    rotor_inertia: NotNegative = 0.0
+    """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
+    stiffness: Positive | None = None
+    """Of a gear that gives, N·m/rad; rigid where it is left out."""
+    damping: NotNegative = 0.0
+    """Of that gear, N·m·s/rad."""
+
+    units = ("rad",)
+    q_count = 1
+    freedoms = 1
+    held = (POINT, *ALIGNED)
+
+    def place(self, q: Array) -> Place:
+        """Turned by q[0] about z."""
+        return Place(np.zeros((*q.shape[:-1], 3)), about(2, q[..., 0]))
+
+    def motion(self, q: Array) -> Array:
+        """Turning about z."""
+        return np.broadcast_to(np.eye(6)[:, 5:], (*q.shape[:-1], 6, 1))

@@ -1,0 +1,71 @@
+"""A link in pieces as the one link: what modal coordinates of the link are in those of its pieces, and back.
+
+A link that bends as its modes say bends every piece, seen from the chord of that piece. Of the shapes of a piece those
+coordinates are taken that leave the least strain energy of the difference; since a piece has the static shapes of
+moments at its ends, the rotations of its ends are then those of the link (what is orthogonal in energy to a load's
+static shape does no work with that load), and so are turns of sections from cut to cut along the whole link.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...fe_models.modal_body import ModalBody
+from .planar_body import PlanarBody
+
+INTERVALS = 32  # of a piece, over which strains are taken as constant
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece, a body of its own: where it begins, m from the root of the link, and its modal body."""
+
+    start: float
+    modal: ModalBody
+    planar: PlanarBody
+
+
+@dataclass(frozen=True)
+class DividedLink:
+    """The n modal coordinates of a link and the N of its pieces, side by side from the root to the tip.
+
+    Attributes:
+        bodies: names of the pieces.
+        spread: (N, n) p of the pieces where the link bends in its modes. Its transpose makes modal forces on the link
+            of those on the pieces: virtual work.
+        gathered: (n, N) p of the link that are nearest to those of the pieces, in strain energy.
+    """
+
+    bodies: tuple[str, ...]
+    spread: Array
+    gathered: Array
+
+
+def divided_link(link: ModalBody, planar: PlanarBody, pieces: Sequence[Piece]) -> DividedLink:
+    """Of a link and its pieces, each with its equations."""
+    spread = np.vstack([_shape_in_piece(link, planar, piece) for piece in pieces])
+    weighted = spread.T * np.concatenate([piece.planar.stiffness for piece in pieces])
+    names = tuple(piece.planar.name for piece in pieces)
+    return DividedLink(names, spread, np.linalg.solve(weighted @ spread, weighted))
+
+
+def _shape_in_piece(link: ModalBody, planar: PlanarBody, piece: Piece) -> Array:
+    """P (m, n) of a piece, m its modes, for the modes of the link: least strain energy of the difference."""
+    x = np.linspace(0.0, piece.modal.length, INTERVALS + 1)
+    of_link = _strains(link, planar, np.minimum(piece.start + x, link.length))
+    of_piece = _strains(piece.modal, piece.planar, x)
+    rigidity = piece.modal.stations.rigidity
+    EA, EI = (1.0, 1.0) if rigidity is None else rigidity.mean(axis=0)
+    weight = np.sqrt(np.repeat([EI, EA], INTERVALS))[:, None]
+    return np.asarray(np.linalg.lstsq(weight * of_piece, weight * of_link, rcond=None)[0])
+
+
+def _strains(modal: ModalBody, planar: PlanarBody, x: Array) -> Array:
+    """(2 · intervals, n) changes of section rotation, then of the displacement along the axis, between places x (m)."""
+    places = [modal.interpolate(at) for at in x]
+    rows = np.array([[at.rotation[2] for at in places], [at.translation[0] for at in places]])
+    return np.asarray(np.diff(rows, axis=1).reshape(2 * INTERVALS, -1) @ planar.modal_transform)

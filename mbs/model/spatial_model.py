@@ -1,0 +1,213 @@
+"""From a scene in space and its bodies to a tree, and to the rows of constraints that close loops or follow paths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ...common.rotations import logarithm
+from ...common.validation import did_you_mean, quoted
+from .._core import TimeFunction
+from ..fields.orientations import OrientationLaw
+from ..joints.spatial.joint import SpatialJoint
+from ..scene.spatial.mechanism import SpatialMechanismScene
+from ..scene.spatial.trajectories import SpatialTrajectory
+from .spatial_body import SpatialBody
+from .spatial_tree import Motion, Section, SpatialTree
+
+RowKind = Literal["point", "slide", "dot", "rotation", "coordinate"]
+
+
+@dataclass(frozen=True)
+class SpatialRow:
+    """One constraint: a measure of section b on section a that follows `target`, or is 0.
+
+    Attributes:
+        owner: the joint or trajectory.
+        kind: "point", f·(r_b − r_a) with f in global axes; "slide", the same with f in axes of a; "dot", f·g with f in
+            axes of a and g in axes of b; "rotation", the turn of b against a about f, global axes; "coordinate", the
+            joint coordinate v[coordinate], `sign` times.
+        target: of points and coordinates.
+        law: an orientation in time: of "rotation" rows that of a, whose triad is then A(t); of "dot" rows that of b.
+    """
+
+    owner: str
+    kind: RowKind
+    a: Section
+    b: Section
+    f: Array
+    g: Array
+    is_trajectory: bool = True
+    coordinate: int = -1
+    q_index: int = -1
+    sign: float = 1.0
+    target: TimeFunction | None = None
+    law: OrientationLaw | None = None
+
+    @property
+    def carries_moment(self) -> bool:
+        """Whether its multiplier is a moment."""
+        return self.kind in ("dot", "rotation")
+
+
+@dataclass(frozen=True)
+class SpatialModel:
+    """A scene in space with its bodies: everything analyses share."""
+
+    scene: SpatialMechanismScene
+    tree: SpatialTree
+    rows: tuple[SpatialRow, ...]
+
+    @property
+    def loop_rows(self) -> Array:
+        """(rows,) which rows close loops."""
+        return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
+
+    @property
+    def motors(self) -> dict[str, Array]:
+        """By joint with motors: indices in v of its coordinates, in the scene's order."""
+        found = {}
+        for joint in self.scene.motor_joints:
+            if joint.name not in self.tree.carried:
+                raise InputError(
+                    f"{self.scene.path}: {joint.label}: motor: expected a joint of the tree, found the one at which the"
+                    " loop is cut; list it before the others of its loop"
+                )
+            node = self.tree.nodes[self.tree.carried[joint.name]]
+            indices = np.arange(node.v.start, node.v.stop)
+            ordered = joint.coordinates(indices)
+            found[joint.name] = ordered[::-1] if node.backwards and joint.type == "universal" else ordered
+        return found
+
+    def sign(self, joint: str) -> float:
+        """−1 where the tree has a joint's coordinates the other way round."""
+        return -1.0 if self.tree.nodes[self.tree.carried[joint]].backwards else 1.0
+
+
+def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBody]) -> SpatialModel:
+    """Check that points exist, and lay out tree and rows. Raises `InputError` for what does not exist or fit."""
+    _check_points(scene, {body.name: body for body in bodies})
+    tree = SpatialTree(bodies, scene.joint, scene.topology)
+    rows = [row for joint in tree.loops for row in _loop_rows(scene, tree, joint)]
+    rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
+    return SpatialModel(scene, tree, tuple(rows))
+
+
+def _loop_rows(scene: SpatialMechanismScene, tree: SpatialTree, joint: SpatialJoint) -> Iterator[SpatialRow]:
+    if joint.held is None:
+        raise InputError(
+            f"{scene.path}: {joint.label}: expected another type of joint where a loop closes, found a {joint.type}"
+            " joint: list it before the other joints of its loop"
+        )
+    first, second = joint.triads()
+    a, b = tree.section(joint.between[0], first, joint.at), tree.section(joint.between[1], second, joint.at)
+    unit = np.eye(3)
+    for held in joint.held:
+        if held.kind == "point":
+            yield from (SpatialRow(joint.name, "point", a, b, e, e, is_trajectory=False) for e in unit)
+        else:
+            yield SpatialRow(joint.name, held.kind, a, b, unit[held.f], unit[held.g], is_trajectory=False)
+
+
+def _path_rows(scene: SpatialMechanismScene, tree: SpatialTree, path: SpatialTrajectory) -> Iterator[SpatialRow]:
+    unit, ground = np.eye(3), Section(-1, "", np.eye(3), np.zeros(3))
+    if path.joint is not None:
+        yield _coordinate_row(scene, tree, path)
+        return
+    assert path.point is not None
+    section = tree.section(path.point, np.eye(3))
+    for component, target in path.components.items():
+        e = unit["xyz".index(component)]
+        yield SpatialRow(path.name, "point", ground, section, e, e, target=target)
+    if path.orientation is None:
+        return
+    if path.tool_axis is None:
+        yield from (SpatialRow(path.name, "rotation", ground, section, e, e, law=path.orientation) for e in unit)
+    else:
+        tool = section._replace(triad=np.array(path.tool_triad))
+        for f in unit[:2]:
+            yield SpatialRow(path.name, "dot", tool, ground, f, unit[2], law=path.orientation)
+
+
+def _coordinate_row(scene: SpatialMechanismScene, tree: SpatialTree, path: SpatialTrajectory) -> SpatialRow:
+    assert path.joint is not None
+    joint = next(each for each in scene.joint if each.name == path.joint)
+    if len(joint.units) != 1 or joint.name not in tree.carried:
+        why = f"{len(joint.units)} coordinates" if joint.name in tree.carried else "the joint at which a loop is cut"
+        raise InputError(
+            f'{scene.path}: trajectory "{path.name}": joint: expected a joint with one coordinate, found'
+            f' "{joint.name}", {why}'
+        )
+    node = tree.nodes[tree.carried[joint.name]]
+    return SpatialRow(
+        path.name, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), coordinate=node.v.start,
+        q_index=node.q.start, sign=-1.0 if node.backwards else 1.0, target=path.components["value"],
+    )  # fmt: skip
+
+
+def row_values(model: SpatialModel, q: Array, times: Array) -> tuple[Array, Array]:
+    """C (T, rows) at q (T, n_q) and `times` (T,), and its Jacobian C_v (T, rows, n_v)."""
+    frames = model.tree.frames(q)
+    values, gradients = np.zeros((len(q), len(model.rows))), np.zeros((len(q), len(model.rows), model.tree.n_v))
+    for k, row in enumerate(model.rows):
+        a, b = (model.tree.motion(section, q, frames) for section in (row.a, row.b))
+        values[:, k], gradients[:, k] = _row(row, a, b, q, times)
+    return values, gradients
+
+
+def target_rates(model: SpatialModel, q: Array, times: Array) -> Array:
+    """What C_v v has to be (T, rows), for Ċ = 0."""
+    frames, found = model.tree.frames(q), np.zeros((len(q), len(model.rows)))
+    for k, row in enumerate(model.rows):
+        if row.target is not None:
+            found[:, k] = row.target.sample(times)[1]
+        elif row.law is not None:
+            omega = row.law.rates(times)[0]
+            if row.kind == "rotation":
+                found[:, k] = omega @ row.f
+            else:  # f·g with g turning by ω
+                f = np.einsum("tij,j->ti", model.tree.motion(row.a, q, frames).F, row.f)
+                found[:, k] = -np.sum(f * np.cross(omega, row.law.sample(times)[:, :, 2]), axis=-1)
+    return found
+
+
+def _row(row: SpatialRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
+    target = 0.0 if row.target is None else row.target.sample(times)[0]
+    if row.kind == "coordinate":
+        gradient = np.zeros((len(q), a.L.shape[-1]))
+        gradient[:, row.coordinate] = row.sign
+        return row.sign * q[:, row.q_index] - target, gradient
+    if row.kind == "rotation":
+        assert row.law is not None
+        residual = logarithm(b.F @ np.swapaxes(row.law.sample(times), -1, -2))
+        return residual @ row.f, np.einsum("i,tij->tj", row.f, b.L[:, 3:])
+    if row.kind == "dot":
+        f = np.einsum("tij,j->ti", a.F, row.f)
+        g = b.F @ row.g if row.law is None else row.law.sample(times)[:, :, 2]
+        across = np.cross(f, g)
+        return np.sum(f * g, axis=-1), np.einsum("ti,tij->tj", across, a.L[:, 3:] - b.L[:, 3:])
+    f = np.einsum("tij,j->ti", a.F, row.f) if row.kind == "slide" else np.broadcast_to(row.f, a.r.shape)
+    d = b.r - a.r
+    gradient = np.einsum("ti,tij->tj", f, b.L[:, :3] - a.L[:, :3])
+    if row.kind == "slide":
+        gradient = gradient + np.einsum("ti,tij->tj", np.cross(f, d), a.L[:, 3:])
+    return np.sum(f * d, axis=-1) - target, gradient
+
+
+def _check_points(scene: SpatialMechanismScene, bodies: dict[str, SpatialBody]) -> None:
+    """Raise `InputError` for a reference to a point that its body has not."""
+    for reference in scene.references():
+        if reference.kind != "body" or reference.body_and_point is None:
+            continue
+        body, point = reference.body_and_point
+        if point not in bodies[body].points:
+            known = bodies[body].points
+            raise InputError(
+                f'{scene.path}: {reference.key}: expected a point of "{body}" ({quoted(known)}), found'
+                f' "{reference.name}"{did_you_mean(point, known)}'
+            )

@@ -1,0 +1,183 @@
+"""A tree of bodies in space: where they are and how they move by joint coordinates and modes.
+
+State q: of each body in the order of the tree the q of its joint, then its p; v likewise, with the joint's freedoms.
+It is the core's. All functions take states (…, n_q) at once; what comes out is in global axes, SI units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import exponential, left_jacobian, of_quaternion, quaternions, skew
+from ..fields.field_types import GROUND, split_point
+from ..joints.spatial.free import SpatialFree
+from ..joints.spatial.joint import SpatialJoint
+from ..scene.topology import Topology
+from .spatial_body import SpatialBody
+
+
+class Section(NamedTuple):
+    """A triad (3, 3), columns, on a section of body number `body`, or standing at `position` (m) on the ground (−1)."""
+
+    body: int
+    point: str
+    triad: Array
+    position: Array
+
+
+class Motion(NamedTuple):
+    """Of a triad: place r (…, 3), axes F (…, 3, 3), and L (…, 6, n_v): velocity and angular velocity by v."""
+
+    r: Array
+    F: Array
+    L: Array
+
+
+@dataclass(frozen=True)
+class Node:
+    """A body on the joint that carries it.
+
+    Attributes:
+        body: its constants.
+        joint: that carries it; a free one at the origin where the scene has none.
+        backwards: whether the joint's first side is on this body.
+        inner: the joint's triad on what carries it.
+        outer: its triad on this body.
+        q, v: where the joint's coordinates stand in states; `p_q` and `p_v` those of the modes.
+    """
+
+    body: SpatialBody
+    joint: SpatialJoint
+    backwards: bool
+    inner: Section
+    outer: Section
+    q: slice
+    p_q: slice
+    v: slice
+    p_v: slice
+
+
+class SpatialTree:
+    """Bodies on the joints of a spanning forest; `loops` are the joints beside it, in the scene's order."""
+
+    def __init__(self, bodies: Sequence[SpatialBody], joints: Sequence[SpatialJoint], topology: Topology) -> None:
+        by_name = {body.name: body for body in bodies}
+        self.index = {name: number for number, name in enumerate(topology.carriers)}
+        nodes, q, v = [], 0, 0
+        for number, (name, carrier) in enumerate(topology.carriers.items()):
+            body = by_name[name]
+            joint = _free(name) if carrier is None else joints[carrier.joint]
+            backwards = carrier is not None and joint.between[0] == carrier.own
+            at_rest = Section(-1, "", np.eye(3), np.zeros(3))
+            inner, outer = at_rest, Section(number, "", np.eye(3), np.zeros(3))
+            if carrier is not None:
+                triads = joint.outward_triads(backwards)
+                inner = self.section(carrier.other, triads[0], joint.at)
+                outer = self.section(carrier.own, triads[1])
+            p_q, p_v, n = q + joint.q_count, v + joint.freedoms, body.n_modes
+            nodes.append(
+                Node(body, joint, backwards, inner, outer, slice(q, p_q), slice(p_q, p_q + n), slice(v, p_v),
+                     slice(p_v, p_v + n))
+            )  # fmt: skip
+            q, v = p_q + n, p_v + n
+        self.nodes = tuple(nodes)
+        self.n_q, self.n_v = q, v
+        self.loops = tuple(joints[number] for number in topology.loop_joints)
+        self.carried = {node.joint.name: number for number, node in enumerate(nodes)}
+
+    def section(self, side: str, triad: Array, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
+        """The triad on "BODY.POINT" or on "ground" `at` (m)."""
+        if side == GROUND:
+            return Section(-1, "", triad, np.array(at, dtype=float))
+        body, point = split_point(side)
+        return Section(self.index[body], point, triad, np.zeros(3))
+
+    @property
+    def joint_columns(self) -> Array:
+        """(n_v,) which of v belong to joints, not to modes."""
+        found = np.ones(self.n_v, dtype=bool)
+        for node in self.nodes:
+            found[node.p_v] = False
+        return found
+
+    def at_rest(self, guesses: Mapping[str, Array]) -> Array:
+        """Q (n_q,) of undeformed links, with joint coordinates in the scene's order by name, else 0."""
+        q = np.zeros(self.n_q)
+        for node in self.nodes:
+            numbers = len(node.joint.guess_units or node.joint.units)
+            given = np.array(guesses.get(node.joint.name, np.zeros(numbers)), dtype=float)
+            q[node.q] = node.joint.state(node.joint.turned_around(given) if node.backwards else given)
+        return q
+
+    def integrate(self, q: Array, dv: Array) -> Array:
+        """Q moved by a small step dv (…, n_v): quaternions along the exponential."""
+        moved = np.broadcast_to(q, (*dv.shape[:-1], self.n_q)).copy()
+        for node in self.nodes:
+            moved[..., node.p_q] += dv[..., node.p_v]
+            own, step, straight = moved[..., node.q], dv[..., node.v], max(0, node.joint.q_count - 4)
+            if node.joint.q_count == node.joint.freedoms:
+                own += step
+                continue
+            own[..., :straight] += step[..., :straight]
+            turned = of_quaternion(own[..., straight:]) @ exponential(step[..., straight:])
+            e = quaternions(turned)
+            same = np.sum(e * own[..., straight:], axis=-1, keepdims=True) >= 0
+            own[..., straight:] = np.where(same, e, -e)
+        return moved
+
+    def frames(self, q: Array) -> list[Motion]:
+        """Motion of each body's frame; L is of (Ṙ, Ω)."""
+        found: list[Motion] = []
+        for node in self.nodes:
+            inner = self.motion(node.inner, q, found)
+            place, S = node.joint.place(q[..., node.q]), node.joint.motion(q[..., node.q])
+            d = np.einsum("...ij,...j->...i", inner.F, place.d)
+            L = inner.L.copy()
+            L[..., :3, :] -= skew(d) @ inner.L[..., 3:, :]
+            L[..., :3, node.v] += inner.F @ S[..., :3, :]
+            L[..., 3:, node.v] += inner.F @ S[..., 3:, :]
+            found.append(self._frame_of(node, q, Motion(inner.r + d, inner.F @ place.C, L)))
+        return found
+
+    def _frame_of(self, node: Node, q: Array, outer: Motion) -> Motion:
+        """The frame of a body from the motion of its section at the joint."""
+        u, E, Phi, turning = _bent(node.body, node.outer, q[..., node.p_q])
+        A = outer.F @ np.swapaxes(E @ node.outer.triad, -1, -2)
+        arm, L = np.einsum("...ij,...j->...i", A, u), outer.L.copy()
+        L[..., 3:, node.p_v] -= A @ turning
+        L[..., :3, :] += skew(arm) @ L[..., 3:, :]
+        L[..., :3, node.p_v] -= A @ Phi
+        return Motion(outer.r - arm, A, L)
+
+    def motion(self, section: Section, q: Array, frames: Sequence[Motion]) -> Motion:
+        """Of a section's triad."""
+        if section.body < 0:
+            shape = q.shape[:-1]
+            r, F = np.broadcast_to(section.position, (*shape, 3)), np.broadcast_to(section.triad, (*shape, 3, 3))
+            return Motion(r, F, np.zeros((*shape, 6, self.n_v)))
+        node, frame = self.nodes[section.body], frames[section.body]
+        u, E, Phi, turning = _bent(node.body, section, q[..., node.p_q])
+        arm, L = np.einsum("...ij,...j->...i", frame.F, u), frame.L.copy()
+        L[..., :3, :] -= skew(arm) @ frame.L[..., 3:, :]
+        L[..., :3, node.p_v] += frame.F @ Phi
+        L[..., 3:, node.p_v] += frame.F @ turning
+        return Motion(frame.r + arm, frame.F @ E @ section.triad, L)
+
+
+def _bent(body: SpatialBody, section: Section, p: Array) -> tuple[Array, Array, Array, Array]:
+    """In body axes: u (…, 3), E (…, 3, 3) = exp φ~, Φ (3, n), and J_l Φ_r (…, 3, n), which gives the spin by ṗ."""
+    if not section.point:
+        zero, none = np.zeros((*p.shape[:-1], 3)), np.zeros((3, body.n_modes))
+        return zero, np.broadcast_to(np.eye(3), (*p.shape[:-1], 3, 3)), none, none
+    at = body.points[section.point]
+    phi = p @ at.rotation.T
+    return at.position + p @ at.translation.T, exponential(phi), at.translation, left_jacobian(phi) @ at.rotation
+
+
+def _free(body: str) -> SpatialFree:
+    return SpatialFree(name=body, type="free", between=(GROUND, f"{body}.frame"))

@@ -1,0 +1,33 @@
+"""Coordinates of the joints over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...common.arrays import Array
+from .. import _core
+from ..analysis.outcome import Outcome
+from ..model.system import MechanismSystem
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """γ of the second side of a joint on the first, one row per output; angles count turns."""
+
+    coordinate: Array  # (T,) rad, or m where prismatic
+    rate: Array  # (T,) rad/s, or m/s
+
+
+def joint_motions(outcome: Outcome) -> dict[str, JointMotion]:
+    """Of all joints that move, by name: between sections or between frames, as `motors` of the scene says.
+
+    Of links in pieces, between their sections as they were computed.
+    """
+    outcome = outcome.computed
+    model = outcome.assembly.model
+    measures = {joint.name: joint.coordinate(model.scene.motors) for joint in model.scene.joint}
+    moving = {name: measure for name, measure in measures.items() if measure is not None}
+    assembly = MechanismSystem(model, model.joints, (), list(moving.values()))
+    along = [(measure, order) for measure in assembly.motor_measures for order in (0, 1)]
+    readings = _core.Sensing(assembly.system, along, []).read(outcome.q, outcome.v, outcome.a)
+    return {name: JointMotion(*readings[:, 2 * k : 2 * k + 2].T.copy()) for k, name in enumerate(moving)}

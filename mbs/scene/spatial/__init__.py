@@ -1,0 +1,1 @@
+"""The records of a scene in space, beside those of the plane."""

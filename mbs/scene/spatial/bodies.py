@@ -1,0 +1,98 @@
+"""Bodies and payloads of a scene in space, key by key. SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from ....common.arrays import Array
+from ....common.numbers import SMALLEST
+from ....common.validation import Record
+from ...fields.field_types import Name, NotNegative, PointReference, Positive, Vector3
+from ...fields.references import Reference
+from ..bodies import BodyKeys
+
+Inertia = Vector3 | tuple[Vector3, Vector3, Vector3]
+ROUNDING = 1e-9  # of the largest entry of an inertia tensor
+
+
+def tensor(inertia: Inertia) -> Array:
+    """(3, 3) from [xx, yy, zz] or all nine entries."""
+    array = np.array(inertia, dtype=float)
+    return np.diag(array) if array.ndim == 1 else array
+
+
+def check_inertia(inertia: Inertia, least: float) -> None:
+    """Raise `ValueError` unless it is symmetric, and that of a body: no moment larger than the sum of the others."""
+    J = tensor(inertia)
+    slack = ROUNDING * np.abs(J).max()
+    if np.abs(J - J.T).max() > slack:
+        raise ValueError(f"expected a symmetric inertia, found {J.tolist()}")
+    moments = np.linalg.eigvalsh(J)
+    if moments[0] < least:
+        raise ValueError(
+            f"expected principal moments of inertia greater than 0, found {moments[0]:g}: a body without them cannot be"
+            " turned about that axis (a point mass is a [[payload]])"
+            if least > 0
+            else f"expected principal moments of inertia not below 0, found {moments[0]:g}"
+        )
+    if moments[2] > moments[0] + moments[1] + slack:
+        raise ValueError(
+            f"expected no principal moment of inertia larger than the sum of the others, found"
+            f" {', '.join(f'{moment:g}' for moment in moments)}"
+        )
+
+
+class SpatialRigidBody(Record):
+    """Mass (kg), inertia about the center (kg·m²), center and named points (m), in the axes of the body."""
+
+    mass: Positive
+    """Mass, kg."""
+    inertia: Inertia
+    """About the center of mass, body axes, kg·m²: [xx, yy, zz], or three rows."""
+    center: Vector3
+    """Center of mass, m, axes of the body."""
+    points: dict[Name, Vector3] = Field(default_factory=dict)
+    """Places for joints, loads and trajectories by name: m, axes of the body."""
+
+    @field_validator("inertia")
+    @classmethod
+    def _is_of_a_body(cls, inertia: Inertia) -> Inertia:
+        check_inertia(inertia, SMALLEST)
+        return inertia
+
+
+class BodyInSpace(BodyKeys):
+    """A link file or a table of its keys (stage 1 runs when needed), a modal body file, or a rigid body.
+
+    The `name` in a table of a link's keys is the body's where it is left out. A link moves in the families of modes
+    that its file has, and is rigid in the others.
+    """
+
+    rigid: SpatialRigidBody | None = None
+    """A body that does not deform."""
+
+
+class SpatialPayload(Record):
+    """A mass (kg) on a section of a body, with its inertia about its own center of mass (kg·m²)."""
+
+    point: PointReference
+    """Where it sits, "BODY.POINT"."""
+    mass: NotNegative
+    """Mass, kg."""
+    center: Vector3 = (0.0, 0.0, 0.0)
+    """Its center of mass, m from the point, axes of the body."""
+    inertia: Inertia = (0.0, 0.0, 0.0)
+    """About that center, axes of the body, kg·m²: [xx, yy, zz], or three rows."""
+
+    @field_validator("inertia")
+    @classmethod
+    def _is_of_a_body(cls, inertia: Inertia) -> Inertia:
+        check_inertia(inertia, 0.0)
+        return inertia
+
+    def references(self) -> Iterator[Reference]:
+        """The point that carries it."""
+        yield Reference("point", self.point)

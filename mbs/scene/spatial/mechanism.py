@@ -1,0 +1,75 @@
+"""What a scene in space says of a mechanism: bodies, joints, trajectories, loads, and the state it starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+from ....common.names import Title
+from ....common.validation import Record
+from ...fields.field_types import NotEmpty, Vector3
+from ...fields.references import Reference, under
+from ...joints.spatial.joints import AnySpatialJoint
+from ..topology import Edge, Topology, spanning_forest
+from .bodies import BodyInSpace, SpatialPayload
+from .initial import SpatialInitial
+from .loads import SpatialLoad
+from .trajectories import SpatialTrajectory
+
+
+class SpatialMechanismKeys(Record):
+    """The keys of a scene in space that concern the mechanism; lists of tables keep the singular name of the file."""
+
+    name: Title
+    """Of the scene."""
+    space: Literal["spatial"]
+    """Dimension of the motion."""
+    gravity: Vector3
+    """Acceleration of gravity, m/s², global axes."""
+    motors: Literal["section", "frame"] = "section"
+    """What motors turn: the sections at the joint, or the frames of the bodies."""
+    body: Annotated[tuple[BodyInSpace, ...], NotEmpty]
+    """Links and rigid bodies."""
+    joint: tuple[AnySpatialJoint, ...] = ()
+    """What joins them to each other and to the ground; bodies without any are free."""
+    trajectory: tuple[SpatialTrajectory, ...] = ()
+    """Motion that is specified."""
+    load: tuple[SpatialLoad, ...] = ()
+    """Forces and moments that are given."""
+    payload: tuple[SpatialPayload, ...] = ()
+    """Masses on points."""
+    initial: SpatialInitial = SpatialInitial()
+    """Where the robot starts."""
+
+    @property
+    def topology(self) -> Topology:
+        """Which joint carries which body, by numbers of `joint`; spherical joints are cut first where loops close."""
+        edges = [Edge(joint.between, joint.locates) for joint in self.joint]
+        return spanning_forest([body.name for body in self.body], edges)
+
+    @property
+    def motor_joints(self) -> tuple[AnySpatialJoint, ...]:
+        """Joints with motors: by default all that move in an open chain, and none in a closed loop."""
+        default = self.topology.is_open_chain
+        return tuple(joint for joint in self.joint if joint.has_motor(default))
+
+    def references(self) -> Iterator[Reference]:
+        """All that records of the scene refer to, with their full keys."""
+        records: list[tuple[str, AnySpatialJoint | SpatialTrajectory | SpatialLoad | SpatialPayload]] = [
+            (joint.label, joint) for joint in self.joint
+        ]
+        records += [(f'trajectory "{trajectory.name}"', trajectory) for trajectory in self.trajectory]
+        records += [(f"load no. {k}", load) for k, load in enumerate(self.load, 1)]
+        records += [(f"payload no. {k}", payload) for k, payload in enumerate(self.payload, 1)]
+        for label, record in records:
+            yield from under(label, record.references())
+        yield from (replace(found, key=f"initial.{found.key}") for found in self.initial.references())
+
+
+class SpatialMechanismScene(SpatialMechanismKeys):
+    """A validated scene, with the absolute `path` of its file and the raw `text` that results files carry."""
+
+    path: Path
+    text: str

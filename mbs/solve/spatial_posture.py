@@ -1,0 +1,212 @@
+"""The posture that a robot in space starts from: the guess of joint coordinates, then Newton on the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ...common.validation import quoted
+from ..joints.spatial.joint import SpatialJoint
+from ..model.spatial_model import SpatialModel, row_values, target_rates
+from .state import State
+
+TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
+SINGULAR = 1e-6  # ratio of singular values below which a posture counts as singular
+NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
+MOVES = 1e-6  # share of a joint in a motion that is left free
+MOST_ITERATIONS = 60
+LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
+
+
+def robot_size(model: SpatialModel) -> float:
+    """A length (m): the largest distance of two named points of a body, or the reach of trajectories' places."""
+    sizes = [
+        float(np.linalg.norm(at.position - other.position))
+        for node in model.tree.nodes
+        for at in node.body.points.values()
+        for other in node.body.points.values()
+    ]
+    return max(sizes, default=0.0) or 1.0
+
+
+def undeformed_posture(model: SpatialModel) -> State:
+    """The state with p = ṗ = 0 that meets all rows at t = 0, next to the guessed coordinates and rates.
+
+    Raises `InputError` where no posture near the guess does.
+    """
+    tree = model.tree
+    q = solve_posture(model, 0.0, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
+    if q is None:
+        owners = quoted(dict.fromkeys(row.owner for row in model.rows))
+        raise InputError(
+            f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
+            f" {owners} at t = 0, found none within {MOST_ITERATIONS} steps (out of reach, or on another branch?)"
+        )
+    return with_rates(model, q, _guessed_rates(model))
+
+
+def solve_posture(model: SpatialModel, t: float, q: Array) -> Array | None:
+    """Q (n_q,) moved onto C(q, t) = 0 by least steps of the joints, p kept; None where that does not converge."""
+    if not model.rows:
+        return q
+    scales, length = _scales(model), robot_size(model)
+    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
+    times, left = np.array([t]), np.inf
+    for _ in range(MOST_ITERATIONS):
+        C, C_v = (array[0] for array in row_values(model, q[None], times))
+        left = float(np.abs(C / row_scales).max())
+        if left <= TOLERANCE:
+            return q
+        if not np.isfinite(left):
+            return None
+        step = np.linalg.lstsq(C_v * scales / row_scales[:, None], -C / row_scales, rcond=1e-10)[0]
+        step *= min(1.0, LARGEST_TURN / max(float(np.abs(step).max()), 1e-300))
+        q = model.tree.integrate(q, step * scales)
+    return q if left <= 1e3 * TOLERANCE else None
+
+
+def with_rates(model: SpatialModel, q: Array, v: Array) -> State:
+    """The state at q with the joints' rates moved onto Ċ = 0 at t = 0 by the least change, ṗ kept."""
+    if not model.rows:
+        return State(q, v)
+    scales, at_start = _scales(model), np.zeros(1)
+    C_v = row_values(model, q[None], at_start)[1][0]
+    left = target_rates(model, q[None], at_start)[0] - C_v @ v
+    return State(q, v + scales * np.linalg.lstsq(C_v * scales, left, rcond=1e-10)[0])
+
+
+def _scales(model: SpatialModel) -> Array:
+    """(n_v,) natural size of the joints' coordinates: 1 rad, or the size of the robot; 0 of modes, which stay."""
+    scales = np.zeros(model.tree.n_v)
+    for node in model.tree.nodes:
+        units = node.joint.units or node.joint.guess_units
+        sizes = np.array([1.0 if unit == "rad" else robot_size(model) for unit in units])
+        scales[node.v] = node.joint.state(sizes) if node.joint.units else sizes
+    return scales
+
+
+def _numbers(model: SpatialModel, table: Mapping[str, object], key: str) -> dict[str, Array]:
+    """The lists of numbers of a table by joint. Raises `InputError` for a wrong number of them."""
+    found = {}
+    for name, value in table.items():
+        joint = next(each for each in model.scene.joint if each.name == name)
+        wanted, numbers = len(joint.guess_units or joint.units), np.atleast_1d(np.array(value, dtype=float))
+        if len(numbers) != wanted:
+            raise InputError(
+                f"{model.scene.path}: initial.{key}.{name}: expected {wanted} numbers of a {joint.type} joint, found"
+                f" {len(numbers)}"
+            )
+        found[name] = numbers
+    return found
+
+
+def _guessed_rates(model: SpatialModel) -> Array:
+    v = np.zeros(model.tree.n_v)
+    for name, rates in _numbers(model, model.scene.initial.joint_rates, "joint_rates").items():
+        number = model.tree.carried.get(name)
+        if number is None:
+            continue  # where a loop is cut the other joints' rates say all
+        node = model.tree.nodes[number]
+        if node.backwards and len(node.joint.units) != 1:
+            raise InputError(
+                f"{model.scene.path}: initial.joint_rates.{name}: expected the side nearer to the ground first in"
+                f" between of a {node.joint.type} joint with rates, found it second"
+            )
+        v[node.v] = -rates if node.backwards else (node.joint.state(rates) if node.joint.units else rates)
+    return v
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """How the rigid mechanism can move in a posture.
+
+    Attributes:
+        freedom: degrees of freedom that joints and loops leave.
+        followed: how many of these the trajectories take.
+        ratio: smallest of largest singular value of the path's rows in these freedoms, lengths in sizes of the robot.
+        left: joints that still move with all trajectories held.
+        loop_rank: how many rows of the loops are independent with rigid links.
+    """
+
+    freedom: int
+    followed: int
+    ratio: float
+    left: tuple[str, ...]
+    loop_rank: int
+
+
+def mobility(model: SpatialModel, q: Array) -> Mobility:
+    """Of the mechanism with rigid links at q (n_q,)."""
+    joints, length, is_loop = model.tree.joint_columns, robot_size(model), model.loop_rows
+    scales = _scales(model)[joints]
+    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows]).reshape(-1, 1)
+    J = row_values(model, q[None], np.zeros(1))[1][0][:, joints] * scales / row_scales
+    free, loop_rank = _null_space(J[is_loop])
+    path = J[~is_loop] @ free
+    values = np.linalg.svd(path, compute_uv=False)
+    still_free, followed = _null_space(path)
+    moving = np.abs(free @ still_free).max(axis=1, initial=0.0) > MOVES
+    names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
+    ratio = float(values[-1] / values[0]) if len(values) and values[0] > 0 else 1.0
+    return Mobility(free.shape[1], followed, ratio, tuple(dict.fromkeys(names[moving].tolist())), loop_rank)
+
+
+def _null_space(J: Array) -> tuple[Array, int]:
+    """Orthonormal columns that J (m, k) takes to zero, and its rank."""
+    if not len(J):
+        return np.eye(J.shape[1]), 0
+    _, values, V = np.linalg.svd(J)
+    rank = int(np.count_nonzero(values > SINGULAR * max(values[0], 1.0)))
+    return V[rank:].T, rank
+
+
+def check_path(model: SpatialModel, q: Array) -> Iterator[str]:
+    """Warnings on what paths and motors leave open at q.
+
+    Raises `InputError` for more rows than the mechanism can follow, motors that do not fit, and a singular posture.
+    """
+    path, found = model.scene.path, mobility(model, q)
+    rows = int(np.count_nonzero(~model.loop_rows))
+    names = quoted(trajectory.name for trajectory in model.scene.trajectory)
+    if rows > found.freedom:
+        raise InputError(
+            f"{path}: trajectory: expected at most {found.freedom} components, as many as the mechanism has degrees of"
+            f" freedom with rigid links, found {rows} in {names}: only vibrations could follow the others"
+        )
+    if found.followed < rows:
+        raise InputError(
+            f"{path}: initial: expected a posture in which the links can follow {names} in every direction, found a"
+            " singular one (two axes in line, an arm stretched or folded?): bend it, or move the start of the path"
+        )
+    if found.ratio < NEARLY_SINGULAR:
+        yield f"near a singular posture at the start: {names} can hardly be followed (ratio {found.ratio:.1e})"
+    if rows and found.followed < found.freedom:
+        yield (
+            f"{found.freedom - found.followed} degrees of freedom are not prescribed: {', '.join(found.left)} move by"
+            " themselves"
+        )
+    if rows:
+        yield from _check_motors(model, found)
+
+
+def _check_motors(model: SpatialModel, found: Mobility) -> Iterator[str]:
+    motors = {name: len(columns) for name, columns in model.motors.items()}
+    count, named = sum(motors.values()), any(joint.asks_for_motor for joint in model.scene.joint)
+    if count > found.freedom:
+        raise InputError(
+            f"{model.scene.path}: joint: expected as many motors as the mechanism has degrees of freedom"
+            f" ({found.freedom}), found {count} ({quoted(motors)})"
+        )
+    if count < found.freedom and (named or model.scene.topology.is_open_chain):
+        moving = [joint.name for joint in _movable(model) if joint.name not in motors]
+        yield f"joints without motor: {', '.join(moving)}: motors alone cannot hold the path, their moments are none"
+
+
+def _movable(model: SpatialModel) -> Iterator[SpatialJoint]:
+    for node in model.tree.nodes:
+        if node.joint.freedoms:
+            yield node.joint

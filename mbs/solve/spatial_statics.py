@@ -1,0 +1,108 @@
+"""Static equilibrium in space under gravity, given loads and the constraints at t = 0."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import SolveError
+from ..model.spatial_model import SpatialModel, row_values
+from ..model.spatial_tree import Section
+from .spatial_posture import robot_size, with_rates
+from .state import State
+
+MOST_ITERATIONS = 60
+TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, positions to the size of the robot
+LARGEST_STEP = 0.3  # rad, sizes of the robot, and of p the same in sizes of its own
+DIFFERENCE = 6e-6  # of natural sizes: central differences of first derivatives
+
+
+def forces_at_rest(model: SpatialModel, q: Array, t: float = 0.0) -> Array:
+    """Generalised forces (T, n_v) at rest, of q (T, n_q): gravity, elasticity, given loads."""
+    tree, gravity = model.tree, np.array(model.scene.gravity)
+    frames, found = tree.frames(q), np.zeros((len(q), tree.n_v))
+    for node, frame in zip(tree.nodes, frames, strict=True):
+        p = q[:, node.p_q]
+        s = np.einsum("tij,tj->ti", frame.F, node.body.first_moment + p @ node.body.S_bar.T)
+        found += frame.L[:, :3].transpose(0, 2, 1) @ (node.body.mass * gravity)
+        found += np.einsum("tij,ti->tj", frame.L[:, 3:], np.cross(s, gravity))
+        found[:, node.p_v] += np.einsum("tji,j->ti", frame.F, gravity) @ node.body.S_bar - node.body.stiffness * p
+    for load in model.scene.load:
+        values = {name: function(t)[0] for name, function in load.components.items()}
+        if load.point is not None:
+            section = tree.section(load.point, np.eye(3))
+            L = tree.motion(Section(*section), q, frames).L
+            wrench = np.array([values.get(name, 0.0) for name in ("x", "y", "z", "mx", "my", "mz")])
+            found += np.einsum("tij,i->tj", L, wrench)
+        elif load.joint is not None:
+            node = tree.nodes[tree.carried[load.joint]]
+            found[:, node.v] += (-1.0 if node.backwards else 1.0) * values["moment"]
+    return found
+
+
+def static_equilibrium(model: SpatialModel, start: State) -> State:
+    """Solve Q(q) − C_vᵀλ = 0, C(q, 0) = 0 by Newton from `start`; v is kept on Ċ = 0.
+
+    Raises `SolveError` where there is no equilibrium near the start.
+    """
+    tree, n, m, length = model.tree, model.tree.n_v, len(model.rows), robot_size(model)
+    sizes = _sizes(model)
+    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
+    q, times = start.q, np.zeros(1)
+    C_v = row_values(model, q[None], times)[1][0]
+    multipliers = np.linalg.lstsq(C_v.T * sizes[:, None], forces_at_rest(model, q[None])[0] * sizes, rcond=None)[0]
+    for _ in range(MOST_ITERATIONS):
+        residual, size = _residual(model, q[None], multipliers, row_scales)
+        if np.abs(residual[0, :n] * sizes).max() <= TOLERANCE * size and (
+            not m or np.abs(residual[0, n:]).max() <= TOLERANCE
+        ):
+            return with_rates(model, q, start.v)
+        jacobian = _jacobian(model, q, multipliers, sizes, row_scales)
+        step = -np.linalg.lstsq(jacobian, residual[0] * np.concatenate([sizes, np.ones(m)]), rcond=1e-14)[0]
+        if not np.all(np.isfinite(step)):
+            break
+        step *= min(1.0, LARGEST_STEP / max(float(np.abs(step[:n]).max()), 1e-300))
+        q, multipliers = tree.integrate(q, step[:n] * sizes), multipliers + step[n:] * _force_scale(size, row_scales)
+    raise SolveError(
+        f"{model.scene.path}: no static equilibrium was found near the initial posture: a robot without motors or"
+        " trajectories may have none there; give joint coordinates closer to it"
+    )
+
+
+def _sizes(model: SpatialModel) -> Array:
+    """(n_v,) natural sizes: 1 rad or the robot's size of joints, √J of modes, bent by about their length."""
+    sizes, length = np.ones(model.tree.n_v), robot_size(model)
+    for node in model.tree.nodes:
+        units = node.joint.units or node.joint.guess_units
+        of_joint = np.array([1.0 if unit == "rad" else length for unit in units])
+        sizes[node.v] = node.joint.state(of_joint) if node.joint.units else of_joint
+        sizes[node.p_v] = np.sqrt(np.linalg.eigvalsh(node.body.inertia)[-1])
+    return sizes
+
+
+def _force_scale(size: float, row_scales: Array) -> Array:
+    scale: Array = max(size, 1e-300) / row_scales
+    return scale
+
+
+def _residual(model: SpatialModel, q: Array, multipliers: Array, row_scales: Array) -> tuple[Array, float]:
+    """(T, n_v + rows): forces left, and C over its natural sizes; and the size of the largest force term."""
+    C, C_v = row_values(model, q, np.zeros(len(q)))
+    Q, held, sizes = forces_at_rest(model, q), np.einsum("tij,i->tj", C_v, multipliers), _sizes(model)
+    size = max(float(np.abs(Q * sizes).max()), float(np.abs(held * sizes).max(initial=0.0)))
+    return np.concatenate([Q - held, C / row_scales], axis=1), size
+
+
+def _jacobian(model: SpatialModel, q: Array, multipliers: Array, sizes: Array, row_scales: Array) -> Array:
+    """Derivative of the residual, forces times `sizes`, by steps in natural sizes (differences) and multipliers."""
+    n, m, tree = model.tree.n_v, len(model.rows), model.tree
+    ahead, behind = (
+        _residual(model, tree.integrate(q, sign * DIFFERENCE * np.diag(sizes)), multipliers, row_scales)[0]
+        for sign in (1.0, -1.0)
+    )
+    by_q = ((ahead - behind) / (2 * DIFFERENCE)).T
+    C_v = row_values(model, q[None], np.zeros(1))[1][0]
+    _, size = _residual(model, q[None], multipliers, row_scales)
+    by_multipliers = np.concatenate([-C_v.T * _force_scale(size, row_scales), np.zeros((m, m))])
+    scaled = np.concatenate([by_q[:n] * sizes[:, None], by_q[n:]])
+    return np.hstack([scaled, np.concatenate([by_multipliers[:n] * sizes[:, None], by_multipliers[n:]])])

@@ -1,0 +1,66 @@
+"""Modal coordinates of a link in those of its pieces: turns of sections, strain energy, and back."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ffrobot.fe_models.link import cached_modal_body
+from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.fe_models.pieces import cut
+from ffrobot.mbs.model.divided_link import Piece, divided_link
+from ffrobot.mbs.model.planar_body import from_modal_body
+
+MODES = 4
+
+
+def divided(condition, count):
+    """A link, its pieces, and its modes in theirs."""
+    section = {"shape": "rectangle", "height": 0.01, "width": 0.02}
+    keys = {
+        "name": "link",
+        "material": {"youngs_modulus": 7e10, "density": 2700.0, "poissons_ratio": 0.3},
+        "geometry": {"kind": "beam", "length": 0.8, "section": section},
+        "mesh": {"elements": 24},
+        "reference": {"condition": condition},
+        "modes": {"count": MODES, "family": "in-plane-bending", "attachment_modes": False},
+    }
+    source = LinkTable(keys, Path("link.toml"))
+    link, parts = cached_modal_body(source).body, cut(source, count)
+    pieces = [
+        Piece(start, modal, from_modal_body(f"piece {k}", modal))
+        for k, (start, modal) in enumerate(
+            (start, cached_modal_body(table).body) for start, table in zip(parts.starts, parts.tables, strict=True)
+        )
+    ]
+    planar = from_modal_body("link", link)
+    return link, planar, pieces, divided_link(link, planar, pieces)
+
+
+@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+@pytest.mark.parametrize("count", [2, 4, 8])
+def test_sections_turn_from_cut_to_cut_as_those_of_the_link(condition, count):
+    link, planar, pieces, found = divided(condition, count)
+    rows = np.cumsum([0, *(piece.planar.n_modes for piece in pieces)])
+    largest = np.abs(link.stations.rotation[:, 2] @ planar.modal_transform).max(axis=0)
+    for piece, first, last in zip(pieces, rows[:-1], rows[1:], strict=True):
+        ends = piece.start, piece.start + piece.modal.length
+        a, b = (link.interpolate(min(x, link.length)).rotation[2] @ planar.modal_transform for x in ends)
+        start, end = (piece.planar.points[name].rotation for name in ("root", "tip"))
+        np.testing.assert_allclose((end - start) @ found.spread[first:last], b - a, atol=2e-4 * largest.max())
+
+
+@pytest.mark.parametrize("count", [4, 8])
+def test_strain_energy_converges_from_below(count):
+    """What the shapes of the pieces do not have of the link's modes is left out: the more pieces, the less."""
+    _, planar, pieces, found = divided("cantilever", count)
+    stiffness = np.concatenate([piece.planar.stiffness for piece in pieces])
+    part = np.einsum("kn,k,kn->n", found.spread, stiffness, found.spread) / planar.stiffness
+    assert (part < 1 + 1e-4).all()  # strains are taken as constant over a 32nd of a piece
+    assert (part > 1 - {4: 0.06, 8: 0.004}[count]).all()
+    assert part[0] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_what_is_spread_is_gathered():
+    *_, found = divided("simply-supported", 4)
+    np.testing.assert_allclose(found.gathered @ found.spread, np.eye(MODES), atol=1e-12)

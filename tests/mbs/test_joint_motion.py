@@ -1,0 +1,55 @@
+"""Coordinates and rates of joints: what paths prescribe, closed forms, and the rates that motors have."""
+
+import numpy as np
+from links import ANGLES, arm
+from mechanisms import always, make_model, pcid, revolute
+from rods import rod, slider_crank
+
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.quantities.joint_motion import joint_motions
+from ffrobot.mbs.quantities.joint_space import motor_rates
+
+
+def test_turns_are_counted():
+    """Two rods on given joint angles, the second for three turns and a half."""
+    model = make_model(
+        [rod("a", 0.8, 3.0), rod("b", 0.6, 2.0)],
+        joint=[revolute("O", "ground", "a.root"), revolute("A", "a.tip", "b.root")],
+        trajectory=[
+            {"name": "first", "joint": "O", "value": "0.4+0.9*sin(2*t)"},
+            {"name": "second", "joint": "A", "value": "-1.1+22*t"},
+        ],
+        initial={"angles": {"a": 0.4, "b": -0.7}},
+    )
+    outcome = run_pcid(model, pcid(tolerance=1e-9), False, always)
+    motions, t = joint_motions(outcome), outcome.time
+    np.testing.assert_allclose(motions["O"].coordinate, 0.4 + 0.9 * np.sin(2 * t), atol=1e-10)
+    np.testing.assert_allclose(motions["A"].coordinate, -1.1 + 22 * t, atol=1e-10)
+    np.testing.assert_allclose(motions["A"].rate, 22.0, rtol=1e-9)
+
+
+def test_way_of_a_slider():
+    """x = r cos φ + √(l² − r² sin² φ) along the guide, φ of the crank."""
+    r, length = 0.2, 0.5
+    outcome = run_pcid(
+        slider_crank({"name": "crank", "joint": "O", "value": "0.9+8*t"}), pcid(tolerance=1e-9), False, always
+    )
+    motions = joint_motions(outcome)
+    phi = 0.9 + 8 * outcome.time
+    (guide,) = (motion for name, motion in motions.items() if name not in ("O", "A", "B"))
+    way = r * np.cos(phi) + np.sqrt(length**2 - (r * np.sin(phi)) ** 2)
+    np.testing.assert_allclose(guide.coordinate - guide.coordinate[0], way - way[0], atol=1e-9)
+    np.testing.assert_allclose(motions["O"].rate, 8.0, rtol=1e-9)
+
+
+def test_flexible_links_turn_with_their_sections_or_frames():
+    """Rates are those that the gradients of the motors' rows give; the two ways differ where links bend."""
+    found = {}
+    for motors in ("section", "frame"):
+        model = arm(motors=motors, initial={"state": "static", "angles": ANGLES})
+        outcome = run_pcid(model, pcid(tolerance=1e-6, end=0.1), False, always)
+        motions, rates = joint_motions(outcome), motor_rates(outcome)
+        for k, name in enumerate(model.motors):
+            np.testing.assert_allclose(motions[name].rate, rates[:, k], atol=1e-12)
+        found[motors] = motions["A"].coordinate
+    assert np.abs(found["section"] - found["frame"]).max() > 1e-4

@@ -1,0 +1,67 @@
+"""Where robots in space start: postures of the checkpoints, undeformed and in equilibrium, mobility, messages."""
+
+import numpy as np
+import pytest
+from rotations import quaternion
+from spatial_checkpoints import CASES, load
+from spatial_scenes import checkpoint_scene
+
+from ffrobot.mbs.model.spatial_model import build_spatial_model, row_values, target_rates
+from ffrobot.mbs.solve.spatial_posture import check_path, mobility, solve_posture, undeformed_posture
+from ffrobot.mbs.solve.spatial_statics import static_equilibrium
+from ffrobot.run.spatial_bodies import load_spatial_bodies
+
+
+def model_of(name):
+    scene = checkpoint_scene(name)
+    return build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_starts_are_those_of_the_numbers(name):
+    """Every body's place and orientation, deformations and spin at t = 0."""
+    model, data = model_of(name), load(name)
+    start = undeformed_posture(model)
+    if data["start"] == "static":
+        start = static_equilibrium(model, start)
+    frames, sample = model.tree.frames(start.q[None]), data["samples"][0]
+    for node, frame in zip(model.tree.nodes, frames, strict=True):
+        expected = sample["bodies"].get(node.body.name)
+        if expected is None:  # the slider, which the numbers have as a mass on the rod
+            continue
+        np.testing.assert_allclose(frame.r[0], expected["position"], atol=1e-11)
+        found = quaternion(frame.F[0])
+        np.testing.assert_allclose(found * np.sign(found @ expected["quaternion"]), expected["quaternion"], atol=1e-11)
+        omega = frame.F[0].T @ frame.L[0, 3:] @ start.v
+        np.testing.assert_allclose(omega, expected["angular_velocity_body"], atol=1e-9)
+        if node.body.n_modes:
+            np.testing.assert_allclose(start.q[node.p_q], expected["modal"], atol=1e-11)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_rates_of_rows_are_those_of_their_values(name):
+    """What C_v v has to be, against differences of C in time at the posture of t = 0.01 s."""
+    model, h, t = model_of(name), 1e-6, 0.01
+    q = solve_posture(model, t, undeformed_posture(model).q)
+    values = row_values(model, np.array([q, q]), np.array([t - h, t + h]))[0]
+    rates = target_rates(model, q[None], np.array([t]))[0]
+    assert np.abs(row_values(model, q[None], np.array([t]))[0]).max() < 1e-12
+    np.testing.assert_allclose((values[0] - values[1]) / (2 * h), rates, atol=1e-9 * max(1.0, np.abs(rates).max()))
+
+
+@pytest.mark.parametrize(
+    ("name", "freedom"),
+    [("arm3_line_static", 3), ("arm5_tool_axis", 5), ("arm6_static", 6), ("slider_crank_3d", 1), ("stanford", 3)],
+)
+def test_paths_take_all_freedom(name, freedom):
+    model = model_of(name)
+    found = mobility(model, undeformed_posture(model).q)
+    assert (found.freedom, found.followed, found.left) == (freedom, freedom, ())
+    assert found.ratio > 0.01
+    assert list(check_path(model, undeformed_posture(model).q)) == []
+
+
+def test_loops_are_cut_at_the_spherical_joint():
+    model = model_of("slider_crank_3d")
+    assert [joint.name for joint in model.tree.loops] == ["rod_tip"]
+    assert [row.kind for row in model.rows] == ["point"] * 4
