@@ -10,11 +10,11 @@ START, END, VOLT = 0.045, 0.105, 100.0
 
 
 def tip(height, face, modes, pieces=1, **keys):
-    """Deflection of the tip, m."""
-    return solved(height, face, modes, **keys)["bent/points/strip.tip/deflection"][0, 1]
+    """Deflection of the tip, m; of a link divided into `pieces`."""
+    return solved(height, face, modes, pieces, **keys)["bent/points/strip.tip/deflection"][0, 1]
 
 
-def solved(height, face, modes, places=(), **keys):
+def solved(height, face, modes, pieces=1, places=(), **keys):
     """Results; stress points p0 … on the upper side at `places`."""
     link = {
         "name": "strip",
