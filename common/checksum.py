@@ -21,7 +21,7 @@ _LINE = "\nffrobot checksum crc32 {:08x} of {:016d} bytes\n"
 _RENEWED = _LINE.replace("checksum", "resealed")
 _LENGTH = len(_LINE.format(0, 0))
 _PATTERN = re.compile(rb"\nffrobot (checksum|resealed) crc32 ([0-9a-f]{8}) of (\d{16}) bytes\n")
-_PIECE = 1 << 20
+_PIECE = 1 << 20  # read into the same memory again: fresh pages would cost as much as the sum itself
 
 
 def sealed(content: bytes, line: str = _LINE) -> bytes:
@@ -41,7 +41,7 @@ def state(path: Path) -> State:
 
     "none" where it does not say. Raises `OSError`.
     """
-    with path.open("rb") as stream:
+    with path.open("rb", buffering=0) as stream:
         size = stream.seek(0, 2) - _LENGTH
         if size < 0:
             return "none"
@@ -52,9 +52,9 @@ def state(path: Path) -> State:
         if int(line[3]) != size:
             return "damaged"
         stream.seek(0)
-        checksum, left = 0, size
-        while left > 0 and (piece := stream.read(min(left, _PIECE))):
-            checksum, left = zlib.crc32(piece, checksum), left - len(piece)
+        checksum, left, piece = 0, size, memoryview(bytearray(min(size, _PIECE)))
+        while left > 0 and (count := stream.readinto(piece[: min(left, _PIECE)])):
+            checksum, left = zlib.crc32(piece[:count], checksum), left - count
     if checksum != int(line[2], 16):
         return "damaged"
     return "sound" if line[1] == b"checksum" else "changed"

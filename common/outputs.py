@@ -55,7 +55,8 @@ def check_file_name(text: str) -> Path:
     path = Path(text)
     try:
         path.resolve()
-        path.exists()
+        with suppress(FileNotFoundError, NotADirectoryError):
+            os.stat(path)  # `exists` and, from Python 3.13 on, `resolve` are silent about circles
     except (OSError, RuntimeError, ValueError) as error:
         raise InputError(f"{shown(text)}: expected the name of a file, found {why_no_file(error)}") from None
     return path

@@ -1,5 +1,6 @@
 """The program as a user runs it: the installed command, the cases of the repository, a cache folder of its own."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -67,7 +68,9 @@ def own_cache(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def ffrobot(tmp_path_factory):
-    return Command(tmp_path_factory.mktemp("cache"), Path(sys.executable).with_name("ffrobot"))
+    """The installed command, or that of FFROBOT_COMMAND: an older version, to see whether a test fails there."""
+    path = os.environ.get("FFROBOT_COMMAND") or Path(sys.executable).with_name("ffrobot")
+    return Command(tmp_path_factory.mktemp("cache"), Path(path))
 
 
 @pytest.fixture(scope="session")

@@ -43,7 +43,7 @@ class ModalBody:
         S_bar: (3, n) ∫ρ Φ dV.
         I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
         S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
-        J_spin: J_s = ∫ρI_p dx in kg·m² of a line of mass (Euler–Bernoulli), not in `second_moment`; else 0; or None.
+        J_spin: J_s = ∫ρI_p dx in kg·m² of lines of mass about their axis, not in `second_moment`; None: unknown.
         h_spin: (n,) h_s = ∫ρI_p φ dx, with φ the twist of the modes.
         S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx; `S_bar_kl` holds it once more at [2, 2], where the plane needs it.
         geometric_stiffness: (n, n) for each unit load, by its name.

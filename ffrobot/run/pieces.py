@@ -264,5 +264,5 @@ def _nearest_shape(modal: ModalBody, body: PlanarBody, u: Array) -> Array:
     """P (3, T, n) for which Φp comes nearest to displacements u (stations, 3, T, 2), with rates and accelerations."""
     Phi = (modal.stations.translation[:, :2] @ body.modal_transform).reshape(-1, body.n_modes)  # (stations · 2, n)
     flat = np.moveaxis(u, 3, 1).reshape(len(Phi), -1)
-    p = np.linalg.lstsq(Phi, flat, rcond=None)[0]
+    p = as_floats(np.linalg.lstsq(Phi, flat, rcond=None)[0])
     return np.moveaxis(p.reshape(body.n_modes, *u.shape[1:3]), 0, 2)

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from ..common.errors import InputError, StoppedError
 from ..common.files import check_folder, write_atomically
@@ -153,7 +154,8 @@ def _performed(runs: Sequence[Run], side_by_side: int) -> Iterator[Iterable[Row 
     if processes() > 1:
         from mpi4py.futures import MPICommExecutor
 
-        with MPICommExecutor() as executor:  # None but on the first process: the others serve it until it is done
+        with MPICommExecutor() as entered:  # None but on the first process: the others serve it until it is done
+            executor: Any = entered  # by the types of mpi4py 4 it is no executor
             yield () if executor is None else executor.map(perform, runs, unordered=True)
         return
     with ThreadPoolExecutor(side_by_side) as threads:  # each waits for a process

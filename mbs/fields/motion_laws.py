@@ -91,13 +91,15 @@ def averaged_step(times: Array) -> Piecewise:
     The highest derivative is constant between the sums of some of the times; the others follow by integration.
     """
     n = len(times)
-    instants, signs = np.zeros(1), np.ones(1)
+    instants: Array = np.zeros(1)
+    signs: Array = np.ones(1)
     for T in times:
         instants, signs = np.concatenate([instants, instants + T]), np.concatenate([signs, -signs])
     breaks = merged(instants)
     jumps = [signs[np.abs(instants - t) <= 2 * SAME_TIME * times.sum()].sum() for t in breaks]
     highest = np.cumsum(jumps) / np.prod(times)
-    coefficients, state = np.zeros((len(breaks) - 1, n + 1, 1)), np.zeros(n)
+    coefficients = np.zeros((len(breaks) - 1, n + 1, 1))
+    state: Array = np.zeros(n)
     for k, step in enumerate(np.diff(breaks)):
         derivatives = np.append(state, highest[k])  # s, ṡ, …
         coefficients[k, :, 0] = [derivatives[m] / factorial(m) for m in range(n, -1, -1)]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ..model.model import Model
 from ..model.system import MechanismSystem
 from .initial_state import undeformed_state
@@ -40,5 +40,4 @@ def unit_damping(model: Model) -> Array:
     assembly = MechanismSystem(model, model.joints)
     modes = vibrations(assembly, start)
     inverse = np.linalg.pinv(np.delete(modes.shape, assembly.frame_coordinates, axis=0))
-    damping: Array = inverse.T @ (2 * modes.frequency[:, None] * inverse)
-    return damping
+    return as_floats(inverse.T @ (2 * modes.frequency[:, None] * inverse))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
 from .. import _core
 from ..model.system import MechanismSystem
@@ -33,7 +33,7 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
 
     q, largest = start.q, np.inf
     _, _, C_q = system.constraints(0.0, q, rest)
-    multipliers: Array = np.linalg.lstsq(C_q.T, system.force_at_rest(0.0, q), rcond=None)[0]
+    multipliers = as_floats(np.linalg.lstsq(C_q.T, system.force_at_rest(0.0, q), rcond=None)[0])
     for _ in range(MOST_ITERATIONS):
         r, size = residual(q, multipliers)
         closed = np.abs(r[n:] / assembly.measure_scales).max(initial=0.0) <= TOLERANCE

@@ -32,8 +32,8 @@ def test_energy_of_a_pendulum(end, record):
     record(
         GROUP,
         f"two flexible links fall and swing for {end:g} s at a tolerance of 1e-6",
-        "energy {energy} of its kinetic part, constraints at most {constraints}",
-        energy=energy,
+        "energy at most {energy} of its kinetic part, constraints at most {constraints}",
+        energy=at_most(1e-11 if end < 100 else 1e-9, energy),  # rounding, added up
         constraints=at_most(1e-11, constraints),
     )
 

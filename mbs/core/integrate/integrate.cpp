@@ -1,5 +1,6 @@
 #include "core/integrate/integrate.h"
 
+#include "core/integrate/jump.h"
 #include "core/integrate/step_control.h"
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <cmath>
 #include <iterator>
 #include <memory>
+#include <optional>
 
 namespace ffrobot {
 
@@ -40,6 +42,11 @@ constexpr double rounding = 2e-14; // what error estimates see of it: shorter st
 // tolerance.
 constexpr double radians_too_long = 5, notable = 0.1;
 
+// Steps that are rejected until they are this part of the usual ones may have met a jump, which is looked for. Steps
+// end before it and begin behind it, and are as long as usual.
+constexpr double may_have_met_jump = 0.1;
+constexpr double no_time = 1e-13; // of the time, or of the run: no step is made for it
+
 // Length of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
 double next_step(double h, double left, bool lands) {
   if (h >= left)
@@ -62,7 +69,7 @@ struct Allowance {
 
 class Integration {
 public:
-  Integration(ImplicitSystem &system, const std::vector<double> &times, const Eigen::VectorXd &y,
+  Integration(OdeSystem &system, const std::vector<double> &times, const Eigen::VectorXd &y,
               const IntegrationControls &controls, const StateFunctionOfTime &output,
               const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks)
       : system_(system), times_(times), controls_(controls), output_(output), carry_on_(carry_on),
@@ -98,6 +105,10 @@ public:
 
   IntegrationReport run() {
     while (report_.outputs < times_.size() && may_go_on()) {
+      if (jump_ && jump_->before - t_ <= no_time * std::max(std::abs(t_), duration_)) {
+        pass_jump();
+        continue;
+      }
       steps_.next_step = std::min(steps_.next_step, duration_);
       const Attempt attempt = next_attempt();
       const Allowance allowance = allowance_of(attempt.step);
@@ -109,6 +120,7 @@ public:
       } else {
         ++report_.rejected;
         steps_.next_step = control_.after_rejected(attempt.step, size);
+        look_for_jump(attempt);
       }
       if (report_.outputs < times_.size() && methods_.takes_over(t_, method_->damps()))
         change_method();
@@ -166,7 +178,7 @@ private:
     if (controls_.max_steps && taken >= controls_.max_steps)
       return end_as(IntegrationStatus::too_many_steps);
     const double left = end_ - t_;
-    bool collapsed = steps_.next_step < 1e-13 * std::max(std::abs(t_), left);
+    bool collapsed = steps_.next_step < no_time * std::max(std::abs(t_), left);
     const bool counted = taken % steps_between_questions == 0;
     if (const auto now = std::chrono::steady_clock::now(); counted || now - asked_ > time_between_questions) {
       asked_ = now;
@@ -184,10 +196,14 @@ private:
   Attempt next_attempt() const {
     bool lands = method_->lands_on_outputs();
     double target = lands ? times_[report_.outputs] : end_;
-    if (breaks_ && next_break_ < breaks_->times.size() && breaks_->times[next_break_] <= target) {
-      target = breaks_->times[next_break_];
-      lands = true;
-    }
+    const auto end_at = [&](double t) {
+      lands = lands || t <= target;
+      target = std::min(t, target);
+    };
+    if (breaks_ && next_break_ < breaks_->times.size())
+      end_at(breaks_->times[next_break_]);
+    if (jump_)
+      end_at(jump_->before);
     const double step = next_step(steps_.next_step, target - t_, lands);
     return {target, step, step == target - t_ ? target : t_ + step};
   }
@@ -236,9 +252,10 @@ private:
       return;
     }
     // A step that was shortened to land on an output tells what the step asked for would have cost. One that was
-    // shortened much, to end at a break, tells nothing: the next step stays as long as the control had asked for.
+    // shortened much, to end at a break or a jump, tells nothing: the next step stays as long as the control had asked
+    // for.
     const double asked = std::clamp(steps_.next_step, attempt.step, 2 * attempt.step);
-    if (!(t_ == attempt.target && breaks_ && 2 * attempt.step < steps_.next_step))
+    if (!(t_ == attempt.target && (breaks_ || jump_) && 2 * attempt.step < steps_.next_step))
       steps_.next_step = control_.after_accepted(asked, size * std::pow(asked / attempt.step, method_->error_order()));
     if (pass_breaks()) {
       system_.slope(t_, z_.data(), method_->first_slope());
@@ -282,6 +299,29 @@ private:
     record();
   }
 
+  void look_for_jump(const Attempt &attempt) {
+    const double usual = steps_.usual_step > 0 ? steps_.usual_step : system_.initial_step();
+    if (attempt.step > may_have_met_jump * usual || attempt.end <= searched_until_)
+      return;
+    jump_ = find_jump(system_, z_.data(), t_, attempt.end);
+    if (jump_)
+      steps_.next_step = usual;
+    else
+      searched_until_ = attempt.end;
+  }
+
+  // The state is the same on both sides.
+  void pass_jump() {
+    t_ = jump_->after;
+    jump_.reset();
+    record();
+    for (; report_.outputs < times_.size() && times_[report_.outputs] <= t_; ++report_.outputs)
+      output_(report_.outputs, times_[report_.outputs], state(z_.data()));
+    pass_breaks();
+    system_.slope(t_, z_.data(), method_->first_slope());
+    method_->restart();
+  }
+
   // True where loads have jumped at t.
   bool pass_breaks() {
     const std::size_t before = next_break_;
@@ -305,7 +345,7 @@ private:
     recording_->states.insert(recording_->states.end(), y, y + system_.local().state_size());
   }
 
-  ImplicitSystem &system_;
+  OdeSystem &system_;
   const std::vector<double> &times_;
   const IntegrationControls &controls_;
   const StateFunctionOfTime &output_;
@@ -320,6 +360,8 @@ private:
   double t_, t_asked_, end_, duration_;
   std::chrono::steady_clock::time_point asked_ = std::chrono::steady_clock::now();
   std::size_t next_break_ = 0;
+  std::optional<Jump> jump_;             // the next one that is known
+  double searched_until_ = t_;           // there is no other before
   Eigen::VectorXd z_, error_, z_output_; // local coordinates (ode.h)
 };
 
@@ -330,7 +372,7 @@ const MethodChoice &Recording::method_of(std::size_t step) const {
   return std::prev(after)->second;
 }
 
-IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
+IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
                             IntegrationCheckpoint *checkpoint) {

@@ -1,0 +1,46 @@
+#include "core/integrate/jump.h"
+
+#include <cmath>
+#include <numeric>
+
+namespace ffrobot {
+
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double part_of_change = 0.5; // that is there between neighbours still: what is only steep has none of it
+constexpr double least = 1e-9;         // of the largest accelerations so far: more than rounding
+constexpr double at_once = 1e-9;       // of the interval: what accelerations do to velocities meanwhile is nothing
+
+} // namespace
+
+std::optional<Jump> find_jump(ImplicitSystem &system, const double *z, double start, double end) {
+  VectorXd left(system.size()), middle(left), right(left), change(left);
+  system.slope(start, z, left.data());
+  system.slope(end, z, right.data());
+  const double rate = 1 / (at_once * (end - start));
+  const auto size = [&](const VectorXd &from, const VectorXd &to) {
+    change = (to - from) / rate;
+    return system.change_size(z, change.data(), rate);
+  };
+  const double whole = size(left, right);
+  if (!(whole > least) || !std::isfinite(whole))
+    return std::nullopt;
+  double t = std::midpoint(start, end);
+  for (; start < t && t < end; t = std::midpoint(start, end)) {
+    system.slope(t, z, middle.data());
+    if (size(left, middle) > size(middle, right)) {
+      end = t;
+      right.swap(middle);
+    } else {
+      start = t;
+      left.swap(middle);
+    }
+  }
+  if (!(size(left, right) >= part_of_change * whole))
+    return std::nullopt;
+  return Jump{start, end};
+}
+
+} // namespace ffrobot
