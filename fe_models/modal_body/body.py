@@ -233,7 +233,7 @@ def _check_spin(body: ModalBody) -> None:
     missing = [name for name, value in parts.items() if value is None]
     if missing:
         if len(missing) < len(parts):
-            _fail(body, f"{missing[0]}: expected beside {', '.join(parts.keys() - set(missing))}, found none")
+            _fail(body, f"{missing[0]}: expected beside {', '.join(name for name in parts if name not in missing)}, found none")
         return
     J, h, S = parts.values()
     if not J >= 0:
