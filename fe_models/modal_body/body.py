@@ -233,7 +233,8 @@ def _check_spin(body: ModalBody) -> None:
     missing = [name for name, value in parts.items() if value is None]
     if missing:
         if len(missing) < len(parts):
-            _fail(body, f"{missing[0]}: expected beside {', '.join(name for name in parts if name not in missing)}, found none")
+            known = ", ".join(name for name in parts if name not in missing)
+            _fail(body, f"{missing[0]}: expected beside {known}, found none")
         return
     J, h, S = parts.values()
     if not J >= 0:
