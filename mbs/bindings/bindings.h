@@ -12,6 +12,7 @@ void bind_system(nanobind::module_ &m);
 void bind_integrate(nanobind::module_ &m);
 void bind_actuation(nanobind::module_ &m);
 void bind_analysis(nanobind::module_ &m);
+void bind_recursion(nanobind::module_ &m);
 void bind_for_tests(nanobind::module_ &m); // of no use to the program
 
 // Raises ValueError with both sizes where they differ.

@@ -14,5 +14,6 @@ NB_MODULE(_core, m) {
   bind_integrate(m);
   bind_actuation(m);
   bind_analysis(m);
+  bind_recursion(m);
   bind_for_tests(m);
 }

@@ -37,7 +37,8 @@ class DividedLink:
         bodies: names of the pieces.
         spread: (N, n) p of the pieces where the link bends in its modes. Its transpose makes modal forces on the link
             of those on the pieces: virtual work.
-        gathered: (n, N) p of the link that are nearest to those of the pieces, in strain energy.
+        gathered: (n, N) p of the link that are nearest to those of the pieces, in strain energy; the smallest where the
+            link has more modes than its pieces.
     """
 
     bodies: tuple[str, ...]
@@ -48,9 +49,9 @@ class DividedLink:
 def divided_link(link: ModalBody, planar: PlanarBody, pieces: Sequence[Piece]) -> DividedLink:
     """Of a link and its pieces, each with its equations."""
     spread = np.vstack([_shape_in_piece(link, planar, piece) for piece in pieces])
-    weighted = spread.T * np.concatenate([piece.planar.stiffness for piece in pieces])
+    root = np.sqrt(np.concatenate([piece.planar.stiffness for piece in pieces]))
     names = tuple(piece.planar.name for piece in pieces)
-    return DividedLink(names, spread, np.linalg.solve(weighted @ spread, weighted))
+    return DividedLink(names, spread, np.linalg.pinv(root[:, None] * spread) * root)
 
 
 def _shape_in_piece(link: ModalBody, planar: PlanarBody, piece: Piece) -> Array:

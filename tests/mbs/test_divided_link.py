@@ -14,7 +14,7 @@ from ffrobot.mbs.model.planar_body import from_modal_body
 MODES = 4
 
 
-def divided(condition, count):
+def divided(condition, count, modes=MODES):
     """A link, its pieces, and its modes in theirs."""
     section = {"shape": "rectangle", "height": 0.01, "width": 0.02}
     keys = {
@@ -23,7 +23,7 @@ def divided(condition, count):
         "geometry": {"kind": "beam", "length": 0.8, "section": section},
         "mesh": {"elements": 24},
         "reference": {"condition": condition},
-        "modes": {"count": MODES, "family": "in-plane-bending", "attachment_modes": False},
+        "modes": {"count": modes, "family": "in-plane-bending", "attachment_modes": False},
     }
     source = LinkTable(keys, Path("link.toml"))
     link, parts = cached_modal_body(source).body, cut(source, count)
@@ -64,3 +64,11 @@ def test_strain_energy_converges_from_below(count):
 def test_what_is_spread_is_gathered():
     *_, found = divided("simply-supported", 4)
     np.testing.assert_allclose(found.gathered @ found.spread, np.eye(MODES), atol=1e-12)
+
+
+def test_a_link_may_have_more_modes_than_its_pieces():
+    """Ten modes in two pieces of three: what the pieces can do is gathered, and found again."""
+    _, planar, pieces, found = divided("cantilever", 2, modes=10)
+    total = sum(piece.planar.n_modes for piece in pieces)
+    assert total < planar.n_modes
+    np.testing.assert_allclose(found.spread @ found.gathered, np.eye(total), atol=1e-8)

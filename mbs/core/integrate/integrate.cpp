@@ -69,7 +69,7 @@ struct Allowance {
 
 class Integration {
 public:
-  Integration(ImplicitSystem &system, const std::vector<double> &times, const Eigen::VectorXd &y,
+  Integration(OdeSystem &system, const std::vector<double> &times, const Eigen::VectorXd &y,
               const IntegrationControls &controls, const StateFunctionOfTime &output,
               const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks)
       : system_(system), times_(times), controls_(controls), output_(output), carry_on_(carry_on),
@@ -348,7 +348,7 @@ private:
     recording_->states.insert(recording_->states.end(), y, y + system_.local().state_size());
   }
 
-  ImplicitSystem &system_;
+  OdeSystem &system_;
   const std::vector<double> &times_;
   const IntegrationControls &controls_;
   const StateFunctionOfTime &output_;
@@ -375,7 +375,7 @@ const MethodChoice &Recording::method_of(std::size_t step) const {
   return std::prev(after)->second;
 }
 
-IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
+IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
                             IntegrationCheckpoint *checkpoint) {

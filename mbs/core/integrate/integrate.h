@@ -87,7 +87,7 @@ struct Breaks {
 // `recording`, `breaks` and `checkpoint` may be null. Of a `checkpoint` that has begun in an earlier call with the same
 // `times` the integration goes on: neither outputs nor the `recording`, which has to be the same, begin again, and
 // max_steps counts anew. It ends as that of this call.
-IntegrationReport integrate(ImplicitSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
+IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording,
                             const Breaks *breaks = nullptr, IntegrationCheckpoint *checkpoint = nullptr);

@@ -68,7 +68,8 @@ struct MethodChoice {
   double spectral_radius = 0.8; // of generalized-alpha at infinite frequency
 };
 
-// The system must outlive the method.
-std::unique_ptr<Method> make_method(const MethodChoice &choice, ImplicitSystem &system);
+// The system must outlive the method. Throws std::invalid_argument where an implicit method gets a system that is not
+// an ImplicitSystem.
+std::unique_ptr<Method> make_method(const MethodChoice &choice, OdeSystem &system);
 
 } // namespace ffrobot

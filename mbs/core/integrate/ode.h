@@ -32,6 +32,10 @@ public:
   // The last slope() was that at (t, z); may evaluate slopes of its own.
   virtual double error_size(double t, const double *z, const double *e) = 0;
 
+  // Size of a change of z relative to the peaks so far, cheaper than error_size: instead of multipliers it looks at the
+  // accelerations that a change of velocity is worth at `rate` (1/s).
+  virtual double change_size(const double *z, const double *change, double rate) const = 0;
+
   // The run starts at, or an accepted step ended in, (t, z, z_dot).
   virtual void accepted(double t, const double *z, const double *z_dot) = 0;
 
@@ -75,10 +79,6 @@ public:
 
   // C and C_dot, both (constraints)
   virtual void constraint_values(double t, const double *z, double *value, double *rate) = 0;
-
-  // Size of a change of z relative to the peaks so far, cheaper than error_size: instead of multipliers it looks at the
-  // accelerations that a change of velocity is worth at `rate` (1/s).
-  virtual double change_size(const double *z, const double *change, double rate) const = 0;
 };
 
 } // namespace ffrobot

@@ -1,0 +1,136 @@
+// The recursion in joint coordinates (docs/recursion.md), for tests and for what is built upon it.
+#include "core/recursion/independent_rows.h"
+#include "core/recursion/observe.h"
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <chrono>
+#include <optional>
+
+#include "bindings/recursion/recursion.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace ffrobot;
+using namespace ffrobot::recursion;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+template <class Space>
+std::tuple<VectorXd, VectorXd> evaluate(Model<Space> &model, const VectorXd &q, const VectorXd &v,
+                                        const VectorXd &target, const std::optional<VectorXd> &force,
+                                        const std::optional<VectorXd> &wrench) {
+  model.check_state(q, v);
+  check_size("target", target.size(), model.rows());
+  Forces<double> forces;
+  if (force) {
+    check_size("force", force->size(), model.mechanism.n_v);
+    forces.generalized = force->data();
+  }
+  if (wrench) {
+    check_size("wrench", wrench->size(), Space::dim * static_cast<Index>(model.mechanism.wrenches.size()));
+    forces.wrench = wrench->data();
+  }
+  VectorXd a(model.mechanism.n_v);
+  accelerations(model.mechanism, q.data(), v.data(), forces, target.data(), model.w, a.data());
+  return {a, Eigen::Map<const VectorXd>(model.w.lambda.data(), model.rows())};
+}
+
+template <class Space>
+std::tuple<VectorXd, VectorXd> row_values(Model<Space> &model, const VectorXd &q, const VectorXd &v) {
+  model.check_state(q, v);
+  VectorXd value(model.rows()), rate(model.rows());
+  measure(model.mechanism, q.data(), v.data(), model.w, value.data(), rate.data());
+  return {value, rate};
+}
+
+template <class Space> VectorXd answer_of(Model<Space> &model, const VectorXd &q, const VectorXd &residual) {
+  check_size("residual", residual.size(), model.rows());
+  VectorXd dq(model.mechanism.n_v);
+  response(model.mechanism, q.data(), residual.data(), model.w, dq.data());
+  return dq;
+}
+
+template <class Space>
+double time_of(Model<Space> &model, const VectorXd &q, const VectorXd &v, const VectorXd &target, int repetitions) {
+  model.check_state(q, v);
+  VectorXd a(model.mechanism.n_v);
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < repetitions; ++i)
+    accelerations(model.mechanism, q.data(), v.data(), Forces<double>(), target.data(), model.w, a.data());
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / repetitions;
+}
+
+template <class Space> void bind_model(nb::module_ &m, const char *name, const char *body_name, const char *text) {
+  using Body = BodyModel<typename Space::Data>;
+  nb::class_<Body>(m, body_name, "A body of a tree and the joint that it hangs on; see mbs/core/recursion/model.h.")
+      .def(nb::init<>())
+      .def_rw("name", &Body::name)
+      .def_rw("parent", &Body::parent)
+      .def_rw("parent_marker", &Body::parent_marker)
+      .def_rw("inboard_marker", &Body::inboard_marker)
+      .def_rw("joint", &Body::joint)
+      .def_rw("lead", &Body::lead)
+      .def_rw("rotor_inertia", &Body::rotor_inertia)
+      .def_rw("gear_ratio", &Body::gear_ratio)
+      .def_rw("driven", &Body::driven)
+      .def_rw("data", &Body::data);
+  nb::class_<Model<Space>>(m, name, text)
+      .def(nb::init<const std::vector<Body> &, const std::vector<typename Space::Marker> &,
+                    const std::vector<RowModel> &, const std::vector<MarkerAt> &, const VectorXd &>(),
+           "bodies"_a, "ground"_a, "rows"_a, "wrenches"_a, "gravity"_a)
+      .def_prop_ro("n_q", [](const Model<Space> &model) { return model.mechanism.n_q; })
+      .def_prop_ro("n_v", [](const Model<Space> &model) { return model.mechanism.n_v; })
+      .def_prop_ro(
+          "first",
+          [](const Model<Space> &model) {
+            std::vector<std::tuple<int, int, int, int>> first;
+            for (const auto &node : model.mechanism.nodes)
+              first.emplace_back(node.q, node.p_q(), node.v, node.p_v());
+            return first;
+          },
+          "Of each body: index in q of its joint and of its modes, index in v of both.")
+      .def("evaluate", &evaluate<Space>, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
+           "(a, lambda): accelerations (n_v) and multipliers (rows).")
+      .def(
+          "keep_independent_rows",
+          [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
+            model.check_state(q, v);
+            return keep_independent_rows(model.mechanism, q.data(), v.data(), model.w);
+          },
+          "q"_a, "v"_a, "Indices of rows that do not depend on others at a state; the rest is left out from now on.")
+      .def("measure", &row_values<Space>, "q"_a, "v"_a, "Values and rates of rows.")
+      .def("response", &answer_of<Space>, "q"_a, "residual"_a,
+           "-M^-1 C^T (C M^-1 C^T)^-1 residual, at the state of the last evaluation.")
+      .def(
+          "frames",
+          [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
+            model.check_state(q, v);
+            return frame_motions(model.mechanism, q.data(), v.data(), model.w);
+          },
+          "q"_a, "v"_a, "Motion of all frames, accelerations those of the last evaluation.")
+      .def(
+          "totals",
+          [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
+            model.check_state(q, v);
+            return totals(model.mechanism, q.data(), v.data(), model.w);
+          },
+          "q"_a, "v"_a, "Energies and momentum.")
+      .def("time_evaluations", &time_of<Space>, "q"_a, "v"_a, "target"_a, "repetitions"_a,
+           "Seconds of one evaluation.");
+}
+
+} // namespace
+
+void bind_recursion(nb::module_ &m) {
+  bind_tree_data(m);
+  bind_model<Planar>(m, "PlanarModel", "PlanarBody", "A mechanism in the plane, in joint coordinates.");
+  bind_model<Spatial>(m, "SpatialModel", "SpatialBody", "A mechanism in space, in joint coordinates.");
+  bind_tree_motion(m);
+}

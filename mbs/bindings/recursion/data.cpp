@@ -1,0 +1,109 @@
+// What a mechanism in joint coordinates is made of: mbs/core/recursion/model.h.
+#include "core/recursion/observe.h"
+
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings/recursion/recursion.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace ffrobot::recursion;
+
+namespace {
+
+void bind_data(nb::module_ &m) {
+  nb::class_<PlanarMarker>(m, "PlanarMarker")
+      .def(nb::init<>())
+      .def_rw("position", &PlanarMarker::position)
+      .def_rw("angle", &PlanarMarker::angle)
+      .def_rw("Phi", &PlanarMarker::Phi);
+  nb::class_<SpatialMarker>(m, "SpatialMarker")
+      .def(nb::init<>())
+      .def_rw("position", &SpatialMarker::position)
+      .def_rw("triad", &SpatialMarker::triad)
+      .def_rw("Phi", &SpatialMarker::Phi);
+  nb::class_<PlanarData>(m, "PlanarData")
+      .def(nb::init<>())
+      .def_rw("mass", &PlanarData::mass)
+      .def_rw("inertia", &PlanarData::inertia)
+      .def_rw("first_moment", &PlanarData::first_moment)
+      .def_rw("stiffness", &PlanarData::stiffness)
+      .def_rw("damping", &PlanarData::damping)
+      .def_rw("S_bar", &PlanarData::S_bar)
+      .def_rw("h", &PlanarData::h)
+      .def_rw("j", &PlanarData::j)
+      .def_rw("S_tilde", &PlanarData::S_tilde)
+      .def_rw("m_xy", &PlanarData::m_xy)
+      .def_rw("markers", &PlanarData::markers);
+  nb::class_<SpatialData>(m, "SpatialData")
+      .def(nb::init<>())
+      .def_rw("mass", &SpatialData::mass)
+      .def_rw("first_moment", &SpatialData::first_moment)
+      .def_rw("J2", &SpatialData::J2)
+      .def_rw("stiffness", &SpatialData::stiffness)
+      .def_rw("damping", &SpatialData::damping)
+      .def_rw("S_bar", &SpatialData::S_bar)
+      .def_rw("I_bar", &SpatialData::I_bar)
+      .def_rw("S_bar_kl", &SpatialData::S_bar_kl)
+      .def_rw("J_spin", &SpatialData::J_spin)
+      .def_rw("h_spin", &SpatialData::h_spin)
+      .def_rw("S_spin", &SpatialData::S_spin)
+      .def_rw("spin_axis", &SpatialData::spin_axis)
+      .def_rw("spin_booked", &SpatialData::spin_booked)
+      .def_rw("markers", &SpatialData::markers);
+}
+
+void bind_rows(nb::module_ &m) {
+  nb::enum_<JointKind>(m, "JointKind")
+      .value("revolute", JointKind::revolute)
+      .value("prismatic", JointKind::prismatic)
+      .value("screw", JointKind::screw)
+      .value("cylindrical", JointKind::cylindrical)
+      .value("universal", JointKind::universal)
+      .value("spherical", JointKind::spherical)
+      .value("planar", JointKind::planar)
+      .value("weld", JointKind::weld)
+      .value("free", JointKind::free);
+  nb::enum_<RowKind>(m, "RowKind")
+      .value("point", RowKind::point)
+      .value("slide", RowKind::slide)
+      .value("dot", RowKind::dot)
+      .value("rotation", RowKind::rotation)
+      .value("coordinate", RowKind::coordinate);
+  nb::class_<MarkerAt>(m, "MarkerAt", "A marker of a body, or of the ground: body -1.")
+      .def(
+          "__init__", [](MarkerAt *at, int body, int marker) { new (at) MarkerAt{body, marker}; }, "body"_a,
+          "marker"_a);
+  nb::class_<RowModel>(m, "RowModel", "A constraint row between markers a and b; see mbs/core/recursion/model.h.")
+      .def(nb::init<>())
+      .def_rw("name", &RowModel::name)
+      .def_rw("kind", &RowModel::kind)
+      .def_rw("a", &RowModel::a)
+      .def_rw("b", &RowModel::b)
+      .def_rw("f", &RowModel::f)
+      .def_rw("g", &RowModel::g)
+      .def_rw("coordinate", &RowModel::coordinate);
+  nb::class_<FrameMotion>(m, "FrameMotion", "Motion of a body's frame, global axes.")
+      .def_ro("r", &FrameMotion::r)
+      .def_ro("v", &FrameMotion::v)
+      .def_ro("a", &FrameMotion::a)
+      .def_ro("omega", &FrameMotion::omega)
+      .def_ro("alpha", &FrameMotion::alpha)
+      .def_ro("R", &FrameMotion::R)
+      .def_ro("angle", &FrameMotion::angle);
+  nb::class_<Totals>(m, "Totals", "Energies (J), momentum (N s), angular momentum about the origin (N m s).")
+      .def_ro("kinetic", &Totals::kinetic)
+      .def_ro("strain", &Totals::strain)
+      .def_ro("gravitational", &Totals::gravitational)
+      .def_ro("momentum", &Totals::momentum)
+      .def_ro("angular_momentum", &Totals::angular_momentum);
+}
+
+} // namespace
+
+void bind_tree_data(nb::module_ &m) {
+  bind_data(m);
+  bind_rows(m);
+}

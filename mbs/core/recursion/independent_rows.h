@@ -1,0 +1,14 @@
+// Which constraint rows say something that the others do not.
+#pragma once
+
+#include "core/recursion/workspace.h"
+
+namespace ffrobot::recursion {
+
+// Rows to keep, found by pivoting in C M^-1 C^T at the state (q, v): what is left of a dependent row's diagonal after
+// elimination is rounding. Sets workspace.active. To be called where a run starts: no step looks again.
+template <class Space>
+std::vector<int> keep_independent_rows(const Mechanism<Space> &m, const double *q, const double *v,
+                                       Workspace<Space, double> &w);
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,237 @@
+#include "core/recursion/mechanism.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <type_traits>
+
+namespace ffrobot::recursion {
+
+namespace {
+
+using Eigen::Index;
+
+[[noreturn]] void refuse(const std::string &text) { throw std::invalid_argument(text); }
+
+// Of the modes at a marker, rows along its own axes
+Eigen::MatrixXd section_rows(const PlanarMarker &marker) {
+  Eigen::MatrixXd rows = marker.Phi;
+  rows.topRows<2>() = Eigen::Rotation2D<double>(-marker.angle).toRotationMatrix() * marker.Phi.topRows<2>();
+  return rows;
+}
+Eigen::MatrixXd section_rows(const SpatialMarker &marker) {
+  Eigen::MatrixXd rows = marker.Phi;
+  rows.topRows<3>() = marker.triad.transpose() * marker.Phi.topRows<3>();
+  rows.bottomRows<3>() = marker.triad.transpose() * marker.Phi.bottomRows<3>();
+  return rows;
+}
+
+PlanarData at_marker(const PlanarData &data, const PlanarMarker &m) { return planar::moved(data, m.position, m.angle); }
+SpatialData at_marker(const SpatialData &data, const SpatialMarker &m) {
+  return spatial::moved(data, m.position, m.triad);
+}
+
+// Whether a frame fixed at the inboard marker is where the joint holds the section: modes move the section at most in
+// ways that the joint leaves free, and nothing asks for the joint's coordinate.
+template <class Space> bool frame_sits_at_joint(const BodyModel<typename Space::Data> &body, const JointShape &shape) {
+  if (body.data.modes() == 0 || body.joint == JointKind::free) // coordinates of a free body are those of its frame
+    return true;
+  const auto &marker = body.data.markers[static_cast<std::size_t>(body.inboard_marker)];
+  const Eigen::MatrixXd rows = section_rows(marker);
+  const bool asked = body.driven || body.rotor_inertia > 0;
+  for (int c = 0; c < Space::dim; ++c) {
+    const int *first = shape.freedoms.component;
+    const bool is_free = std::find(first, first + shape.freedoms.count, c) != first + shape.freedoms.count;
+    // The free axis of a universal joint on the inner side is none of the section's.
+    const bool counts = !is_free || asked || (body.joint == JointKind::universal && c == 3) ||
+                        (body.joint == JointKind::screw && c == 5); // turns and slides together
+    const double scale = 1 / std::sqrt(std::max(body.data.mass, 1e-300));
+    if (counts && rows.row(c).cwiseAbs().maxCoeff() > 1e-12 * scale)
+      return false;
+  }
+  return true;
+}
+
+template <class Data>
+void check(const BodyModel<Data> &body, std::size_t index, std::size_t ground_markers,
+           const std::vector<BodyModel<Data>> &bodies, int dim) {
+  const std::string name = "body " + body.name;
+  const auto count = body.data.markers.size();
+  if (body.parent < -1 || body.parent >= static_cast<int>(index))
+    refuse(name + ": parent: expected -1 (ground) or a body before it, got " + std::to_string(body.parent));
+  const std::size_t there =
+      body.parent < 0 ? ground_markers : bodies[static_cast<std::size_t>(body.parent)].data.markers.size();
+  if (body.parent_marker < 0 || body.parent_marker >= static_cast<int>(there))
+    refuse(name + ": parent_marker: expected 0 to " + std::to_string(there) + " - 1, got " +
+           std::to_string(body.parent_marker));
+  if (body.inboard_marker < 0 || body.inboard_marker >= static_cast<int>(count))
+    refuse(name + ": inboard_marker: expected 0 to " + std::to_string(count) + " - 1, got " +
+           std::to_string(body.inboard_marker));
+  for (const auto &marker : body.data.markers)
+    if (body.data.modes() && (marker.Phi.rows() != dim || marker.Phi.cols() != body.data.modes()))
+      refuse(name + ": Phi of a marker: expected (" + std::to_string(dim) + ", " + std::to_string(body.data.modes()) +
+             ")");
+  if (body.rotor_inertia > 0 && body.joint != JointKind::revolute)
+    refuse(name + ": rotor_inertia: expected a revolute joint under a rotor");
+}
+
+} // namespace
+
+template <class Space>
+Attachment Mechanism<Space>::attach(const MarkerAt &at, std::vector<std::vector<int>> &used) const {
+  if (at.body < 0) {
+    if (at.marker < 0 || at.marker >= static_cast<int>(ground.size()))
+      refuse("ground marker: expected 0 to " + std::to_string(ground.size()) + " - 1, got " +
+             std::to_string(at.marker));
+    return {-1, at.marker, -1};
+  }
+  if (at.body >= static_cast<int>(used.size()))
+    refuse("marker: expected a body below " + std::to_string(used.size()) + ", got " + std::to_string(at.body));
+  auto &ports = used[static_cast<std::size_t>(at.body)];
+  const auto found = std::find(ports.begin(), ports.end(), at.marker);
+  const int port = static_cast<int>(found - ports.begin());
+  if (found == ports.end())
+    ports.push_back(at.marker);
+  return {at.body, port, -1};
+}
+
+template <class Space>
+Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Marker> ground_,
+                            std::vector<RowModel> row_models, std::vector<MarkerAt> loaded,
+                            const Eigen::VectorXd &gravity_)
+    : ground(std::move(ground_)), gravity(gravity_) {
+  constexpr bool in_plane = std::is_same_v<Space, Planar>;
+  const std::size_t count = bodies.size();
+  if (gravity.size() != Space::linear)
+    refuse("gravity: expected " + std::to_string(Space::linear) + " components, got " + std::to_string(gravity.size()));
+  nodes.resize(count);
+  std::vector<std::vector<int>> used(count); // markers that are outboard ports
+  // What hangs on what: a port for each child, ports of rows and wrenches where there is none yet
+  for (std::size_t i = 0; i < count; ++i) {
+    check(bodies[i], i, ground.size(), bodies, Space::dim);
+    nodes[i].parent = bodies[i].parent, nodes[i].parent_port = bodies[i].parent_marker;
+    if (bodies[i].parent >= 0) {
+      auto &ports_there = used[static_cast<std::size_t>(bodies[i].parent)];
+      nodes[i].parent_port = static_cast<int>(ports_there.size());
+      ports_there.push_back(bodies[i].parent_marker);
+    }
+  }
+  for (const RowModel &model : row_models) {
+    Row row{model, {}, {}, -1, 0};
+    if (model.kind != RowKind::coordinate)
+      row.a = attach(model.a, used), row.b = attach(model.b, used);
+    rows.push_back(row);
+  }
+  for (const MarkerAt &at : loaded)
+    wrenches.push_back(attach(at, used));
+
+  // Coordinates, ports, columns
+  std::vector<char> is_driven(count);
+  int coordinate_rows = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    BodyModel<Data> &model = bodies[i];
+    Node<Space> &node = nodes[i];
+    node.name = model.name, node.joint = model.joint, node.shape = Space::shape(model.joint);
+    node.lead = model.lead, node.rotor_inertia = model.rotor_inertia, node.gear_ratio = model.gear_ratio;
+    node.q = n_q, node.v = n_v;
+    for (Row &row : rows)
+      if (row.model.kind == RowKind::coordinate && row.model.coordinate >= n_v &&
+          row.model.coordinate < n_v + node.shape.v_count) {
+        row.node = static_cast<int>(i), row.freedom = row.model.coordinate - n_v;
+        node.has_rows = model.driven = true;
+        ++coordinate_rows;
+      }
+    is_driven[i] = model.driven;
+    const bool sits = frame_sits_at_joint<Space>(model, node.shape);
+    const Marker inboard = model.data.markers[static_cast<std::size_t>(model.inboard_marker)];
+    node.outboard = static_cast<int>(used[i].size());
+    if (sits)
+      model.data = at_marker(model.data, inboard);
+    else
+      node.inboard = node.outboard, used[i].push_back(model.inboard_marker);
+    node.body = typename Space::Body(model.data, used[i]);
+    node.first_port = ports, ports += node.ports();
+    const int n_ports = node.ports();
+    node.first_cross = crosses, crosses += n_ports * (n_ports - 1) / 2;
+    node.first_slot = slots, slots = node.port_slot(node.outboard);
+    if (node.shape.quaternion >= 0)
+      rotations.push_back(n_v + node.shape.v_count - 3);
+    n_q += node.shape.q_count + node.n(), n_v += node.shape.v_count + node.n();
+  }
+  for (const Row &row : rows)
+    if (row.node >= 0 && nodes[static_cast<std::size_t>(row.node)].shape.in_inner_axes)
+      refuse("row " + row.model.name + ": expected a coordinate of a joint with rotations or one slide, got one of a " +
+             "planar or free joint: use rows between markers");
+  for (const Row &row : rows)
+    if (row.model.kind == RowKind::coordinate && row.node < 0)
+      refuse("row " + row.model.name + ": expected a joint coordinate, got " + std::to_string(row.model.coordinate) +
+             " of " + std::to_string(n_v) + " velocities");
+
+  // Ports: who hangs there, and whether moments pass
+  children.assign(static_cast<std::size_t>(ports), -1);
+  cleared.assign(static_cast<std::size_t>(ports), 0);
+  std::vector<char> passes_moment(static_cast<std::size_t>(ports), 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    Node<Space> &node = nodes[i];
+    if (node.parent < 0)
+      continue;
+    node.parent_port += nodes[static_cast<std::size_t>(node.parent)].first_port;
+    const auto port = static_cast<std::size_t>(node.parent_port);
+    children[port] = static_cast<int>(i);
+    if (node.joint != JointKind::revolute || is_driven[i] || node.rotor_inertia > 0)
+      passes_moment[port] = 1;
+  }
+  const auto finish = [&](Attachment &at, bool moment) {
+    if (at.node < 0)
+      return;
+    at.global_port = nodes[static_cast<std::size_t>(at.node)].first_port + at.port;
+    cleared[static_cast<std::size_t>(at.global_port)] = 1;
+    if (moment)
+      passes_moment[static_cast<std::size_t>(at.global_port)] = 1;
+  };
+  for (Row &row : rows)
+    if (row.model.kind != RowKind::coordinate) {
+      const bool moment = row.model.kind != RowKind::point;
+      row.moves = row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
+      if (row.model.kind == RowKind::point)
+        row.lift = gravity.dot(row.model.f.head(Space::linear)) * ((row.a.node < 0) - (row.b.node < 0));
+      needs_positions = needs_positions || row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
+      finish(row.a, moment), finish(row.b, moment);
+    }
+  for (Attachment &at : wrenches)
+    finish(at, true);
+  for (std::size_t port = 0; port < children.size(); ++port)
+    if (children[port] < 0)
+      cleared[port] = 1;
+  for (std::size_t i = 0; i < count; ++i)
+    for (int k = 0; k < nodes[i].outboard; ++k)
+      if (const int port = nodes[i].first_port + k; cleared[static_cast<std::size_t>(port)]) {
+        Actions found{static_cast<int>(i), k, port, {}};
+        for (std::size_t r = 0; r < rows.size(); ++r) {
+          for (const double sign : {1., -1.})
+            if ((sign > 0 ? rows[r].b : rows[r].a).global_port == port) {
+              const Eigen::Vector3d f = sign * rows[r].model.f;
+              found.list.push_back(
+                  {static_cast<int>(r), -1, sign, rows[r].model.kind == RowKind::point, {f[0], f[1], f[2]}});
+            }
+        }
+        for (std::size_t k_wrench = 0; k_wrench < wrenches.size(); ++k_wrench)
+          if (wrenches[k_wrench].global_port == port)
+            found.list.push_back({-1, static_cast<int>(k_wrench), -1, false, {}});
+        actions.push_back(found);
+      }
+  if constexpr (in_plane)
+    for (std::size_t i = 0; i < count; ++i) {
+      Node<Space> &node = nodes[i];
+      node.is_pin = node.joint == JointKind::revolute && node.inboard < 0 && node.rotor_inertia == 0 &&
+                    node.outboard <= 1 &&
+                    (node.outboard == 0 || !passes_moment[static_cast<std::size_t>(node.first_port)]);
+    }
+}
+
+template struct Mechanism<Planar>;
+template struct Mechanism<Spatial>;
+
+} // namespace ffrobot::recursion

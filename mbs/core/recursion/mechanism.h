@@ -1,0 +1,96 @@
+// The constants of a mechanism, made once from what the caller says. Whatever can be decided before an evaluation is
+// decided here: which blocks of a body exist, whether its frame can sit at its joint, what hangs on which port, which
+// ports pass moments, where rows attach.
+#pragma once
+
+#include "core/recursion/space.h"
+
+#include <Eigen/Core>
+
+namespace ffrobot::recursion {
+
+// A body with the joint that it hangs on.
+template <class Space> struct Node {
+  std::string name;
+  typename Space::Body body;
+  JointKind joint = JointKind::revolute;
+  JointShape shape{0, 0, -1, {}};
+  double lead = 0, rotor_inertia = 0, gear_ratio = 1;
+
+  int parent = -1;     // node, or -1
+  int parent_port = 0; // of all ports; on the ground: of ground markers
+  int first_port = 0;  // of all ports; outboard ones first
+  int outboard = 0;    // how many
+  int inboard =
+      -1; // its port (of the body) where modes move the section that the joint holds; else its frame sits there
+  int q = 0, v = 0; // first of the joint; those of the modes follow
+  int first_slot =
+      0; // of columns: the joint's freedoms; 2 dim where it has an inboard port; dim for each outboard port
+  int first_cross = 0;   // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
+  bool is_pin = false;   // plane: a revolute joint at the frame, at most one port, which passes forces only
+  bool has_rows = false; // constraint rows that are coordinates of the joint
+
+  int n() const { return body.n; }
+  int body_width() const { return body.row_count(); } // rows of W
+  int ports() const { return static_cast<int>(body.ports.size()); }
+  int p_q() const { return q + shape.q_count; }
+  int p_v() const { return v + shape.v_count; }
+  int joint_slot(int freedom) const { return first_slot + freedom; }
+  int inboard_slot() const { return first_slot + shape.freedoms.count; }
+  int port_slot(int port) const { return inboard_slot() + (inboard >= 0 ? 2 * Space::dim : 0) + port * Space::dim; }
+};
+
+// One side of a row, or of a wrench: a port, or a marker of the ground.
+struct Attachment {
+  int node = -1, port = 0; // of the node; node -1: ground marker
+  int global_port = -1;    // of all ports
+};
+
+// What acts on a port: side b (+1) or a (-1) of a row, or a wrench.
+struct Action {
+  int row, wrench;
+  double sign;
+  bool is_point = false; // of a row: a force of constant direction, global axes
+  double force[3] = {};  // it, with the sign
+};
+
+struct Row {
+  RowModel model;
+  Attachment a, b;
+  int node = -1, freedom = 0; // of a row that is a joint coordinate
+  bool moves = false;         // its direction does
+  double lift = 0;            // what it measures of gravity, one end being on the ground
+};
+
+template <class Space> struct Mechanism {
+  using Data = typename Space::Data;
+  using Marker = typename Space::Marker;
+
+  // Throws std::invalid_argument with what was expected and found.
+  Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Marker> ground, std::vector<RowModel> rows,
+            std::vector<MarkerAt> wrenches, const Eigen::VectorXd &gravity);
+
+  std::vector<Node<Space>> nodes;
+  std::vector<Marker> ground;
+  std::vector<Row> rows;
+  std::vector<Attachment> wrenches; // markers on which forces act
+  Eigen::VectorXd gravity;          // (linear) m/s^2
+  int n_q = 0, n_v = 0, ports = 0, slots = 0, crosses = 0;
+  std::vector<int> children; // of each port: the node that hangs on it, or -1
+  std::vector<char> cleared; // of each port: what acts on it is summed up, and starts at zero
+  struct Actions {
+    int node, port, global_port; // of cleared ports
+    std::vector<Action> list;
+  };
+  std::vector<Actions> actions;
+  bool needs_positions = false;        // rows have directions that move
+  std::vector<Eigen::Index> rotations; // index in v of the first of three components of each quaternion's rate
+
+private:
+  Attachment attach(const MarkerAt &at, std::vector<std::vector<int>> &used) const;
+};
+
+extern template struct Mechanism<Planar>;
+extern template struct Mechanism<Spatial>;
+
+} // namespace ffrobot::recursion

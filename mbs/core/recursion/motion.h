@@ -1,0 +1,72 @@
+// The motion of a mechanism in joint coordinates as an OdeSystem: rows follow functions of time, forces act along
+// joints and on modes; after every step the state is moved back onto the rows with the columns of the recursion.
+#pragma once
+
+#include "core/constraint/constraint.h"
+#include "core/integrate/ode.h"
+#include "core/recursion/workspace.h"
+#include "core/space/configuration_space.h"
+#include "core/time_function/time_function.h"
+
+namespace ffrobot::recursion {
+
+// `magnitude`(t) times `direction` (n_v), generalized forces: joint moments, modal forces of patches.
+struct Load {
+  Eigen::VectorXd direction;
+  TimeFunction magnitude;
+};
+
+// Along a joint's coordinate: spring about `rest`, viscous and Coulomb friction.
+struct JointForce {
+  int q = 0, v = 0;     // of the coordinate
+  double stiffness = 0; // N m/rad, N/m
+  double rest = 0;      // rad, m
+  Friction friction;
+};
+
+struct Scene {
+  std::vector<TimeFunction> targets; // of rows: value, rate and acceleration
+  std::vector<Load> loads;
+  std::vector<JointForce> joint_forces;
+};
+
+template <class Space> class RecursiveMotion final : public OdeSystem {
+public:
+  // The mechanism and the scene must outlive this. Rows that depend on others at (q, v) are left out of the equations
+  // from there on; they are to be consistent.
+  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, const double *q, const double *v);
+
+  void slope(double t, const double *z, double *z_dot) override;
+  bool correct(double t, double *z) override;
+  double error_size(double t, const double *z, const double *e) override;
+  double change_size(const double *z, const double *change, double rate) const override;
+  void accepted(double t, const double *z, const double *z_dot) override;
+  bool is_sensible(const double *z) const override;
+  double initial_step() const override { return 0.1 / fastest_; }
+  unsigned long evaluations() const override { return workspace_.evaluations; }
+
+  // At a state y = (q, v): accelerations (n_v); multipliers are in workspace().lambda
+  void evaluate(double t, const double *q, const double *v, double *a);
+  // Moves q (n_q) and v (n_v) onto the rows at time t; the largest residual left, relative to 1 m, 1 rad, 1 m/s
+  double project(double t, double *q, double *v);
+
+  const Workspace<Space, double> &workspace() const { return workspace_; }
+
+private:
+  void update_targets(double t);
+  void residuals(double t, const double *q, const double *v);
+
+  const Mechanism<Space> &mechanism_;
+  const Scene &scene_;
+  Workspace<Space, double> workspace_, measured_; // of accelerations; of rows, which must not disturb these
+  Eigen::VectorXd force_, target_, value_, rate_, correction_, state_;
+  std::vector<Jet> jets_;
+  double target_time_;
+  double fastest_ = 1; // 1/s
+  // Errors are judged against the largest values so far of what is alike: all joints' ways, angles, each body's modes.
+  std::vector<int> group_; // of each of 2 n_v entries of z
+  std::vector<double> peak_;
+  mutable std::vector<double> size_;
+};
+
+} // namespace ffrobot::recursion

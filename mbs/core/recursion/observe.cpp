@@ -1,0 +1,119 @@
+#include "core/recursion/observe.h"
+
+#include "core/recursion/rows.h"
+
+#include <Eigen/Geometry>
+
+namespace ffrobot::recursion {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+Vector3d vector(const double *x) { return {x[0], x[1], x[2]}; }
+
+Matrix3d axes(const Pose<double> &frame) {
+  Matrix3d R;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      R(i, j) = frame.R[i][j];
+  return R;
+}
+
+// A in body axes as linear and angular parts with three components each
+std::pair<Vector3d, Vector3d> parts(const planar::State<double> &s) { return {{s.A[0], s.A[1], 0}, {0, 0, s.A[2]}}; }
+std::pair<Vector3d, Vector3d> parts(const spatial::State<double> &s) { return {vector(s.A), vector(s.A + 3)}; }
+
+// Of one body: s and M_rr of the frame (translation, rotation; body axes), m p_dot (linear, angular)
+struct Inertia {
+  double mass;
+  Vector3d s, S_p_dot, h_p_dot;
+  Matrix3d J;
+};
+
+Inertia inertia_of(const planar::Body &b, const double *p, const double *v, planar::State<double> &s) {
+  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero()};
+  inertia(b, p, v, s);
+  to.s << b.sx, b.sy, 0;
+  to.J(2, 2) = b.J;
+  if (b.n) {
+    to.s += Vector3d(s.u[0], s.u[1], 0), to.S_p_dot << s.u_dot[0], s.u_dot[1], 0;
+    to.h_p_dot[2] = s.u_dot[2], to.J(2, 2) += s.p_p;
+    for (int i = 0; b.has_more && i < b.n; ++i)
+      to.h_p_dot[2] += s.h[i] * v[i];
+  }
+  return to;
+}
+
+Inertia inertia_of(const spatial::Body &b, const double *p, const double *v, spatial::State<double> &s) {
+  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero()};
+  inertia(b, p, v, s);
+  to.s = vector(s.s);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      to.J(i, j) = s.J[i][j];
+  if (b.n) {
+    to.S_p_dot = vector(s.u_dot.data());
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < b.n; ++k)
+        to.h_p_dot[i] += s.W[k * b.width + spatial::Body::h + i] * v[k];
+  }
+  return to;
+}
+
+} // namespace
+
+template <class Space>
+std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
+                                       Workspace<Space, double> &w) {
+  kinematics(m, q, v, Forces<double>(), w);
+  locate(m, q, w);
+  Vector3d g = Vector3d::Zero();
+  g.head(m.gravity.size()) = m.gravity;
+  std::vector<FrameMotion> all;
+  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
+    const Pose<double> &frame = w.frames[i];
+    const auto [a, alpha] = parts(w.bodies[i]);
+    const Matrix3d R = axes(frame);
+    all.push_back({vector(frame.r), vector(frame.v), R * a + g, vector(frame.omega), R * alpha, R, frame.angle});
+  }
+  return all;
+}
+
+template <class Space>
+Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Workspace<Space, double> &w) {
+  kinematics(m, q, v, Forces<double>(), w);
+  locate(m, q, w);
+  Totals sum;
+  Vector3d g = Vector3d::Zero();
+  g.head(m.gravity.size()) = m.gravity;
+  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
+    const Node<Space> &node = m.nodes[i];
+    const double *p = q + node.p_q(), *p_dot = v + node.p_v();
+    const Inertia body = inertia_of(node.body, p, p_dot, w.bodies[i]);
+    const Matrix3d R = axes(w.frames[i]);
+    const Vector3d r = vector(w.frames[i].r), u = R.transpose() * vector(w.frames[i].v),
+                   omega = R.transpose() * vector(w.frames[i].omega);
+    const Vector3d linear = body.mass * u + omega.cross(body.s) + body.S_p_dot;
+    const Vector3d angular = body.s.cross(u) + body.J * omega + body.h_p_dot;
+    sum.kinetic += 0.5 * (u.dot(linear) + omega.dot(angular) + u.dot(body.S_p_dot) + omega.dot(body.h_p_dot));
+    for (int k = 0; k < node.n(); ++k) {
+      sum.kinetic += 0.5 * p_dot[k] * p_dot[k];
+      sum.strain += 0.5 * node.body.K[static_cast<std::size_t>(k)] * p[k] * p[k];
+    }
+    sum.gravitational -= g.dot(body.mass * r + R * body.s);
+    sum.momentum += R * linear;
+    sum.angular_momentum += R * angular + r.cross(R * linear);
+  }
+  return sum;
+}
+
+template std::vector<FrameMotion> frame_motions(const Mechanism<Planar> &, const double *, const double *,
+                                                Workspace<Planar, double> &);
+template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, const double *, const double *,
+                                                Workspace<Spatial, double> &);
+template Totals totals(const Mechanism<Planar> &, const double *, const double *, Workspace<Planar, double> &);
+template Totals totals(const Mechanism<Spatial> &, const double *, const double *, Workspace<Spatial, double> &);
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,29 @@
+// What a mechanism does at a state, in global axes: for outputs and tests, not for steps.
+#pragma once
+
+#include "core/recursion/workspace.h"
+
+namespace ffrobot::recursion {
+
+// Frames of all bodies after accelerations(): rows (3) of position, velocity, acceleration, angular velocity, angular
+// acceleration; R: body axes to global ones. In the plane the third components are angles' and zero.
+struct FrameMotion {
+  Eigen::Vector3d r, v, a, omega, alpha;
+  Eigen::Matrix3d R;
+  double angle = 0; // in the plane, full turns counted
+};
+
+template <class Space>
+std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
+                                       Workspace<Space, double> &w);
+
+// Kinetic, strain and gravitational energy (J), and momentum: linear, angular about the origin (3 each). Without
+// rotors.
+struct Totals {
+  double kinetic = 0, strain = 0, gravitational = 0;
+  Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
+};
+template <class Space>
+Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Workspace<Space, double> &w);
+
+} // namespace ffrobot::recursion

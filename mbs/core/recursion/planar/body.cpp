@@ -1,0 +1,117 @@
+#include "core/recursion/planar/body.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+
+namespace ffrobot::recursion::planar {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+PlanarData moved(const PlanarData &data, const Eigen::Vector2d &position, double angle) {
+  PlanarData to = data;
+  const Eigen::Matrix2d R = Eigen::Rotation2D<double>(-angle).toRotationMatrix();
+  const double x = position.x(), y = position.y();
+  to.first_moment = R * (data.first_moment - data.mass * position);
+  to.inertia = data.inertia - 2 * position.dot(data.first_moment) + data.mass * position.squaredNorm();
+  const Index n = data.modes();
+  if (n) {
+    to.S_bar = R * data.S_bar;
+    to.h = (data.h.size() ? data.h : Eigen::VectorXd::Zero(n)) - x * data.S_bar.row(1).transpose() +
+           y * data.S_bar.row(0).transpose();
+    to.j = (data.j.size() ? data.j : Eigen::VectorXd::Zero(n)) - data.S_bar.transpose() * position;
+  }
+  for (PlanarMarker &marker : to.markers) {
+    marker.position = R * (marker.position - position);
+    marker.angle -= angle;
+    if (n)
+      marker.Phi.topRows<2>() = (R * marker.Phi.topRows<2>()).eval();
+  }
+  return to;
+}
+
+namespace {
+
+// a - x . y, summed in extended precision: what is left after elimination is a small part of a
+double less(double a, const Eigen::RowVectorXd &x, const Eigen::RowVectorXd &y) {
+  long double sum = a;
+  for (Index i = 0; i < x.size(); ++i)
+    sum -= static_cast<long double>(x[i]) * y[i];
+  return static_cast<double>(sum);
+}
+
+template <class M> bool vanishes(const M &matrix, double scale) {
+  return matrix.size() == 0 || matrix.cwiseAbs().maxCoeff() <= 1e-12 * scale;
+}
+
+} // namespace
+
+Body::Body(const PlanarData &data, const std::vector<int> &used) : n(static_cast<int>(data.modes())) {
+  mass = data.mass, J = data.inertia, sx = data.first_moment.x(), sy = data.first_moment.y();
+  blocks = 1 + static_cast<int>(used.size()) / 2;
+  padded = (n + 7) / 8 * 8;
+  MatrixXd W = MatrixXd::Zero(width(), n);
+  if (n) {
+    W.topRows<2>() = data.S_bar;
+    if (data.h.size())
+      W.row(H) = data.h.transpose();
+  }
+  for (std::size_t k = 0; k < used.size(); ++k) {
+    const PlanarMarker &marker = data.markers[static_cast<std::size_t>(used[k])];
+    Port port;
+    port.x = marker.position.x(), port.y = marker.position.y(), port.angle = marker.angle;
+    const int i = static_cast<int>(k);
+    port.row = i == 0 ? 3 : 8 * ((i + 1) / 2) + 3 * ((i + 1) % 2);
+    if (n) {
+      W.middleRows<3>(port.row) = marker.Phi;
+      port.is_soft = !vanishes(marker.Phi, 1 / std::sqrt(mass));
+      port.turns = !vanishes(marker.Phi.row(2), 1 / std::sqrt(mass));
+    }
+    ports.push_back(port);
+  }
+  columns.assign(static_cast<std::size_t>(std::max(n, 1) * width()), 0.0);
+  rows.assign(static_cast<std::size_t>(padded * width()), 0.0);
+  for (int r = 0; r < width(); ++r)
+    for (int i = 0; i < n; ++i)
+      columns[static_cast<std::size_t>(i * width() + r)] = rows[static_cast<std::size_t>(r * padded + i)] = W(r, i);
+  G.assign(static_cast<std::size_t>(width() * width()), 0.0);
+  for (int r = 0; r < width(); ++r)
+    for (int c = 0; c < width(); ++c)
+      G[static_cast<std::size_t>(r * width() + c)] = -less(0, W.row(r), W.row(c));
+  const double M[3][3] = {{mass, 0, -sy}, {0, mass, sx}, {-sy, sx, J}};
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c)
+      residual[r][c] = less(M[r][c], W.row(r), W.row(c));
+  for (Port &port : ports) {
+    const double X[3][3] = {{1, 0, -port.y}, {0, 1, port.x}, {0, 0, 1}};
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c)
+        port.T[r][c] = less(X[r][c], W.row(port.row + r), W.row(c));
+  }
+  K.assign(static_cast<std::size_t>(padded), 0.0), D = K;
+  for (int i = 0; i < n; ++i)
+    K[static_cast<std::size_t>(i)] = data.stiffness[i];
+  if (data.damping.cols() == 1 && n && !vanishes(data.damping, 0)) {
+    is_damped = true;
+    for (int i = 0; i < n; ++i)
+      D[static_cast<std::size_t>(i)] = data.damping(i, 0);
+  } else if (data.damping.cols() > 1) {
+    if (data.damping.isDiagonal(0)) {
+      is_damped = !vanishes(data.damping, 0);
+      for (int i = 0; i < n; ++i)
+        D[static_cast<std::size_t>(i)] = data.damping(i, i);
+    } else
+      D_full = data.damping;
+  }
+  const double length = std::sqrt(J / std::max(mass, 1e-300));
+  if (n && !vanishes(data.j, length))
+    j = data.j;
+  if (n && !vanishes(data.S_tilde, 1))
+    S_tilde = data.S_tilde;
+  if (n && data.m_xy.size() && !vanishes(data.m_xy - MatrixXd::Identity(n, n), 1))
+    m_xy = data.m_xy;
+  has_more = j.size() || S_tilde.size() || m_xy.size() || D_full.size();
+}
+
+} // namespace ffrobot::recursion::planar

@@ -1,0 +1,195 @@
+// Outward, in the plane: angles, angular velocities, what velocities do at joints.
+#pragma once
+
+#include "core/recursion/workspace.h"
+
+namespace ffrobot::recursion {
+
+// All angles at once: 4 lanes, |x| below 1e5, within an ulp or two. Reduction after Cody and Waite, polynomials of
+// Cephes.
+FFROBOT_INLINE void sines_and_cosines(const double *x, double *s, double *c, std::size_t count) {
+  if (count <= 2) {
+    for (std::size_t i = 0; i < count; ++i)
+      sine_and_cosine(x[i], s[i], c[i]);
+    return;
+  }
+  using V = double __attribute__((vector_size(32)));
+  using I = std::int64_t __attribute__((vector_size(32)));
+  for (std::size_t i = 0; i < count; i += 4) {
+    V y;
+    std::memcpy(&y, x + i, sizeof y);
+    const V shift = V{} + 6755399441055744.0, shifted = y * 0.63661977236758134308 + shift, k = shifted - shift;
+    const V r = ((y - k * 1.5707963267341256142) - k * 6.0771005063039659764e-11) - k * 2.0222662487959507324e-21;
+    const V z = r * r, z2 = z * z, z4 = z2 * z2;
+    const V sine = r + r * z *
+                           ((-1.66666666666666307295e-1 + z * 8.33333333332211858878e-3) +
+                            z2 * (-1.98412698295895385996e-4 + z * 2.75573136213857245213e-6) +
+                            z4 * (-2.50507477628578072866e-8 + z * 1.58962301576546568060e-10));
+    const V cosine = (1 - 0.5 * z) + z2 * ((4.16666666666665929218e-2 + z * -1.38888888888730564116e-3) +
+                                           z2 * (2.48015872888517045348e-5 + z * -2.75573141792967388112e-7) +
+                                           z4 * (2.08757008419747316778e-9 + z * -1.13585365213876817300e-11));
+    const I quadrant = __builtin_bit_cast(I, shifted), odd = -(quadrant & 1);
+    const I p = __builtin_bit_cast(I, sine), q = __builtin_bit_cast(I, cosine);
+    const I sine_bits = ((odd & q) | (~odd & p)) ^ ((quadrant & 2) << 62);
+    const I cosine_bits = ((odd & p) | (~odd & q)) ^ (((quadrant + 1) & 2) << 62);
+    std::memcpy(s + i, &sine_bits, sizeof sine_bits), std::memcpy(c + i, &cosine_bits, sizeof cosine_bits);
+  }
+}
+template <class T> inline void sines_and_cosines(const T *x, T *s, T *c, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i)
+    sine_and_cosine(x[i], s[i], c[i]);
+}
+
+// Angle and its rate of the section at a port against the body
+template <class T> FFROBOT_INLINE T section_angle(const planar::Body &b, int port, const planar::State<T> &s) {
+  return b.ports[port].angle + s.u[b.ports[port].row + 2];
+}
+template <class T> FFROBOT_INLINE T section_rate(const planar::Body &b, int port, const planar::State<T> &s) {
+  return s.u_dot[b.ports[port].row + 2];
+}
+
+template <class T>
+FFROBOT_INLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T *v, const Forces<T> &forces,
+                               Workspace<Planar, T> &w) {
+  const std::size_t count = m.nodes.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Node<Planar> &node = m.nodes[i];
+    planar::State<T> &s = w.bodies[i];
+    project(node.body, q + node.p_q(), v + node.p_v(), forces.generalized ? forces.generalized + node.p_v() : nullptr,
+            s);
+    T angle = T(0.);
+    if (node.joint == JointKind::revolute || node.joint == JointKind::free)
+      angle = q[node.joint == JointKind::free ? node.q + 2 : node.q];
+    if (node.parent >= 0)
+      angle += section_angle(m.nodes[node.parent].body, node.parent_port - m.nodes[node.parent].first_port,
+                             w.bodies[node.parent]);
+    else
+      angle += m.ground[node.parent_port].angle;
+    w.angle[i] = angle;
+  }
+  sines_and_cosines(w.angle.data(), w.sine.data(), w.cosine.data(), count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Node<Planar> &node = m.nodes[i];
+    planar::State<T> &s = w.bodies[i];
+    Hinge<Planar, T> &hinge = w.hinges[i];
+    const T cosine = w.cosine[i], sine = w.sine[i];
+    hinge.turn = {cosine, sine};
+    T omega(0.); // of the section that it hangs on
+    if (node.parent >= 0) {
+      const Node<Planar> &parent = m.nodes[node.parent];
+      const planar::State<T> &p = w.bodies[node.parent];
+      omega = p.omega + section_rate(parent.body, node.parent_port - parent.first_port, p);
+      s.absolute_cosine = p.absolute_cosine * cosine - p.absolute_sine * sine;
+      s.absolute_sine = p.absolute_sine * cosine + p.absolute_cosine * sine;
+    } else
+      s.absolute_cosine = cosine, s.absolute_sine = sine;
+    if (node.joint == JointKind::revolute)
+      s.omega = omega + v[node.v];
+    else {
+      PlanarPlace<T> to;
+      place(node.joint, node.lead, q + node.q, v + node.v, to);
+      s.omega = omega + to.rate;
+      const T oo = omega * omega, o2 = 2. * omega;
+      for (int k = 0; k < 2; ++k)
+        hinge.r[k] = to.r[k], hinge.r_dot[k] = to.r_dot[k];
+      hinge.c[0] = -(oo * to.r[0]) - o2 * to.r_dot[1], hinge.c[1] = o2 * to.r_dot[0] - oo * to.r[1], hinge.c[2] = T(0.);
+    }
+    if (node.inboard >= 0) { // from the section to the frame
+      T c, n;
+      sine_and_cosine(section_angle(node.body, node.inboard, s), n, c);
+      s.omega -= section_rate(node.body, node.inboard, s);
+      s.cosine = c, s.sine = n;
+      const T ac = s.absolute_cosine, as = s.absolute_sine;
+      s.absolute_cosine = ac * c + as * n, s.absolute_sine = as * c - ac * n;
+    }
+  }
+}
+
+// --- the general path
+
+// Axes of the body by those of the section at the inboard port
+template <class T> FFROBOT_INLINE PlanarTurn<T> inboard_tilt(const Node<Planar> &, const planar::State<T> &s) {
+  return {s.cosine, s.sine};
+}
+
+template <class T>
+FFROBOT_INLINE void evaluate_inertia(const Node<Planar> &node, const T *p, const T *v, planar::State<T> &s,
+                                     Pack<T, 3> *M, T *b) {
+  const planar::Inertia<T> I = inertia(node.body, p, v, s);
+  const T rows[3][3] = {{I.xx, I.xy, I.xa}, {I.xy, I.yy, I.ya}, {I.xa, I.ya, I.aa}};
+  for (int i = 0; i < 3; ++i) {
+    M[i] = Pack<T, 3>::zero();
+    for (int j = 0; j < 3; ++j)
+      M[i].set(j, rows[i][j]);
+  }
+  b[0] = I.bx, b[1] = I.by, b[2] = I.ba;
+}
+
+template <class T>
+FFROBOT_INLINE void port_gram(const planar::Body &b, const planar::State<T> &, int i, int j, Pack<T, 3> *G) {
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c)
+      G[r].set(c, T(b.gram(b.ports[i].row + r, b.ports[j].row + c)));
+}
+
+template <class T>
+FFROBOT_INLINE void port_rows(const planar::Body &b, int i, planar::State<T> &s, Pack<T, 3> *X, T *beta,
+                              Pack<T, 3> *G) {
+  const planar::Port &port = b.ports[i];
+  const T *u = s.u.data() + port.row, *u_dot = s.u_dot.data() + port.row, *Q = s.Q.data() + port.row;
+  const T ww = s.omega * s.omega, w2 = 2. * s.omega;
+  T column[3] = {port.T[0][2] - u[1], port.T[1][2] + u[0], T(port.T[2][2])};
+  if (b.has_more)
+    for (int r = 0; r < 3; ++r)
+      column[r] -= s.WH[port.row + r];
+  for (int r = 0; r < 3; ++r) {
+    X[r].set(0, T(port.T[r][0])), X[r].set(1, T(port.T[r][1])), X[r].set(2, column[r]);
+  }
+  beta[0] = Q[0] - ww * (port.x + u[0]) - w2 * u_dot[1];
+  beta[1] = Q[1] - ww * (port.y + u[1]) + w2 * u_dot[0];
+  beta[2] = Q[2];
+  if (port.is_soft)
+    port_gram(b, s, i, i, G);
+}
+
+template <class T>
+FFROBOT_INLINE void put_force(const planar::Body &b, const planar::State<T> &, int i, const T *f, T *z) {
+  for (int r = 0; r < 3; ++r)
+    z[b.ports[i].row + r] = f[r];
+}
+
+template <bool by_multipliers, class T>
+FFROBOT_INLINE void modes(const Node<Planar> &node, const T *p, const T *z, planar::State<T> &s, T *a) {
+  modal_accelerations<by_multipliers>(node.body, p, z, s, a);
+}
+
+template <class T> FFROBOT_INLINE void ground_acceleration(const Mechanism<Planar> &m, int marker, T *A) {
+  const double angle = m.ground[marker].angle; // ports have axes of the body: here global ones
+  (void)angle;
+  A[0] = T(-m.gravity[0]), A[1] = T(-m.gravity[1]), A[2] = T(0.);
+}
+
+// y = R x from axes of a port to global ones, and back
+template <class X, class T>
+FFROBOT_INLINE void port_to_global(const planar::Body &, int, const planar::State<T> &s, const X *x, X *y) {
+  PlanarTurn<T>{s.absolute_cosine, s.absolute_sine}.apply(x, y);
+}
+template <class X, class T>
+FFROBOT_INLINE void global_to_port(const planar::Body &, int, const planar::State<T> &s, const X *x, X *y) {
+  PlanarTurn<T>{s.absolute_cosine, s.absolute_sine}.back(x, y);
+}
+
+// Lift an acceleration from unit freedoms of the outer section to the rates of joint coordinates, and the reverse for
+// forces: translations along inner axes
+template <class T> FFROBOT_INLINE void to_inner_axes(const Node<Planar> &, const T *q, const T *x, T *y) {
+  T s, c;
+  sine_and_cosine(q[2], s, c);
+  PlanarTurn<T>{c, s}.apply(x, y);
+}
+template <class T> FFROBOT_INLINE void to_outer_axes(const Node<Planar> &, const T *q, const T *x, T *y) {
+  T s, c;
+  sine_and_cosine(q[2], s, c);
+  PlanarTurn<T>{c, s}.back(x, y);
+}
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,193 @@
+// The recursion for what most planar mechanisms consist of: a body whose frame sits at a revolute joint, with at most
+// one port, which passes forces only. Ports have two rows then, Y is 2 x 2 in closed form without a subtraction,
+//     Y = (Lambda + det Lambda adj G) / (1 + tr Lambda G + det Lambda det G)
+// and numbers stay in registers. The same steps as in articulated.h and release.h.
+#pragma once
+
+#include "core/recursion/release.h"
+
+namespace ffrobot::recursion {
+
+// What hangs on the port: Lambda of the child
+template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int index, Workspace<Planar, T> &w) {
+  const int child = m.children[index];
+  PortWork<Planar, T> &port = w.ports[index];
+  if (m.nodes[child].is_pin)
+    return; // has left it there
+  T L[2][2];
+  const Hinge<Planar, T> &hinge = w.hinges[child];
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j)
+      L[i][j] = hinge.Lambda[i][j];
+  const T c = hinge.turn.c, n = hinge.turn.s, twice = 2. * (c * n * L[0][1]);
+  port.Lambda_xx = c * c * L[0][0] - twice + n * n * L[1][1];
+  port.Lambda_yy = n * n * L[0][0] + twice + c * c * L[1][1];
+  port.Lambda_xy = c * n * (L[0][0] - L[1][1]) + (c * c - n * n) * L[0][1];
+}
+
+template <class T, int W>
+FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q, const T *v,
+                               const Forces<T> &forces, Workspace<Planar, T> &w, Pack<T, W> (&S)[W],
+                               Pack<T, W> &gamma) {
+  constexpr int stride = stride_of(W);
+  using Cols = Pack<T, W>;
+  const planar::Body &body = node.body;
+  planar::State<T> &s = w.bodies[&node - m.nodes.data()];
+  const planar::Inertia<T> I = inertia(body, q + node.p_q(), v + node.p_v(), s);
+  T M_xx = I.xx, M_xy = I.xy, M_xa = I.xa, M_yy = I.yy, M_ya = I.ya, M_aa = I.aa;
+  Cols H[3];
+  if (node.outboard) {
+    const int index = node.first_port;
+    const planar::Port &constants = body.ports[0];
+    PortWork<Planar, T> &port = w.ports[index];
+    const T *u = s.u.data() + 3, *u_dot = s.u_dot.data() + 3, *Q = s.Q.data() + 3;
+    const T ww = s.omega * s.omega, w2 = 2. * s.omega;
+    T X_xa = constants.T[0][2] - u[1], X_ya = constants.T[1][2] + u[0];
+    if (body.has_more)
+      X_xa -= s.WH[3], X_ya -= s.WH[4];
+    port.X_xa = X_xa, port.X_ya = X_ya;
+    const T beta_x = Q[0] - ww * (constants.x + u[0]) - w2 * u_dot[1];
+    const T beta_y = Q[1] - ww * (constants.y + u[1]) + w2 * u_dot[0];
+    port.beta_x = beta_x, port.beta_y = beta_y;
+    const T *from = w.force.data() + index * 3 * stride;
+    const Cols P0 = Cols::read(from), P1 = Cols::read(from + stride);
+    Cols E0 = P0, E1 = P1;
+    const bool loaded = m.children[index] >= 0;
+    const double Gx = body.gram(3, 3), Gc = body.gram(3, 4), Gy = body.gram(4, 4);
+    T Y_xx(0.), Y_xy(0.), Y_yy(0.);
+    if (loaded) {
+      load_pin(m, index, w);
+      const T Lx = port.Lambda_xx, Lc = port.Lambda_xy, Ly = port.Lambda_yy;
+      if (constants.is_soft) {
+        const T det = Lx * Ly - Lc * Lc, xG = Gx * Lx, yG = Gy * Ly, cG = Gc * Lc;
+        const T i = T(1.) / (1. + xG + 2. * cG + yG + (Gx * Gy - Gc * Gc) * det);
+        Y_xx = (Lx + Gy * det) * i, Y_yy = (Ly + Gx * det) * i, Y_xy = (Lc - Gc * det) * i;
+        const T e00 = (1. + cG + yG) * i, e01 = -((Gc * Lx + Gy * Lc) * i);
+        const T e10 = -((Gx * Lc + Gc * Ly) * i), e11 = (1. + xG + cG) * i;
+        E0 = e00 * P0 + e01 * P1, E1 = e10 * P0 + e11 * P1;
+      } else
+        Y_xx = Lx, Y_xy = Lc, Y_yy = Ly;
+      port.Y_xx = Y_xx, port.Y_xy = Y_xy, port.Y_yy = Y_yy;
+    }
+    if constexpr (W > 1) {
+      if (constants.is_soft) {
+        gain(S, P0, Cols(Gx * E0 + Gc * E1));
+        gain(S, P1, Cols(Gc * E0 + Gy * E1));
+      }
+      gamma += beta_x * E0 + beta_y * E1;
+    }
+    if (loaded)
+      E0.add(0, Y_xx * beta_x + Y_xy * beta_y), E1.add(0, Y_xy * beta_x + Y_yy * beta_y);
+    T *answer = w.answer.data() + node.port_slot(0) * stride;
+    E0.write(answer), E1.write(answer + stride);
+    const double x0 = constants.T[0][0], x1 = constants.T[0][1], y0 = constants.T[1][0], y1 = constants.T[1][1];
+    H[0] = x0 * E0 + y0 * E1, H[1] = x1 * E0 + y1 * E1, H[2] = X_xa * E0 + X_ya * E1;
+    if (loaded) {
+      const T p0 = x0 * Y_xx + y0 * Y_xy, p1 = x1 * Y_xx + y1 * Y_xy, p2 = X_xa * Y_xx + X_ya * Y_xy;
+      const T r0 = x0 * Y_xy + y0 * Y_yy, r1 = x1 * Y_xy + y1 * Y_yy, r2 = X_xa * Y_xy + X_ya * Y_yy;
+      M_xx += x0 * p0 + y0 * r0, M_xy += x0 * p1 + y0 * r1, M_xa += x0 * p2 + y0 * r2;
+      M_yy += x1 * p1 + y1 * r1, M_ya += x1 * p2 + y1 * r2, M_aa += X_xa * p2 + X_ya * r2;
+    }
+  } else
+    H[0] = H[1] = H[2] = Cols::zero();
+  H[0].add(0, I.bx), H[1].add(0, I.by), H[2].add(0, I.ba);
+
+  // the joint
+  Hinge<Planar, T> &hinge = w.hinges[&node - m.nodes.data()];
+  const T D_inverse = T(1.) / M_aa;
+  Cols applied = Cols::zero();
+  bool moment = false;
+  if (forces.generalized)
+    applied.set(0, forces.generalized[node.v]), moment = true;
+  if (node.has_rows) {
+    moment = true;
+    for (std::size_t r = 0; r < w.active.size(); ++r)
+      if (const Row &row = m.rows[w.active[r]]; row.node >= 0 && &m.nodes[row.node] == &node)
+        applied.set(static_cast<int>(r) + 1, T(-1.));
+  }
+  const Cols su = moment ? Cols(H[2] - applied) : H[2], sd = D_inverse * su;
+  sd.write(w.answer.data() + node.joint_slot(0) * stride);
+  if constexpr (W > 1)
+    gain(S, sd, su);
+  const T ux = M_xa * D_inverse, uy = M_ya * D_inverse;
+  hinge.pin[0] = ux, hinge.pin[1] = uy;
+  const T xx = M_xx - M_xa * ux, xy = M_xy - M_xa * uy, yy = M_yy - M_ya * uy;
+  H[0] -= M_xa * sd, H[1] -= M_ya * sd;
+  const T c = hinge.turn.c, n = hinge.turn.s, cn = c * n, twice = 2. * (cn * xy);
+  const Cols P0 = c * H[0] - n * H[1], P1 = n * H[0] + c * H[1];
+  if (node.parent < 0) {
+    if constexpr (W > 1)
+      gamma += T(-m.gravity[0]) * P0 + T(-m.gravity[1]) * P1;
+    return;
+  }
+  const int index = node.parent_port;
+  T *to = w.force.data() + index * 3 * stride;
+  const bool add = m.cleared[index];
+  if (m.nodes[node.parent].is_pin) {
+    PortWork<Planar, T> &port = w.ports[index];
+    const T cc = c * c, nn = n * n;
+    port.Lambda_xx = cc * xx - twice + nn * yy;
+    port.Lambda_yy = nn * xx + twice + cc * yy;
+    port.Lambda_xy = cn * (xx - yy) + (cc - nn) * xy;
+  } else {
+    hinge.Lambda[0].set(0, xx), hinge.Lambda[0].set(1, xy), hinge.Lambda[1].set(0, xy), hinge.Lambda[1].set(1, yy);
+    (add ? Cols(applied + Cols::read(to + 2 * stride)) : applied).write(to + 2 * stride);
+  }
+  if (add)
+    Cols(P0 + Cols::read(to)).write(to), Cols(P1 + Cols::read(to + stride)).write(to + stride);
+  else
+    P0.write(to), P1.write(to + stride);
+}
+
+// A_port (2): acceleration of the port that the body hangs on, in and out: of its own port
+template <bool by_multipliers, class T, int W>
+FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q,
+                                Workspace<Planar, T> &w, const Pack<T, W> &y, T *a) {
+  const planar::Body &body = node.body;
+  const auto i_node = &node - m.nodes.data();
+  planar::State<T> &s = w.bodies[i_node];
+  const Hinge<Planar, T> &hinge = w.hinges[i_node];
+  T Px, Py, P_rotation(0.);
+  if (node.parent < 0)
+    Px = T(by_multipliers ? 0. : -m.gravity[0]), Py = T(by_multipliers ? 0. : -m.gravity[1]);
+  else {
+    const T *A = w.ports[node.parent_port].A;
+    Px = A[0], Py = A[1], P_rotation = A[2];
+  }
+  const T c = hinge.turn.c, n = hinge.turn.s;
+  const T Ax = c * Px + n * Py, Ay = c * Py - n * Px;
+  const T Aa = -(answer<Planar, T, W>(w, node.joint_slot(0), y) + hinge.pin[0] * Ax + hinge.pin[1] * Ay);
+  a[node.v] = Aa - P_rotation;
+  s.A[0] = Ax, s.A[1] = Ay, s.A[2] = Aa;
+  T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), T(0.), T(0.), T(0.)};
+  if (node.outboard) {
+    const planar::Port &constants = body.ports[0];
+    PortWork<Planar, T> &port = w.ports[node.first_port];
+    const T Xx = constants.T[0][0] * Ax + constants.T[0][1] * Ay + port.X_xa * Aa;
+    const T Xy = constants.T[1][0] * Ax + constants.T[1][1] * Ay + port.X_ya * Aa;
+    T fx = -answer<Planar, T, W>(w, node.port_slot(0), y), fy = -answer<Planar, T, W>(w, node.port_slot(0) + 1, y);
+    if (m.children[node.first_port] >= 0) // Y beta is among the columns
+      fx -= port.Y_xx * Xx + port.Y_xy * Xy, fy -= port.Y_xy * Xx + port.Y_yy * Xy;
+    z[3] = fx, z[4] = fy;
+    port.f[0] = fx, port.f[1] = fy, port.f[2] = T(0.);
+    port.A[0] = by_multipliers ? Xx : Xx + port.beta_x, port.A[1] = by_multipliers ? Xy : Xy + port.beta_y;
+    T rotation = Aa;
+    if (constants.is_soft) {
+      const double Gx = body.gram(3, 3), Gc = body.gram(3, 4), Gy = body.gram(4, 4);
+      port.A[0] += Gx * fx + Gc * fy, port.A[1] += Gc * fx + Gy * fy;
+      if (constants.turns) {
+        if (!by_multipliers)
+          rotation += s.Q[5];
+        rotation += body.gram(5, 3) * fx + body.gram(5, 4) * fy - body.gram(5, 0) * Ax - body.gram(5, 1) * Ay -
+                    body.gram(5, 2) * Aa;
+        if (body.has_more)
+          rotation -= s.WH[5] * Aa;
+      }
+    }
+    port.A[2] = rotation;
+  }
+  if (body.n)
+    modal_accelerations<by_multipliers>(body, q + node.p_q(), z, s, a + node.p_v());
+}
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,182 @@
+// Doubles side by side: in registers of the processor, in pairs of shorter ones where it has none so long. (Compilers
+// keep vectors that are longer than a register in memory.)
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <new>
+#include <vector>
+#if defined(__AVX__)
+#include <immintrin.h>
+#endif
+
+#define FFROBOT_INLINE [[gnu::always_inline]] inline
+
+namespace ffrobot::recursion {
+
+#if defined(__AVX512F__)
+constexpr int native_lanes = 8;
+#elif defined(__AVX__)
+constexpr int native_lanes = 4;
+#else
+constexpr int native_lanes = 2;
+#endif
+
+template <int n> struct Vectors;
+template <> struct Vectors<2> {
+  using V = double __attribute__((vector_size(16)));
+  using I = std::int64_t __attribute__((vector_size(16)));
+};
+template <> struct Vectors<4> {
+  using V = double __attribute__((vector_size(32)));
+  using I = std::int64_t __attribute__((vector_size(32)));
+};
+template <> struct Vectors<8> {
+  using V = double __attribute__((vector_size(64)));
+  using I = std::int64_t __attribute__((vector_size(64)));
+};
+
+template <int n> struct Register;
+
+template <int n>
+  requires(n <= native_lanes)
+struct Register<n> {
+  using V = typename Vectors<n>::V;
+  using I = typename Vectors<n>::I;
+  V v;
+
+  FFROBOT_INLINE static Register zero() { return {V{}}; }
+  FFROBOT_INLINE static Register all(double x) { return {V{} + x}; }
+  FFROBOT_INLINE static Register load(const double *x) {
+    Register r;
+    std::memcpy(&r.v, x, sizeof r.v);
+    return r;
+  }
+  FFROBOT_INLINE void store(double *x) const { std::memcpy(x, &v, sizeof v); }
+  // Lane i alone: 1 in an integer mask
+  FFROBOT_INLINE static I only(int i) {
+    I lane;
+    for (int k = 0; k < n; ++k)
+      lane[k] = k;
+    return lane == I{} + i;
+  }
+  FFROBOT_INLINE double operator[](int i) const { return v[i]; }
+  FFROBOT_INLINE void set(int i, double x) { v = only(i) ? V{} + x : v; }
+  FFROBOT_INLINE void add(int i, double x) { v += only(i) ? V{} + x : V{}; }
+  FFROBOT_INLINE double sum() const {
+    if constexpr (n == 2)
+      return v[0] + v[1];
+    else if constexpr (n == 4)
+      return (v[0] + v[2]) + (v[1] + v[3]);
+    else
+      return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
+  }
+  FFROBOT_INLINE Register &operator+=(const Register &o) { return v += o.v, *this; }
+  FFROBOT_INLINE Register &operator-=(const Register &o) { return v -= o.v, *this; }
+  FFROBOT_INLINE friend Register operator+(const Register &a, const Register &b) { return {a.v + b.v}; }
+  FFROBOT_INLINE friend Register operator-(const Register &a, const Register &b) { return {a.v - b.v}; }
+  FFROBOT_INLINE friend Register operator-(const Register &a) { return {-a.v}; }
+  FFROBOT_INLINE friend Register operator*(const Register &a, const Register &b) { return {a.v * b.v}; }
+  FFROBOT_INLINE friend Register operator*(double s, const Register &a) { return {a.v * s}; }
+};
+
+template <int n>
+  requires(n > native_lanes)
+struct Register<n> {
+  using Half = Register<n / 2>;
+  static constexpr int half = n / 2;
+  Half low, high;
+
+  FFROBOT_INLINE static Register zero() { return {Half::zero(), Half::zero()}; }
+  FFROBOT_INLINE static Register all(double x) { return {Half::all(x), Half::all(x)}; }
+  FFROBOT_INLINE static Register load(const double *x) { return {Half::load(x), Half::load(x + half)}; }
+  FFROBOT_INLINE void store(double *x) const { low.store(x), high.store(x + half); }
+  FFROBOT_INLINE double operator[](int i) const { return i < half ? low[i] : high[i - half]; }
+  FFROBOT_INLINE void set(int i, double x) { i < half ? low.set(i, x) : high.set(i - half, x); }
+  FFROBOT_INLINE void add(int i, double x) { i < half ? low.add(i, x) : high.add(i - half, x); }
+  FFROBOT_INLINE double sum() const { return (low + high).sum(); }
+  FFROBOT_INLINE Register &operator+=(const Register &o) { return low += o.low, high += o.high, *this; }
+  FFROBOT_INLINE Register &operator-=(const Register &o) { return low -= o.low, high -= o.high, *this; }
+  FFROBOT_INLINE friend Register operator+(const Register &a, const Register &b) {
+    return {a.low + b.low, a.high + b.high};
+  }
+  FFROBOT_INLINE friend Register operator-(const Register &a, const Register &b) {
+    return {a.low - b.low, a.high - b.high};
+  }
+  FFROBOT_INLINE friend Register operator-(const Register &a) { return {-a.low, -a.high}; }
+  FFROBOT_INLINE friend Register operator*(const Register &a, const Register &b) {
+    return {a.low * b.low, a.high * b.high};
+  }
+  FFROBOT_INLINE friend Register operator*(double s, const Register &a) { return {s * a.low, s * a.high}; }
+};
+
+using Eight = Register<8>;
+
+// The first `count` (1 to 8) of eight numbers, zeros behind them; and back. What stands behind them is not touched.
+#if defined(__AVX512F__)
+FFROBOT_INLINE Eight load_part(const double *x, long count) {
+  return {(Eight::V)_mm512_maskz_loadu_pd(static_cast<__mmask8>((1u << count) - 1), x)};
+}
+FFROBOT_INLINE void store_part(double *x, const Eight &v, long count) {
+  _mm512_mask_storeu_pd(x, static_cast<__mmask8>((1u << count) - 1), (__m512d)v.v);
+}
+#elif defined(__AVX__)
+// Not by masked moves: their stores are microcode on some processors.
+FFROBOT_INLINE Register<4> load_four(const double *x, long count) {
+  using V = Register<4>::V;
+  if (count >= 4)
+    return Register<4>::load(x);
+  if (count == 3)
+    return {(V)_mm256_insertf128_pd(_mm256_zextpd128_pd256(_mm_loadu_pd(x)), _mm_load_sd(x + 2), 1)};
+  if (count == 2)
+    return {(V)_mm256_zextpd128_pd256(_mm_loadu_pd(x))};
+  return count == 1 ? Register<4>{(V)_mm256_zextpd128_pd256(_mm_load_sd(x))} : Register<4>::zero();
+}
+FFROBOT_INLINE void store_four(double *x, const Register<4> &v, long count) {
+  if (count >= 4)
+    return v.store(x);
+  if (count >= 2)
+    _mm_storeu_pd(x, _mm256_castpd256_pd128((__m256d)v.v));
+  if (count == 3)
+    x[2] = v[2];
+  if (count == 1)
+    x[0] = v[0];
+}
+FFROBOT_INLINE Eight load_part(const double *x, long count) {
+  return {load_four(x, count), load_four(x + 4, count - 4)};
+}
+FFROBOT_INLINE void store_part(double *x, const Eight &v, long count) {
+  store_four(x, v.low, count), store_four(x + 4, v.high, count - 4);
+}
+#else
+FFROBOT_INLINE Eight load_part(const double *x, long count) {
+  if (count >= 8)
+    return Eight::load(x);
+  alignas(64) double all[8] = {};
+  for (long i = 0; i < count; ++i)
+    all[i] = x[i];
+  return Eight::load(all);
+}
+FFROBOT_INLINE void store_part(double *x, const Eight &v, long count) {
+  if (count >= 8)
+    return v.store(x);
+  alignas(64) double all[8];
+  v.store(all);
+  for (long i = 0; i < count; ++i)
+    x[i] = all[i];
+}
+#endif
+
+// What registers are loaded from: 64-byte lines of the cache, of which none is split
+template <class T> struct CacheLineAllocator {
+  using value_type = T;
+  CacheLineAllocator() = default;
+  template <class U> CacheLineAllocator(const CacheLineAllocator<U> &) {}
+  T *allocate(std::size_t n) { return static_cast<T *>(::operator new(n * sizeof(T), std::align_val_t(64))); }
+  void deallocate(T *p, std::size_t) { ::operator delete(p, std::align_val_t(64)); }
+  friend bool operator==(const CacheLineAllocator &, const CacheLineAllocator &) { return true; }
+};
+template <class T> using Aligned = std::vector<T, CacheLineAllocator<T>>;
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,62 @@
+// Small matrices as rows in registers, and vectors of space.
+#pragma once
+
+#include "core/recursion/pack.h"
+
+#include <cmath>
+
+namespace ffrobot::recursion {
+
+FFROBOT_INLINE void sine_and_cosine(double x, double &s, double &c) { s = std::sin(x), c = std::cos(x); }
+
+template <class A, class B, class C> FFROBOT_INLINE void cross(const A *a, const B *b, C *c) {
+  c[0] = a[1] * b[2] - a[2] * b[1];
+  c[1] = a[2] * b[0] - a[0] * b[2];
+  c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+template <class A, class B> FFROBOT_INLINE auto dot(const A *a, const B *b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// y = R x and y = R^T x, R (3, 3)
+template <class M, class X> FFROBOT_INLINE void turn(const M &R, const X *x, X *y) {
+  for (int i = 0; i < 3; ++i)
+    y[i] = R[i][0] * x[0] + R[i][1] * x[1] + R[i][2] * x[2];
+}
+template <class M, class X> FFROBOT_INLINE void turn_back(const M &R, const X *x, X *y) {
+  for (int i = 0; i < 3; ++i)
+    y[i] = R[0][i] * x[0] + R[1][i] * x[1] + R[2][i] * x[2];
+}
+template <class A, class B, class C> FFROBOT_INLINE void product(const A &a, const B &b, C &c) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      c[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+}
+
+// y = M x of rows
+template <int d, class T> FFROBOT_INLINE void multiply(const Pack<T, d> *M, const T *x, T *y) {
+  for (int i = 0; i < d; ++i) {
+    T sum = M[i][0] * x[0];
+    for (int j = 1; j < d; ++j)
+      sum += M[i][j] * x[j];
+    y[i] = sum;
+  }
+}
+
+// The inverse of a symmetric positive definite matrix, in its place (Gauss and Jordan)
+template <int d, class T> inline void invert(Pack<T, d> *M) {
+  for (int k = 0; k < d; ++k) {
+    const T pivot = T(1.) / M[k][k];
+    M[k].set(k, T(1.));
+    M[k] = pivot * M[k];
+    for (int i = 0; i < d; ++i)
+      if (i != k) {
+        const T factor = M[i][k];
+        M[i].set(k, T(0.));
+        M[i] -= factor * M[k];
+      }
+  }
+}
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,194 @@
+// Outward, in space: orientations, angular velocities, what velocities do at joints.
+#pragma once
+
+#include "core/recursion/workspace.h"
+
+namespace ffrobot::recursion {
+
+namespace spatial {
+
+// The section that a joint hangs on: its axes against undeformed ones (null: the same), axes of the undeformed section
+// in global ones, angular velocity in axes of the undeformed section.
+template <class T> struct InnerSection {
+  const T (*tilt)[3];
+  T axes[3][3], omega[3];
+};
+
+template <class T>
+FFROBOT_INLINE void inner_section(const Mechanism<Spatial> &m, const Node<Spatial> &node, Workspace<Spatial, T> &w,
+                                  InnerSection<T> &to) {
+  to.tilt = nullptr;
+  if (node.parent < 0) {
+    const Eigen::Matrix3d &triad = m.ground[node.parent_port].triad;
+    for (int i = 0; i < 3; ++i) {
+      to.omega[i] = T(0.);
+      for (int j = 0; j < 3; ++j)
+        to.axes[i][j] = T(triad(i, j));
+    }
+    return;
+  }
+  const Node<Spatial> &parent = m.nodes[node.parent];
+  const State<T> &p = w.bodies[node.parent];
+  const int port = node.parent_port - parent.first_port;
+  turn_back(parent.body.ports[port].R, p.omega, to.omega);
+  product(p.absolute, parent.body.ports[port].R, to.axes);
+  if (parent.body.ports[port].is_soft) {
+    T rate[3];
+    section_rate(p.ports[port], rate);
+    for (int i = 0; i < 3; ++i)
+      to.omega[i] += rate[i];
+    to.tilt = p.ports[port].turn;
+  }
+}
+
+// R = tilt R_z, A = (R^T omega) x e_z q_dot
+template <class T>
+FFROBOT_INLINE void turn_revolute(const InnerSection<T> &inner, const T &q, const T &v, Hinge<Spatial, T> &hinge,
+                                  T *omega) {
+  T s, c;
+  sine_and_cosine(q, s, c);
+  auto &R = hinge.turn.R;
+  if (inner.tilt)
+    for (int i = 0; i < 3; ++i) {
+      R[i][0] = c * inner.tilt[i][0] + s * inner.tilt[i][1], R[i][1] = c * inner.tilt[i][1] - s * inner.tilt[i][0];
+      R[i][2] = inner.tilt[i][2];
+    }
+  else {
+    R[0][0] = c, R[0][1] = -s, R[1][0] = s, R[1][1] = c, R[2][2] = T(1.);
+    R[0][2] = R[1][2] = R[2][0] = R[2][1] = T(0.);
+  }
+  turn_back(R, inner.omega, omega);
+  hinge.c[3] = omega[1] * v, hinge.c[4] = -(omega[0] * v);
+  omega[2] += v;
+}
+
+template <class T>
+inline void turn_any(const Node<Spatial> &node, const InnerSection<T> &inner, const T *q, const T *v,
+                     Hinge<Spatial, T> &hinge, T *omega) {
+  SpatialPlace<T> to;
+  place(node.joint, node.lead, q, v, to);
+  if (inner.tilt) {
+    T tilt[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        tilt[i][j] = inner.tilt[i][j];
+    product(tilt, to.R, hinge.turn.R);
+  } else
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        hinge.turn.R[i][j] = to.R[i][j];
+  hinge.cross_cosine = to.R[0][0], hinge.cross_sine = to.R[0][2];
+  T o[3], or_[3], oor[3], or_dot[3], ow[3];
+  turn_back(hinge.turn.R, inner.omega, o);
+  cross(o, to.r, or_), cross(o, or_, oor), cross(o, to.r_dot, or_dot), cross(o, to.w, ow);
+  for (int i = 0; i < 3; ++i) {
+    hinge.r[i] = to.r[i], hinge.r_dot[i] = to.r_dot[i];
+    hinge.c[i] = oor[i] + 2. * or_dot[i], hinge.c[3 + i] = ow[i] + to.w_dot[i];
+    omega[i] = o[i] + to.w[i];
+  }
+}
+
+} // namespace spatial
+
+template <class T>
+FFROBOT_INLINE void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v, const Forces<T> &forces,
+                               Workspace<Spatial, T> &w) {
+  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
+    const Node<Spatial> &node = m.nodes[i];
+    spatial::State<T> &s = w.bodies[i];
+    Hinge<Spatial, T> &hinge = w.hinges[i];
+    project(node.body, q + node.p_q(), v + node.p_v(), forces.generalized ? forces.generalized + node.p_v() : nullptr,
+            s);
+    spatial::InnerSection<T> inner;
+    spatial::inner_section(m, node, w, inner);
+    if (node.joint == JointKind::revolute)
+      spatial::turn_revolute(inner, q[node.q], v[node.v], hinge, s.omega);
+    else
+      spatial::turn_any(node, inner, q + node.q, v + node.v, hinge, s.omega);
+    product(inner.axes, hinge.turn.R, s.absolute);
+    if (node.inboard >= 0) { // from the section to the frame
+      const spatial::PortMotion<T> &port = s.ports[node.inboard];
+      T undeformed[3], rate[3], axes[3][3], turned[3][3];
+      turn(port.turn, s.omega, undeformed);
+      spatial::section_rate(port, rate);
+      for (int k = 0; k < 3; ++k)
+        undeformed[k] -= rate[k];
+      turn(node.body.ports[node.inboard].R, undeformed, s.omega);
+      for (int k = 0; k < 3; ++k)
+        for (int l = 0; l < 3; ++l)
+          axes[k][l] = s.absolute[k][l], turned[k][l] = T(0.);
+      const auto &R = node.body.ports[node.inboard].R;
+      for (int k = 0; k < 3; ++k)
+        for (int l = 0; l < 3; ++l)
+          for (int j = 0; j < 3; ++j)
+            turned[k][l] += axes[k][j] * port.turn[l][j];
+      for (int k = 0; k < 3; ++k)
+        for (int l = 0; l < 3; ++l)
+          s.absolute[k][l] = turned[k][0] * R[l][0] + turned[k][1] * R[l][1] + turned[k][2] * R[l][2];
+    }
+    for (int k = 0; k < node.ports(); ++k)
+      spatial::place_port(node.body, k, s);
+  }
+}
+
+// Undeformed axes of the inboard port by those of the section there
+template <class T> FFROBOT_INLINE SpatialTurn<T> inboard_tilt(const Node<Spatial> &node, const spatial::State<T> &s) {
+  SpatialTurn<T> to;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      to.R[i][j] = s.ports[node.inboard].turn[i][j];
+  return to;
+}
+
+template <class T>
+FFROBOT_INLINE void evaluate_inertia(const Node<Spatial> &node, const T *p, const T *v, spatial::State<T> &s,
+                                     Pack<T, 6> *M, T *b) {
+  inertia(node.body, p, v, s);
+  for (int i = 0; i < 6; ++i)
+    M[i] = s.M[i], b[i] = s.b[i];
+}
+
+template <bool by_multipliers, class T>
+FFROBOT_INLINE void modes(const Node<Spatial> &node, const T *, const T *z, spatial::State<T> &s, T *a) {
+  modal_accelerations<by_multipliers>(node.body, z, s, a);
+}
+
+template <class T> FFROBOT_INLINE void ground_acceleration(const Mechanism<Spatial> &m, int marker, T *A) {
+  const Eigen::Vector3d g = m.ground[marker].triad.transpose() * m.gravity;
+  for (int i = 0; i < 3; ++i)
+    A[i] = T(-g[i]), A[3 + i] = T(0.);
+}
+
+// y = R x from axes of a port to global ones, and back
+template <class X, class T>
+FFROBOT_INLINE void port_to_global(const spatial::Body &b, int port, const spatial::State<T> &s, const X *x, X *y) {
+  SpatialTurn<T> axes;
+  product(s.absolute, b.ports[port].R, axes.R);
+  axes.apply(x, y);
+}
+template <class X, class T>
+FFROBOT_INLINE void global_to_port(const spatial::Body &b, int port, const spatial::State<T> &s, const X *x, X *y) {
+  SpatialTurn<T> axes;
+  product(s.absolute, b.ports[port].R, axes.R);
+  axes.back(x, y);
+}
+
+// As in the plane; x, y (6): translations
+template <class T> FFROBOT_INLINE void to_inner_axes(const Node<Spatial> &node, const T *q, const T *x, T *y) {
+  SpatialPlace<T> to;
+  const T zero[6] = {T(0.), T(0.), T(0.), T(0.), T(0.), T(0.)};
+  place(node.joint, node.lead, q, zero, to);
+  turn(to.R, x, y);
+  for (int i = 3; i < 6; ++i)
+    y[i] = x[i];
+}
+template <class T> FFROBOT_INLINE void to_outer_axes(const Node<Spatial> &node, const T *q, const T *x, T *y) {
+  SpatialPlace<T> to;
+  const T zero[6] = {T(0.), T(0.), T(0.), T(0.), T(0.), T(0.)};
+  place(node.joint, node.lead, q, zero, to);
+  turn_back(to.R, x, y);
+  for (int i = 3; i < 6; ++i)
+    y[i] = x[i];
+}
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,95 @@
+// What changes from evaluation to evaluation. Nothing is allocated after construction.
+#pragma once
+
+#include "core/recursion/mechanism.h"
+
+#include <string>
+
+namespace ffrobot::recursion {
+
+// Columns side by side: 0 is what acts without constraints, column r what a unit of multiplier r does. Sizes that are
+// compiled; where there are fewer rows the rest is zero.
+constexpr int column_counts[] = {1, 3, 4, 7, 16, 32};
+constexpr int most_rows = 31;
+
+// A joint, in axes of the outer section
+template <class Space, class T> struct Hinge {
+  static constexpr int d = Space::dim;
+  typename Space::template Turn<T> turn;    // to axes of the port on which it hangs
+  T cross_cosine, cross_sine;               // of a universal joint's second angle
+  T r[Space::linear], r_dot[Space::linear]; // origin of the section from the port's, and its rate
+  T c[d];                                   // acceleration by velocities
+  Pack<T, d> Lambda[d];                     // what the port feels: f = Lambda A + bias
+  Pack<T, d> U[d];                          // by freedoms, the last eliminated first
+  T D_inverse[d];
+  T A[d];   // of the section
+  T pin[2]; // U/D of a pin, in place of all that
+};
+
+template <class Space, class T> struct PortWork {
+  static constexpr int d = Space::dim;
+  Pack<T, d> X[d], G[d], Y[d]; // A_port = X A + beta + G f; f = -Y (X A + …) - …
+  T beta[d];
+  T A[d]; // axes of the undeformed section
+  T f[d]; // on the body, by what hangs there and by rows
+  // of a port in the plane that passes forces only
+  T Lambda_xx, Lambda_xy, Lambda_yy, Y_xx, Y_xy, Y_yy, X_xa, X_ya, beta_x, beta_y;
+};
+
+// Motion of a frame or of a section, global axes; in the plane with a third axis
+template <class T> struct Pose {
+  T r[3], v[3], omega[3]; // position, velocity, angular velocity
+  T R[3][3];              // its axes
+  T angle;                // in the plane, full turns counted
+};
+
+template <class Space, class T> struct Workspace {
+  static constexpr int d = Space::dim;
+  explicit Workspace(const Mechanism<Space> &m);
+
+  int columns; // entry of column_counts
+  std::vector<typename Space::template State<T>> bodies;
+  std::vector<Hinge<Space, T>> hinges;
+  Aligned<PortWork<Space, T>> ports;
+  Aligned<Pack<T, d>> cross; // (crosses, d): G between ports
+  Aligned<Pack<T, d>> soft;  // (nodes with an inboard port, 2 d): M^-1 X^T, and M^-1
+  std::vector<int> first_soft;
+  Aligned<T> force;               // (ports, d, columns) on ports, with opposite sign: bias of what hangs there
+  Aligned<T> bias;                // (ports, d, columns) beta of ports, by columns; of bodies with several
+  Aligned<T> answer;              // (slots, columns)
+  Aligned<T> angle, sine, cosine; // (nodes) in the plane
+  Aligned<T> z;                   // of the widest body
+  Aligned<T> schur;               // (columns, columns) C M^-1 C^T, without row and column of what is not constrained
+  bool keeps_schur = false;       // asked for
+  Aligned<T> factor;              // (columns - 1)^2, L and 1/D of it
+  std::vector<int> active;        // rows that are kept; others depend on them
+  std::vector<int> column;        // of each row; 0: not kept
+  Aligned<T> lambda;              // (all rows)
+  Aligned<T> y;                   // (columns): 1, multipliers of active rows
+  std::vector<Pose<T>> frames;    // of nodes
+  unsigned long evaluations = 0;
+
+  void keep(std::vector<int> rows); // these alone
+};
+
+// Forces beside gravity, elasticity and damping
+template <class T> struct Forces {
+  const T *generalized = nullptr; // (n_v): of joints and on modes
+  const T *wrench = nullptr;      // (wrenches, dim): force and moment on each, global axes
+};
+
+// Accelerations a (n_v), multipliers workspace.lambda for rows whose second time derivative is to be `target` (rows).
+template <class Space, class T>
+void accelerations(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
+                   Workspace<Space, T> &w, T *a);
+
+// What the multipliers that answer a residual do to a system at rest: dq (n_v) = -M^-1 C^T (C M^-1 C^T)^-1 residual
+// (rows), with the factors of the last accelerations(), at whose state q is.
+template <class Space, class T>
+void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq);
+
+// Values and rates of all rows (m, rad; m/s, rad/s); refreshes kinematics and frames.
+template <class Space, class T>
+void measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate);
+
+} // namespace ffrobot::recursion

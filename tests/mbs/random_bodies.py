@@ -1,0 +1,59 @@
+"""Random spatial bodies of material points, their joints, states and rows."""
+
+import numpy as np
+from points_in_space import Body, J, r
+
+
+def rotation(rng):
+    Q = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    return Q * np.linalg.det(Q)
+
+
+def random_body(rng, modes, joint, clamped=False, **keys):
+    """Points with random modes, dense damping, a root and two outer sections; `clamped`: modes leave the root alone."""
+    points = 10
+    mass, x = rng.uniform(0.1, 0.4, points), rng.uniform([0, -0.1, -0.1], [1, 0.1, 0.1], (points, 3))
+    Phi = rng.standard_normal((points, 3, modes)) * 0.5
+    if modes:
+        flat = Phi.reshape(3 * points, modes)
+        gram = flat.T @ (np.repeat(mass, 3)[:, None] * flat)
+        Phi = (flat @ np.linalg.inv(np.linalg.cholesky(gram)).T).reshape(points, 3, modes)
+    C = rng.standard_normal((modes, modes)) * 0.3
+    markers = [
+        (
+            rng.standard_normal(3) * 0.3,
+            rotation(rng),
+            rng.standard_normal((6, modes)) * (0 if clamped and k == 0 else 0.5),
+        )
+        for k in range(3)
+    ]
+    return Body(mass, x, Phi, np.sort(rng.uniform(1, 60, modes)), C @ C.T, markers, joint, lead=0.13, **keys)
+
+
+def ground(rng, count=1):
+    return [(rng.standard_normal(3), rotation(rng)) for _ in range(count)]
+
+
+def random_state(rng, mechanism, model, deflection=0.1):
+    q, v = deflection * rng.standard_normal(model.n_q), rng.standard_normal(model.n_v)
+    for body, (joint_q, p_q, *_) in zip(mechanism.bodies, model.first, strict=True):
+        q[joint_q:p_q] = rng.standard_normal(p_q - joint_q)
+        if body.joint in (J.spherical, J.free):
+            e = q[p_q - 4 : p_q]
+            e /= np.linalg.norm(e)
+    return q, v
+
+
+def row(kind, a, b, f, g=(1, 0, 0), name="row"):
+    row = r.RowModel()
+    row.name, row.kind, row.a, row.b = name, kind, r.MarkerAt(*a), r.MarkerAt(*b)
+    row.f, row.g = np.array(f, dtype=float), np.array(g, dtype=float)
+    return row, (a, b)
+
+
+def three_links(rng, modes=3, **keys):
+    return [
+        random_body(rng, modes, J.revolute, **keys),
+        random_body(rng, modes, J.spherical, parent=0, parent_marker=1, **keys),
+        random_body(rng, modes, J.universal, parent=1, parent_marker=1, **keys),
+    ]

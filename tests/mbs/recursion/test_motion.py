@@ -1,0 +1,136 @@
+"""Motions in joint coordinates: against the core in absolute coordinates, closed forms, identities."""
+
+import numpy as np
+import pytest
+import zoo
+from mechanisms import assemble, core_run, relative
+from points_in_space import J, Mechanism, r
+from random_bodies import ground, random_body, row, three_links
+from recursion_trees import tree_of
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.fields.expressions import parse_expression
+
+DOP853 = [(_core.MethodKind.dop853, 1.0, 0.0)]
+
+
+def controls(tolerance=1e-10, methods=DOP853):
+    return _core.IntegrationControls(tolerance=tolerance, max_steps=0, methods=methods, spectral_radius=0.8)
+
+
+def scene_of(tree):
+    """The targets of the rows of a tree, values moved by the measures' offsets."""
+    scene = _core.TreeScene()
+    for i in tree.rows:
+        scene.add_target(tree.assembly.constraints[i].target)
+    return scene
+
+
+@pytest.mark.parametrize("name", ["chain of 2", "tree"])
+def test_inverse_dynamics_of_plane_trees(name):
+    """The same motion and multipliers as the core in absolute coordinates gives from the same start."""
+    assembly = assemble(zoo.build(name))
+    tree = tree_of(assembly)
+    scene, model = scene_of(tree), tree.model
+    rng = np.random.default_rng(2)
+    q, v = 0.02 * rng.standard_normal(model.n_q), 0.1 * rng.standard_normal(model.n_v)
+    q[[joint for joint, *_ in model.first]] = [1.2, -1.9, 0.3][: len(model.first)]
+    q, v, left = _core.tree_projected(model, scene, 0.0, q, v)
+    assert left < 1e-12
+    times = np.linspace(0, 0.3, 4)
+    (status, _, _), states, _, lambda_ = _core.tree_motion(model, scene, list(times), q, v, controls())
+    assert status == _core.IntegrationStatus.completed
+    Q, V, _ = tree.from_tree(q, v)
+    expected = core_run(assembly, Q, V, times, tolerance=1e-10)
+    for i in range(len(times)):
+        Q, V, _ = tree.from_tree(states[i, : model.n_q], states[i, model.n_q :])
+        assert relative(Q, expected.q[i]) < 1e-8
+        _, expected_lambda = assembly.system.evaluate(times[i], Q, V)
+        assert relative(lambda_[i], expected_lambda[tree.rows]) < 1e-8
+
+
+def test_rows_are_kept_along_a_motion_in_space():
+    """A loop with flexible links, one joint driven: rows and rates at every output within rounding."""
+    rng = np.random.default_rng(5)
+    bodies = [
+        random_body(rng, 2, J.revolute),
+        random_body(rng, 2, J.spherical, parent=0, parent_marker=1),
+    ]
+    rows = [row(r.RowKind.point, (-1, 1), (1, 2), axis) for axis in np.eye(3)[:2]]
+    mechanism = Mechanism(bodies, ground(rng, 2), np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
+    model = mechanism.model()
+    q, v = np.zeros(model.n_q), np.zeros(model.n_v)
+    q[model.first[1][0]] = 1
+    value, _ = model.measure(q, v)
+    scene = _core.TreeScene()
+    for k in range(2):
+        scene.add_target(parse_expression(f"{float(value[k])!r}+0.05*sin(3*t)-0.1*t**2"))
+    q, v, left = _core.tree_projected(model, scene, 0.0, q, v)
+    assert left < 1e-12
+    times = list(np.linspace(0, 0.5, 6))
+    (status, _, _), states, _, _ = _core.tree_motion(model, scene, times, q, v, controls(1e-8))
+    assert status == _core.IntegrationStatus.completed
+    for t, y in zip(times, states, strict=True):
+        at, rate = model.measure(y[: model.n_q], y[model.n_q :])
+        assert np.abs(at - value - (0.05 * np.sin(3 * t) - 0.1 * t**2)).max() < 1e-9  # dense output
+        assert np.abs(rate - (0.15 * np.cos(3 * t) - 0.2 * t)).max() < 1e-6
+
+
+def test_a_free_rigid_body_turns_as_jacobi_says():
+    """formulation_spatial.md, checkpoint A: I = diag(0.02, 0.03, 0.045), omega = (3, 0, 4) at t = 0, at 4 s."""
+    body, data, marker = r.SpatialBody(), r.SpatialData(), r.SpatialMarker()
+    inertia = np.array([0.02, 0.03, 0.045])
+    data.mass, data.J2 = 1.0, np.diag(inertia.sum() / 2 - inertia)
+    data.markers = [marker]
+    body.name, body.joint, body.data = "top", J.free, data
+    model = r.SpatialModel([body], [r.SpatialMarker()], [], [], np.zeros(3))
+    q, v = np.array([0, 0, 0, 1.0, 0, 0, 0]), np.array([0, 0, 0, 3.0, 0, 4.0])
+    _, states, _, _ = _core.tree_motion(model, _core.TreeScene(), [0.0, 4.0], q, v, controls(1e-12))
+    assert np.abs(states[-1, -3:] - [2.64241551, -1.49727169, 3.92456121]).max() < 1e-8
+    assert abs(np.linalg.norm(states[-1, 3:7]) - 1) < 1e-13
+
+
+def test_a_flexible_tree_keeps_momentum_and_energy():
+    rng = np.random.default_rng(7)
+    bodies = three_links(rng)
+    bodies[0].joint = J.free
+    for body in bodies:
+        body.damping *= 0
+    model = Mechanism(bodies, ground(rng), np.zeros(3)).model()
+    q, v = 0.02 * rng.standard_normal(model.n_q), 0.3 * rng.standard_normal(model.n_v)
+    for body, (_, p_q, *_) in zip(bodies, model.first, strict=True):
+        if body.joint in (J.spherical, J.free):
+            q[p_q - 4 : p_q] = [1, 0, 0, 0]
+    _, states, _, _ = _core.tree_motion(model, _core.TreeScene(), [0.0, 1.0], q, v, controls(1e-11))
+
+    def kept(y):
+        totals = model.totals(y[: model.n_q], y[model.n_q :])
+        return np.array([totals.kinetic + totals.strain, *totals.momentum, *totals.angular_momentum])
+
+    assert relative(kept(states[-1]), kept(states[0])) < 1e-9
+
+
+def test_dependent_rows_are_found_and_left_out():
+    """The same point held twice: three of six rows are kept, motion as with three."""
+    rng = np.random.default_rng(8)
+    rows = [row(r.RowKind.point, (-1, 1), (2, 1), axis) for axis in (*np.eye(3), *np.eye(3))]
+    bodies, bases = three_links(rng), ground(rng, 2)
+    mechanism = Mechanism(bodies, bases, np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
+    model = mechanism.model()
+    q, v = 0.1 * rng.standard_normal(model.n_q), rng.standard_normal(model.n_v)
+    q[model.first[1][0] : model.first[1][0] + 4] = [1, 0, 0, 0]
+    kept = model.keep_independent_rows(q, v)
+    assert len(kept) == 3
+    a, lambda_ = model.evaluate(q, v, np.ones(6), None, None)
+    mechanism.rows, mechanism.row_sides = mechanism.rows[:3], mechanism.row_sides[:3]
+    expected, _ = mechanism.model().evaluate(q, v, np.ones(3), None, None)
+    assert relative(a, expected) < 1e-12
+    assert np.count_nonzero(lambda_) == 3
+
+
+def test_an_implicit_method_is_refused():
+    rng = np.random.default_rng(0)
+    model = Mechanism([random_body(rng, 1, J.revolute)], ground(rng), np.zeros(3)).model()
+    radau = controls(methods=[(_core.MethodKind.radau, 1.0, 0.0)])
+    with pytest.raises(ValueError, match="explicit"):
+        _core.tree_motion(model, _core.TreeScene(), [0.0, 1.0], np.zeros(model.n_q), np.zeros(model.n_v), radau)
