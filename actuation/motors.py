@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..mbs._core import TimeFunction
 from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.joints.joint import JointRecord
+from ..mbs.joints.transmission import MotorLimits
 from ..mbs.quantities.joint_motion import joint_motions
 
 SHORT = 0.01  # of the time: a peak that lasts less is one of its own
@@ -56,24 +57,18 @@ class MotorFeasibility:
     @property
     def has_spike(self) -> bool:
         """Whether the largest moment is more than a tenth above what is needed for 99 % of the time."""
-        return is_spike(self.moment, self.usual_moment)
+        return self.moment > APART * self.usual_moment
 
-    @property
-    def spike_in_words(self) -> str:
-        """Why a short peak is there and what helps; empty where there is none."""
+    def spike_in_words(self, unit: str) -> str:
+        """Why a short peak is there and what helps; empty where there is none. `unit` of the moment."""
         if not self.has_spike:
             return ""
         why = f": the {self.jump} of the path jumps there, so take a smoother path" if self.jump else ""
         or_fewer = " or leave out the highest modes" if self.jump else ""
         return (
             f"the peak at t = {self.moment_time:g} s lasts for less than 1 % of the time, and {self.usual_moment:.4g}"
-            f" is enough for the rest{why}{or_fewer}"
+            f" {unit} are enough for the rest{why}{or_fewer}"
         )
-
-
-def is_spike(moment: float, usual: float) -> bool:
-    """Whether a largest moment is one of its own against the one that 99 % of the time needs."""
-    return moment > APART * usual
 
 
 def judge_motors(outcome: Outcome, joints: Mapping[str, JointRecord]) -> dict[str, MotorFeasibility]:
@@ -88,7 +83,12 @@ def judge_motors(outcome: Outcome, joints: Mapping[str, JointRecord]) -> dict[st
 
 
 def _judge(outcome: Outcome, joint: JointRecord, moment: Array, rate: Array) -> MotorFeasibility:
-    limits, time = joint.motor_limits, outcome.time
+    judged = judge_motion(outcome.time, moment, rate, joint.motor_limits)
+    return replace(judged, jump=path_jump(outcome, int(np.abs(moment).argmax()))) if judged.has_spike else judged
+
+
+def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits) -> MotorFeasibility:
+    """What a motor has to do that gives `moment` (T,) at `rate` (T,) of its joint over `time` (T,); SI units."""
     size, speed, power = np.abs(moment), np.abs(rate), np.abs(moment * rate)
     beyond = (size > limits.moment) | (speed > limits.speed) | (power > limits.power)
     shares, peak, usual = _shares(time), int(size.argmax()), _not_exceeded(time, size, 1.0 - SHORT)
@@ -99,7 +99,6 @@ def _judge(outcome: Outcome, joint: JointRecord, moment: Array, rate: Array) -> 
         usual_moment=usual,
         moment_time=float(time[peak]),
         share_beyond=float(shares @ beyond),
-        jump=path_jump(outcome, peak) if is_spike(float(size[peak]), usual) else "",
     )  # fmt: skip
 
 

@@ -17,16 +17,20 @@ INTRODUCTION = {
     "scene": "What stage 2 reads. SI units, angles in rad; files are named relative to the scene's folder. Values that"
     " the program cannot do yet are refused, with a message that says so."
     " Axes and signs: [conventions](conventions.md).",
+    "spatial": 'What stage 2 reads where `space = "spatial"`. SI units, angles in rad. `ffrobot solve` takes inverse'
+    " dynamics (pcid) along places and joint coordinates so far; what it cannot do yet is refused, with a message that"
+    " says so.",
     "figures": "What `ffrobot plot` draws: a file `figures.toml` beside the results. Without it, the standard figures.",
 }
 HERE = Path(__file__).parent / "reference"
 
 
 LINK_TABLES = tuple(schema("link")["$defs"])
+SCENE_TABLES = tuple(schema("scene")["$defs"])
 
 
 def write_key_tables(folder: Path) -> None:
-    """Write `link_keys.md`, `scene_keys.md` and `figures_keys.md` into `folder`."""
+    """Write `link_keys.md`, `scene_keys.md`, `spatial_keys.md` and `figures_keys.md` into `folder`."""
     for name, text in key_pages().items():
         (folder / name).write_text(text, encoding="utf-8")
 
@@ -35,11 +39,16 @@ def key_pages() -> dict[str, str]:
     """The pages by the name of their file."""
     pages = {}
     for kind, introduction in INTRODUCTION.items():
-        lines = [f"# Keys of a {kind} file", "", introduction, ""]
-        elsewhere = LINK_TABLES if kind == "scene" else ()  # a body's link has the keys of a link file
+        what = "scene in space" if kind == "spatial" else f"{kind} file"
+        lines = [f"# Keys of a {what}", "", introduction, ""]
+        elsewhere = LINK_TABLES if kind in ("scene", "spatial") else ()
+        elsewhere += SCENE_TABLES if kind == "spatial" else ()  # a body's link has the keys of a link file
         records = [(name, record) for name, record in _records(schema(kind)) if name not in elsewhere]
         lines += [line for name, record in records for line in _section(name, record)]
-        pages[f"{kind}_keys.md"] = "\n".join(lines).rstrip("\n") + "\n"
+        text = "\n".join(lines).rstrip("\n") + "\n"
+        for name in SCENE_TABLES if kind == "spatial" else ():  # analyses are those of planar scenes
+            text = text.replace(f"](#{name.lower()})", f"](scene_keys.md#{name.lower()})")
+        pages[f"{kind}_keys.md"] = text
     return pages
 
 

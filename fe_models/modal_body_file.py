@@ -187,6 +187,8 @@ def _image(body: ModalBody) -> bytes:
         _write_arrays(file, {"stress/surface": body.surface_stress, "stress/surface_static": body.surface_static})
         if body.stress_loads:
             _write_names(file, "stress/loads", body.stress_loads)
+        if body.reference_condition == "craig-bampton":
+            _write_craig_bampton(file.create_group("craig_bampton"), body)
         if body.surface_patches is not None:
             _write_arrays(file.create_group("surface_patches"), vars(body.surface_patches))
         file.flush()
@@ -198,6 +200,15 @@ def _write_arrays(group: h5py.Group, arrays: Mapping[str, NDArray[np.generic] | 
     for name, array in arrays.items():
         if array is not None:
             group.create_dataset(name, data=array, track_times=False)
+
+
+def _write_craig_bampton(group: h5py.Group, body: ModalBody) -> None:
+    """For other programs; it follows from the rest of the file, and is not read."""
+    from .modal_body.craig_bampton import craig_bampton  # here: reading does without the records of links
+
+    link = craig_bampton(body)
+    _write_names(group, "coordinates", link.coordinates)
+    _write_arrays(group, {"mass": link.mass, "stiffness": link.stiffness, "recovery": link.recovery})
 
 
 def _write_names(group: h5py.Group, name: str, names: Sequence[str]) -> None:

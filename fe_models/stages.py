@@ -29,6 +29,9 @@ from .modal_body_file import FORMAT_VERSION
 # To be raised whenever the same link file gives other numbers than before, or further ones.
 ALGORITHM_VERSION = {"beam": 4, "solid": 3}
 
+# Likewise, of what files of links with stresses hold of these: 1 without static ones of unit loads.
+STRESS_VERSION = 2
+
 _AFTER_THE_MODES = ("name", "damping", "stress")
 
 
@@ -37,7 +40,10 @@ def input_hash(link: Link) -> str:
 
     A part's file counts by its content. Comments, the order of keys, 1 for 1.0, dates of files change nothing.
     """
-    return _digest(_content(link))
+    content = _content(link)
+    if link.stress.points or link.stress.surface:
+        content["stresses"] = STRESS_VERSION
+    return _digest(content)
 
 
 def modes_hash(link: Link) -> str:
@@ -86,7 +92,7 @@ def _stresses(body: ModalBody, link: Link) -> tuple[dict[str, StressPoint], tupl
         from .beam.stress import beam_stresses, stress_loads  # loads SciPy
 
         attached = lumps(link.interface, body.interfaces)
-        of_modes = np.diag(body.stiffness), attached, body.residual, body.interfaces
+        of_modes = np.diag(body.stiffness), body.family, attached, body.residual, body.interfaces
         return beam_stresses(link, body.stations, *of_modes), stress_loads(link, body.interfaces)
     known = {tuple(point.position): point for point in body.stress.values() if point.static is not None}
     if not known.keys() >= set(link.stress.points.values()):

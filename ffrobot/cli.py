@@ -89,16 +89,20 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     from .common.files import check_output
     from .present.progress import Display
     from .present.summary import print_summary, summary_console
-    from .results.file import FORMAT
+    from .results.file import FORMAT, Results
     from .results.resume import how_to_go_on, left_out
     from .results.resume import resume as resume_scene
     from .results.write import write_results
     from .run.inputs import files_of
     from .run.solve import solve as solve_scene
+    from .scene.spatial import is_spatial
 
     path = output or scene_file.with_suffix(".results.h5")
     _protect(files_of(scene_file))
     check_output(path, FORMAT)
+    if is_spatial(scene_file):
+        _solve_spatial(scene_file, path, resume=resume, strict=strict)
+        return
     writing = 0.0
 
     def keep(solution: Solution) -> None:
@@ -112,7 +116,9 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     if solution is None:
         click.echo(f"{path}: complete, nothing to go on with")
         return
-    print_summary(solution, path, {**solution.seconds, "writing": writing}, summary_console())
+    with Results(path) as results:
+        verdict = results.verdict
+    print_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
     where = f" -o {output}" if output else ""
     go_on = how_to_go_on(solution, f"ffrobot solve {scene_file}{where} --resume")
     try:
@@ -125,6 +131,37 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
         raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
     for name, result in solution.analyses.items() if strict else ():
         for text in result.warnings:
+            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
+
+
+def _planar(*paths: Path) -> None:
+    """Raise `InputError` for results in space, of which only `info` and `Results` can tell anything yet."""
+    from .results.file import refuse_spatial
+
+    for path in paths:
+        refuse_spatial(path)
+
+
+def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) -> None:
+    """The same for a scene in space."""
+    from .common.errors import InputError, SolveError
+    from .present.progress import Display
+    from .present.spatial import print_spatial_summary
+    from .present.summary import summary_console
+    from .results.spatial import write_spatial_results
+    from .run.spatial import solve_spatial
+
+    if resume:
+        raise InputError(f'{scene_file}: --resume: expected a planar scene, found space = "spatial": not available yet')
+    with Display() as display:
+        solution = solve_spatial(scene_file, display)
+    began = time.perf_counter()
+    write_spatial_results(solution, path)
+    seconds = {**solution.seconds, "writing": time.perf_counter() - began}
+    print_spatial_summary(solution, path, seconds, summary_console())
+    for name, result in solution.analyses.items():
+        result.run.check_completed(scene_file)
+        for text in result.run.warnings if strict else ():
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
@@ -148,6 +185,7 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
     from .present.feasibility import print_feasibility
     from .present.summary import summary_console
 
+    _planar(results_file)
     with reading(results_file):
         print_feasibility(results_file, analysis, summary_console())
 
@@ -165,6 +203,7 @@ def plot(file: Path, output: Path | None, formats: str, only: tuple[str, ...]) -
     from .common.hdf5 import reading
     from .pictures.figures.plot import plot_file
 
+    _planar(file)
     with reading(file):
         paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","), only)
     for path in paths:
@@ -187,6 +226,7 @@ def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN4
     from .common.hdf5 import reading
     from .pictures.view import Options, view_file
 
+    _planar(file)
     with reading(file):
         viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
     for path in viewed.paths:
@@ -207,6 +247,7 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
+    _planar(*results_files)
     with reading(*results_files):
         write_report(results_files, path)
     click.echo(path)
@@ -222,6 +263,7 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
     from .results.file import Results
 
     path = output or results_file.with_suffix(".npz")
+    _planar(results_file)
     with reading(results_file), Results(results_file) as results:
         name = results.export_linear(analysis, path)
     click.echo(f"{path}: linear model of {name}")
@@ -287,9 +329,9 @@ def sweep(
 
 
 @cli.command()
-@click.argument("kind", type=click.Choice(["link", "scene", "figures"]))
+@click.argument("kind", type=click.Choice(["link", "scene", "spatial", "figures"]))
 def schema(kind: str) -> None:
-    """Print the JSON schema of link, scene or figures files, for editors.
+    """Print the JSON schema of link, scene or figures files, or of scenes in space, for editors.
 
     \b
     ffrobot schema scene > scene.schema.json

@@ -18,14 +18,15 @@ DIALECT = GenerateJsonSchema.schema_dialect
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """The JSON schema of a "link", "scene" or "figures" file, as a dictionary."""
+    """The JSON schema of a "link", "scene" or "figures" file, or of a scene in space ("spatial"), as a dictionary."""
     described = TypeAdapter(_record(kind)).json_schema(schema_generator=_Described)
-    if kind == "scene":
+    if kind in ("scene", "spatial"):
         for link in ("BeamLink", "SolidLink"):
             described["$defs"][link]["required"].remove("name")  # that of the body
     if kind == "link":
         described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
-    return {"$schema": DIALECT, **_for_toml(described), "title": f"ffrobot {kind} file"}
+    title = "scene in space" if kind == "spatial" else f"{kind} file"
+    return {"$schema": DIALECT, **_for_toml(described), "title": f"ffrobot {title}"}
 
 
 def _record(kind: str) -> Any:  # noqa: ANN401 (a record or a union of them)
@@ -33,6 +34,10 @@ def _record(kind: str) -> Any:  # noqa: ANN401 (a record or a union of them)
         from .scene.scene import SceneKeys
 
         return SceneKeys
+    if kind == "spatial":
+        from .scene.spatial import SpatialSceneKeys
+
+        return SpatialSceneKeys
     if kind == "link":
         from .fe_models.link_records import Link
 

@@ -99,15 +99,15 @@ def dynamic(folder, count, attachment_modes=False):
     """A swing under gravity with a payload."""
     modes = {"count": count, "family": "in-plane-bending", "attachment_modes": attachment_modes}
     body = link("simply-supported", modes, damping={"ratio": 0.01})
-    kind = {"kind": "pcid", "end": 1.0, "output_step": 0.01, "tolerance": 1e-8}
+    kind = {"kind": "pcid", "end": 1.0, "output_step": 0.01}
     path = [{"name": "turn", "joint": "root", "value": "1.5*(10*t**3 - 15*t**4 + 6*t**5)"}]
     keys = {"trajectory": path, "payload": [{"point": "arm.tip", "mass": 2.0, "inertia": 0.02}]}
     return solved(folder, body, joint="revolute", kind=kind, gravity=[0.0, -9.81], initial={"state": "static"}, **keys)
 
 
 def test_few_modes_are_enough_in_motion(tmp_path):
-    """Two modes against twenty with attachment modes; mode displacement is off by 60 times as much, and more."""
-    _, exact = dynamic(tmp_path, 20, True)
+    """Two modes against six with attachment modes; mode displacement is off by 60 times as much, and more."""
+    _, exact = dynamic(tmp_path, 6, True)
     results, few = dynamic(tmp_path, 2)
     body, p = results.modal_body("arm"), results.modal("run", "arm")
     plain = np.stack([p @ body.stress[f"x{k}"].stress[0] for k in range(len(PLACES))], axis=1)

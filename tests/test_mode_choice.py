@@ -130,7 +130,8 @@ def test_results_say_what_their_modal_coordinates_are(reduced, tmp_path):
 
 
 def test_the_summary_tells_the_number_the_estimate_and_what_is_saved(reduced, tmp_path, capsys):
-    print_summary(reduced, tmp_path / "x.h5", reduced.seconds, summary_console())
+    verdict = Results.from_image(results_image(reduced), tmp_path / "x.h5").verdict
+    print_summary(reduced, verdict, tmp_path / "x.h5", reduced.seconds, summary_console())
     printed = " ".join(capsys.readouterr().out.split())
     assert "link1: 3 of 10 modes and 2 static shapes for the others; link2: 3 of 10 modes" in printed
     assert "inverse: error of leaving out the others, estimated: deflections" in printed

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import ffrobot
+from ffrobot.cli import cli
+from ffrobot.present import progress
 
 ROOT = Path(__file__).parents[1]
 SECTION = {"shape": "tube", "outer": 0.02, "inner": 0.016}
@@ -243,3 +245,57 @@ def test_tables_without_end():
     endless["a"] = endless
     with pytest.raises(ffrobot.InputError, match="expected"):
         ffrobot.make_scene(name="endless", initial=endless)
+
+
+def test_verdict_says_what_the_file_holds(folder, tmp_path, capsys):
+    """Peaks, RMS and limits of the motor, the deflection, what to try next; as `ffrobot solve` prints it."""
+    joint = {"name": "shoulder", "type": "revolute", "between": ("ground", "arm.root"), "moment_limit": 0.4}
+    scene = swing(folder, joint=[joint])
+    results = ffrobot.solve(scene)
+    found = results.verdict["inverse"]
+    moment, deflection = results["inverse/joints/shoulder/moment"], results["inverse/points/arm.tip/deflection"]
+    motor = found.motors["shoulder"]
+    assert motor.moment == np.abs(moment).max() > 0.4
+    square = (moment[1:] ** 2 + moment[:-1] ** 2).mean() / 2
+    assert motor.rms_moment == pytest.approx(np.sqrt(square), rel=1e-9)
+    assert found.feasible is False
+    assert found.answer.startswith("beyond their limits: motor shoulder (factor ")
+    assert found.deflection == (np.linalg.norm(deflection, axis=1).max(), "arm.tip", pytest.approx(0.0))
+    assert any("slower path" in text for text in found.advice)
+    (folder / "limited.toml").write_text(scene.text, encoding="utf-8")
+    cli(["solve", str(folder / "limited.toml"), "-o", str(tmp_path / "r.h5")], standalone_mode=False)
+    printed = " ".join(capsys.readouterr().out.split())
+    for line in str(results.verdict).splitlines():
+        assert " ".join(line.split()) in printed
+    assert "beyond their limits" in results._repr_html_()
+    with pytest.raises(KeyError):
+        results.verdict["invers"]
+
+
+def test_keys_of_results(results):
+    keys = results.keys()
+    assert {"inverse/time", "inverse/joints/shoulder/rate"} <= set(keys)
+    assert results._ipython_key_completions_() == keys == list(results)
+    assert "inverse/time" in results
+    assert "inverse/tim" not in results
+    for key in keys:
+        results[key]
+
+
+def test_progress_in_a_log_is_a_line_now_and_then(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "EVERY", 0.0)
+    with progress.Display() as display:
+        display.stage('analysis "inverse"')
+        display.advance(0.25, 1.0)
+    lines = capsys.readouterr().err.splitlines()
+    told = [line.partition(" (")[0] for line in lines]
+    assert told == ['ffrobot: analysis "inverse"', 'ffrobot: analysis "inverse", 0.25 of 1']
+
+
+def test_verdict_of_a_run_that_ended_early_judges_nothing(folder, tmp_path):
+    few = {"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.001, "max_steps": 3}
+    with pytest.raises(ffrobot.SolveError):
+        ffrobot.solve(swing(folder, analysis=[few]), tmp_path / "r.h5")
+    with ffrobot.Results(tmp_path / "r.h5") as results:
+        assert str(results.verdict) == "inverse: ended early (too many steps)"
+        assert results.verdict["inverse"].feasible is None

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+import scene_of
+from spatial_checkpoints import CASES as CHECKPOINTS
+from spatial_checkpoints import load as checkpoint
 
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link_file import read_link
@@ -31,7 +34,7 @@ def validator(ffrobot):
         cls.check_schema(printed)
         return cls(printed)
 
-    return {kind: make(kind) for kind in ("link", "scene", "figures")}
+    return {kind: make(kind) for kind in ("link", "scene", "spatial", "figures")}
 
 
 def parsed(path):
@@ -42,6 +45,11 @@ def parsed(path):
 def test_scenes_of_the_cases_pass(validator, path):
     load_scene(path)
     validator["scene"].validate(parsed(path))
+
+
+@pytest.mark.parametrize("name", CHECKPOINTS)
+def test_scenes_in_space_pass(validator, name):
+    validator["spatial"].validate(tomllib.loads(scene_of.scene(checkpoint(name), 1e-8)[0]))
 
 
 @pytest.mark.parametrize("path", LINKS, ids=lambda path: f"{path.parent.name}/{path.stem}")
@@ -55,7 +63,7 @@ def test_figures_of_the_cases_pass(validator, path):
     validator["figures"].validate(parsed(path))
 
 
-@pytest.mark.parametrize("kind", ["link", "scene", "figures"])
+@pytest.mark.parametrize("kind", ["link", "scene", "spatial", "figures"])
 def test_every_key_says_what_it_means(kind):
     """Hover text of editors, and the pages of keys: the text under the field in its record."""
     described = schema(kind)
@@ -139,7 +147,7 @@ def test_mistakes_in_a_link_are_refused_by_both(validator, tmp_path, keys, value
 
 
 def test_schema_knows_only_what_toml_can_say():
-    for kind in ("link", "scene", "figures"):
+    for kind in ("link", "scene", "spatial", "figures"):
         text = json.dumps(schema(kind))
         assert '"null"' not in text
         assert ": null" not in text

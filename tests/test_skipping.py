@@ -106,7 +106,10 @@ def test_terms_that_vanish_are_not_multiplied(folder):
     bending, both = (prepare(arm(folder, link)) for link in ("bending", "all"))
     n = both.model.bodies[1].n_modes
     of_bending, of_both = (core_arguments(solution.model.bodies[1], [], []) for solution in (bending, both))
-    for term, symbol, shape in (("S_tilde", "S̃", (n, n)), ("j", "j", (n,))):
+    for term, symbol, shape in (
+        ("S_tilde", "inertia between rotation and pairs of modes", (n, n)),
+        ("j", "change of inertia to first order in deflections", (n,)),
+    ):
         assert of_bending[term].size == 0
         assert of_both[term].shape == shape
         assert f"{symbol}, which is zero" in bending.omissions

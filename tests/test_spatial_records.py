@@ -15,7 +15,7 @@ from ffrobot.common.key_descriptions import key_descriptions
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
 from ffrobot.scene.load import load_scene
-from ffrobot.scene.spatial import SpatialSceneKeys, spatial_scene
+from ffrobot.scene.spatial import SpatialSceneKeys, check_available, spatial_scene
 from ffrobot.schema import DIALECT
 
 FOLDER = Path(scene_of.__file__).parent
@@ -76,8 +76,8 @@ x = "0.1*cos(t)"
 y = "0.1*sin(t)"
 
 [[load]]
-point = "hand.tip"
-mz = "0.1*t"
+joint = "waist"
+moment = "0.1*t"
 
 [[payload]]
 point = "hand.tip"
@@ -96,6 +96,12 @@ def scene(change=lambda tables: None):
     data = tomllib.loads(ARM)
     change(data)
     return spatial_scene(data, FOLDER / "scene.toml", ARM)
+
+
+def available_scene(change):
+    found = scene(change)
+    check_available(found)
+    return found
 
 
 def test_keys_and_their_meaning():
@@ -213,6 +219,18 @@ MISTAKES = {
         add("load", joint="wrist", moment="1.0"),
         'load no. 2: joint: expected one with a single coordinate, found "wrist", a universal',
     ),
+    "orientation, which is not there yet": (
+        put("trajectory", rpy=["0", "0", "t"]),
+        'trajectory "tool": expected x, y, z or a joint, found an orientation, which is not available yet',
+    ),
+    "load on a point, which is not there yet": (
+        add("load", point="hand.tip", mz="0.1*t"),
+        "load no. 2: point: expected a load on a joint, found a point, which is not available in space yet",
+    ),
+    "integrator that is not there yet": (
+        put("analysis", integrator="radau"),
+        'integrator: expected "auto", "dop853", "dopri5" in space = "spatial", found "radau"',
+    ),
     "nothing to follow": (lambda data: data.pop("trajectory"), r"expected at least one \\[\\[trajectory\\]\\]"),
 }
 
@@ -221,14 +239,14 @@ MISTAKES = {
 def test_mistakes_are_told(name):
     change, message = MISTAKES[name]
     with pytest.raises(InputError, match=message.replace(r"\\[", r"\[").replace(r"\\]", r"\]")) as caught:
-        scene(change)
+        available_scene(change)
     assert str(FOLDER / "scene.toml") in str(caught.value)
 
 
-def test_scenes_in_space_are_not_solved_yet(tmp_path):
+def test_planar_readers_refuse_scenes_in_space(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(ARM)
-    with pytest.raises(InputError, match='space: expected "planar", found "spatial", which is not available yet'):
+    with pytest.raises(InputError, match='space: expected "planar", found "spatial": only the command `ffrobot solve`'):
         load_scene(path)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array, ComplexArray
 from ...common.errors import InputError
+from ...common.extras import extras
 from ...common.files import write_atomically
 from ...common.validation import did_you_mean, quoted
 from ...mbs.solve.linearisation import LinearMechanism
@@ -21,9 +22,10 @@ if TYPE_CHECKING:
 
 ComplexArray = ComplexArray
 Names = str | Sequence[str]
+SHOWN = 4  # names in the line that a model prints
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LinearModel:
     """x = (δs, δṡ) about a configuration or one instant of a motion, frozen there; f coordinates s.
 
@@ -47,6 +49,14 @@ class LinearModel:
     time: float
     mass: Array
     transformation: Array
+
+    def __repr__(self) -> str:
+        inputs, outputs = len(self.input_names), len(self.output_names)
+        return (
+            f"LinearModel at t = {self.time:g} s: {self.freedom} degrees of freedom, {len(self.A)} states,"
+            f" {inputs} input{'s' * (inputs != 1)} ({_some(self.input_names)}),"
+            f" {outputs} output{'s' * (outputs != 1)} ({_some(self.output_names)})"
+        )
 
     @property
     def freedom(self) -> int:
@@ -85,13 +95,24 @@ class LinearModel:
         """Write to a .npz or .mat file (MATLAB's). Raises `InputError` for another suffix."""
         save_arrays(self.arrays(), path)
 
-    def to_control(self) -> control.StateSpace:
-        """The model as python-control's state space, "." in names made ":"; needs that package (extra "control")."""
-        import control
+    def to_control(self, inputs: Names | None = None, outputs: Names | None = None) -> control.StateSpace:
+        """The model as python-control's state space, "." in names made ":"; needs that package (extra "control").
 
-        names = {"states": self.state_names, "inputs": self.input_names, "outputs": self.output_names}
+        From `inputs` to `outputs` by their names here, in that order; all where they are not given. Raises `InputError`
+        for unknown ones.
+        """
+        with extras():
+            import control
+
+        columns = self.inputs(self.input_names if inputs is None else inputs)
+        rows = self.outputs(self.output_names if outputs is None else outputs)
+        names = {
+            "states": self.state_names,
+            "inputs": [self.input_names[k] for k in columns],
+            "outputs": [self.output_names[k] for k in rows],
+        }
         allowed = {kind: [name.replace(".", ":") for name in given] for kind, given in names.items()}
-        return control.ss(self.A, self.B, self.C, self.D, **allowed)
+        return control.ss(self.A, self.B[:, columns], self.C[rows], self.D[np.ix_(rows, columns)], **allowed)
 
 
 def linear_model(mechanism: LinearMechanism, patches: Mapping[str, PatchArray]) -> LinearModel:
@@ -141,6 +162,11 @@ def _spread(size: int, places: list[int], values: Array) -> Array:
     spread = np.zeros(size)
     spread[places] = values
     return spread
+
+
+def _some(names: tuple[str, ...]) -> str:
+    """The first few of many names."""
+    return ", ".join(names[:SHOWN]) + (", …" if len(names) > SHOWN else "")
 
 
 def _numbers(kind: str, names: Names, known: tuple[str, ...]) -> list[int]:

@@ -24,6 +24,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import Interface, ModalBody
+from ...mbs.quantities.stress import SectionLoads
 from .layers import as_array, layer_section, moment_per_volt, pull_per_volt, side
 from .records import PztLayout
 
@@ -61,6 +62,38 @@ def composite(layout: PztLayout, body: ModalBody, edges: Array) -> Composite:
     On both faces patches bend only. On one named face they stretch the link too; without a named face they lie on one
     and the axis stretches freely, which shifts the neutral axis, but no mode along the link feels them.
     """
+    layers = _on_link(layout, body, edges)
+    stiffness, per_volt = layers.B.T @ layers.by_modes, layers.by_volts.T @ layers.B
+    return Composite(0.5 * (stiffness + stiffness.T), layers.straight.T @ layers.B - per_volt)
+
+
+def section_loads(layout: PztLayout, body: ModalBody, edges: Array, p: Array, voltages: Array) -> SectionLoads:
+    """P over a motion, per length of the link: p (T, n) in the modes of the modal body, voltages (T, k)."""
+    layers = _on_link(layout, body, edges)
+    P = voltages @ layers.by_volts.T - p @ layers.by_modes.T
+    count = len(layers.points)
+    density = P.reshape(len(p), count, -1) / np.array([at.weight for at in layers.points])[:, None]
+    along = density[..., 1] if density.shape[2] == 2 else np.zeros((len(p), count))
+    patch = np.array([at.patch for at in layers.points])
+    x = np.array([at.x for at in layers.points])
+    return SectionLoads(edges, patch, x, density[..., 0], along, P @ layers.B)
+
+
+class _OnLink(NamedTuple):
+    """Layers on their link, rows (φ', and on one named face u') of each Gauss point.
+
+    B (rows, n); P of coordinates p and of voltages: `by_modes` (rows, n) taken off, `by_volts` (rows, k); `straight`
+    (rows, k) of a volt on a link held straight.
+    """
+
+    points: list[GaussPoint]
+    B: Array
+    by_modes: Array
+    by_volts: Array
+    straight: Array
+
+
+def _on_link(layout: PztLayout, body: ModalBody, edges: Array) -> _OnLink:
     points = list(gauss_points(body, edges))
     one_face = bool(side(layout))
     loads = [_layers(layout, at) for at in points]
@@ -76,8 +109,7 @@ def composite(layout: PztLayout, body: ModalBody, edges: Array) -> Composite:
         exact[block] = 1.0 / (at.weight * np.array([at.EI, at.EA]))[:rows]
     R = _residual(exact, B @ np.linalg.solve(body.stiffness, B.T))
     held = np.linalg.solve(np.eye(len(B)) + C @ R, np.concatenate([C @ B, f], axis=1))
-    stiffness, per_volt = B.T @ held[:, : B.shape[1]], held[:, B.shape[1] :].T @ B
-    return Composite(0.5 * (stiffness + stiffness.T), straight.T @ B - per_volt)
+    return _OnLink(points, B, held[:, : B.shape[1]], held[:, B.shape[1] :], straight)
 
 
 def stiffness_ratios(layout: PztLayout, body: ModalBody, edges: Array) -> tuple[Array, Array]:

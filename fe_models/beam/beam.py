@@ -117,7 +117,7 @@ def _euler_bernoulli(link: BeamLink, mesh: Mesh, stations: Array, second_moment:
     M = P.T @ assemble_matrix(rhoA * w * v * ufl.dx) @ P
     strain = _at_gauss_points(V, "Hermite", 3, EI, derivative=2) @ P
     last = K.shape[0] - 2
-    free = _all_but(K.shape[0], [0, 1] if link.reference.condition == "cantilever" else [0, last])
+    free = _all_but(K.shape[0], [0, 1] if link.reference.holds_root else [0, last])
     deflection = _values(V, "Hermite", 3, stations) @ P
     slope = _values(V, "Hermite", 3, stations, derivative=1) @ P
     return K[free][:, free], M[free][:, free], strain[:, free], deflection[:, free], slope[:, free]
@@ -158,8 +158,8 @@ def _timoshenko(link: BeamLink, mesh: Mesh, stations: Array, second_moment: Prop
         [assemble_matrix(rhoA * w * v * ufl.dx), assemble_matrix(rhoI * theta * eta * ufl.dx)], format="csr"
     )
     size = K_ww.shape[0]
-    cantilever = link.reference.condition == "cantilever"
-    held = [_dof_at(W, 0.0), size + _dof_at(T, 0.0) if cantilever else _dof_at(W, link.geometry.length)]
+    clamped = link.reference.holds_root
+    held = [_dof_at(W, 0.0), size + _dof_at(T, 0.0) if clamped else _dof_at(W, link.geometry.length)]
     free = _all_but(K.shape[0], held)
     deflection, rotation = _values(W, "P", 3, stations), _values(T, "P", 2, stations)
     nothing_w, nothing_t = sp.csr_matrix(deflection.shape), sp.csr_matrix(rotation.shape)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
@@ -24,6 +25,7 @@ from ..modal_body.signs import canonical_signs
 from .attachment_modes import attachment_modes
 from .beam import R_X, FamilyModel, family_model
 from .eigen import lowest_modes
+from .fixed_interfaces import fixed_interfaces, ritz_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
 from .section_outline import section_outlines
 from .stress import beam_stresses, segments, stress_loads
@@ -61,12 +63,10 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         progress(f"{link.name}: assembling {family}")
         models[family] = _loaded(family_model(link, family, mesh, stations.x), link, stations.x)
     progress(f"{link.name}: solving for the modes")
-    modes = select(models, _wanted(link, models, path)) if _is_numbered(link) else select_default(models)
+    places = [int(np.argmin(np.abs(stations.x - place))) for place in named.values()]
+    modes, static = _modes(link, models, places, path)
     count = len(modes)
-    if link.modes.attachment_modes:
-        known = {family: _together(models[family], family, modes) for family in models}
-        places = [int(np.argmin(np.abs(stations.x - place))) for place in named.values()]
-        modes += [Mode(*mode) for mode in attachment_modes(models, known, places, length)]
+    modes += static
     fields = station_fields(models, modes, stations.x.size)
     fields = fields * canonical_signs(fields)
     progress(f"{link.name}: integrating the inertia")
@@ -81,6 +81,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
     E = link.material.youngs_modulus
     rigidity = np.array([[E * section.area, E * section.I_yy] for section in link.sections])[segment]
     outlines = section_outlines(link.shapes)[segment]
+    families = tuple(mode.family for mode in modes)
     residual = np.repeat([0, 1], [count, omega.size - count])
     kept = Stations(position, translation, rotation, heights, stations.element, outlines, rigidity)
     return ModalBody(
@@ -94,16 +95,47 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         modal_mass=modal_mass(models, modes),
         damping_ratio=damping_ratio(link, omega),
         damping_of=link.damping.of,
-        family=tuple(mode.family for mode in modes),
+        family=families,
         residual=residual,
         geometric_stiffness=with_lumped_loads(geometric_stiffness(link, stations, fields, named), attached),
         interfaces=interfaces,
         stations=kept,
-        stress=beam_stresses(link, kept, omega**2, attached, residual, interfaces),
+        stress=beam_stresses(link, kept, omega**2, families, attached, residual, interfaces),
         stress_loads=stress_loads(link, interfaces),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         ffrobot_version=program_version(),
     )
+
+
+def _modes(
+    link: BeamLink, models: Mapping[Family, FamilyModel], places: Sequence[int], path: Path
+) -> tuple[list[Mode], list[Mode]]:
+    """Eigenmodes, or what stands for them, and attachment modes; interfaces are at the stations `places`."""
+    is_fixed = link.reference.condition == "craig-bampton"
+    held, Z = dict(models), dict[Family, sp.csr_matrix]()
+    if is_fixed:
+        for family, model in models.items():
+            held[family], Z[family] = fixed_interfaces(model, family, places)
+    modes = select(held, _wanted(link, held, path)) if _is_numbered(link) else select_default(held)
+    if is_fixed:
+        modes = [mode._replace(x=Z[mode.family] @ mode.x) for mode in modes]
+    if not link.modes.attachment_modes:
+        return modes, []
+    known = {family: _together(models[family], family, modes) for family in models}
+    static = [Mode(*mode) for mode in attachment_modes(models, known, places, link.geometry.length)]
+    return _ritz(models, modes, static) if is_fixed else (modes, static)
+
+
+def _ritz(
+    models: Mapping[Family, FamilyModel], modes: Sequence[Mode], static: Sequence[Mode]
+) -> tuple[list[Mode], list[Mode]]:
+    """Modes of the floating frame in the space of fixed-interface modes and static shapes, family by family."""
+    lower, higher = list[Mode](), list[Mode]()
+    for family, model in models.items():
+        pair = ritz_modes(model, family, _together(model, family, modes), _together(model, family, static))
+        for found, of_family in zip((lower, higher), pair, strict=True):
+            found += [Mode(*mode) for mode in of_family]
+    return sorted(lower, key=_by_frequency), sorted(higher, key=_by_frequency)
 
 
 def _loaded(model: FamilyModel, link: BeamLink, stations: Array) -> FamilyModel:

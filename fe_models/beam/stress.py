@@ -17,7 +17,7 @@ from scipy.special import roots_legendre
 
 from ...common.arrays import Array, Booleans, Integers
 from ..link_records import BeamLink
-from ..modal_body import Interface, Stations, StressPoint
+from ..modal_body import Interface, Stations, StressPoint, craig_bampton
 from ..modal_body.attachment_modes import interface_loads
 from ..modal_body.lumped_masses import Lump
 from ..modal_body.unit_loads import inertia_wrenches, unit_load_names
@@ -101,6 +101,7 @@ def beam_stresses(
     link: BeamLink,
     stations: Stations,
     omega2: Array,
+    families: Sequence[str],
     attached: Sequence[Lump],
     residual: Integers,
     interfaces: Mapping[str, Interface],
@@ -114,11 +115,12 @@ def beam_stresses(
         link: for sections, material, points.
         stations: with their elements.
         omega2: (n,) ω² in rad²/s².
+        families: of the modes.
         attached: lumps, with what the modes do there.
         residual: (n,) 1 of residual attachment modes.
         interfaces: likewise, where loads act in these.
     """
-    W, at_interfaces = interface_loads(omega2, residual, interfaces)
+    W, at_interfaces = _loads_of_modes(link, omega2, families, residual, interfaces)
     n = len(W)
     of_modes = [(interfaces[name].position[0], load) for name, load in at_interfaces.items()]
     E, nu = link.material.youngs_modulus, link.material.poissons_ratio
@@ -137,6 +139,15 @@ def beam_stresses(
         strain[:3] = np.outer([1.0, -nu, -nu], modal[0] / E)
         points[name] = StressPoint(np.array(position), modal, strain, static_stress)
     return points
+
+
+def _loads_of_modes(
+    link: BeamLink, omega2: Array, families: Sequence[str], residual: Integers, interfaces: Mapping[str, Interface]
+) -> tuple[Array, dict[str, Array]]:
+    """The inertia and the loads at interfaces that bend the link into its modes: see `interface_loads`."""
+    if link.reference.condition == "craig-bampton":
+        return craig_bampton.interface_loads(omega2, families, int(residual.sum()), interfaces)
+    return interface_loads(omega2, residual, interfaces)
 
 
 def stress_loads(link: BeamLink, interfaces: Mapping[str, Interface]) -> tuple[str, ...]:
@@ -220,7 +231,7 @@ def segments(link: BeamLink, x: Array) -> Integers:
 
 def _with_support(link: BeamLink, loads: SectionLoads) -> SectionLoads:
     """The loads, with the transverse forces that hold the tip of a simply supported link: its root takes no moment."""
-    if link.reference.condition == "cantilever":
+    if link.reference.holds_root:
         return loads
     length = link.geometry.length
     moment = loads.beyond(0.0, np.full(loads.x.size, True))[1]

@@ -1,10 +1,11 @@
 """The link file as records: what stage 1 reads, checked key by key."""
 
 from .attached import Coupling, InterfaceRecord, SurfacePatches
-from .link import FAMILIES, BeamLink, Family, Link, Material, OrthotropicMaterial, SolidLink
+from .link import FAMILIES, HOLDING_ROOT, BeamLink, Family, Link, Material, OrthotropicMaterial, SolidLink
 
 __all__ = [
     "FAMILIES",
+    "HOLDING_ROOT",
     "BeamLink",
     "Coupling",
     "Family",

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from ...common.names import Name, Title
 from ...common.numbers import MOST_MODES, ModeCount, NotNegative, Positive, Vector3
@@ -85,17 +85,27 @@ class BeamModel(Record):
     """Without shear, or with shear and rotary inertia of the sections."""
 
 
+HOLDING_ROOT = ("cantilever", "craig-bampton")
+"""Reference conditions under which the root's section stays where it is in the frame."""
+
+
 class Reference(Record):
     """How the link's frame is held to it (docs/theory.md, Reference conditions).
 
-    `coupling` says how a solid's end faces are held; default: mean for simply-supported, rigid for cantilever. A beam's
+    `coupling` says how a solid's end faces are held; default: mean for simply-supported, else rigid. A beam's
     section moves as a plate in any case: both words mean the same there.
     """
 
-    condition: Literal["cantilever", "simply-supported"]
-    """The frame moves with the root's section, or its x axis goes through root and tip."""
+    condition: Literal["cantilever", "simply-supported", "craig-bampton"]
+    """The frame moves with the root's section, or its x axis goes through root and tip; "craig-bampton" is on the root,
+    too, with modes of the link held at all interfaces beside static shapes of unit motions of these."""
     coupling: Coupling | None = None
-    """How a solid's end faces are held; by default mean for simply-supported, rigid for cantilever."""
+    """How a solid's end faces are held; by default mean for simply-supported, else rigid."""
+
+    @property
+    def holds_root(self) -> bool:
+        """Whether the frame moves with the root's section: the root is clamped."""
+        return self.condition in HOLDING_ROOT
 
 
 class Modes(Record):
@@ -157,6 +167,15 @@ class _Link(Record):
     stress: StressRecovery = StressRecovery()
     """Where stresses are wanted."""
 
+    @model_validator(mode="after")
+    def _has_constraint_modes(self) -> Self:
+        if self.reference.condition == "craig-bampton" and not self.modes.attachment_modes:
+            raise ValueError(
+                'modes.attachment_modes: expected true, or nothing, with condition = "craig-bampton", whose constraint'
+                " modes stand for them, found false"
+            )
+        return self
+
     @property
     def families(self) -> tuple[Family, ...]:
         """The mode families asked for."""
@@ -211,7 +230,7 @@ class SolidLink(_Link):
     @property
     def coupling(self) -> Coupling:
         """How the supports of the reference condition hold the end faces."""
-        return self.reference.coupling or ("rigid" if self.reference.condition == "cantilever" else "mean")
+        return self.reference.coupling or ("rigid" if self.reference.holds_root else "mean")
 
 
 Link = BeamLink | SolidLink

@@ -125,8 +125,15 @@ def _independent(shapes: Array, known: Array, inertia: Inertia) -> Array:
 
 def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> ResidualModes:
     """Principal axes of the strain energy: in each family by itself, unless the link couples families."""
-    K = inertia.energy(X)
-    of = np.array([FAMILIES.index(family) for family in families])
+    of = np.array([FAMILIES.index(family) for family in families], dtype=np.int64)
+    squares, turn, of = uncoupled(inertia.energy(X), of)
+    # Equal frequencies of different families are ordered by these, not by rounding.
+    order = sorted(range(of.size), key=lambda k: (float(f"{squares[k]:.6e}"), int(of[k])))
+    return ResidualModes(squares[order], tuple(FAMILIES[of[k]] for k in order), X @ turn[:, order])
+
+
+def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:
+    """Eigenvalues (n,), eigenvectors (n, n) and families (n,) of K (n, n) in coordinates of families `of` (n,)."""
     apart = of[:, None] != of
     size = np.sqrt(np.diag(K))
     if np.any(np.abs(K)[apart] > (COUPLED * np.outer(size, size))[apart]):
@@ -138,9 +145,7 @@ def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> Residu
         for k in set(of.tolist()):
             own = np.flatnonzero(of == k)
             squares[own], turn[np.ix_(own, own)] = np.linalg.eigh(K[np.ix_(own, own)])
-    # Equal frequencies of different families are ordered by these, not by rounding.
-    order = sorted(range(of.size), key=lambda k: (float(f"{squares[k]:.6e}"), int(of[k])))
-    return ResidualModes(squares[order], tuple(FAMILIES[of[k]] for k in order), X @ turn[:, order])
+    return squares, turn, of
 
 
 def interface_loads(

@@ -28,7 +28,7 @@ class ModalBody:
     Attributes:
         name: of the link.
         kind: "beam" or "solid".
-        reference_condition: "cantilever" or "simply-supported".
+        reference_condition: "cantilever", "simply-supported" or "craig-bampton".
         length: in m.
         mass: m in kg.
         first_moment: (3,) ∫ρ x dV in kg·m.
@@ -121,7 +121,8 @@ class ModalBody:
     def modes_in_words(self) -> str:
         """How many modes there are."""
         static = self.mode_count - self.eigenmode_count
-        return f"{self.eigenmode_count} modes" + (f" and {static} attachment modes" if static else "")
+        kind = "constraint" if self.reference_condition == "craig-bampton" else "attachment"
+        return f"{self.eigenmode_count} modes" + (f" and {static} {kind} modes" if static else "")
 
     def interpolate(self, x: float) -> Interface:
         """What the modes do at `x` (m from the root) on the axis.
@@ -232,7 +233,8 @@ def _check_spin(body: ModalBody) -> None:
     missing = [name for name, value in parts.items() if value is None]
     if missing:
         if len(missing) < len(parts):
-            _fail(body, f"{missing[0]}: expected beside {', '.join(parts.keys() - set(missing))}, found none")
+            known = ", ".join(name for name in parts if name not in missing)
+            _fail(body, f"{missing[0]}: expected beside {known}, found none")
         return
     J, h, S = parts.values()
     if not J >= 0:

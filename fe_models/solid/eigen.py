@@ -7,7 +7,7 @@ preconditioner of an exact solve, and the mass as a matrix that only multiplies.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from petsc4py import PETSc
@@ -16,7 +16,6 @@ from slepc4py import SLEPc
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from .elasticity import SolidModel
-from .supports import Flexibility
 
 TOLERANCE = 1e-13
 
@@ -51,17 +50,30 @@ class Mass:
         return product
 
 
+class Inverse(Protocol):
+    """The flexibility of a held body: `supports.Flexibility`, or held at interfaces besides."""
+
+    model: SolidModel
+
+    @property
+    def rank(self) -> int:
+        """Number of independent displacements."""
+
+    def apply(self, load: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Displacements under loads, of this rank's own degrees of freedom."""
+
+
 class _Inverse:
     """F as PETSc wants a preconditioner."""
 
-    def __init__(self, flexibility: Flexibility) -> None:
+    def __init__(self, flexibility: Inverse) -> None:
         self.flexibility = flexibility
 
     def apply(self, _: PETSc.PC, load: PETSc.Vec, result: PETSc.Vec) -> None:
         self.flexibility.apply(load, result)
 
 
-def lowest_modes(flexibility: Flexibility, mass: Mass, count: int, known: Array) -> Array:
+def lowest_modes(flexibility: Inverse, mass: Mass, count: int, known: Array) -> Array:
     """The `count` lowest modes besides those `known` (3 owned, m), M-orthonormal with them to rounding; collective.
 
     Returns:

@@ -19,7 +19,7 @@ from ...mesh.compat import lagrange_element, node_map
 from ...mesh.defaults import default_order
 from ...mesh.interval import with_points
 from ...mesh.solid_mesh import SolidMesh, solid_mesh
-from ..link_records import SolidLink
+from ..link_records import HOLDING_ROOT, SolidLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.damping import damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
@@ -28,6 +28,7 @@ from .attachment_modes import attachment_modes
 from .eigen import Mass
 from .elasticity import MaterialMap, SolidModel, material_map, solid_model
 from .families import section_motion
+from .fixed_interfaces import fixed_interfaces, ritz_modes
 from .functionals import Averages, face_averages, section_averages
 from .invariants import prestressed, shape_integrals, static_shapes
 from .modes import wanted_modes
@@ -41,8 +42,9 @@ Progress = Callable[[str], None]
 ELEMENTS = (20, 40)
 
 # Components (translation 0 … 2, rotation 3 … 5) that each reference condition holds at root and tip.
-HELD: dict[str, dict[str, tuple[int, ...]]] = {
-    "cantilever": {"root": (0, 1, 2, 3, 4, 5), "tip": ()},
+_CLAMPED: dict[str, tuple[int, ...]] = {"root": (0, 1, 2, 3, 4, 5), "tip": ()}
+HELD = {
+    **dict.fromkeys(HOLDING_ROOT, _CLAMPED),
     "simply-supported": {"root": (0, 1, 2, 3), "tip": (1, 2)},
 }
 
@@ -89,9 +91,10 @@ def solid_modal_body(
     flexibility = _held(link, model, solid, places, path)
     mass = _loaded(link, model, places)
     progress(f"{link.name}: solving for the modes")
+    fixed = link.reference.condition == "craig-bampton"
     modes = wanted_modes(
         link,
-        flexibility,
+        fixed_interfaces(flexibility, link.families, places.rows) if fixed else flexibility,
         mass,
         lambda X: section_motion(
             sections, x, element, *sections.of(model, model.with_ghosts(X)), mass.motion_of_attached(X)
@@ -102,6 +105,8 @@ def solid_modal_body(
     if link.modes.attachment_modes:
         residual = attachment_modes(link.families, flexibility, mass, modes.X, places.rows, link.geometry.length)
         modes = modes.followed_by(residual)
+    if fixed:
+        modes = ritz_modes(model, modes, count)
     progress(f"{link.name}: integrating the inertia")
     translation, rotation = sections.of(model, model.with_ghosts(modes.X))
     signs = canonical_signs(np.concatenate([translation, rotation], axis=1).transpose(1, 0, 2))

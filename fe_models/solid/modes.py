@@ -12,11 +12,10 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ..link_records import SolidLink
 from ..modal_body.attachment_modes import DEFAULT_COUNT, ResidualModes
-from .eigen import Mass, lowest_modes
+from .eigen import Inverse, Mass, lowest_modes
 from .elasticity import SolidModel
 from .families import NEARLY, SectionMotion, aligned, names
 from .strain_energy import strain_energy
-from .supports import Flexibility
 
 # Mean motion of the sections, of modes (3 owned, n).
 Reader = Callable[[Array], SectionMotion]
@@ -45,7 +44,7 @@ class SolidModes:
         )
 
 
-def wanted_modes(link: SolidLink, flexibility: Flexibility, mass: Mass, read: Reader, where: str) -> SolidModes:
+def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader, where: str) -> SolidModes:
     """The modes that `link.modes` asks for; collective.
 
     Lowest modes are computed in batches, those found before deflated, until the wanted ones are among them. The size of

@@ -18,8 +18,8 @@ FREQUENCIES = 5  # that are listed, and damping ratios
 UNDAMPED = 1e-9  # ratios below are rounding
 
 LOOP_COLUMNS = (
-    "closed loop", "verdict", "rms (m)", "max (m)", "settled (s)", "vibration (m)", "at end (m)", "work (J)", "N·m",
-    "V", "cut",
+    "closed loop", "verdict", "rms (m)", "max (m)", "settled (s)", "vibration (m)", "at end (m)", "work (J)",
+    "moment\n(N·m)", "voltage\n(V)", "at\nlimits",
 )  # fmt: skip
 
 

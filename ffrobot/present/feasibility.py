@@ -45,8 +45,10 @@ def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
     yield f'analysis "{name}" ({group.attrs["kind"]})'
     types = {joint["name"]: joint["type"] for joint in tomllib.loads(group.file.attrs["scene"])["joint"]}
     if motors := read_motors(group["feasibility"], list(types)):
-        yield _motors(motors, {name: JOINT_TYPES[types[name]].force_unit for name in motors})
-        yield from (f"motor of {name}: {text}" for name, motor in motors.items() if (text := motor.spike_in_words))
+        units = {name: JOINT_TYPES[types[name]].force_unit for name in motors}
+        yield _motors(motors, units)
+        spikes = ((name, motor.spike_in_words(units[name])) for name, motor in motors.items())
+        yield from (f"motor of {name}: {text}" for name, text in spikes if text)
     if (missed := read_unsupplied(group["feasibility"])) is not None:
         yield missed.in_words
     for body, judged in group["feasibility"].get("pzt", {}).items():

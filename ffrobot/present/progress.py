@@ -1,10 +1,11 @@
-"""Progress on a terminal: what is being done and how far it is; nothing where the error stream is piped."""
+"""Progress: what is being done and how far it is; a bar on a terminal, a line now and then in a pipe or a log."""
 
 from __future__ import annotations
 
 import logging
 import os
 import sys
+import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+EVERY = 30.0  # s between lines where the error stream is no terminal
+
 
 class Display(Watcher):
     """Shows the stage, and a bar with the remaining time for analyses; cleared when done."""
@@ -25,6 +28,8 @@ class Display(Watcher):
         self._progress: Progress | None = None
         self._task: TaskID | None = None
         self.signal = 0  # that has asked for an end
+        self._title = ""
+        self._began = self._told = time.monotonic()
 
     def __enter__(self) -> Display:
         if sys.stderr.isatty() and is_first():
@@ -44,7 +49,9 @@ class Display(Watcher):
     def stage(self, title: str) -> None:
         """Replace what is shown by `title`, with a pulse until a time is known."""
         logger.info("%s", title)
+        self._title = title
         if self._progress is None:
+            self._tell()
             return
         if self._task is not None:
             self._progress.remove_task(self._task)
@@ -60,4 +67,13 @@ class Display(Watcher):
         """Move the bar."""
         if self._progress is not None and self._task is not None:
             self._progress.update(self._task, completed=t, total=end)
+        elif self._progress is None:
+            self._tell(f", {t:.4g} of {end:g}")
         return True
+
+    def _tell(self, reached: str = "") -> None:
+        """A line on the error stream where the last one is long ago: nothing of short runs."""
+        now = time.monotonic()
+        if now - self._told > EVERY and is_first():
+            self._told = now
+            print(f"ffrobot: {self._title}{reached} ({now - self._began:.0f} s)", file=sys.stderr, flush=True)

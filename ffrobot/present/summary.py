@@ -10,12 +10,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..actuation.feasibility import Feasibility
 from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.raised_mass import raised_in_words
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.validity import deflection_warning
+from ..results.verdict import Verdict
 from ..run.solution import ModeChoice, Solution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
@@ -30,7 +30,9 @@ def summary_console() -> Console:
     return Console(width=width, markup=False, highlight=False, emoji=False)
 
 
-def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], console: Console) -> None:
+def print_summary(
+    solution: Solution, verdict: Verdict, path: Path, seconds: Mapping[str, float], console: Console
+) -> None:
     """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
     console.print(_analyses(solution))
     for line in _warnings(solution):
@@ -38,9 +40,9 @@ def print_summary(solution: Solution, path: Path, seconds: Mapping[str, float], 
     for table in _tables(solution):
         console.print()
         console.print(table)
-    for name, result in solution.analyses.items():
-        if result.feasibility is not None:
-            console.print(f"{name}: {_verdict(result.feasibility)}")
+    console.print()
+    for line in verdict.lines():
+        console.print(line)
     for line in control_lines(solution):
         console.print(line)
     notes = Table.grid(padding=(0, 2))
@@ -177,24 +179,6 @@ def _voltages(solution: Solution) -> Table:
                 f"{patches.condition_number:.3g}",
             )
     return table
-
-
-def _verdict(feasibility: Feasibility) -> str:
-    """Whether the actuators can do it, and which cannot."""
-    short = feasibility.short
-    if not short:
-        return _enough(feasibility)
-    lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
-    return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility"
-
-
-def _enough(feasibility: Feasibility) -> str:
-    """Of actuators none of which is beyond its limits."""
-    within = "within the limits that are given" if feasibility.has_limits else "no limits are given"
-    if feasibility.unsupplied is not None:
-        means = "motors and patches" if feasibility.unsupplied.with_patches else "motors alone"
-        return f"{means} cannot do it: see the warning ({within})"
-    return f"motors{' and patches' if feasibility.patches else ''} can do it, {within}"
 
 
 def _stresses(solution: Solution) -> Table:

@@ -10,7 +10,7 @@ from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.observation import body_motion, energies, point_motion, stored_coordinates
-from ..mbs.quantities.stress import BodyStress, Recovery, mode_displacement
+from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.validity import Bending
 
 
@@ -66,7 +66,9 @@ def read_recovery(group: h5py.Group, body: str) -> Recovery:
         return mode_displacement(read_modal(group, body))
     entry = group[f"stress/{body}"]
     names = tuple(str(name) for name in entry["loads"].attrs["columns"])
-    return Recovery(str(entry.attrs["method"]), entry["modal"][()], names, entry["loads"][()])
+    layers = {key: values[()] for key, values in entry["layers"].items()} if "layers" in entry else None
+    sections = None if layers is None else SectionLoads(**layers)
+    return Recovery(str(entry.attrs["method"]), entry["modal"][()], names, entry["loads"][()], sections)
 
 
 def write_stress(group: h5py.Group, stress: BodyStress) -> None:
@@ -75,6 +77,9 @@ def write_stress(group: h5py.Group, stress: BodyStress) -> None:
     group["modal"] = stress.recovery.modal
     group["loads"] = stress.recovery.sizes
     group["loads"].attrs.create("columns", list(stress.recovery.loads), dtype=h5py.string_dtype())
+    if stress.recovery.sections is not None:
+        for key, values in vars(stress.recovery.sections).items():
+            group[f"layers/{key}"] = values
     for name, point in stress.points.items():
         for key, values in vars(point).items():
             group[f"points/{name}/{key}"] = values

@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from html import escape
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
     from ..actuation.control.linear_model import LinearModel
     from ..mbs.quantities.stress import Recovery
+    from .verdict import Verdict
 
 FORMAT = "ffrobot-results"
 COLUMN = re.compile(r"(?P<dataset>.*?)\[(?P<column>\d+)\]")
@@ -50,6 +52,20 @@ def status_in_words(attributes: Mapping[str, Any]) -> str:
     """How an analysis with these attributes ended, with the number of its warnings: "completed, 2 warnings"."""
     status, count = attributes["status"], len(attributes.get("warnings", ()))
     return f"{status}, {count} warning{'s' if count > 1 else ''}" if count else str(status)
+
+
+def refuse_spatial(path: Path) -> None:
+    """Raise `InputError` where the file at `path` holds results of a scene in space; others are judged elsewhere."""
+    try:
+        with open_checked(path) as file:
+            is_spatial = file.attrs.get("space") == "spatial"
+    except (OSError, InputError):
+        return
+    if is_spatial:
+        raise InputError(
+            f'{path}: expected results of a planar scene, found space = "spatial", for which this command is not'
+            " available yet: `ffrobot info` lists the datasets, `ffrobot.Results` reads them"
+        )
 
 
 class _Attributes(dict[str, Any]):
@@ -111,6 +127,28 @@ class Results:
             ended = f"{len(time)} outputs up to {time[-1]:g} s, {status_in_words(about)}"
             lines.append(f"  {name}: {about['kind']}, {ended}")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """The verdict, as notebooks show it."""
+        if not self._file:
+            return f"<p>{escape(repr(self))}</p>"
+        return f"<p><b>{escape(self.name)}</b></p><pre>{escape(str(self.verdict))}</pre>"
+
+    def keys(self) -> list[str]:
+        """Names of all datasets, as `results[…]` takes them."""
+        names: list[str] = []
+        self._file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
+        return [name for name in names if "/resume/" not in name]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """What an interactive session offers behind `results["`."""
+        return self.keys()
+
+    def __contains__(self, dataset: object) -> bool:
+        return isinstance(dataset, str) and self.has(dataset)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
 
     def save(self, path: PathLike[str] | str) -> Path:
         """Write results that are in memory only to the file `path`, or a copy of those that are in one.
@@ -222,6 +260,17 @@ class Results:
         """Why results of an analysis may be wrong, or not mean what they seem to; by analysis, where there is any."""
         told = {name: self.attributes(name).get("warnings", ()) for name in self.analyses}
         return {name: [str(text) for text in texts] for name, texts in told.items() if len(texts)}
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of every analysis: can it be done, peaks and RMS of motors, deflection, stress, warnings, what to try next.
+
+        `print(results.verdict)` is what `ffrobot solve` prints; `results.verdict["inverse"]` that of one analysis.
+        """
+        from .verdict import judge
+
+        with blaming(self.path):
+            return judge(self._file, self.analyses, self.scene.get("joint", []))
 
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`.

@@ -11,15 +11,24 @@ import numpy as np
 
 from ..actuation.feasibility import Feasibility, judge_patches
 from ..actuation.motors import MotorFeasibility, judge_motors
+from ..actuation.patches.composite import section_loads
 from ..actuation.patches.patches import with_patch_count
+from ..actuation.patches.voltages import voltage_gain
 from ..actuation.points import PointForces, solve_point_forces
 from ..actuation.prediction import Unsupplied, predicted_shift, unmet_modal_forces, unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.attachment_error import mode_error, start_jolt
-from ..mbs.quantities.link_loads import link_loads
+from ..mbs.quantities.link_loads import LinkLoads, link_loads
 from ..mbs.quantities.observation import modes_of_file
-from ..mbs.quantities.stress import BodyStress, body_stress, has_stresses, mode_acceleration
+from ..mbs.quantities.stress import (
+    BodyStress,
+    SectionLoads,
+    body_stress,
+    has_stresses,
+    mode_acceleration,
+    mode_displacement,
+)
 from .solution import AnalysisResult, Solution
 from .warnings import warnings_of
 
@@ -113,5 +122,19 @@ def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
     for name, link in links.items():
         planar = solution.bodies[name].planar
         p = modes_of_file(outcome, planar)
-        found[name] = body_stress(link, mode_acceleration(link, planar.modal_transform, p, loads.get(name, {})))
+        if name not in loads:
+            found[name] = body_stress(link, mode_displacement(p))
+            continue
+        sections = _sections(solution, name, p, loads[name])
+        recovery = mode_acceleration(link, planar.modal_transform, p, loads[name].sizes, sections)
+        found[name] = body_stress(link, recovery)
     return found
+
+
+def _sections(solution: Solution, body: str, p: Array, loads: LinkLoads) -> SectionLoads | None:
+    """What the patches of a body, of file coordinates p (T, n), do to its sections, where they are part of it."""
+    patches = solution.patches.get(body)
+    if patches is None or not patches.layout.adds_stiffness or not np.isfinite(patches.authority).all():
+        return None
+    voltages = loads.modal_force @ voltage_gain(patches).T
+    return section_loads(patches.layout, solution.links[body], patches.edges, p, voltages)

@@ -17,7 +17,11 @@ _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the 
 
 RIGID = 1e-9  # of the motion across: less along the axis is rounding
 
-_TERMS = {"D_ff": "damping", "S_tilde": "S̃", "j": "j"}
+_TERMS = {
+    "D_ff": "damping",
+    "S_tilde": "inertia between rotation and pairs of modes",  # S̃
+    "j": "change of inertia to first order in deflections",  # j
+}
 
 
 def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:

@@ -16,6 +16,7 @@ from ..actuation.control.linear import LinearModels
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.plane import perpendicular, rotated
+from ..fe_models.link_records import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.outcome import Details, Forces, Motion, Outcome
 from ..mbs.model.model import Constraint, Model
@@ -192,7 +193,7 @@ def _motion_of_link(outcome: Outcome, link: LoadedBody, body: BodyInPieces, piec
     root, tip = r[np.argmin(x)], r[np.argmax(x)]
     theta = (
         _section_angle(outcome, body, pieces)
-        if modal.reference_condition == "cantilever"
+        if modal.reference_condition in HOLDING_ROOT
         else _chord(outcome, body, root, tip)
     )
     y = _in_frame(r - root, theta)

@@ -61,7 +61,10 @@ def _scene(data: dict[str, Any], path: Path, text: str, objects: Mapping[str, ob
 def _refuse_unavailable(data: dict[str, Any], path: Path) -> None:
     """Say so plainly, before the keys of what is not there yet are called wrong."""
     if data.get("space") == "spatial":
-        raise InputError(f'{path}: space: expected "planar", found "spatial", which is not available yet')
+        raise InputError(
+            f'{path}: space: expected "planar", found "spatial": only the command `ffrobot solve` takes scenes in space'
+            " so far"
+        )
 
 
 def _with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:

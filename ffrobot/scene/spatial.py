@@ -13,6 +13,7 @@ from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import did_you_mean, quoted, validate
 from ..fe_models.link_file import LinkTable, read_link
+from ..mbs.analysis.spatial_pcid import INTEGRATORS
 from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND, NotEmpty
 from ..mbs.fields.functions import check_domain
@@ -49,12 +50,29 @@ class SpatialScene(SpatialSceneKeys, SpatialMechanismScene):
     """A validated scene in space, with the absolute `path` of its file and the raw `text` that results files carry."""
 
 
+def is_spatial(path: Path) -> bool:
+    """Whether the scene file says `space = "spatial"`; False of what cannot be read, which others tell."""
+    try:
+        return bool(load_toml(path, "scene file").get("space") == "spatial")
+    except InputError:
+        return False
+
+
 def load_spatial_scene(path: Path) -> SpatialScene:
     """Read and validate the scene file at `path`; paths in it come out relative to its folder.
 
     Raises `InputError` with one line for each wrong key: file, key, expected, found.
     """
-    return spatial_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
+    scene = spatial_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
+    check_available(scene)
+    return scene
+
+
+def check_available(scene: SpatialScene) -> None:
+    """Raise `InputError` with a line for each thing that the records can say and the program cannot do yet."""
+    found = [f"{scene.path}: {problem}" for problem in _not_available(scene)]
+    if found:
+        raise InputError("\n".join(found))
 
 
 def spatial_scene(data: dict[str, object], path: Path, text: str) -> SpatialScene:
@@ -91,7 +109,6 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
             if count > 1:
                 yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
     yield from _reference_problems(scene)
-    yield from _not_available(scene)
     for k, analysis in enumerate(scene.analysis):
         for problem in analysis.problems(Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS)):
             yield f'analysis "{analysis.name}": {problem}'
@@ -128,6 +145,11 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
                 f'analysis "{analysis.name}": kind: expected {quoted(AVAILABLE_KINDS)} in space = "spatial", found'
                 f' "{analysis.kind}", which is not available there yet'
             )
+        elif getattr(analysis, "integrator", "auto") not in INTEGRATORS:
+            yield (
+                f'analysis "{analysis.name}": integrator: expected {quoted(INTEGRATORS)} in space = "spatial", found'
+                f' "{getattr(analysis, "integrator", "")}", which is not available there yet'
+            )
         elif analysis.is_checked:
             yield f'analysis "{analysis.name}": check: expected none in space = "spatial", found it: not available yet'
     for joint in scene.joint:
@@ -138,7 +160,13 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
         for key in ("rotor_inertia", "viscous_friction", "coulomb_friction"):
             if getattr(joint, key, 0.0):
                 yield f'{joint.label}: {key}: expected none in space = "spatial", found it: not available there yet'
+    for trajectory in scene.trajectory:
+        if trajectory.orientation is not None:
+            label = f'trajectory "{trajectory.name}"'
+            yield f"{label}: expected x, y, z or a joint, found an orientation, which is not available yet"
     for k, load in enumerate(scene.load, 1):
+        if load.point is not None:
+            yield f"load no. {k}: point: expected a load on a joint, found a point, which is not available in space yet"
         loaded = next((joint for joint in scene.joint if joint.name == load.joint), None)
         if loaded is not None and len(loaded.units) != 1:
             yield f'load no. {k}: joint: expected one with a single coordinate, found "{loaded.name}", a {loaded.type}'

@@ -8,6 +8,7 @@ So forces that an inverse analysis has along its trajectories count as the momen
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,15 +24,25 @@ from ..model.system import MechanismSystem
 FORCES_AT_POINTS = "points"  # value of `apply` whose forces act elsewhere than in joints
 
 
-def link_loads(outcome: Outcome, bodies: Iterable[str]) -> dict[str, dict[str, Array]]:
-    """For each of `bodies`, sizes (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`).
+@dataclass(frozen=True)
+class LinkLoads:
+    """What acts on a link over a motion.
 
-    Nothing where it is not known what acts: forces at actuation points, links in pieces.
+    Attributes:
+        sizes: (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`).
+        modal_force: (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches.
     """
+
+    sizes: Mapping[str, Array]
+    modal_force: Array
+
+
+def link_loads(outcome: Outcome, bodies: Iterable[str]) -> dict[str, LinkLoads]:
+    """Of each of `bodies`. Nothing where it is not known what acts: forces at actuation points, links in pieces."""
     if outcome.in_pieces is not None or getattr(outcome.analysis, "apply", None) == FORCES_AT_POINTS:
         return {}
     model = outcome.assembly.model
-    wrenches = _wrenches(outcome)
+    wrenches, left = _wrenches(outcome)
     found = {}
     for name in bodies:
         motion = _Motion(outcome, model.body(name))
@@ -41,9 +52,8 @@ def link_loads(outcome: Outcome, bodies: Iterable[str]) -> dict[str, dict[str, A
             if body == name:
                 inertia = motion.of_mass(point, payload.mass, payload.inertia)
                 at_points[point] = at_points.get(point, 0.0) + inertia
-        found[name] = motion.of_frame() | {
-            load: column for point, wrench in at_points.items() for load, column in _named(point, wrench)
-        }
+        named = {load: column for point, wrench in at_points.items() for load, column in _named(point, wrench)}
+        found[name] = LinkLoads(motion.of_frame() | named, left[:, outcome.coordinates(name)][:, 3:])
     return found
 
 
@@ -83,16 +93,17 @@ def _named(point: str, wrench: Array) -> Iterable[tuple[str, Array]]:
     return zip(names, wrench.T, strict=True)
 
 
-def _wrenches(outcome: Outcome) -> Mapping[str, Mapping[str, Array]]:
-    """On points of bodies (T, 3), global axes."""
-    model = outcome.assembly.model
+def _wrenches(outcome: Outcome) -> tuple[Mapping[str, Mapping[str, Array]], Array]:
+    """On points of bodies (T, 3), global axes; and the generalized forces (T, coordinates) that these leave."""
+    model = replace(outcome.assembly.model, modal_loads=())  # of patches: they are told with what is left
     loads = model.loads if outcome.details.loads is None else outcome.details.loads
     acting = MechanismSystem(model, [*model.joints, *_actuated(outcome)], loads)
     time, (q, v, a) = outcome.time, (np.ascontiguousarray(x) for x in (outcome.q, outcome.v, outcome.a))
     frames = acting.frame_coordinates
-    f = acting.system.required_forces(time, q, v, a)[:, frames]
-    C_q = acting.system.constraint_jacobians(q)[:, :, frames]
-    return acting.marker_wrenches(time, q, v, a, _solved(C_q, -f))
+    f, C_q = acting.system.required_forces(time, q, v, a), acting.system.constraint_jacobians(q)
+    lambda_ = _solved(C_q[:, :, frames], -f[:, frames])
+    left: Array = f + np.einsum("tri,tr->ti", C_q, lambda_)
+    return acting.marker_wrenches(time, q, v, a, lambda_), left
 
 
 def _actuated(outcome: Outcome) -> list[Constraint]:

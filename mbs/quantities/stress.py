@@ -11,11 +11,11 @@ the mode displacement method.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, Integers
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import work_on_modes
 
@@ -60,6 +60,36 @@ class BodyStress:
 
 
 @dataclass(frozen=True)
+class SectionLoads:
+    """Moments and forces that layers on a link put on its sections, and on no others: what patches do that stiffen it.
+
+    Attributes:
+        edges: (k, 2) where each patch begins and ends, m from the root.
+        patch: (g,) number of the patch of each place, from 0.
+        x: (g,) the places, ascending within a patch, m.
+        moment: (T, g) of the section at each place, N·m, positive with φ'.
+        force: (T, g) along the link, N, positive in tension.
+        modal_force: (T, n) what they do to the modes of the modal body file, N/√kg.
+    """
+
+    edges: Array
+    patch: Integers
+    x: Array
+    moment: Array
+    force: Array
+    modal_force: Array
+
+    def shares(self, x: Array) -> Array:
+        """(m, g) what each place counts for the sections at x (m,): straight lines between those under one patch."""
+        found = np.zeros((len(x), len(self.x)))
+        for k, (start, end) in enumerate(self.edges):
+            own, under = np.flatnonzero(self.patch == k), np.flatnonzero((x >= start) & (x <= end))
+            unit = np.eye(own.size)
+            found[np.ix_(under, own)] = np.stack([np.interp(x[under], self.x[own], row) for row in unit], axis=1)
+        return found
+
+
+@dataclass(frozen=True)
 class Recovery:
     """What stresses of a body are computed from, one row per output.
 
@@ -68,16 +98,27 @@ class Recovery:
         modal: (T, n) p − p_s, in the modes of the modal body file.
         loads: names of the unit loads beside it that are not zero; none in the mode displacement method.
         sizes: (T, l) of these.
+        sections: what layers on the link do to its sections; None where there are none.
     """
 
     method: str
     modal: Array
     loads: tuple[str, ...]
     sizes: Array
+    sections: SectionLoads | None = None
+
+    @property
+    def cases(self) -> Array:
+        """(T, n + l + …) sizes of all that has a stress of its own: modes, loads, sections."""
+        sections = () if self.sections is None else (self.sections.moment, self.sections.force)
+        return np.concatenate([self.modal, self.sizes, *sections], axis=1)
 
     def at(self, rows: Indices) -> Recovery:
         """These outputs alone."""
-        return Recovery(self.method, self.modal[rows], self.loads, self.sizes[rows])
+        of = self.sections
+        if of is not None:
+            of = replace(of, moment=of.moment[rows], force=of.force[rows], modal_force=of.modal_force[rows])
+        return Recovery(self.method, self.modal[rows], self.loads, self.sizes[rows], of)
 
 
 def mode_displacement(p: Array) -> Recovery:
@@ -85,7 +126,9 @@ def mode_displacement(p: Array) -> Recovery:
     return Recovery("mode displacement", p, (), np.zeros((len(p), 0)))
 
 
-def mode_acceleration(body: ModalBody, T: Array, p: Array, loads: Mapping[str, Array]) -> Recovery:
+def mode_acceleration(
+    body: ModalBody, T: Array, p: Array, loads: Mapping[str, Array], sections: SectionLoads | None = None
+) -> Recovery:
     """With the static stresses of loads, as far as the file has them.
 
     Args:
@@ -93,6 +136,7 @@ def mode_acceleration(body: ModalBody, T: Array, p: Array, loads: Mapping[str, A
         T: (n, m) what makes its modal coordinates of those in the equations.
         p: (outputs, n) modal coordinates of the file.
         loads: sizes (outputs,) of unit loads by name.
+        sections: what layers on the link do to its sections.
     """
     known = [name for name in loads if name in body.stress_loads]
     if not known:
@@ -101,8 +145,10 @@ def mode_acceleration(body: ModalBody, T: Array, p: Array, loads: Mapping[str, A
     work = work_on_modes(body.S_bar, body.I_bar, body.interfaces)
     sizes = np.array([loads[name] for name in names]).reshape(-1, len(p)).T
     forces = sizes @ np.array([work[name] for name in names]).reshape(-1, body.mode_count)
+    if sections is not None:
+        forces = forces + sections.modal_force
     static = forces @ T @ np.linalg.solve(T.T @ body.stiffness @ T, T.T)
-    return Recovery("mode acceleration", p - static, names, sizes)
+    return Recovery("mode acceleration", p - static, names, sizes, sections)
 
 
 def has_stresses(body: ModalBody) -> bool:
@@ -112,32 +158,39 @@ def has_stresses(body: ModalBody) -> bool:
 
 def body_stress(body: ModalBody, found: Recovery) -> BodyStress:
     """Stresses over a motion wherever the file of `body` has those of modes."""
-    both = np.concatenate([found.modal, found.sizes], axis=1)
     points = {}
     for name, point in body.stress.items():
-        stress = both @ _cases(body, found, point.stress, point.static).T
+        stress = found.cases @ _cases(body, found, point.position[:1], point.stress[None], point.static)[0].T
         points[name] = PointStress(stress, von_mises(stress))
     surface = None
     if body.surface_stress is not None:
-        cases = _cases(body, found, body.surface_stress, body.surface_static)
-        surface = _surface(cases, body.mesh.points, both)
+        cases = _cases(body, found, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
+        surface = _surface(cases, body.mesh.points, found.cases)
     return BodyStress(points, surface, found)
 
 
 def surface_stress(body: ModalBody, found: Recovery) -> Array:
     """(T, p, 6) everywhere on the surface of a body whose file has stresses there, Pa, in the body frame."""
     assert body.surface_stress is not None
-    cases = _cases(body, found, body.surface_stress, body.surface_static)
-    both = np.concatenate([found.modal, found.sizes], axis=1)
-    return np.asarray(np.einsum("pin,tn->tpi", cases, both, optimize=True))
+    cases = _cases(body, found, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
+    return np.asarray(np.einsum("pin,tn->tpi", cases, found.cases, optimize=True))
 
 
-def _cases(body: ModalBody, found: Recovery, modal: Array, static: Array | None) -> Array:
-    """(…, n + l): stresses of modes, and of the unit loads of `found`."""
-    if static is None or not found.loads:
+def _cases(body: ModalBody, found: Recovery, x: Array, modal: Array, static: Array | None) -> Array:
+    """(m, 6, n + l + …) stresses at m places x (m from the root) of all that `found` has sizes of.
+
+    Unit loads that pull at both ends, or bend them, are the unit force and moment in every section.
+    """
+    if static is None or (not found.loads and found.sections is None):
         return modal
-    columns = [body.stress_loads.index(name) for name in found.loads]
-    return np.concatenate([modal, static[..., columns]], axis=-1)
+    of = dict(zip(body.stress_loads, np.moveaxis(static.reshape(len(modal), 6, -1), 2, 0), strict=True))
+    parts = [modal, *(of[name][..., None] for name in found.loads)]
+    if found.sections is not None:
+        shares = found.sections.shares(x)[:, None]
+        for load in ("moment/{}/z", "force/{}/x"):
+            unit = of[load.format("tip")] - of[load.format("root")]
+            parts.append(unit[..., None] * shares)
+    return np.concatenate(parts, axis=-1)
 
 
 def von_mises(stress: Array) -> Array:

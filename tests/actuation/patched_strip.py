@@ -10,14 +10,20 @@ START, END, VOLT = 0.045, 0.105, 100.0
 
 
 def tip(height, face, modes, pieces=1, **keys):
-    """Deflection of the tip, m."""
+    """Deflection of the tip, m; of a link divided into `pieces`."""
+    return solved(height, face, modes, pieces, **keys)["bent/points/strip.tip/deflection"][0, 1]
+
+
+def solved(height, face, modes, pieces=1, places=(), **keys):
+    """Results; stress points p0 … on the upper side at `places`."""
     link = {
         "name": "strip",
-        "material": {"youngs_modulus": E, "density": 2700.0},
+        "material": {"youngs_modulus": E, "poissons_ratio": 0.3, "density": 2700.0},
         "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": height, "width": B}},
         "mesh": {"elements": 40},
         "reference": {"condition": "cantilever"},
         "modes": {"family": "in-plane-bending"} | modes,
+        "stress": {"points": {f"p{k}": [x, height / 2, 0.0] for k, x in enumerate(places)}},
     }
     centers, on = [(START + END) / 2], {"face": face} if face else {}
     pzt = {"body": "strip", "centers": centers, "length": END - START, "width": B, "thickness": T_P, **on, **keys}
@@ -30,12 +36,17 @@ def tip(height, face, modes, pieces=1, **keys):
         load=[{"pzt": "strip", "voltage": [f"{VOLT}"]}],
         analysis=[{"name": "bent", "kind": "static"}],
     )
-    return ffrobot.solve(scene)["bent/points/strip.tip/deflection"][0, 1]
+    return ffrobot.solve(scene)
 
 
 def exact(height, faces):
-    """The Euler–Bernoulli beam's, m: section loads of the free strain Λ in the layers over the composite section's
-    2 × 2 stiffness.
+    """Deflection of the tip of the Euler–Bernoulli beam, m."""
+    return strain(height, faces)[0] * (END - START) * (L - (START + END) / 2)
+
+
+def strain(height, faces):
+    """(2,) curvature (1/m) and stretch of the axis under the patches: section loads of the free strain Λ in the layers
+    over the composite section's 2 × 2 stiffness.
     """
     A, S, I = (B * np.diff([(height / 2) ** k, (height / 2 + T_P) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
     if faces == 2:
@@ -44,4 +55,4 @@ def exact(height, faces):
         moment = S
     stiffness = np.diag([E * B * height**3 / 12, E * B * height]) + E_P * np.array([[I, -S], [-S, A]])
     free = E_P * D31 * VOLT / T_P * np.array([moment, -A if faces == 1 else 0.0])
-    return np.linalg.solve(stiffness, free)[0] * (END - START) * (L - (START + END) / 2)
+    return np.linalg.solve(stiffness, free)

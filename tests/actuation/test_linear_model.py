@@ -108,6 +108,11 @@ def test_frequency_response_of_python_control_is_the_same(tmp_path):
     rows = [system.output_labels.index(name) for name in ("point/arm:tip/y", "joint/hub")]
     got = np.array([system(1j * w) for w in omega])[:, rows, :1]
     np.testing.assert_allclose(got, wanted, rtol=1e-8, atol=1e-12)
+    some = model.to_control("joint/hub", ["joint/hub", "point/arm.tip/y"])
+    assert (some.input_labels, some.output_labels) == (["joint/hub"], ["joint/hub", "point/arm:tip/y"])
+    np.testing.assert_allclose(np.array([some(1j * w) for w in omega])[:, ::-1], wanted, rtol=1e-8, atol=1e-12)
+    with pytest.raises(InputError, match=r'expected an output .*found "point/arm\.tpi/y"'):
+        model.to_control(outputs="point/arm.tpi/y")
     path = tmp_path / "model.npz"
     model.save(path)
     stored = np.load(path)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from ffrobot.common.checksum import seal
 from ffrobot.fe_models.link import cached_modal_body, make_link
 from ffrobot.fe_models.link_file import read_link
-from ffrobot.fe_models.stages import input_hash, modes_hash
+from ffrobot.fe_models.stages import input_hash, modes_hash, restated
 from ffrobot.mesh.kept_parts import kept_part, kept_path
 
 FINITE_ELEMENTS = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl")
@@ -131,6 +132,9 @@ def test_solids_keep_their_mesh_and_their_modes(solid, cache):
     assert lines == []
     assert outcome.reused == "modes"
     np.testing.assert_array_equal(outcome.body.stress["low"].stress, before.stress["root"].stress)
+    assert outcome.body.stress_loads == before.stress_loads
+    plain = {name: replace(point, static=None) for name, point in before.stress.items()}
+    assert restated(replace(before, stress=plain, stress_loads=()), read_link(path)) is None  # of an earlier version
     lines, outcome = told(change("0.1, 0.005", "0.11, 0.005"))  # the stress there is not known
     assert "bar: solving for the modes" in lines
     lines, outcome = told(change("size = 0.02", "size = 0.021"))

@@ -39,6 +39,8 @@ def angle_behind(jumps, time):
         [(0.50003, 1)],
         [(0.123456789, 1)],
         [(0.5, 1)],  # an output time
+        [(0.5 - 2**-53, 1)],  # the last number before one
+        [(0.5 - 2**-52, 1)],  # the one before
         [(1 / 3, 1), (0.75, -1)],
         [(0.2, 1), (0.2000001, 1), (0.7, -3)],
     ],

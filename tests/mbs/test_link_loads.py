@@ -36,7 +36,7 @@ def _names(point):
 
 def missing(outcome, name):
     """(T, 3 + n) what M a − Q of a body needs beside its loads at points, and the largest of what it needs."""
-    body, loads = outcome.assembly.model.body(name), link_loads(outcome, [name])[name]
+    body, loads = outcome.assembly.model.body(name), link_loads(outcome, [name])[name].sizes
     motion = (x[:, outcome.coordinates(name)] for x in (outcome.q, outcome.v, outcome.a))
     gravity = np.array(outcome.assembly.model.scene.gravity)
     needed, given = np.zeros((2, len(outcome.time), 3 + body.n_modes))
@@ -68,15 +68,17 @@ def test_inverse_dynamics_counts_what_motors_and_patches_do():
     for body in outcome.assembly.model.links:
         left, largest = missing(outcome, body.name)
         np.testing.assert_allclose(left[:, :3], 0.0, atol=1e-9 * largest)
-        np.testing.assert_allclose(left[:, 3:], outcome.F_p[:, outcome.modal_columns(body.name)], atol=1e-9 * largest)
-    np.testing.assert_allclose(at_point(link_loads(outcome, ["link2"])["link2"], "tip"), 0.0, atol=1e-9)
+        F_p = outcome.F_p[:, outcome.modal_columns(body.name)]
+        np.testing.assert_allclose(left[:, 3:], F_p, atol=1e-9 * largest)
+        np.testing.assert_allclose(link_loads(outcome, [body.name])[body.name].modal_force, F_p, atol=1e-9 * largest)
+    np.testing.assert_allclose(at_point(link_loads(outcome, ["link2"])["link2"].sizes, "tip"), 0.0, atol=1e-9)
     assert np.abs(outcome.lambda_[:, outcome.assembly.is_trajectory]).max() > 1.0
 
 
 def test_forces_in_joints_are_those_of_the_multipliers():
     """Of a forward run, whose multipliers are the reactions themselves; moments of the motors come with the loads."""
     outcome = run_forward(arm(trajectory=[], load=LOADS), forward(output_step=0.1), None, {}, always)
-    loads, columns = link_loads(outcome, ["link2"])["link2"], outcome.coordinates("link2")
+    loads, columns = link_loads(outcome, ["link2"])["link2"].sizes, outcome.coordinates("link2")
     reaction = rotated(-outcome.q[:, columns][:, 2], joint_forces(outcome, "A").reaction)
     found = at_point(loads, "root")
     np.testing.assert_allclose(found[:, :2], reaction, rtol=1e-8, atol=1e-9 * np.abs(reaction).max())

@@ -1,5 +1,6 @@
 """What a report is made of: outlines, trees of joints, curves of many points, tables, and what it refuses."""
 
+import html
 import shutil
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from ffrobot.pictures.motion import topology
 from ffrobot.pictures.outline import body_outline, points_outline
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
+from ffrobot.pictures.report.histories import history_charts
 from ffrobot.pictures.report.runs import distinct_parts, runs, targets
 from ffrobot.pictures.report.tables import peaks_table
 from ffrobot.results.file import Results
@@ -98,7 +100,7 @@ def test_peaks_are_those_of_the_file(results, two_link):
     rows = {(analysis, what): (value, at) for analysis, what, value, at in peaks_table(runs([results])).rows}
     moment = np.abs(two_link.file["inverse/joints/O/moment"][()])
     value, at = rows["inverse", "motor of joint O"]
-    assert value == f"{moment.max():.6g} N·m"
+    assert value == f"{moment.max():.4g} N·m"
     assert float(at) == pytest.approx(two_link.file["inverse/time"][moment.argmax()], abs=1e-12)
 
 
@@ -222,3 +224,20 @@ def test_what_is_not_installed_is_named(two_link, tmp_path, monkeypatch, missing
     monkeypatch.delitem(sys.modules, "plotly.offline", raising=False)
     with pytest.raises(SolveError, match=rf"a report needs {missing}.*pip install plotly jinja2"):
         write_report([two_link.folder / "scene.results.h5"], tmp_path / "r.html")
+
+
+def test_page_says_what_the_summary_says(two_link_page, results):
+    body = two_link_page.read_text(encoding="utf-8").partition("<main>")[2].partition('<script type="application')[0]
+    shown = html.unescape(body)
+    for one in results.verdict.analyses:
+        for line in one.lines():
+            assert line.strip().removeprefix(f"{one.name}: ") in shown
+    for text in (text for texts in results.warnings.values() for text in texts):
+        assert text in shown
+
+
+def test_curves_keep_all_their_points(results):
+    """Plotly would leave out points that it takes for straight."""
+    lines = [trace for chart in history_charts([results]) for trace in chart.traces if trace["mode"] == "lines"]
+    assert lines
+    assert all(trace["line"]["simplify"] is False for trace in lines)

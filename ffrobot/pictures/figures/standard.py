@@ -24,6 +24,7 @@ def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
             *_deflections(results),
             *_trajectory_forces(results),
             *_joints(results),
+            *_stresses(results),
             *_voltages(results),
             *_tip_errors(results),
             *_linear(results),
@@ -153,6 +154,26 @@ def _curves(results: Results, dataset: str, *, magnitude: bool = False) -> tuple
     """That dataset of every analysis that has it."""
     names = ((analysis, f"{analysis}/{dataset}") for analysis in results.analyses)
     return tuple(Curve(data=name, label=a, magnitude=magnitude) for a, name in names if results.has(name))
+
+
+def _stresses(results: Results) -> Iterator[FigureRecord]:
+    """Von Mises stress at stress points, and the largest on surfaces."""
+    for body in _members(results, "stress"):
+        places = [(f"points/{point}/von_mises", point) for point in _stress_points(results, body)]
+        for dataset, where in (*places, ("surface/von_mises_max", "surface")):
+            if curves := _curves(results, f"stress/{body}/{dataset}"):
+                title = f"stress in {body}, {'largest on its surface' if where == 'surface' else where} (von Mises)"
+                yield FigureRecord(
+                    name=file_name("stress", body, where),
+                    title=title,
+                    curves=curves,
+                    y_label="stress (MPa)",
+                    scale=1e-6,
+                )
+
+
+def _stress_points(results: Results, body: str) -> list[str]:
+    return list(dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/stress/{body}/points")))
 
 
 def _voltages(results: Results) -> Iterator[FigureRecord]:

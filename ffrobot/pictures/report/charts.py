@@ -69,7 +69,7 @@ class Chart:
             "xaxis": {"title": {"text": self.x_label, "standoff": 5}},
             "yaxis": y_axis,
             "shapes": lines,
-            "showlegend": True,
+            "showlegend": len(self.traces) > 1,
         }
 
 

@@ -33,6 +33,25 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
     return list(charts.values())
 
 
+FOLDS = (
+    ("Paths", ("error_", "path_", "tip_error")),
+    ("Motors and joints", ("coordinate_", "moment_", "torque_speed_", "reaction_", "force_")),
+    ("Deflections", ("deflection_",)),
+    ("Stresses", ("stress_",)),
+    ("Patches", ("voltage_", "required_voltage_")),
+)
+"""Parts of the page that fold, by how names of their charts begin; the others come last."""
+
+
+def folded(charts: Sequence[Chart]) -> list[tuple[str, list[Chart]]]:
+    """Charts by the part of the page that they are in; parts without any are left out."""
+    parts: dict[str, list[Chart]] = {title: [] for title in (*(title for title, _ in FOLDS), "Bodies and energies")}
+    for chart in charts:
+        fits = (title for title, starts in FOLDS if chart.name.startswith(starts))
+        parts[next(fits, "Bodies and energies")].append(chart)
+    return [(title, members) for title, members in parts.items() if members]
+
+
 def _empty(record: FigureRecord) -> Chart:
     if record.kind == "path":
         return Chart(record.name, record.title, record.y_label or "y (m)", x_label="x (m)", equal_axes=True)

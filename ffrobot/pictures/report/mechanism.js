@@ -117,7 +117,7 @@ function styles(run) {
     ...group, name: run.label, showlegend: i === 0, line, hoverinfo: "name", hoverlabel: { namelength: -1 },
     ...(body.filled ? { fill: "toself", fillcolor: run.color + "55" } : {}),
   }));
-  const marker = { color: "#fff", size: 7, line: { color: run.color, width: 2 } };
+  const marker = { color: pageColor("--paper"), size: 7, line: { color: run.color, width: 2 } };
   const joints = { ...group, name: "points of " + run.label, mode: "markers", marker, hoverinfo: "x+y" };
   const paths = run.paths.map((path) => ({ ...group, name: `${path.name}, ${run.label}`, line: { ...line, width: 1 } }));
   return [...bodies, joints, ...paths].map((trace) => ({ ...trace, visible: run.visible ? true : "legendonly" }));
@@ -134,7 +134,7 @@ function scenery() {
     for (const path of run.paths)
       if (path.target && !wanted[path.name])
         wanted[path.name] = {
-          type: "scatter", mode: "lines", name: "path wanted of " + path.name, line: { color: "#1c2430", width: 1, dash: "dash" },
+          type: "scatter", mode: "lines", name: "path wanted of " + path.name, line: { color: pageColor("--ink"), width: 1, dash: "dash" },
           x: path.target.filter((_, i) => i % 2 === 0), y: path.target.filter((_, i) => i % 2 === 1),
         };
   return [ground, ...Object.values(wanted)];

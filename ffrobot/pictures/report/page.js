@@ -1,18 +1,22 @@
 "use strict";
 
+// Colours of the page, light or dark, as its style sheet has them; paper is always light.
+const SCREEN = matchMedia("(prefers-color-scheme: dark)");
+const pageColor = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
 // What all charts have in common, over the layout that each brings along.
 const COMMON_LAYOUT = {
-  margin: { l: 70, r: 15, t: 40, b: 50 },
-  font: { size: 12 },
+  margin: { l: 70, r: 15, t: 55, b: 50 },
   colorway: ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000"],
   legend: { orientation: "h", y: -0.27, font: { size: 11 } },
   hovermode: "closest",
-  plot_bgcolor: "#fff",
 };
-const AXIS = { gridcolor: "#e6e9ee", zerolinecolor: "#c4cad3", linecolor: "#8b95a3", ticks: "outside" };
+const paint = () => ({ font: { size: 12, color: pageColor("--ink") }, plot_bgcolor: pageColor("--paper"), paper_bgcolor: pageColor("--paper") });
+const axis = () => ({ gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line"), linecolor: pageColor("--axis"), ticks: "outside" });
 const CONFIG = {
   responsive: true,
   displaylogo: false,
+  displayModeBar: matchMedia("(hover: none)").matches ? false : "hover",
   // Results stay where they are: Plotly's button that uploads a chart is left out.
   showSendToCloud: false,
   plotlyServerURL: "",
@@ -22,11 +26,20 @@ const CONFIG = {
 function chartLayout(layout) {
   return {
     ...COMMON_LAYOUT,
+    ...paint(),
     ...layout,
-    title: { ...layout.title, font: { size: 14 }, x: 0, xanchor: "left", xref: "paper" },
-    xaxis: { ...AXIS, ...layout.xaxis },
-    yaxis: { ...AXIS, ...layout.yaxis },
+    title: { ...layout.title, font: { size: 14 }, x: 0, xanchor: "left", xref: "paper", y: 1, yanchor: "top", pad: { t: 8 } },
+    xaxis: { ...axis(), ...layout.xaxis },
+    yaxis: { ...axis(), ...layout.yaxis },
   };
+}
+
+// A chart that is drawn takes the colours of the page anew.
+function repaint(element) {
+  const colors = { ...paint() };
+  for (const name of ["xaxis", "yaxis"])
+    for (const [key, value] of Object.entries(axis())) if (key !== "ticks") colors[`${name}.${key}`] = value;
+  return Plotly.relayout(element, { "font.color": colors.font.color, ...Object.fromEntries(Object.entries(colors).filter(([key]) => key !== "font")) });
 }
 
 // Charts are drawn when they come near the window: a page of many opens at once.
@@ -46,4 +59,11 @@ const watcher = new IntersectionObserver(
   { rootMargin: "500px" },
 );
 places.forEach((place) => watcher.observe(place));
-window.addEventListener("beforeprint", () => places.forEach(drawChart));
+const drawn = () => [...document.querySelectorAll(".js-plotly-plot")];
+SCREEN.addEventListener("change", () => drawn().forEach(repaint));
+
+// On paper: every chart and everything that is folded.
+window.addEventListener("beforeprint", () => {
+  document.querySelectorAll("details").forEach((fold) => (fold.open = true));
+  places.forEach(drawChart);
+});

@@ -13,12 +13,13 @@ from ...common.files import write_atomically
 from ...common.outputs import check_not_an_input
 from ...common.version import program_version
 from ...results.file import Results
-from .histories import history_charts
+from .histories import folded, history_charts
 from .mechanism import mechanism
 from .modes import link_modes
 from .modes_3d import modes_3d
 from .runs import runs, sources
 from .tables import analyses_table, bending_table, origins_table, peaks_table, voltages_table, warnings_table
+from .verdicts import loops_table, verdicts, zeros_table
 
 HERE = Path(__file__).parent
 
@@ -73,9 +74,12 @@ def _content(files: Sequence[Results]) -> dict[str, Any]:
         "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
         "shapes": shapes["links"],
         "modes_3d": _script_data(shapes),
-        "histories": histories,
+        "histories": folded(histories),
         "modes": modes,
         "analyses": analyses_table(all_runs),
+        "verdicts": verdicts(all_runs),
+        "loops": loops_table(all_runs),
+        "zeros": zeros_table(all_runs),
         "warnings": warnings_table(all_runs),
         "bending": bending_table(all_runs),
         "peaks": peaks_table(all_runs),

@@ -64,7 +64,7 @@ def bending_table(runs: Sequence[Run]) -> Table:
 def peaks_table(runs: Sequence[Run]) -> Table:
     """The largest absolute value of what a reader asks for first, in every run."""
     rows = [
-        (run.label, what, f"{np.max(np.abs(values)):.6g} {unit}", f"{run.results.time(run.analysis)[_peak(values)]:g}")
+        (run.label, what, f"{np.max(np.abs(values)):.4g} {unit}", f"{run.results.time(run.analysis)[_peak(values)]:g}")
         for run in runs
         for what, unit, values in _peaks(run)
     ]
@@ -75,16 +75,16 @@ def _peaks(run: Run) -> Iterator[tuple[str, str, Array]]:
     """(quantity, unit, its values (T, …)) of a run."""
     results, analysis = run.results, run.analysis
     for target in targets(run):
-        yield f"distance of {target.point} from its path", "m", path_error(run, target)
+        yield f"distance of {target.point} from its path", "mm", 1e3 * path_error(run, target)
     types = {joint["name"]: joint["type"] for joint in results.scene.get("joint", [])}
-    for joint in results.names(f"{analysis}/joints"):
+    for joint in types:
         if results.has(f"{analysis}/joints/{joint}/moment"):
             unit = JOINT_TYPES[types[joint]].force_unit
             yield f"motor of joint {joint}", unit, results[f"{analysis}/joints/{joint}/moment"]
     for point in results.names(f"{analysis}/points"):
         deflection = np.linalg.norm(results[f"{analysis}/points/{point}/deflection"], axis=1)
         if deflection.any():
-            yield f"deflection of {point}", "m", deflection
+            yield f"deflection of {point}", "mm", 1e3 * deflection
 
 
 def voltages_table(runs: Sequence[Run]) -> Table:
@@ -98,7 +98,7 @@ def voltages_table(runs: Sequence[Run]) -> Table:
             limits = np.atleast_1d(about["limit"])  # one for all patches, or one each
             times = np.max(required / limits)
             limit = (f"{limits.min():g}", f"{times:.3g}") if np.isfinite(limits).any() else ("none", "")
-            rows.append((run.label, body, f"{required.max():.6g}", *limit, f"{about['condition_number']:.3g}"))
+            rows.append((run.label, body, f"{required.max():.4g}", *limit, f"{about['condition_number']:.3g}"))
     return Table(heading, rows)
 
 

@@ -47,11 +47,11 @@ template <int Count> void project_rows(const double *p, const double *p_dot, Ind
   }
 }
 
-// Rows of W W^T
+// Rows of W W^T, in the columns of rows that move
 template <int Count> void multiply_rows(Index first, PackedRows &s) {
   constexpr int groups = Count / lane_count;
   const Index n = s.W.cols(), stride = s.rows();
-  for (Index j = 0; j < stride; ++j) {
+  for (const Index j : s.moving) {
     Lanes sum[groups] = {};
     const double *W = s.W.data();
     for (Index i = 0; i < n; ++i, W += stride)
@@ -136,6 +136,9 @@ PackedRows::PackedRows(const PlanarBody &body) : place(static_cast<std::size_t>(
   W_transposed.topRows(n) = W.transpose();
   G = W * W.transpose();
   if (body.affine) {
+    for (Index row = 0; row < body.affine_row() + body.affine.moving; ++row)
+      if (moves(body, row) || row >= body.affine_row())
+        moving.push_back(at(row));
     gram = G;
     with_U = reaction = Eigen::MatrixXd::Zero(rows, body.affine.rank());
   }
@@ -166,6 +169,8 @@ void PackedRows::replace(Index row, const Eigen::Ref<const Eigen::RowVectorXd> &
 void PackedRows::reduce(const Eigen::MatrixXd &C_inverse) {
   const Index rank = C_inverse.rows();
   in_pieces(rows(), [&]<int Count>(Index first) { multiply_rows<Count>(first, *this); });
+  for (const Index j : moving)
+    gram.row(j) = gram.col(j).transpose();
   with_U = gram.middleCols(affine, rank);
   const LowRank S = C_inverse + with_U.middleRows(affine, rank);
   const LowRank S_inverse = S.partialPivLu().inverse();

@@ -37,11 +37,12 @@ struct PackedRows {
   // z' = z - C U m_ff^-1 W^T z in the rows of U
   void apply_inertia(const Eigen::MatrixXd &C, Eigen::VectorXd &z) const;
 
-  std::vector<Eigen::Index> place; // of each row of W; rows that carry nothing share the frame's empty one
-  Eigen::Index ports = 0;          // padded
-  Eigen::Index affine = 0;         // the first of the rows of affine inertia
-  Eigen::MatrixXd W, W_transposed; // (rows, n), (n padded, rows)
-  Eigen::MatrixXd G;               // W m_ff^-1 W^T
+  std::vector<Eigen::Index> place;  // of each row of W; rows that carry nothing share the frame's empty one
+  Eigen::Index ports = 0;           // padded
+  Eigen::Index affine = 0;          // the first of the rows of affine inertia
+  std::vector<Eigen::Index> moving; // those that move with p, of a body with affine inertia
+  Eigen::MatrixXd W, W_transposed;  // (rows, n), (n padded, rows)
+  Eigen::MatrixXd G;                // W m_ff^-1 W^T
   // Where m_ff is not the identity, else empty: W W^T, W U^T, and W U^T (C^-1 + U U^T)^-1
   Eigen::MatrixXd gram, with_U, reaction;
   Eigen::VectorXd elastic_force;  // (n) K p + D p_dot

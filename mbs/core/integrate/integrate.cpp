@@ -45,7 +45,7 @@ constexpr double radians_too_long = 5, notable = 0.1;
 // Steps that are rejected until they are this part of the usual ones may have met a jump, which is looked for. Steps
 // end before it and begin behind it, and are as long as usual.
 constexpr double may_have_met_jump = 0.1;
-constexpr double no_time = 1e-13; // of the time, or of the run: no step is made for it
+constexpr double no_time = 1e-13; // of the time, or of the run: no step is made for it before or behind a jump
 
 // Length of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
 double next_step(double h, double left, bool lands) {
@@ -105,7 +105,7 @@ public:
 
   IntegrationReport run() {
     while (report_.outputs < times_.size() && may_go_on()) {
-      if (jump_ && jump_->before - t_ <= no_time * std::max(std::abs(t_), duration_)) {
+      if (jump_ && jump_->before <= at_once()) {
         pass_jump();
         continue;
       }
@@ -310,12 +310,15 @@ private:
       searched_until_ = attempt.end;
   }
 
+  // The latest time that cannot be told from now.
+  double at_once() const { return t_ + no_time * std::max(std::abs(t_), duration_); }
+
   // The state is the same on both sides.
   void pass_jump() {
     t_ = jump_->after;
     jump_.reset();
     record();
-    for (; report_.outputs < times_.size() && times_[report_.outputs] <= t_; ++report_.outputs)
+    for (; report_.outputs < times_.size() && times_[report_.outputs] <= at_once(); ++report_.outputs)
       output_(report_.outputs, times_[report_.outputs], state(z_.data()));
     pass_breaks();
     system_.slope(t_, z_.data(), method_->first_slope());

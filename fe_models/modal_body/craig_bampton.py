@@ -1,0 +1,181 @@
+"""Craig–Bampton: a link by the motion of its interfaces and by modes of the link held at all of them. NumPy only.
+
+    u = Σ ψ_c q_c + Σ φ_k η_k
+
+with constraint modes ψ, the static shapes of unit motions of one interface coordinate q while the others rest, and
+eigenmodes φ of the link held at all interfaces (R. R. Craig and M. C. C. Bampton, Coupling of substructures for dynamic
+analyses, AIAA J. 6, 1968, 1313–1319). With the frame on the root's section its motion r is that of the frame; the
+others move by d = q − R r beside it, R being their rigid motion. In this frame the link has the modes of the floating
+frame, all p with XᵀMX = I and K = diag(ω²), that span ψ and φ: as many as there are d and η, their highest in place of
+attachment modes. The way back, p = T (d, η), follows from what they do at interfaces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array, Integers
+from ...common.errors import InputError
+from ..link_records import FAMILIES, Family
+from .attachment_modes import COMPONENTS, uncoupled
+from .body import ModalBody
+from .parts import Interface
+from .tensors import LEVI_CIVITA
+
+ROOT = "root"
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True)
+class ModesInOrder:
+    """Columns X turn of a basis X: those that stand for eigenmodes, then as many of each family as loads brought.
+
+    Attributes:
+        omega2: (n,) in rad²/s².
+        families: of each.
+        turn: (n, n).
+        residual: (n,) 1 of the latter.
+    """
+
+    omega2: Array
+    families: list[Family]
+    turn: Array
+    residual: Integers
+
+
+def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> ModesInOrder:
+    """Modes in the space of a basis X, XᵀMX = I, of fixed-interface modes and static shapes.
+
+    Args:
+        K: (n, n) XᵀKX.
+        families: of the columns of X.
+        is_static: which of them are static shapes.
+    """
+    names: list[str] = list(FAMILIES)
+    of = np.array([names.index(family) for family in families])
+    squares, turn, of_modes = uncoupled(K, of)
+    residual = np.zeros(of.size, dtype=np.int64)
+    for family in set(of.tolist()):
+        static = int(np.count_nonzero(of[np.array(is_static)] == family))
+        own = np.flatnonzero(of_modes == family)
+        residual[own[np.argsort(squares[own], kind="stable")][own.size - static :]] = 1
+    # Equal frequencies of different families are ordered by these, not by rounding.
+    order = sorted(range(of.size), key=lambda k: (residual[k], float(f"{squares[k]:.6e}"), of_modes[k]))
+    return ModesInOrder(squares[order], [FAMILIES[of_modes[k]] for k in order], turn[:, order], residual[order])
+
+
+@dataclass(frozen=True)
+class InterfaceCoordinates:
+    """What the modes of a body make of interface motion.
+
+    Attributes:
+        names: of the c coordinates d: "tip/y" … "tip/rz", of interfaces other than the root.
+        rows: (c, n) d = rows p.
+        constraint: (n, c) p of each constraint mode, rows constraint = 1.
+        fixed: (n, n − c) p of each fixed-interface mode, rows fixed = 0, orthonormal in M, uncoupled in K.
+    """
+
+    names: list[str]
+    rows: Array
+    constraint: Array
+    fixed: Array
+
+
+def interface_coordinates(
+    omega2: Array, families: Sequence[str], static: int, interfaces: Mapping[str, Interface]
+) -> InterfaceCoordinates:
+    """From ω² and families of n modes, the number of static shapes among them, and what all do at interfaces.
+
+    Raises:
+        InputError: interfaces are so near to each other that they cannot move by themselves.
+    """
+    moving = sorted({k for family in FAMILIES if family in families for k in COMPONENTS[family]})
+    names = [f"{name}/{AXES[k]}" for name in interfaces if name != ROOT for k in moving]
+    motions = [np.concatenate([at.translation, at.rotation])[moving] for name, at in interfaces.items() if name != ROOT]
+    rows = np.concatenate(motions)
+    if len(rows) != static:
+        raise InputError(
+            f"craig-bampton: expected interfaces that can move by themselves ({', '.join(names)}), found only {static}"
+            " independent static shapes: interfaces too near to each other, or to the root"
+        )
+    omega = np.sqrt(omega2)
+    size = np.linalg.norm(rows / omega, axis=1)  # √ of the flexibility
+    left, values, right = np.linalg.svd(rows / size[:, None] / omega)
+    constraint = (right[:static].T / values) @ left.T / size / omega[:, None]
+    fixed = np.linalg.qr(right[static:].T / omega[:, None])[0]
+    _, turn = np.linalg.eigh(fixed.T @ (omega2[:, None] * fixed))
+    return InterfaceCoordinates(names, rows, constraint, fixed @ turn)
+
+
+def interface_loads(
+    omega2: Array, families: Sequence[str], static: int, interfaces: Mapping[str, Interface]
+) -> tuple[Array, dict[str, Array]]:
+    """The loads that bend a link into each of its n modes, as `attachment_modes.interface_loads` has them.
+
+    K φ = ω² M φ + B c of a fixed-interface mode, held by loads c; K ψ = B c of a constraint mode. So in all modes the
+    inertia is that of fixed-interface modes N: KX = M X N Nᵀ Ω² + B c, and Xᵀ of it gives c.
+    """
+    found = interface_coordinates(omega2, families, static, interfaces)
+    W = found.fixed @ (found.fixed.T * omega2)
+    c = found.constraint.T @ (np.diag(omega2) - W)
+    loads = {name: np.zeros((6, len(omega2))) for name in interfaces}
+    for name, row in zip(found.names, c, strict=True):
+        place, component = name.split("/")
+        loads[place][AXES.index(component)] = row
+    return W, loads
+
+
+@dataclass(frozen=True)
+class CraigBampton:
+    """A link in interface coordinates and fixed-interface modes, for other programs; SI units, the link's frame.
+
+    Attributes:
+        coordinates: names of the m coordinates: "root/x" … "root/rz", "tip/y" …, then "mode/1" … .
+        mass: (m, m).
+        stiffness: (m, m); zero for rigid motions.
+        recovery: (n, m) modal coordinates p of the floating frame on the root, whose motion is that of the root.
+    """
+
+    coordinates: list[str]
+    mass: Array
+    stiffness: Array
+    recovery: Array
+
+
+def craig_bampton(body: ModalBody) -> CraigBampton:
+    """Of a body with reference condition "craig-bampton", from its invariants: nothing new is approximated."""
+    omega2 = np.diag(body.stiffness)
+    static = body.mode_count - body.eigenmode_count
+    found = interface_coordinates(omega2, body.family, static, body.interfaces)
+    rigid = np.array([_rigid_row(body, name) for name in found.names]).reshape(-1, 6)
+    recovery = np.concatenate([-found.constraint @ rigid, found.constraint, found.fixed], axis=1)
+    frame = np.zeros((6, recovery.shape[1]))
+    frame[:, :6] = np.eye(6)
+    turn = np.einsum("akl,kln->an", LEVI_CIVITA, body.I_bar)  # ∫ρ x × Φ dV
+    coupling = np.concatenate([body.S_bar, turn])
+    cross = frame.T @ coupling @ recovery
+    mass = frame.T @ _rigid_mass(body) @ frame + cross + cross.T + recovery.T @ recovery
+    names = [f"{ROOT}/{axis}" for axis in AXES] + found.names
+    names += [f"mode/{k + 1}" for k in range(found.fixed.shape[1])]
+    return CraigBampton(names, mass, recovery.T @ (omega2[:, None] * recovery), recovery)
+
+
+def _rigid_row(body: ModalBody, coordinate: str) -> Array:
+    """(6,) an interface coordinate under unit motions of the frame."""
+    name, component = coordinate.split("/")
+    k = AXES.index(component)
+    if k >= 3:
+        return np.asarray(np.eye(6)[k])
+    turn = LEVI_CIVITA[k] @ body.interfaces[name].position  # (θ × x)_k = ε_kab θ_a x_b
+    return np.concatenate([np.eye(3)[k], turn])
+
+
+def _rigid_mass(body: ModalBody) -> Array:
+    """(6, 6) of the frame's translation and rotation."""
+    coupling = np.einsum("akl,k->al", LEVI_CIVITA, body.first_moment)  # ∫ρ x × e_l dV, (rotation, translation)
+    second = body.second_moment
+    J = np.trace(second) * np.eye(3) - second
+    return np.asarray(np.block([[body.mass * np.eye(3), coupling.T], [coupling, J]]))

@@ -1,0 +1,43 @@
+"""What a solve of a scene in space prints at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from ..run.spatial import SpatialSolution
+from .tables import plain_table
+
+
+def print_spatial_summary(
+    solution: SpatialSolution, path: Path, seconds: Mapping[str, float], console: Console
+) -> None:
+    """A table of the analyses, one of the motors, warnings, wall time per stage, where the results are."""
+    table = plain_table("analysis", "kind", "status", "integrator", "steps", "evaluations", "off the constraints")
+    motors = plain_table("analysis", "motor", "largest", "unit")
+    units = {joint.name: joint.units for joint in solution.scene.joint}
+    for name, result in solution.analyses.items():
+        run = result.run
+        off = f"{run.violation.max(initial=0.0):.1e}"
+        table.add_row(name, run.analysis.kind, run.status, run.integrator, f"{run.steps}", f"{run.evaluations}", off)
+        for joint, moments in result.motion.motor_forces.moments.items():
+            for unit, values in zip(units[joint], moments.T, strict=True):
+                motors.add_row(name, joint, f"{np.abs(values).max():.5g}", "N·m" if unit == "rad" else "N")
+    console.print(table)
+    if motors.row_count:
+        console.print()
+        console.print(motors)
+    for name, result in solution.analyses.items():
+        for text in result.run.warnings:
+            console.print(f"warning    {name}: {text}")
+    notes = Table.grid(padding=(0, 2))
+    for note in solution.notes:
+        notes.add_row("links", note)
+    notes.add_row("time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
+    console.print()
+    console.print(notes)
+    console.print(f"results    {path}", soft_wrap=True)

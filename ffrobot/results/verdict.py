@@ -1,0 +1,270 @@
+"""The answer of a solve in one record, for terminal, report and Python: can it be done, and what to try next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+
+from ..actuation.motors import MotorFeasibility, judge_motion
+from ..common.arrays import Array
+from ..mbs.joints.joints import JOINT_TYPES
+from ..mbs.joints.transmission import MotorLimits
+from .actuators import read_motors, read_unsupplied
+
+Place = tuple[float, str, float]
+"""A largest value, where it is, and when (s)."""
+
+
+@dataclass(frozen=True)
+class PatchNeed:
+    """What patches of a body need, times their limit (0 without), since when (s), and a limit (V) that would do."""
+
+    factor: float
+    since: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class AnalysisVerdict:
+    """What one analysis says.
+
+    Attributes:
+        name, kind, status: of the analysis; `cause` why it ended early.
+        answer: whether motors and patches can do it, or how a closed loop went, in words; empty where nothing is asked.
+        feasible: whether they can; None where that is not asked.
+        motors: by joint, in the order of the scene: peaks, RMS and limits at the joint.
+        units: of the force along each of these joints, "N·m" or "N".
+        patches: by body, of an inverse analysis.
+        deflection: largest of a point, m, which, and when.
+        stress: largest von Mises, Pa, the body, and when; None where none was asked for.
+        warnings: why results may be wrong, or not mean what they seem to.
+        advice: what to try next, a text each.
+    """
+
+    name: str
+    kind: str
+    status: str
+    cause: str
+    answer: str
+    feasible: bool | None
+    motors: Mapping[str, MotorFeasibility]
+    units: Mapping[str, str]
+    patches: Mapping[str, PatchNeed]
+    deflection: Place | None
+    stress: Place | None
+    warnings: tuple[str, ...]
+    advice: tuple[str, ...]
+
+    def lines(self) -> Iterator[str]:
+        """As text: the answer, then a line each, indented."""
+        ended = "" if self.status == "completed" else f"ended early ({self.status})"
+        yield f"{self.name}: {'; '.join(text for text in (ended, self.answer) if text) or 'completed'}"
+        if self.feasible is not None:  # of closed loops, a table has them
+            yield from (f"  motor of {name}: {text}" for name, text in self.motor_texts.items())
+        if self.deflection is not None:
+            yield f"  largest deflection {_place(1e3 * self.deflection[0], 'mm', *self.deflection[1:])}"
+        if self.stress is not None:
+            yield f"  largest stress {_place(self.stress[0] / 1e6, 'MPa', *self.stress[1:])} (von Mises)"
+        yield from (f"  to try: {text}" for text in self.advice)
+
+    @property
+    def motor_texts(self) -> dict[str, str]:
+        """Peaks and RMS of each motor, with limits where it has them."""
+        return {name: _motor(motor, self.units[name]) for name, motor in self.motors.items()}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What every analysis of a results file says, in the order of the scene. Printed, it is that text."""
+
+    analyses: tuple[AnalysisVerdict, ...]
+
+    def __getitem__(self, name: str) -> AnalysisVerdict:
+        """Of one analysis. Raises `KeyError` where there is none of that name."""
+        for one in self.analyses:
+            if one.name == name:
+                return one
+        raise KeyError(name)
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    __repr__ = __str__
+
+    def lines(self) -> Iterator[str]:
+        """Of all analyses."""
+        for one in self.analyses:
+            yield from one.lines()
+
+
+def judge(file: h5py.File, analyses: Sequence[str], joints: Sequence[Mapping[str, str | float]]) -> Verdict:
+    """The verdict of the `analyses` of a results file; `joints` as the scene has them."""
+    return Verdict(tuple(_judge(name, file[name], joints) for name in analyses))
+
+
+def _judge(name: str, group: h5py.Group, joints: Sequence[Mapping[str, str | float]]) -> AnalysisVerdict:
+    motors = _motors(group, joints)
+    units = {str(joint["name"]): JOINT_TYPES[str(joint["type"])].force_unit for joint in joints}
+    patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
+    answer, feasible = _answer(group, motors, patches)
+    about = group.attrs
+    return AnalysisVerdict(
+        name=name,
+        kind=str(about["kind"]),
+        status=str(about["status"]),
+        cause=str(about.get("cause", "")),
+        answer=answer,
+        feasible=feasible,
+        motors=motors,
+        units=units,
+        patches=patches,
+        deflection=None if _ended_early(group) else _deflection(group),
+        stress=None if _ended_early(group) else _stress(group),
+        warnings=tuple(map(str, about.get("warnings", ()))),
+        advice=tuple(_advice(group, motors, units, patches)),
+    )
+
+
+def _motors(group: h5py.Group, joints: Sequence[Mapping[str, str | float]]) -> dict[str, MotorFeasibility]:
+    """As the analysis judged them; of kinds that do not, such as closed loops, from what their motors did."""
+    if "feasibility" in group:
+        return read_motors(group["feasibility"], [str(joint["name"]) for joint in joints])
+    found, time = {}, group["time"][()]
+    for joint in joints:
+        entry = group.get(f"joints/{joint['name']}")
+        if entry is not None and "moment" in entry and "rate" in entry:
+            limits = MotorLimits(*(float(joint.get(f"{what}_limit", np.inf)) for what in ("moment", "speed", "power")))
+            found[str(joint["name"])] = judge_motion(time, entry["moment"][()], entry["rate"][()], limits)
+    return found
+
+
+def _patches(entry: h5py.Group) -> PatchNeed:
+    factors, since = entry["factor"][()], entry["saturation_time"][()]
+    beyond = since[~np.isnan(since)]
+    limit = float(entry["remedies"].attrs["limit"])
+    return PatchNeed(float(factors.max()), float(beyond.min()) if beyond.size else float("nan"), limit)
+
+
+def _answer(
+    group: h5py.Group, motors: Mapping[str, MotorFeasibility], patches: Mapping[str, PatchNeed]
+) -> tuple[str, bool | None]:
+    """Whether it can be done, in words and as such; of a run that ended early nothing is known of that."""
+    if "control" in group:
+        about = group["control"].attrs
+        held = f", {100 * about['saturated']:.2g} % of the samples at a limit" if about["saturated"] else ""
+        error = f"tip off by {1e3 * about['tip_error_max']:.4g} mm at most, {1e3 * about['tip_error_rms']:.4g} mm RMS"
+        return f"loop {about['verdict']}: {error}{held}", None
+    if "feasibility" not in group or _ended_early(group):
+        return "", None
+    short = dict(_short(motors, patches))
+    if short:
+        lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
+        return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility", False
+    limited = [motor for motor in motors.values() if np.isfinite((motor.moment_limit, motor.speed_limit,
+                                                                  motor.power_limit)).any()]  # fmt: skip
+    has_limits = bool(limited) or any(np.isfinite(e["available_moment"]).any() for e in _of_patches(group))
+    within = "within the limits that are given" if has_limits else "no limits are given"
+    if (missed := read_unsupplied(group["feasibility"])) is not None:
+        means = "motors and patches" if missed.with_patches else "motors alone"
+        return f"{means} cannot do it: see the warning ({within})", False
+    return f"motors{' and patches' if patches else ''} can do it, {within}", True
+
+
+def _ended_early(group: h5py.Group) -> bool:
+    return bool(group.attrs["status"] != "completed")
+
+
+def _of_patches(group: h5py.Group) -> Iterator[h5py.Group]:
+    yield from group.get("feasibility/pzt", {}).values()
+
+
+def _short(
+    motors: Mapping[str, MotorFeasibility], patches: Mapping[str, PatchNeed]
+) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Actuators that cannot do it: the factor they lack, and from what time on (s)."""
+    for name, motor in motors.items():
+        if motor.factor > 1.0:
+            yield f"motor {name}", (motor.factor, motor.saturation_time)
+    for body, need in patches.items():
+        if need.factor > 1.0:
+            yield f"patches of {body}", (need.factor, need.since)
+
+
+def _deflection(group: h5py.Group) -> Place | None:
+    """Of all points of flexible bodies."""
+    found = [_peak(np.linalg.norm(point["deflection"][()], axis=1), name, group["time"][()])
+             for name, point in group.get("points", {}).items() if "deflection" in point]  # fmt: skip
+    worst = max(found, default=None)
+    return worst if worst is not None and worst[0] > 0.0 else None
+
+
+def _stress(group: h5py.Group) -> Place | None:
+    """Of stress points and surfaces."""
+    time, found = group["time"][()], []
+    for body, entry in group.get("stress", {}).items():
+        points = entry.get("points", {}).items()
+        found += [_peak(point["von_mises"][()], f"{body}, {name}", time) for name, point in points]
+        if "surface" in entry:
+            found.append(_peak(entry["surface/von_mises_max"][()], f"the surface of {body}", time))
+    return max(found, default=None)
+
+
+def _peak(values: Array, where: str, time: Array) -> Place:
+    k = int(np.argmax(values))
+    return float(values[k]), where, float(time[k])
+
+
+def _advice(
+    group: h5py.Group,
+    motors: Mapping[str, MotorFeasibility],
+    units: Mapping[str, str],
+    patches: Mapping[str, PatchNeed],
+) -> Iterator[str]:
+    """What to try next, the nearest thing first."""
+    asked = "feasibility" in group and not _ended_early(group)
+    beyond = [name for name, motor in motors.items() if motor.factor > 1.0]
+    for name, motor in motors.items() if asked else ():
+        if (motor.jump or motor.moment > motor.moment_limit) and (text := motor.spike_in_words(units[name])):
+            yield f"motor of {name}: {text}"
+    if beyond and asked:
+        yield (
+            f"a slower path (fastest = true seeks the least stretch of its times), or another motor or gear for"
+            f" {', '.join(beyond)}"
+        )
+    for body, need in patches.items() if asked else ():
+        if need.factor > 1.0:
+            yield (
+                f"patches of {body}: a limit of {_number(need.limit)} V would do; what layers, thickness or number"
+                " would: ffrobot feasibility"
+            )
+    if asked and read_unsupplied(group["feasibility"]) is not None:
+        yield 'kind = "motors-only", or patches ([[pzt]]) on the links'
+    if "control" in group and group["control"].attrs["verdict"] != "stable":
+        yield "smaller gains, a shorter sample_time, or rotor_inertia in the joints"
+
+
+def _motor(motor: MotorFeasibility, unit: str) -> str:
+    speed = "rad/s" if unit == "N·m" else "m/s"
+    parts = [
+        f"peak {_of(motor.moment, motor.moment_limit)} {unit}, RMS {motor.rms_moment:.4g} {unit}",
+        f"{_of(motor.speed, motor.speed_limit)} {speed}",
+        f"{_of(motor.power, motor.power_limit)} W",
+    ]
+    share = f"; beyond a limit for {100 * motor.share_beyond:.3g} % of the time" if motor.share_beyond > 0.0 else ""
+    return ", ".join(parts) + share
+
+
+def _number(value: float) -> str:
+    """Four digits, large ones in full."""
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
+
+
+def _of(peak: float, limit: float) -> str:
+    return f"{peak:.4g}" + (f" of {limit:g}" if np.isfinite(limit) else "")
+
+
+def _place(value: float, unit: str, where: str, time: float) -> str:
+    return f"{value:.4g} {unit}: {where}, t = {time:g} s"

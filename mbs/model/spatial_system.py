@@ -1,0 +1,125 @@
+"""The equations of motion of a scene in space under its constraints, as the core's recursion evaluates them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...common.arrays import Array
+from .. import _core
+from .._core import TimeFunction
+from ..scene.spatial.loads import SpatialLoad
+from .spatial_body import SpatialBody
+from .spatial_model import SpatialModel, SpatialRow
+from .spatial_tree import Section
+
+ZERO = _core.TimeFunction.constant(0.0)
+
+
+class SpatialSystem:
+    """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
+
+    Attributes:
+        model: what it was made from.
+        core: `_core.SpatialModel`.
+        scene: what its rows follow, and what acts on it.
+    """
+
+    def __init__(self, model: SpatialModel) -> None:
+        self.model, tree = model, model.tree
+        self._markers: list[list[Section]] = [[] for _ in tree.nodes]
+        self._ground: list[Section] = []
+        sides = [(self._place(node.inner), self._place(node.outer)) for node in tree.nodes]
+        rows = [self._row(row) for row in model.rows]
+        driven = {name for name in model.motors} | {load.joint for load in model.scene.load}
+        driven |= {trajectory.joint for trajectory in model.scene.trajectory}
+        bodies = []
+        for number, (node, (inner, outer)) in enumerate(zip(tree.nodes, sides, strict=True)):
+            body = _core.SpatialBody()
+            body.name, (body.parent, body.parent_marker), body.inboard_marker = node.body.name, inner, outer[1]
+            body.joint = getattr(_core.JointKind, node.joint.type)
+            body.lead = float(getattr(node.joint, "rise", 0.0))
+            body.driven = node.joint.name in driven
+            body.data = _data(node.body, self._markers[number])
+            bodies.append(body)
+        ground = [_marker(section, np.zeros((6, 0)), section.position) for section in self._ground]
+        self.core = _core.SpatialModel(bodies, ground, rows, [], np.array(model.scene.gravity))
+        self._along = [self._load(load) for load in model.scene.load if load.joint is not None]
+        self.scene = self._follow()
+
+    def target(self, t: float) -> Array:
+        """Second derivatives that the rows follow at time t (rows,)."""
+        return np.array([0.0 if row.target is None else row.target(t)[2] for row in self.model.rows])
+
+    def force(self, t: float) -> Array | None:
+        """Given forces along v (n_v,) at time t; None where there are none."""
+        if not self._along:
+            return None
+        return sum((function(t)[0] * direction for direction, function in self._along), np.zeros(self.model.tree.n_v))
+
+    def _follow(self) -> _core.TreeScene:
+        """Targets of the rows, and given forces along joints."""
+        scene = _core.TreeScene()
+        for row in self.model.rows:
+            scene.add_target(ZERO if row.target is None else row.target)
+        for direction, magnitude in self._along:
+            scene.add_load(direction, magnitude)
+        return scene
+
+    def _load(self, load: SpatialLoad) -> tuple[Array, TimeFunction]:
+        """Direction (n_v,) and size of the moment of a joint."""
+        assert load.joint is not None
+        direction = np.zeros(self.model.tree.n_v)
+        direction[self.model.tree.nodes[self.model.tree.carried[load.joint]].v] = self.model.sign(load.joint)
+        return direction, load.components["moment"]
+
+    def _place(self, section: Section) -> tuple[int, int]:
+        """Body (−1: the ground) and number of the marker of a section there; made where it is new."""
+        known = self._ground if section.body < 0 else self._markers[section.body]
+        for number, other in enumerate(known):
+            same = other.point == section.point and np.array_equal(other.triad, section.triad)
+            if same and np.array_equal(other.position, section.position):
+                return section.body, number
+        known.append(section)
+        return section.body, len(known) - 1
+
+    def _row(self, row: SpatialRow) -> _core.RowModel:
+        found = _core.RowModel()
+        found.name, found.kind = row.owner, getattr(_core.RowKind, row.kind)
+        if row.kind == "coordinate":
+            found.coordinate = row.coordinate
+            return found
+        found.a, found.b = (_core.MarkerAt(*self._place(section)) for section in (row.a, row.b))
+        found.f, found.g = np.array(row.f), np.array(row.g)
+        return found
+
+
+def _data(body: SpatialBody, markers: list[Section]) -> _core.SpatialData:
+    """The constants of a body; those of modes are left empty of a rigid one."""
+    data = _core.SpatialData()
+    data.mass, data.first_moment, data.J2 = body.mass, np.array(body.first_moment), np.array(body.second_moment)
+    if body.n_modes:
+        diagonal = np.array_equal(body.damping, np.diag(np.diag(body.damping)))
+        data.stiffness = np.array(body.stiffness)
+        data.damping = np.array(np.diag(body.damping)[:, None] if diagonal else body.damping)
+        data.S_bar, data.I_bar = np.array(body.S_bar), np.array(body.I_bar.reshape(9, -1))
+        booked = body.S_bar_kl.copy()
+        booked[2, 2] += body.S_spin
+        data.S_bar_kl = [np.array(booked[k, l]) for k in range(3) for l in range(3)]  # noqa: E741
+        data.h_spin, data.S_spin = np.array(body.h_spin), np.array(body.S_spin)
+    data.J_spin = body.J_spin
+    data.markers = [_marker(section, *_rows_of(body, section)) for section in markers]
+    return data
+
+
+def _rows_of(body: SpatialBody, section: Section) -> tuple[Array, Array]:
+    """Φ over Φ_r (6, n) and the position (3,) of a section."""
+    if not section.point:
+        return np.zeros((6, body.n_modes)), np.zeros(3)
+    at = body.points[section.point]
+    return np.vstack([at.translation, at.rotation]), at.position
+
+
+def _marker(section: Section, Phi: Array, position: Array) -> _core.SpatialMarker:
+    marker = _core.SpatialMarker()
+    marker.position, marker.triad, marker.Phi = np.array(position), np.array(section.triad), Phi
+    return marker

@@ -1,0 +1,48 @@
+"""Stress in a link under its patches: what their strain does to the sections there, which modes show late."""
+
+import numpy as np
+import pytest
+from patched_strip import END, START, E, solved, strain
+
+PLACES = (0.03, START + 0.005, (START + END) / 2, END - 0.005, 0.15)
+MODES = {"count": 4, "attachment_modes": False}
+
+
+def stress(results):
+    return np.array([results[f"bent/stress/strip/points/p{k}/stress"][0, 0] for k in range(len(PLACES))])
+
+
+@pytest.mark.parametrize("height", [0.004, 0.002])
+@pytest.mark.parametrize(("face", "faces"), [("both", 2), (None, 1)])
+def test_composite_section(height, face, faces):
+    """−E y φ' under the patch and nothing beside it: with four modes, at ψ 8.9 and 4.4."""
+    found = stress(solved(height, face, MODES, places=PLACES))
+    curvature = strain(height, faces)[0]
+    largest = E * height / 2 * curvature
+    np.testing.assert_allclose(found, [0, *(-largest,) * 3, 0], atol=2e-3 * largest)
+
+
+def test_pull_of_a_named_face():
+    """E (u' − y φ'), though the modes only bend."""
+    height = 0.004
+    found = stress(solved(height, "+y", MODES | {"family": ["in-plane-bending", "axial"], "count": 6}, places=PLACES))
+    curvature, stretch = strain(height, 1)
+    expected = E * (stretch - height / 2 * curvature)
+    np.testing.assert_allclose(found, [0, *(expected,) * 3, 0], atol=5e-3 * abs(expected))
+
+
+def test_modes_alone_are_a_third_off():
+    """What the patches add: four modes have neither the jump at their ends nor the plateau between."""
+    results = solved(0.002, "both", MODES, places=PLACES)
+    body, p = results.modal_body("strip"), results.modal("bent", "strip")[0]
+    alone = np.array([body.stress[f"p{k}"].stress[0] @ p for k in range(len(PLACES))])
+    assert np.abs(alone - stress(results)).max() > 0.3 * np.abs(stress(results)).max()
+
+
+def test_results_say_what_layers_do():
+    results = solved(0.004, "both", MODES, places=PLACES)
+    sections = results.stress_recovery("bent", "strip").sections
+    assert sections.moment.shape == (1, len(sections.x))
+    assert np.all((sections.x > START) & (sections.x < END))
+    bare = solved(0.004, "both", MODES, places=PLACES, structural=False)
+    assert bare.stress_recovery("bent", "strip").sections is None
