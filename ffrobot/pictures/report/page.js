@@ -16,7 +16,7 @@ const axis = () => ({ gridcolor: pageColor("--grid"), zerolinecolor: pageColor("
 const CONFIG = {
   responsive: true,
   displaylogo: false,
-  displayModeBar: matchMedia("(hover: none)").matches ? false : "hover",
+  displayModeBar: matchMedia("(pointer: coarse)").matches ? false : "hover",
   // Results stay where they are: Plotly's button that uploads a chart is left out.
   showSendToCloud: false,
   plotlyServerURL: "",
