@@ -15,7 +15,7 @@ constexpr double at_once = 1e-9;       // of the interval: what accelerations do
 
 } // namespace
 
-std::optional<Jump> find_jump(ImplicitSystem &system, const double *z, double start, double end) {
+std::optional<Jump> find_jump(OdeSystem &system, const double *z, double start, double end) {
   VectorXd left(system.size()), middle(left), right(left), change(left);
   system.slope(start, z, left.data());
   system.slope(end, z, right.data());

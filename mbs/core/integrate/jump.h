@@ -13,6 +13,6 @@ struct Jump {
 
 // Where slopes at the state z jump between `start` and `end`, which are short compared with what else changes them;
 // nothing where they do not. Bisection: some 50 slopes.
-std::optional<Jump> find_jump(ImplicitSystem &system, const double *z, double start, double end);
+std::optional<Jump> find_jump(OdeSystem &system, const double *z, double start, double end);
 
 } // namespace ffrobot
