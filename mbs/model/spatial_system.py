@@ -5,14 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.errors import InputError
 from .. import _core
 from .._core import TimeFunction
 from ..scene.spatial.loads import SpatialLoad
 from .spatial_body import SpatialBody
 from .spatial_model import SpatialModel, SpatialRow
-from .spatial_tree import Section
+from .spatial_tree import Node, Section
 
 ZERO = _core.TimeFunction.constant(0.0)
+MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
+
+
+def _moves(node: Node) -> bool:
+    """Whether modes move the section of the body at its joint."""
+    return bool(np.any(_rows_of(node.body, node.outer)[0]))
 
 
 class SpatialSystem:
@@ -32,19 +39,37 @@ class SpatialSystem:
         rows = [self._row(row) for row in model.rows]
         driven = {name for name in model.motors} | {load.joint for load in model.scene.load}
         driven |= {trajectory.joint for trajectory in model.scene.trajectory}
+        self._check()
         bodies = []
         for number, (node, (inner, outer)) in enumerate(zip(tree.nodes, sides, strict=True)):
             body = _core.SpatialBody()
             body.name, (body.parent, body.parent_marker), body.inboard_marker = node.body.name, inner, outer[1]
             body.joint = getattr(_core.JointKind, node.joint.type)
             body.lead = float(getattr(node.joint, "rise", 0.0))
-            body.driven = node.joint.name in driven
+            # Else the core may take the frame's coordinates where modes turn the section: same motion, other numbers.
+            body.driven = node.joint.name in driven or _moves(node)
             body.data = _data(node.body, self._markers[number])
             bodies.append(body)
         ground = [_marker(section, np.zeros((6, 0)), section.position) for section in self._ground]
         self.core = _core.SpatialModel(bodies, ground, rows, [], np.array(model.scene.gravity))
         self._along = [self._load(load) for load in model.scene.load if load.joint is not None]
         self.scene = self._follow()
+
+    def _check(self) -> None:
+        """Raise `InputError` for what the core does not take."""
+        path, rows = self.model.scene.path, self.model.rows
+        for node in self.model.tree.nodes:
+            if node.joint.type == "free" and _moves(node):
+                raise InputError(
+                    f"{path}: {node.joint.label}: expected a point that modes do not move, found"
+                    f' "{node.outer.point}" of "{node.body.name}": leave the joint out (a body without one is free from'
+                    " the origin on)"
+                )
+        if len(rows) > MOST_ROWS:
+            raise InputError(
+                f"{path}: expected at most {MOST_ROWS} rows of paths and cut loops in all, found {len(rows)}: scenes in"
+                " space with more of them are not available yet"
+            )
 
     def target(self, t: float) -> Array:
         """Second derivatives that the rows follow at time t (rows,)."""

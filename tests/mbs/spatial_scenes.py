@@ -1,16 +1,20 @@
 """Scenes in space for tests: those of the checkpoints, and random ones with the joints of a `spatial_trees.Tree`."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import scene_of
+from rotations import logarithm
 from spatial_checkpoints import load
+from spatial_trees import Tree
 
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.mbs.scene.spatial.mechanism import SpatialMechanismScene
 from ffrobot.scene.spatial import spatial_scene
 
+UNDIRECTED = ("spherical", "weld", "free")
 PLACEHOLDER = {"mass": 1.0, "inertia": [1.0, 1.0, 1.0], "center": [0.0, 0.0, 0.0]}  # bodies are passed beside the scene
 
 
@@ -78,3 +82,34 @@ def as_tuples(value):
     if isinstance(value, dict):
         return {key: as_tuples(item) for key, item in value.items()}
     return tuple(as_tuples(item) for item in value) if isinstance(value, list | tuple) else value
+
+
+def as_scene(tree, turned):
+    """The tree with triads that a scene can say: without an axis they are the axes of the first side."""
+    joints = [_along_the_first(joint, turned) if joint.type in UNDIRECTED else joint for joint in tree.joints]
+    plain = Tree(tree.bodies, joints, tree.loops, tree.poses)
+    tables = [joint_table(joint, turned) for joint in (*joints, *tree.loops)]
+    return plain, tables
+
+
+def _along_the_first(joint, turned):
+    a, b = joint.a.triad, joint.b.triad
+    if turned:
+        return replace(joint, a=replace(joint.a, triad=a @ b.T), b=replace(joint.b, triad=np.eye(3)))
+    return replace(joint, a=replace(joint.a, triad=np.eye(3)), b=replace(joint.b, triad=b @ a.T))
+
+
+def coordinates(model, tree, turned):
+    """By joint, in the order of the sides that the scene has."""
+    found = {}
+    joints = {joint.name: joint for joint in (*tree.joints, *tree.loops)}
+    for node in model.tree.nodes:
+        joint, record, pose = joints[node.joint.name], node.joint, tree.poses[node.joint.name]
+        numbers = pose.coordinates
+        if joint.type in ("spherical", "free"):
+            numbers = np.concatenate([pose.d, logarithm(pose.C)])[-len(record.guess_units) :]
+        elif joint.type == "planar":  # the smallest turn chooses x and y
+            turn = node.inner.triad[:, :2].T @ joint.a.triad[:, :2]
+            numbers = np.concatenate([turn @ numbers[:2], numbers[2:]])
+        found[joint.name] = record.turned_around(numbers) if turned else numbers
+    return found

@@ -1,47 +1,12 @@
 """The tree of a scene in space against the oracle: places, coordinates, gradients, loops, both orders of sides."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from rotations import logarithm, quaternion
-from spatial_scenes import joint_table, tree_model
-from spatial_trees import TYPES, Tree, placed, random_tree
+from rotations import quaternion
+from spatial_scenes import as_scene, coordinates, tree_model
+from spatial_trees import TYPES, placed, random_tree
 
 from ffrobot.mbs.model.spatial_model import row_values
-
-UNDIRECTED = ("spherical", "weld", "free")
-
-
-def as_scene(tree, turned):
-    """The tree with triads that a scene can say: without an axis they are the axes of the first side."""
-    joints = [_along_the_first(joint, turned) if joint.type in UNDIRECTED else joint for joint in tree.joints]
-    plain = Tree(tree.bodies, joints, tree.loops, tree.poses)
-    tables = [joint_table(joint, turned) for joint in (*joints, *tree.loops)]
-    return plain, tables
-
-
-def _along_the_first(joint, turned):
-    a, b = joint.a.triad, joint.b.triad
-    if turned:
-        return replace(joint, a=replace(joint.a, triad=a @ b.T), b=replace(joint.b, triad=np.eye(3)))
-    return replace(joint, a=replace(joint.a, triad=np.eye(3)), b=replace(joint.b, triad=b @ a.T))
-
-
-def coordinates(model, tree, turned):
-    """By joint, in the order of the sides that the scene has."""
-    found = {}
-    joints = {joint.name: joint for joint in (*tree.joints, *tree.loops)}
-    for node in model.tree.nodes:
-        joint, record, pose = joints[node.joint.name], node.joint, tree.poses[node.joint.name]
-        numbers = pose.coordinates
-        if joint.type in ("spherical", "free"):
-            numbers = np.concatenate([pose.d, logarithm(pose.C)])[-len(record.guess_units) :]
-        elif joint.type == "planar":  # the smallest turn chooses x and y
-            turn = node.inner.triad[:, :2].T @ joint.a.triad[:, :2]
-            numbers = np.concatenate([turn @ numbers[:2], numbers[2:]])
-        found[joint.name] = record.turned_around(numbers) if turned else numbers
-    return found
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
