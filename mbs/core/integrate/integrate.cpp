@@ -107,7 +107,8 @@ public:
     while (report_.outputs < times_.size() && may_go_on()) {
       if (jump_ && jump_->before <= at_once()) {
         pass_jump();
-        continue;
+        if (report_.outputs == times_.size())
+          break;
       }
       steps_.next_step = std::min(steps_.next_step, duration_);
       const Attempt attempt = next_attempt();
