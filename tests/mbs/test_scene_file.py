@@ -160,7 +160,7 @@ MISTAKES = [
     ("gravity", "gravty", "gravty: expected one of the keys name, space, gravity, ", '(did you mean "gravity"?)'),
     ("[0.0, -9.81]", '"down"', 'gravity: expected a list, found "down"', ""),
     ("[0.0, -9.81]", "[0.0, nan]", "gravity[1]: expected a finite number, found ", ""),
-    ('"planar"', '"spatial"', 'space: expected "planar", found "spatial"', "not available yet"),
+    ('"planar"', '"spatial"', 'space: expected "planar", found "spatial"', "`ffrobot solve`"),
     ('"planar"', '"plane"', 'space: expected "planar" or "spatial", found "plane"', '"planar"?'),
     ("[[payload]]", "[[paylod]]", "paylod: expected one of the keys", '(did you mean "payload"?)'),
     ("[initial]", "[[initial]]", "initial: expected a table, found [", ""),
