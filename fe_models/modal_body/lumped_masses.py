@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -63,22 +64,27 @@ def lumps(records: Iterable[InterfaceRecord], interfaces: Mapping[str, Interface
 def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invariants:
     """The integrals (meaning and shapes as in `ModalBody`) of the link together with what is attached to it."""
     for lump in attached:
-        m, E, x = lump.mass, lump.spread, lump.at.position
-        Phi, phi = lump.at.translation, lump.at.rotation
-        # (φ × ξ)_k = turn[k, b] ξ_b, each (n,).
-        turn = np.einsum("kab,an->kbn", LEVI_CIVITA, phi)
-        integrals = replace(
-            integrals,
-            mass=integrals.mass + m,
-            first_moment=integrals.first_moment + m * x,
-            second_moment=integrals.second_moment + m * np.outer(x, x) + E,
-            S_bar=integrals.S_bar + m * Phi,
-            I_bar=integrals.I_bar + m * np.einsum("k,ln->kln", x, Phi) + np.einsum("kb,lbn->kln", E, turn),
-            S_bar_kl=integrals.S_bar_kl
-            + m * np.einsum("km,ln->klmn", Phi, Phi)
-            + np.einsum("kbm,bd,ldn->klmn", turn, E, turn),
-        )
+        at = lump.at
+        added = attached_integrals(lump.mass, at.position, lump.spread, at.translation, at.rotation)
+        integrals = replace(integrals, **{key: getattr(integrals, key) + more for key, more in added.items()})
     return integrals
+
+
+def attached_integrals(m: float, x: Array, E: Array, Phi: Array, phi: Array) -> dict[str, Any]:
+    """What a rigid mass adds to the integrals of these names.
+
+    It is m (kg) with its center at x (3,) and E = ∫ρ ξ ξᵀ dV about it. The center moves by Φ p, its points by (φ p) × ξ
+    more; Φ and φ are (3, n).
+    """
+    turn = np.einsum("kab,an->kbn", LEVI_CIVITA, phi)  # (φ × ξ)_k = turn[k, b] ξ_b, each (n,)
+    return {
+        "mass": m,
+        "first_moment": m * x,
+        "second_moment": m * np.outer(x, x) + E,
+        "S_bar": m * Phi,
+        "I_bar": m * np.einsum("k,ln->kln", x, Phi) + np.einsum("kb,lbn->kln", E, turn),
+        "S_bar_kl": m * np.einsum("km,ln->klmn", Phi, Phi) + np.einsum("kbm,bd,ldn->klmn", turn, E, turn),
+    }
 
 
 def with_lumped_loads(of_loads: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:

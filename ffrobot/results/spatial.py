@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from ..common.checksum import MARK, METHOD, sealed
+from ..common.checksum import sealed
 from ..common.files import write_atomically
-from ..common.version import program_version
 from ..run.spatial import SpatialResult, SpatialSolution
-from .file import FORMAT
-from .write import FORMAT_VERSION
+from .write import write_head
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -23,21 +20,9 @@ def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
 
 def _image(solution: SpatialSolution) -> bytes:
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = FORMAT_VERSION
-        file.attrs[MARK] = METHOD
-        file.attrs["ffrobot_version"] = program_version()
-        file.attrs["name"] = solution.scene.name
+        write_head(file, solution.scene.name, solution.scene.text, solution.bodies)
         file.attrs["space"] = "spatial"
-        file.attrs["scene"] = solution.scene.text
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
-        file.attrs["modal_bodies"] = json.dumps(
-            {
-                name: {"path": str(body.path.absolute()), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
-                for name, body in solution.bodies.items()
-                if body.modal is not None and body.path is not None
-            }
-        )
         for name, result in solution.analyses.items():
             _write_analysis(file.create_group(name), result)
         file.flush()

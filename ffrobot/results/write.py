@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..common.files import write_atomically
 from ..common.version import program_version
 from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Details, Outcome
+from ..run.loaded_body import Loaded
 from ..run.solution import AnalysisResult, Solution
 from .actuators import write_actuators, write_placement
 from .bodies import write_bending, write_motion, write_stress
@@ -45,15 +46,9 @@ def write_results(solution: Solution, path: Path) -> None:
 def results_image(solution: Solution) -> bytes:
     """The content of the results file of a solution."""
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = FORMAT_VERSION
-        file.attrs[MARK] = METHOD
-        file.attrs["ffrobot_version"] = program_version()
-        file.attrs["name"] = solution.scene.name
-        file.attrs["scene"] = solution.scene.text
+        write_head(file, solution.scene.name, solution.scene.text, solution.bodies)
         file.attrs["skipped"] = list(solution.omissions)
         file.attrs["geometric_stiffening"] = solution.stiffened
-        file.attrs["modal_bodies"] = json.dumps(_modal_files(solution))
         for name, result in solution.analyses.items():
             _write_analysis(file.create_group(name), solution, result)
         write_state(file, solution)
@@ -62,13 +57,20 @@ def results_image(solution: Solution) -> bytes:
     return image
 
 
-def _modal_files(solution: Solution) -> dict[str, dict[str, str]]:
-    """Path and hashes of the modal body file behind each flexible body."""
-    return {
+def write_head(file: h5py.File, name: str, text: str, bodies: Mapping[str, Loaded]) -> None:
+    """What every results file says of itself, of the scene `name` with its `text`, and of the modal bodies' files."""
+    file.attrs["format"] = FORMAT
+    file.attrs["format_version"] = FORMAT_VERSION
+    file.attrs[MARK] = METHOD
+    file.attrs["ffrobot_version"] = program_version()
+    file.attrs["name"] = name
+    file.attrs["scene"] = text
+    files = {
         name: {"path": str(body.path.absolute()), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
-        for name, body in solution.bodies.items()
+        for name, body in bodies.items()
         if body.modal is not None and body.path is not None
     }
+    file.attrs["modal_bodies"] = json.dumps(files)
 
 
 def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:

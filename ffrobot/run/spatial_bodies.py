@@ -2,39 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from ..common.errors import InputError
-from ..common.validation import did_you_mean, quoted
 from ..fe_models.link_records import FAMILIES
-from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_modal_body
-from ..mbs.fields.field_types import split_point
 from ..mbs.model.spatial_body import SpatialBody, from_modal_body, rigid_body
 from ..mbs.model.spatial_masses import with_payload
 from ..mbs.scene.spatial.bodies import BodyInSpace, tensor
 from ..scene.spatial import SpatialScene
+from .loaded_body import Loaded, payloads_on
 
 
-@dataclass(frozen=True)
-class LoadedSpatialBody:
-    """A body of the scene: its modal body and file (None where rigid) and its equations in space."""
+@dataclass(frozen=True, kw_only=True)
+class LoadedSpatialBody(Loaded):
+    """A body of the scene with its equations in space."""
 
     spatial: SpatialBody
-    modal: ModalBody | None
-    path: Path | None
-    computed: bool = False
-    reused: str = ""
-
-    @property
-    def file_hash(self) -> str:
-        """SHA-256 of the modal body file; empty where rigid."""
-        return hashlib.sha256(self.path.read_bytes()).hexdigest() if self.path else ""
 
     @property
     def rigid_in(self) -> tuple[str, ...]:
@@ -54,28 +40,22 @@ def _loaded(body: BodyInSpace, stage: Callable[[str], None]) -> LoadedSpatialBod
         rigid = body.rigid
         points = {name: np.array(position) for name, position in rigid.points.items()}
         made = rigid_body(body.name, rigid.mass, np.array(rigid.center), tensor(rigid.inertia), points)
-        return LoadedSpatialBody(made, None, None)
+        return LoadedSpatialBody(spatial=made)
     if body.modal is not None:
         modal = read_modal_body(body.modal)
-        return LoadedSpatialBody(from_modal_body(body.name, modal), modal, body.modal)
+        return LoadedSpatialBody(spatial=from_modal_body(body.name, modal), modal=modal, path=body.modal)
     from ..fe_models.link import cached_modal_body
 
     assert body.link is not None
     outcome = cached_modal_body(body.link, stage)
-    spatial = from_modal_body(body.name, outcome.body)
-    return LoadedSpatialBody(spatial, outcome.body, outcome.path, outcome.computed, outcome.reused)
+    return LoadedSpatialBody(
+        spatial=from_modal_body(body.name, outcome.body),
+        modal=outcome.body, path=outcome.path, computed=outcome.computed, reused=outcome.reused,
+    )  # fmt: skip
 
 
 def _with_payloads(scene: SpatialScene, body: LoadedSpatialBody) -> LoadedSpatialBody:
     spatial = body.spatial
-    for payload in scene.payload:
-        name, point = split_point(payload.point)
-        if name != spatial.name:
-            continue
-        if point not in spatial.points:
-            raise InputError(
-                f'{scene.path}: payload: point: expected a point of "{name}" ({quoted(spatial.points)}), found'
-                f' "{payload.point}"{did_you_mean(point, spatial.points)}'
-            )
+    for point, payload in payloads_on(scene.payload, spatial.name, spatial.points, scene.path):
         spatial = with_payload(spatial, point, payload.mass, np.array(payload.center), tensor(payload.inertia))
     return replace(body, spatial=spatial)

@@ -1,0 +1,52 @@
+"""What is loaded of a body of a scene, in the plane and in space: its modal body, and the payloads on it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from ..common.errors import InputError
+from ..common.validation import did_you_mean, quoted
+from ..fe_models.modal_body import ModalBody
+from ..mbs.fields.field_types import split_point
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loaded:
+    """The modal body and its file (None where the body is rigid), and whether stage 1 ran for it."""
+
+    modal: ModalBody | None = None
+    path: Path | None = None
+    computed: bool = False
+    reused: str = ""
+
+    @property
+    def file_hash(self) -> str:
+        """SHA-256 of the modal body file; empty where rigid."""
+        return hashlib.sha256(self.path.read_bytes()).hexdigest() if self.path else ""
+
+
+class _OnPoint(Protocol):
+    @property
+    def point(self) -> str:
+        """Where it sits, "BODY.POINT"."""
+
+
+P = TypeVar("P", bound=_OnPoint)
+
+
+def payloads_on(payloads: Iterable[P], body: str, points: Collection[str], scene: Path) -> Iterator[tuple[str, P]]:
+    """The payloads of a body with the names of their points. Raises `InputError` for a point that it does not have."""
+    for payload in payloads:
+        name, point = split_point(payload.point)
+        if name != body:
+            continue
+        if point not in points:
+            raise InputError(
+                f'{scene}: payload: point: expected a point of "{name}" ({quoted(points)}), found'
+                f' "{payload.point}"{did_you_mean(point, points)}'
+            )
+        yield point, payload
