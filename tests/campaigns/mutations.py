@@ -3,9 +3,9 @@
     python tests/campaigns/mutations.py [--count 100] [--seed 0] [--case NAME …] [--folder FOLDER] [--record]
 
 Run by hand, about half a second each. Every scene is cut short, and its scene, link or figure file changed in one
-place: values of other types, huge, tiny, not finite, empty, nested, with markup and line breaks, keys removed, added, doubled,
-damage to the text. Keys take turns, values are drawn. The command runs in a process forked from this one, with limits
-of time and memory, and after `solve` the commands that read its results. Exit code 1 where anything fell over: a
+place: values of other types, huge, tiny, not finite, empty, nested, with markup and line breaks, keys removed, added,
+doubled, damage to the text. Keys take turns, values are drawn. The command runs in a process forked from this one, with
+limits of time and memory, and after `solve` the commands that read its results. Exit code 1 where anything fell over: a
 traceback, a crash, no end within a minute of processor time, a message that names no file, other words on stderr.
 """
 
