@@ -124,9 +124,9 @@ def test_frequencies_of_held_and_free_motors(write, tmp_path):
     free = RobotTarget(scene, "free").modes({})[1]
     # twenty cubic elements: (βh)⁴/1440 = 1.7e-5 of the third frequency
     np.testing.assert_allclose(held[:3], spring_beam(1e12, 3), rtol=2e-5)
-    np.testing.assert_allclose(
-        free[:3], spring_beam(0.0, 3), rtol=1e-3
-    )  # four modes of the cantilever, two static ones
+    # six shapes of a cantilever: those of a pinned beam lie below (Rayleigh and Ritz), the first two close
+    assert np.all(free[:3] >= spring_beam(0.0, 3))
+    np.testing.assert_allclose(free[:2], spring_beam(0.0, 2), rtol=5e-4)
 
 
 def test_links_of_a_scene_get_files_of_their_own(write, tmp_path):
