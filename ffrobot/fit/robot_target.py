@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.linear_model import LinearModel
-from ..actuation.control.modes import robot_modes
+from ..actuation.control.modes import held_frequencies, robot_modes
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
@@ -21,7 +19,6 @@ from .link_target import fitted_name
 from .toml_edit import Key, with_values
 
 ANALYSIS = {"name": "fit", "kind": "linear"}
-RIGID = 1e-6  # of the highest frequency: below it a mode has no stiffness
 
 
 class RobotTarget:
@@ -92,12 +89,3 @@ def _link_of(scene: Mapping[str, Any], body: str) -> str:
 def _free(model: LinearModel) -> Array:
     found = robot_modes(model).frequency
     return as_floats(found[found > 0.0])
-
-
-def held_frequencies(model: LinearModel) -> Array:
-    """Undamped frequencies, Hz, with the shafts of all motors held: of N_Bᵀ K̂ N_B, where Bᵀ N_B = 0."""
-    K, _, B, _ = model.second_order
-    columns = B[:, [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]]
-    N = np.linalg.qr(columns, mode="complete")[0][:, columns.shape[1] :]
-    omega = np.sqrt(np.linalg.eigvalsh(N.T @ (K + K.T) @ N / 2).clip(min=0.0))
-    return as_floats(omega[omega > RIGID * omega.max(initial=0.0)] / (2 * np.pi))
