@@ -19,7 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .api import load_scene, make_link, plot_results, read_modal_body, solve, view_file, write_report
+    from .api import fit_measured, load_scene, make_link, plot_results, read_modal_body, solve, view_file, write_report
     from .common.errors import FfrobotError, FfrobotWarning, InputError, SolveError
     from .fe_models.modal_body import ModalBody
     from .results.file import Results
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
+    "fit_measured": ".api",
     "load_scene": ".api",
     "make_link": ".api",
     "plot_results": ".api",
@@ -57,6 +58,7 @@ __all__ = [
     "Scene",
     "SolveError",
     "Watcher",
+    "fit_measured",
     "load_scene",
     "make_link",
     "make_scene",

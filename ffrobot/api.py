@@ -7,11 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
+    from .fit import Fit
     from .results.file import Results
     from .run.solution import Solution
     from .run.watcher import Watcher
@@ -97,6 +98,22 @@ def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, 
 
     source = LinkTable(plain(link), Path("<link made in Python>")) if isinstance(link, Mapping) else Path(link)
     return make_link(source, None if output is None else Path(output), force)
+
+
+def fit_measured(
+    file: AnyPath,
+    measured: AnyPath,
+    vary: Sequence[str],
+    output: AnyPath | None = None,
+    *,
+    motors: Literal["free", "held"] | None = None,
+    force: bool = False,
+) -> Fit:
+    """Fit keys of a link or a scene file to measured natural frequencies: `ffrobot fit`. See `fit.fitting`."""
+    from .fit import fit_measured
+
+    where = None if output is None else Path(output)
+    return fit_measured(Path(file), Path(measured), vary, where, motors=motors, force=force)
 
 
 def read_modal_body(path: AnyPath) -> ModalBody:

@@ -103,6 +103,31 @@ class StressPoint:
 
 
 @dataclass(frozen=True, eq=False)
+class MeasuredValues:
+    """Which values of the modes were measured, and what the finite element model says in the place of frequencies.
+
+    Attributes:
+        frequency: (n,) 1 of modes whose `ModalBody.frequency` was measured, else 0.
+        damping_ratio: (n,) likewise, of `ModalBody.damping_ratio`.
+        computed_frequency: (n,) in Hz, of the finite element model.
+    """
+
+    frequency: Integers
+    damping_ratio: Integers
+    computed_frequency: Array
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+    def in_words(self) -> str:
+        """Which modes they are, counted from 1."""
+        found = {"frequencies": self.frequency, "damping ratios": self.damping_ratio}
+        numbers = {what: np.flatnonzero(flags) + 1 for what, flags in found.items()}
+        parts = [f"{what} of modes {', '.join(map(str, of))}" for what, of in numbers.items() if len(of)]
+        return " and ".join(parts)
+
+
+@dataclass(frozen=True, eq=False)
 class OutlinedPatches:
     """Piezoelectric patches whose outlines are edges of the mesh, on the faces at largest (top) and smallest y.
 

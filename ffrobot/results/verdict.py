@@ -40,6 +40,7 @@ class AnalysisVerdict:
         patches: by body, of an inverse analysis.
         deflection: largest of a point, m, which, and when.
         stress: largest von Mises, Pa, the body, and when; None where none was asked for.
+        margins: of a closed loop by its linear model, in words; empty where not known.
         warnings: why results may be wrong, or not mean what they seem to.
         advice: what to try next, a text each.
     """
@@ -55,6 +56,7 @@ class AnalysisVerdict:
     patches: Mapping[str, PatchNeed]
     deflection: Place | None
     stress: Place | None
+    margins: str
     warnings: tuple[str, ...]
     advice: tuple[str, ...]
 
@@ -68,6 +70,8 @@ class AnalysisVerdict:
             yield f"  largest deflection {_place(1e3 * self.deflection[0], 'mm', *self.deflection[1:])}"
         if self.stress is not None:
             yield f"  largest stress {_place(self.stress[0] / 1e6, 'MPa', *self.stress[1:])} (von Mises)"
+        if self.margins:
+            yield f"  {self.margins}"
         yield from (f"  to try: {text}" for text in self.advice)
 
     @property
@@ -123,6 +127,7 @@ def _judge(name: str, group: h5py.Group, joints: Sequence[Mapping[str, str | flo
         patches=patches,
         deflection=None if _ended_early(group) else _deflection(group),
         stress=None if _ended_early(group) else _stress(group),
+        margins=_margins(group),
         warnings=tuple(map(str, about.get("warnings", ()))),
         advice=tuple(_advice(group, motors, units, patches)),
     )
@@ -242,8 +247,31 @@ def _advice(
             )
     if asked and read_unsupplied(group["feasibility"]) is not None:
         yield 'kind = "motors-only", or patches ([[pzt]]) on the links'
-    if "control" in group and group["control"].attrs["verdict"] != "stable":
-        yield "smaller gains, a shorter sample_time, or rotor_inertia in the joints"
+    if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
+        yield text
+    if "control" in group:
+        about = group["control"].attrs
+        general = ("smaller gains, a shorter sample_time, or rotor_inertia in the joints",)
+        yield from (
+            map(str, about.get("advice", ()))
+            if len(about.get("advice", ()))
+            else (general if about["verdict"] != "stable" else ())
+        )
+
+
+def _margins(group: h5py.Group) -> str:
+    """Of a closed loop of joint PID controllers."""
+    about = group["control"].attrs if "control" in group else {}
+    if "gain_margin" not in about:
+        return ""
+    if about["delay_margin"] == 0.0:
+        return f"margins (linear model): none, spectral radius of the sampled loop {about['spectral_radius']:.6g}"
+    gain, delay = float(about["gain_margin"]), float(about["delay_margin"])
+    texts = (
+        f"gains may grow {gain:.3g}-fold" if np.isfinite(gain) else "gains may grow as they like",
+        f"the delay by {1e3 * delay:.3g} ms" if np.isfinite(delay) else "the delay by 50 sample times or more",
+    )
+    return f"margins (linear model): {', '.join(texts)}"
 
 
 def _motor(motor: MotorFeasibility, unit: str) -> str:

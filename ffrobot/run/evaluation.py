@@ -50,7 +50,7 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
         mode_error=mode_error(outcome.computed) if outcome.analysis.is_integrated else None,
         start_jolt=start_jolt(outcome.computed) if outcome.analysis.is_integrated else 0.0,
     )
-    result = replace(result, warnings=tuple(warnings_of(result)))
+    result = replace(result, warnings=tuple(warnings_of(solution.scene, result)))
     return replace(result, seconds=result.seconds + time.perf_counter() - began)
 
 
