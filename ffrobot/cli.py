@@ -245,7 +245,6 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
-    _planar(*results_files)
     with reading(*results_files):
         write_report(results_files, path)
     click.echo(path)

@@ -280,7 +280,7 @@ class Results:
         from .verdict import judge
 
         with blaming(self.path):
-            return judge(self._file, self.analyses, self.scene.get("joint", []))
+            return judge(self._file, self.analyses, self.scene)
 
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`.

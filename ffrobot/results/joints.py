@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..common.arrays import Array
 from ..mbs.joints.joint import JointKeys
 from ..mbs.joints.joints import JOINT_TYPES
 from ..mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
@@ -31,6 +32,10 @@ class Coordinate(NamedTuple):
     column: str
     unit: str
     limits: MotorLimits
+
+    def of(self, values: Array) -> Array:
+        """Its own (T,) of `values` of a dataset of its joint, (T,) or (T, coordinates)."""
+        return values.reshape(len(values), -1)[:, int(self.column[1:-1] or 0)]
 
     @property
     def force_unit(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +91,7 @@ def spatial_motions(results: Results, analysis: str, frames: Indices) -> tuple[l
     return bodies, [shift[body.name] for body in bodies]
 
 
-def section_axes(bodies: list[SpatialBodyMotion], side: str, outputs: int) -> Array:
+def section_axes(bodies: Sequence[SpatialBodyMotion], side: str, outputs: int) -> Array:
     """(T, 3, 3) the axes of the section on a `side` of a joint, "BODY.POINT"; of the ground the global ones."""
     for body in bodies:
         if side in body.point_names:

@@ -8,10 +8,14 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
+from ...common.rotations import smallest_turn
 from ...fe_models.modal_body import ModalBody
 from ...results.file import Results
 from ..body_surface import body_surface
 from .motion import SpatialBodyMotion, placed, turned
+
+SIDES = 8  # of bars that stand for lines
+OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,36 @@ def point_shape(body: SpatialBodyMotion) -> Shape:
     shapes = np.eye(3 * k).reshape(k, 3, 3 * k)
     cells = shortest_tree(body.points) if k > 1 else np.zeros((k, 1), dtype=np.int64)
     return Shape(body.points, shapes, body.deflection.reshape(len(body.position), 3 * k), cells)
+
+
+def thickened(shape: Shape, radius: float) -> Shape:
+    """Lines as bars of `radius` (m) with `SIDES` sides, in triangles; single points as octahedra."""
+    if shape.cells.shape[1] > 2:
+        return shape
+    if shape.cells.shape[1] == 1:
+        offsets = 2 * radius * np.concatenate([np.eye(3), -np.eye(3)])
+        return Shape(shape.points + offsets, np.repeat(shape.shapes, 6, axis=0), shape.coordinates, OCTAHEDRON)
+    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    points, ends, triangles, count = [], [], [], 0
+    for first, last in shape.cells:
+        across = smallest_turn(shape.points[last] - shape.points[first])[:, :2]
+        ring = radius * (np.outer(np.cos(angle), across[:, 0]) + np.outer(np.sin(angle), across[:, 1]))
+        points += [shape.points[first] + ring, shape.points[last] + ring]
+        ends += [np.full(SIDES, first), np.full(SIDES, last)]
+        triangles.append(_bar() + count)
+        count += 2 * SIDES
+    at = np.concatenate(ends)
+    return Shape(np.concatenate(points), shape.shapes[at], shape.coordinates, np.concatenate(triangles))
+
+
+def _bar() -> Integers:
+    """(t, 3) between a ring of `SIDES` points and the next, with caps."""
+    k = np.arange(SIDES)
+    after = (k + 1) % SIDES
+    sides = np.concatenate([np.stack([k, after, SIDES + after], 1), np.stack([k, SIDES + after, SIDES + k], 1)])
+    fan = np.stack([np.zeros(SIDES - 2, dtype=np.int64), k[1:-1], k[2:]], axis=1)
+    found: Integers = np.concatenate([sides, fan[:, ::-1], SIDES + fan]).astype(np.int64)
+    return found
 
 
 def shortest_tree(points: Array) -> Integers:
