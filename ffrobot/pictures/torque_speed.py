@@ -31,8 +31,9 @@ def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
     In all four quadrants; the curve of the power goes as far as the data, `speed` and `moment` at most, ask for. Empty
     without limits.
     """
-    speed_end = min(limits.speed, MARGIN * max(speed, limits.power / limits.moment, 1e-300))
-    moment_end = min(limits.moment, MARGIN * max(moment, limits.power / speed_end, 1e-300))
+    power = limits.power if np.isfinite(limits.power) else 0.0  # without that limit nothing asks for more than the data
+    speed_end = min(limits.speed, MARGIN * max(speed, power / limits.moment, 1e-300))
+    moment_end = min(limits.moment, MARGIN * max(moment, power / speed_end, 1e-300))
     pieces = []
     if np.isfinite(limits.moment):
         pieces.append(np.array([[0.0, limits.moment], [min(speed_end, limits.power / limits.moment), limits.moment]]))

@@ -54,11 +54,6 @@ def status_in_words(attributes: Mapping[str, Any]) -> str:
     return f"{status}, {count} warning{'s' if count > 1 else ''}" if count else str(status)
 
 
-def is_spatial(scene: Mapping[str, Any]) -> bool:
-    """Whether a scene, as TOML has it, is one in space."""
-    return bool(scene.get("space") == "spatial")
-
-
 def refuse_spatial(path: Path) -> None:
     """Raise `InputError` where the file at `path` holds results of a scene in space; others are judged elsewhere."""
     try:
@@ -186,6 +181,8 @@ class Results:
     @property
     def is_spatial(self) -> bool:
         """Whether they are of a scene in space."""
+        from .joints import is_spatial
+
         return is_spatial(self.scene)
 
     @property

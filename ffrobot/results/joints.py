@@ -12,10 +12,14 @@ from ..mbs.joints.joint import JointKeys
 from ..mbs.joints.joints import JOINT_TYPES
 from ..mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
 from ..mbs.joints.transmission import MotorLimits
-from .file import is_spatial
 
 Scene = Mapping[str, Any]
 """A scene file as TOML has it."""
+
+
+def is_spatial(scene: Scene) -> bool:
+    """Whether the scene is one in space."""
+    return bool(scene.get("space") == "spatial")
 
 
 class Coordinate(NamedTuple):
