@@ -203,7 +203,6 @@ def plot(file: Path, output: Path | None, formats: str, only: tuple[str, ...]) -
     from .common.hdf5 import reading
     from .pictures.figures.plot import plot_file
 
-    _planar(file)
     with reading(file):
         paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","), only)
     for path in paths:
@@ -226,7 +225,6 @@ def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN4
     from .common.hdf5 import reading
     from .pictures.view import Options, view_file
 
-    _planar(file)
     with reading(file):
         viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
     for path in viewed.paths:
@@ -247,7 +245,6 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
-    _planar(*results_files)
     with reading(*results_files):
         write_report(results_files, path)
     click.echo(path)

@@ -43,6 +43,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
         group[f"trajectories/{trajectory.name}/force"] = motion.path_force(trajectory.name)
         entry = group[f"trajectories/{trajectory.name}"]
         entry.attrs["components"] = list(trajectory.components)
+        functions = trajectory.components.values()
+        entry["target"] = np.stack([function.sample(run.time)[0] for function in functions] or [run.time[:0]], axis=1)
     for key, values in zip(("kinetic", "strain", "gravitational"), run.energy.T, strict=True):
         group[f"energy/{key}"] = values
     violation = group.create_dataset("constraint_violation", data=run.violation)

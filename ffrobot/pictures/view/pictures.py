@@ -15,7 +15,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from ..body_surface import drawn_mode
-from ..projection import RIGHT, UP, VIEWER
+from ..projection import LINK, SPACE, View
 
 SECONDS = 300.0  # after which a machine that cannot draw is given up
 SIZE = (1400, 800)  # pixels
@@ -43,6 +43,7 @@ class Picture:
         step: of the grid's time steps.
         scale: of deflections; None for a modal body, whose modes are drawn.
         length: of a modal body, in m.
+        in_space: whether z goes up, as in scenes in space.
     """
 
     title: str
@@ -51,6 +52,7 @@ class Picture:
     step: int = 0
     scale: float | None = None
     length: float = 0.0
+    in_space: bool = False
 
 
 def draw_pictures(pictures: Sequence[Picture]) -> None:
@@ -99,7 +101,7 @@ def _snapshot(picture: Picture, scale: float) -> Any:  # noqa: ANN401 (PyVista's
     if scale != 1.0:
         _add_outline(plotter, grid)
     _add(plotter, shown, "deflection (mm)", BAR)
-    _finish(plotter, picture.title, shown.points)
+    _finish(plotter, picture.title, shown.points, SPACE if picture.in_space else LINK)
     return plotter
 
 
@@ -119,7 +121,7 @@ def _modes(picture: Picture) -> Any:  # noqa: ANN401
         shown["size"] = size
         _add_outline(plotter, grid)
         _add(plotter, shown, "size", None)
-        _finish(plotter, name, shown.points)
+        _finish(plotter, name, shown.points, LINK)
     return plotter
 
 
@@ -148,14 +150,14 @@ def _add_outline(plotter: Any, grid: Any) -> None:  # noqa: ANN401
     plotter.add_mesh(edges if edges.n_points else grid, style="wireframe", color=GHOST, line_width=1)
 
 
-def _finish(plotter: Any, title: str, points: Array) -> None:  # noqa: ANN401
-    """Title, directions, and the view of the other pictures of links: x to the right, y up, from the front."""
+def _finish(plotter: Any, title: str, points: Array, view: View) -> None:  # noqa: ANN401
+    """Title, directions, and the view of the other pictures."""
     plotter.set_background("white")
     plotter.add_text(title, font_size=9, color="black", position="upper_left")
     plotter.add_axes(color="black")
     plotter.enable_parallel_projection()
-    plotter.view_vector(VIEWER, UP)
-    across, up = np.ptp(points @ RIGHT), np.ptp(points @ UP)
+    plotter.view_vector(view.viewer, view.up)
+    across, up = np.ptp(points @ view.right), np.ptp(points @ view.up)
     width, height = plotter.renderer.GetSize()
     plotter.camera.parallel_scale = 0.5 * MARGIN * max(up, across * height / width)
     plotter.enable_anti_aliasing("ssaa")

@@ -15,10 +15,11 @@ from ...common.files import check_folder, write_atomically
 from ...common.validation import did_you_mean
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
-from ..figures.standard import file_name
+from ..figures.shared import file_name
 from ..motion import visible_exaggeration
 from .grids import modes_grid, results_grid
 from .pictures import Picture, draw_pictures
+from .spatial_grids import spatial_results_grid
 from .vtkhdf import Grid, vtkhdf_image
 from .xdmf import xdmf_text
 
@@ -92,8 +93,10 @@ def _modal_body(path: Path) -> Iterator[View]:
 def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
     with Results(path) as results:
         for analysis in _analyses(results, options.analysis):
-            grid = results_grid(results, analysis, _frames(results, analysis, options.frames), notes)
-            yield file_name(analysis), grid, _snapshot(f"{results.name}: {analysis}", grid, options)
+            grid_of = spatial_results_grid if results.is_spatial else results_grid
+            grid = grid_of(results, analysis, _frames(results, analysis, options.frames), notes)
+            picture = _snapshot(f"{results.name}: {analysis}", grid, options)
+            yield file_name(analysis), grid, replace(picture, in_space=results.is_spatial)
 
 
 def _analyses(results: Results, wanted: str | None) -> Sequence[str]:
