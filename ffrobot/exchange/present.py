@@ -7,6 +7,7 @@ from pathlib import Path
 from rich.console import Console
 
 from ..present.tables import plain_table
+from .export import Exported
 from .urdf.import_urdf import Imported
 
 UNITS = {"revolute": "rad", "prismatic": "m"}
@@ -38,6 +39,13 @@ def print_import(imported: Imported, console: Console) -> None:
     for remark in imported.remarks:
         console.print(f"note       {remark}", highlight=False, soft_wrap=True, markup=False)
     _print_files(imported.files, console)
+
+
+def print_export(exported: Exported, console: Console) -> None:
+    """What was written, and what the format does not carry."""
+    for remark in exported.remarks:
+        console.print(f"note       {remark}", highlight=False, soft_wrap=True, markup=False)
+    console.print(f"written    {exported.path}: {exported.what}", highlight=False, soft_wrap=True, markup=False)
 
 
 def _print_masses(imported: Imported, console: Console) -> None:
