@@ -31,6 +31,9 @@ UNAVAILABLE = {
     "load": ("pzt", "voltage", "force"),
 }
 
+# Keys of joints that are refused unless they are zero.
+UNAVAILABLE_JOINT_KEYS = ("rotor_inertia", "viscous_friction", "coulomb_friction")
+
 
 class SpatialSceneKeys(SpatialMechanismKeys):
     """Everything a scene file in space may contain."""
@@ -151,7 +154,7 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f'{joint.label}: stiffness: expected none in space = "spatial", found it: not available there yet'
         if not joint.units and getattr(joint, "motor", False):
             yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
-        for key in ("rotor_inertia", "viscous_friction", "coulomb_friction"):
+        for key in UNAVAILABLE_JOINT_KEYS:
             if getattr(joint, key, 0.0):
                 yield f'{joint.label}: {key}: expected none in space = "spatial", found it: not available there yet'
     for trajectory in scene.trajectory:
