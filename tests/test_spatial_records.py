@@ -219,13 +219,9 @@ MISTAKES = {
         add("load", joint="wrist", moment="1.0"),
         'load no. 2: joint: expected one with a single coordinate, found "wrist", a universal',
     ),
-    "orientation, which is not there yet": (
-        put("trajectory", rpy=["0", "0", "t"]),
-        'trajectory "tool": expected x, y, z or a joint, found an orientation, which is not available yet',
-    ),
-    "load on a point, which is not there yet": (
-        add("load", point="hand.tip", mz="0.1*t"),
-        "load no. 2: point: expected a load on a joint, found a point, which is not available in space yet",
+    "rotor, which is not there yet": (
+        put("joint", rotor_inertia=1e-4),
+        'joint "waist": rotor_inertia: expected none in',
     ),
     "integrator that is not there yet": (
         put("analysis", integrator="radau"),

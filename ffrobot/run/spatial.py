@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from ..mbs.analysis.spatial_pcid import SpatialRun, run_spatial_pcid
@@ -68,7 +69,9 @@ def solve_spatial(path: Path, watcher: Watcher) -> SpatialSolution:
         assert isinstance(analysis, IntegratedAnalysis)
         watcher.stage(analysis.name)
         began = time.perf_counter()
-        run = run_spatial_pcid(model, analysis)  # the only kind there is yet: see scene.spatial.AVAILABLE_KINDS
+        run = run_spatial_pcid(
+            model, analysis, partial(watcher.advance, end=analysis.last_time)
+        )  # the only kind there is yet: see scene.spatial.AVAILABLE_KINDS
         motion = SpatialMotion(model, run.time, run.q, run.v, run.a, run.multipliers)
         analyses[analysis.name] = SpatialResult(run, motion, reactions(motion, run.frames))
         seconds[analysis.name] = time.perf_counter() - began

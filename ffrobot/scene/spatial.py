@@ -157,16 +157,9 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f'{joint.label}: stiffness: expected none in space = "spatial", found it: not available there yet'
         if not joint.units and getattr(joint, "motor", False):
             yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
-        for key in ("rotor_inertia", "viscous_friction", "coulomb_friction"):
-            if getattr(joint, key, 0.0):
-                yield f'{joint.label}: {key}: expected none in space = "spatial", found it: not available there yet'
-    for trajectory in scene.trajectory:
-        if trajectory.orientation is not None:
-            label = f'trajectory "{trajectory.name}"'
-            yield f"{label}: expected x, y, z or a joint, found an orientation, which is not available yet"
+        if getattr(joint, "rotor_inertia", 0.0):
+            yield f'{joint.label}: rotor_inertia: expected none in space = "spatial", found it: not available there yet'
     for k, load in enumerate(scene.load, 1):
-        if load.point is not None:
-            yield f"load no. {k}: point: expected a load on a joint, found a point, which is not available in space yet"
         loaded = next((joint for joint in scene.joint if joint.name == load.joint), None)
         if loaded is not None and len(loaded.units) != 1:
             yield f'load no. {k}: joint: expected one with a single coordinate, found "{loaded.name}", a {loaded.type}'

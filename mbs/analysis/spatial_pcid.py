@@ -17,7 +17,7 @@ from ..scene.analysis import IntegratedAnalysis
 from ..solve.integrators import METHODS
 from ..solve.spatial_posture import check_path, undeformed_posture
 from ..solve.spatial_statics import static_equilibrium
-from .drive import STATUS
+from .drive import STATUS, Progress
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class SpatialRun:
             )
 
 
-def run_spatial_pcid(model: SpatialModel, analysis: IntegratedAnalysis) -> SpatialRun:
-    """C_m and C_s hold, p is free.
+def run_spatial_pcid(model: SpatialModel, analysis: IntegratedAnalysis, progress: Progress) -> SpatialRun:
+    """C_m and C_s hold, p is free. Where `progress` ends it, what there is is kept.
 
     Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to start
     from.
@@ -83,37 +83,18 @@ def run_spatial_pcid(model: SpatialModel, analysis: IntegratedAnalysis) -> Spati
         methods=[(METHODS[integrator], 1.0, 0.0)],
         spectral_radius=analysis.spectral_radius,
     )
-    (status, steps, evaluations), states, a, multipliers = _core.tree_motion(
-        system.core, system.scene, as_list(analysis.times), start.q, start.v, controls
-    )
-    q, v = (np.ascontiguousarray(part) for part in np.split(states, [model.tree.n_q], axis=1))
+    run = _core.tree_motion(system.core, system.scene, as_list(analysis.times), start.q, start.v, controls, progress)
+    q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
     times = analysis.times[: len(q)]
-    frames, energy = _observed(system, times, q, v)
+    frames = [(of_one[:, :3], of_one[:, 3:]) for of_one in np.split(run.frames, len(model.tree.nodes), axis=1)]
     return SpatialRun(
-        analysis, times, q, v, a, multipliers, frames, energy, _violation(model, times, q, v),
-        STATUS[status], integrator, steps, evaluations, time.perf_counter() - began, warnings,
+        analysis, times, q, v, run.accelerations, run.multipliers, frames, run.energy, _violation(model, times, q, v),
+        STATUS[run.status], integrator, run.steps, run.evaluations, time.perf_counter() - began, warnings,
     )  # fmt: skip
 
 
 INTEGRATORS = {"auto": "dop853", "dop853": "dop853", "dopri5": "dopri5"}
 """What scenes may ask for: methods that need no Newton matrix, which the recursion does not give yet."""
-
-
-def _observed(system: SpatialSystem, times: Array, q: Array, v: Array) -> tuple[list[tuple[Array, Array]], Array]:
-    """R̈ and α (T, 3) of each body's frame, and energies (T, 3)."""
-    bodies = len(system.model.tree.nodes)
-    R_2dot, alpha, energy = (
-        np.zeros((bodies, len(times), 3)),
-        np.zeros((bodies, len(times), 3)),
-        np.zeros((len(times), 3)),
-    )
-    for k, t in enumerate(times):
-        system.core.evaluate(q[k], v[k], system.target(float(t)), system.force(float(t)), None)
-        for number, frame in enumerate(system.core.frames(q[k], v[k])):
-            R_2dot[number, k], alpha[number, k] = frame.a, frame.alpha
-        totals = system.core.totals(q[k], v[k])
-        energy[k] = totals.kinetic, totals.strain, totals.gravitational
-    return [(R_2dot[number], alpha[number]) for number in range(bodies)], energy
 
 
 def _violation(model: SpatialModel, times: Array, q: Array, v: Array) -> Array:

@@ -20,8 +20,10 @@ SOLVED = (
     "arm3_circle_static",
     "stanford",
     "slider_crank_3d",
+    "arm5_tool_axis",
+    "arm6_static",
+    "arm6_undeformed",
 )
-TURNED = ("arm5_tool_axis", "arm6_static", "arm6_undeformed")  # paths with orientations, which are refused so far
 
 
 def write_scene(name, folder):
@@ -112,14 +114,6 @@ def test_info_and_python_read_them(solved, ffrobot):
     assert done.returncode == 0, done.stderr
     with Results(solved[1].filename) as results:
         np.testing.assert_array_equal(results["inverse/time"], solved[1]["inverse/time"])
-
-
-@pytest.mark.parametrize("name", TURNED)
-def test_orientations_are_refused_by_name(name, tmp_path, ffrobot):
-    done = ffrobot("solve", write_scene(name, tmp_path))
-    assert done.returncode == 2
-    assert 'trajectory "path": expected x, y, z or a joint, found an orientation' in done.stderr
-    assert not (tmp_path / "scene.results.h5").exists()
 
 
 def test_links_say_what_they_cannot_do(tmp_path, ffrobot):

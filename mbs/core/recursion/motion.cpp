@@ -11,14 +11,22 @@ namespace ffrobot::recursion {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+Load::Load(const VectorXd &direction, TimeFunction magnitude_) : magnitude(std::move(magnitude_)) {
+  for (Index i = 0; i < direction.size(); ++i)
+    if (direction[i] != 0)
+      along.emplace_back(static_cast<int>(i), direction[i]);
+}
+
 template <class Space>
-RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, const double *q,
-                                        const double *v)
+RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
+                                        const double *q, const double *v)
     : OdeSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
       workspace_(mechanism), measured_(mechanism), force_(VectorXd::Zero(mechanism.n_v)),
+      wrench_(VectorXd::Zero(Space::dim * static_cast<Index>(mechanism.wrenches.size()))),
       target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
       correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
       target_time_(std::numeric_limits<double>::quiet_NaN()) {
+  update_targets(t);
   keep_independent_rows(mechanism, q, v, workspace_);
   int groups = 2; // ways of joints, angles of joints
   pace_ = {1e-3, 1e-3};
@@ -49,6 +57,9 @@ template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
     return;
   for (std::size_t r = 0; r < scene_.targets.size(); ++r)
     jets_[r] = scene_.targets[r](t), target_[static_cast<Index>(r)] = jets_[r].acceleration;
+  for (const DrivenMarker &driven : scene_.driven)
+    workspace_.turning[static_cast<std::size_t>(driven.marker)] =
+        measured_.turning[static_cast<std::size_t>(driven.marker)] = driven.law(t);
   target_time_ = t;
 }
 
@@ -57,11 +68,20 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
   Forces<double> forces;
   if (!scene_.loads.empty() || !scene_.joint_forces.empty()) {
     force_.setZero();
-    for (const Load &load : scene_.loads)
-      force_ += load.magnitude(t).value * load.direction;
+    for (const Load &load : scene_.loads) {
+      const double magnitude = load.magnitude(t).value;
+      for (const auto &[i, share] : load.along)
+        force_[i] += magnitude * share;
+    }
     for (const JointForce &joint : scene_.joint_forces)
       force_[joint.v] -= joint.stiffness * (q[joint.q] - joint.rest) + joint.friction.resistance(v[joint.v]);
     forces.generalized = force_.data();
+  }
+  if (!scene_.point_loads.empty()) {
+    wrench_.setZero();
+    for (const PointLoad &load : scene_.point_loads)
+      wrench_[Space::dim * load.wrench + load.component] += load.magnitude(t).value;
+    forces.wrench = wrench_.data();
   }
   accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
 }

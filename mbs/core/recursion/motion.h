@@ -10,10 +10,24 @@
 
 namespace ffrobot::recursion {
 
-// `magnitude`(t) times `direction` (n_v), generalized forces: joint moments, modal forces of patches.
+// `magnitude`(t) times a direction in generalized forces: joint moments, modal forces of patches.
 struct Load {
-  Eigen::VectorXd direction;
+  Load(const Eigen::VectorXd &direction, TimeFunction magnitude_); // direction (n_v)
+
+  std::vector<std::pair<int, double>> along; // entries of v that it acts on
   TimeFunction magnitude;
+};
+
+// `magnitude`(t) along a component of the force (N), then the moment (N m), global axes, on a wrench of the mechanism.
+struct PointLoad {
+  int wrench = 0, component = 0;
+  TimeFunction magnitude;
+};
+
+// How a marker of the ground turns.
+struct DrivenMarker {
+  int marker = 0;
+  OrientationLaw law;
 };
 
 // Along a joint's coordinate: spring about `rest`, viscous and Coulomb friction.
@@ -27,14 +41,16 @@ struct JointForce {
 struct Scene {
   std::vector<TimeFunction> targets; // of rows: value, rate and acceleration
   std::vector<Load> loads;
+  std::vector<PointLoad> point_loads;
   std::vector<JointForce> joint_forces;
+  std::vector<DrivenMarker> driven;
 };
 
 template <class Space> class RecursiveMotion final : public OdeSystem {
 public:
-  // The mechanism and the scene must outlive this. Rows that depend on others at (q, v) are left out of the equations
-  // from there on; they are to be consistent.
-  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, const double *q, const double *v);
+  // The mechanism and the scene must outlive this. Rows that depend on others at time t and (q, v) are left out of the
+  // equations from there on; they are to be consistent.
+  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v);
 
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
@@ -51,6 +67,7 @@ public:
   double project(double t, double *q, double *v);
 
   const Workspace<Space, double> &workspace() const { return workspace_; }
+  Workspace<Space, double> &workspace() { return workspace_; }
 
 private:
   void update_targets(double t);
@@ -59,7 +76,7 @@ private:
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
   Workspace<Space, double> workspace_, measured_; // of accelerations; of rows, which must not disturb these
-  Eigen::VectorXd force_, target_, value_, rate_, correction_, state_;
+  Eigen::VectorXd force_, wrench_, target_, value_, rate_, correction_, state_;
   std::vector<Jet> jets_;
   double target_time_;
   double fastest_ = 1; // 1/s
