@@ -223,10 +223,6 @@ MISTAKES = {
         put("joint", rotor_inertia=1e-4),
         'joint "waist": rotor_inertia: expected none in',
     ),
-    "integrator that is not there yet": (
-        put("analysis", integrator="radau"),
-        'integrator: expected "auto", "dop853", "dopri5" in space = "spatial", found "radau"',
-    ),
     "nothing to follow": (lambda data: data.pop("trajectory"), r"expected at least one \\[\\[trajectory\\]\\]"),
 }
 
