@@ -17,6 +17,7 @@ from .state import State
 TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
 SINGULAR = 1e-6  # ratio of singular values below which a posture counts as singular
 NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
+MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
 MOVES = 1e-6  # share of a joint in a motion that is left free
 MOST_ITERATIONS = 60
 LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
@@ -153,6 +154,22 @@ def mobility(model: SpatialModel, q: Array) -> Mobility:
     names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
     ratio = float(values[-1] / values[0]) if len(values) and values[0] > 0 else 1.0
     return Mobility(free.shape[1], followed, ratio, tuple(dict.fromkeys(names[moving].tolist())), loop_rank)
+
+
+def told_posture(model: SpatialModel, ratio: float, t: float, q: Array) -> str:
+    """What to say of the worst posture q (n_q,) on a path, at time t, where its ratio is that; "" where it is fine."""
+    if not ratio < NEARLY_SINGULAR:
+        return ""
+    joints, is_loop = model.tree.joint_columns, model.loop_rows
+    scales, length = _scales(model)[joints], robot_size(model)
+    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows]).reshape(-1, 1)
+    J = row_values(model, q[None], np.array([t]))[1][0][:, joints] * scales / row_scales
+    free, _ = _null_space(J[is_loop])
+    least = np.abs(free @ np.linalg.svd(J[~is_loop] @ free)[2][-1])
+    names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
+    moving = quoted(dict.fromkeys(names[least > MOVING * least.max()].tolist()))
+    how = "a singular posture" if ratio < SINGULAR else f"nearly a singular posture (ratio {ratio:.1e})"
+    return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
 
 
 def _null_space(J: Array) -> tuple[Array, int]:

@@ -38,6 +38,8 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
   }
   for (const JointForce &force : scene.joint_forces)
     check_index("q of a joint's force", force.q, n_q), check_index("v of a joint's force", force.v, n_v);
+  if (scene.watch)
+    check_size("is_path", static_cast<Index>(scene.watch->is_path.size()), model.rows());
   for (const DrivenMarker &driven : scene.driven)
     check_index("marker of the ground", driven.marker, model.mechanism.ground.size());
 }
@@ -49,6 +51,8 @@ struct TreeRun {
   RowMajorMatrix states, accelerations, lambda; // (T, n_q + n_v), (T, n_v), (T, rows)
   RowMajorMatrix frames;                        // (T, 6 bodies) of each body: R_ddot of its origin, alpha
   RowMajorMatrix energy;                        // (T, 3) kinetic, strain, gravitational
+  double least_ratio = 1, singular_at = 0;      // of the scene's watch
+  VectorXd singular_posture;
 };
 
 // All that is read off the states of a run at the first `reached` of `times`
@@ -94,6 +98,8 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
         return carry_on(t);
       },
       nullptr);
+  run.least_ratio = motion.least_ratio(), run.singular_at = motion.singular_at();
+  run.singular_posture = motion.singular_posture();
   run.states.conservativeResize(static_cast<Index>(run.report.outputs), Eigen::NoChange);
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data());
   evaluate_outputs(reader, model.mechanism, times, run);
@@ -148,6 +154,10 @@ void bind_run_and_laws(nb::module_ &m) {
       .def_prop_ro("rejected", [](const TreeRun &r) { return r.report.rejected; })
       .def_prop_ro("evaluations", [](const TreeRun &r) { return r.report.evaluations; })
       .def_prop_ro("time_reached", [](const TreeRun &r) { return r.report.time; })
+      .def_ro("least_ratio", &TreeRun::least_ratio,
+              "Of the scene's watch: 1 without; see mbs/core/recursion/posture.h.")
+      .def_ro("singular_at", &TreeRun::singular_at, "When that was, s.")
+      .def_ro("singular_posture", &TreeRun::singular_posture, "(n_q) q there; empty without a watch.")
       .def_ro("last", &TreeRun::last, "(q, v) of the last accepted step.")
       .def_ro("states", &TreeRun::states, "(T, n_q + n_v) q, then v.")
       .def_ro("accelerations", &TreeRun::accelerations, "(T, n_v)")
@@ -205,6 +215,13 @@ void bind_tree_motion(nb::module_ &m) {
           },
           "q"_a, "v"_a, "stiffness"_a, "rest"_a, "viscous"_a, "coulomb"_a, "speed"_a,
           "Spring and friction along the coordinate with these indices in q and v.")
+      .def(
+          "watch_posture",
+          [](Scene &s, const std::vector<bool> &is_path, double length) {
+            s.watch = PostureWatch{{is_path.begin(), is_path.end()}, length};
+          },
+          "is_path"_a, "length"_a,
+          "Watch how well the joints can follow the rows of the path; the run diverges where they cannot at all.")
       .def(
           "turn_marker", [](Scene &s, int marker, const OrientationLaw &law) { s.driven.push_back({marker, law}); },
           "marker"_a, "law"_a, "How a marker of the ground turns, which the model says it does.");

@@ -1,26 +1,34 @@
-// The motion of a mechanism in joint coordinates as a system that all methods integrate: rows follow functions of time,
-// forces act along joints and on modes; after every step the state is moved back onto the rows with the columns of the
-// recursion.
+// The motion of a mechanism in joint coordinates as a system that all methods
+// integrate: rows follow functions of time, forces act along joints and on
+// modes; after every step the state is moved back onto the rows with the
+// columns of the recursion.
 #pragma once
 
 #include "core/constraint/constraint.h"
 #include "core/integrate/ode.h"
+#include "core/recursion/motion_norm.h"
 #include "core/recursion/newton.h"
+#include "core/recursion/posture.h"
 #include "core/recursion/workspace.h"
 #include "core/space/configuration_space.h"
 #include "core/time_function/time_function.h"
 
+#include <optional>
+
 namespace ffrobot::recursion {
 
-// `magnitude`(t) times a direction in generalized forces: joint moments, modal forces of patches.
+// `magnitude`(t) times a direction in generalized forces: joint moments, modal
+// forces of patches.
 struct Load {
-  Load(const Eigen::VectorXd &direction, TimeFunction magnitude_); // direction (n_v)
+  Load(const Eigen::VectorXd &direction,
+       TimeFunction magnitude_); // direction (n_v)
 
   std::vector<std::pair<int, double>> along; // entries of v that it acts on
   TimeFunction magnitude;
 };
 
-// `magnitude`(t) along a component of the force (N), then the moment (N m), global axes, on a wrench of the mechanism.
+// `magnitude`(t) along a component of the force (N), then the moment (N m),
+// global axes, on a wrench of the mechanism.
 struct PointLoad {
   int wrench = 0, component = 0;
   TimeFunction magnitude;
@@ -32,7 +40,8 @@ struct DrivenMarker {
   OrientationLaw law;
 };
 
-// Along a joint's coordinate: spring about `rest`, viscous and Coulomb friction.
+// Along a joint's coordinate: spring about `rest`, viscous and Coulomb
+// friction.
 struct JointForce {
   int q = 0, v = 0;     // of the coordinate
   double stiffness = 0; // N m/rad, N/m
@@ -46,18 +55,22 @@ struct Scene {
   std::vector<PointLoad> point_loads;
   std::vector<JointForce> joint_forces;
   std::vector<DrivenMarker> driven;
+  std::optional<PostureWatch> watch;
 };
 
 template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
-  // The mechanism and the scene must outlive this. Rows that depend on others at time t and (q, v) are left out of the
-  // equations from there on; they are to be consistent.
-  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v);
+  // The mechanism and the scene must outlive this. Rows that depend on others
+  // at time t and (q, v) are left out of the equations from there on; they are
+  // to be consistent.
+  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene,
+                  double t, const double *q, const double *v);
 
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
   double error_size(double t, const double *z, const double *e) override;
-  double change_size(const double *z, const double *change, double rate) const override;
+  double change_size(const double *z, const double *change,
+                     double rate) const override;
   void accepted(double t, const double *z, const double *z_dot) override;
   bool is_sensible(const double *z) const override;
   double initial_step() const override { return 0.1 / fastest_; }
@@ -72,12 +85,21 @@ public:
   void solve(const double *r, const double *c, double *x) override;
   void solve(const Complex *r, Complex *x) override;
   void constrain(const double *x, double *c) override;
-  void constraint_values(double t, const double *z, double *value, double *rate) override;
+  void constraint_values(double t, const double *z, double *value,
+                         double *rate) override;
 
-  // At a state y = (q, v): accelerations (n_v); multipliers are in workspace().lambda
+  // At a state y = (q, v): accelerations (n_v); multipliers are in
+  // workspace().lambda
   void evaluate(double t, const double *q, const double *v, double *a);
-  // Moves q (n_q) and v (n_v) onto the rows at time t; the largest residual left, relative to 1 m, 1 rad, 1 m/s
+  // Moves q (n_q) and v (n_v) onto the rows at time t; the largest residual
+  // left, relative to 1 m, 1 rad, 1 m/s
   double project(double t, double *q, double *v);
+
+  // Of the scene's watch: the smallest ratio of posture_at() so far, when, and
+  // q there; 1 before the first.
+  double least_ratio() const { return least_ratio_; }
+  double singular_at() const { return singular_at_; }
+  const Eigen::VectorXd &singular_posture() const { return singular_posture_; }
 
   const Workspace<Space, double> &workspace() const { return workspace_; }
   Workspace<Space, double> &workspace() { return workspace_; }
@@ -87,26 +109,32 @@ private:
   void residuals(double t, const double *q, const double *v);
   void find_stiff_terms();
   void find_compliance();
+  void watch_posture(double t, const double *q);
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
-  // of accelerations; of rows and of Newton's method, which must not disturb these
+  // of accelerations; of rows and of Newton's method, which must not disturb
+  // these
   Workspace<Space, double> workspace_, measured_, newton_;
   Eigen::VectorXd force_, wrench_, target_, value_, rate_, correction_, state_;
   std::vector<Jet> jets_;
   double target_time_;
   double fastest_ = 1; // 1/s
-  // Errors are judged against the largest values so far of what is alike: all joints' ways, angles, each body's modes.
-  std::vector<int> group_; // of each of 2 n_v entries of z
-  std::vector<double> peak_;
-  std::vector<double> pace_; // 1/s, of each group: a rate counts as small below this times the peak of what it is of
-  mutable std::vector<double> size_;
+  MotionNorm<Space> norm_;
+  Eigen::VectorXd shifted_, unused_;
+  // the worst posture along the path, and when
+  double least_ratio_ = 1, singular_at_ = 0;
+  Eigen::VectorXd singular_posture_;
+  unsigned long accepted_ = 0, steps_between_postures_ =
+                                   1; // many where steps follow vibrations
+  int side_ = 0;
 
   Eigen::VectorXd stiffness_, damping_; // diagonals (n_v)
   std::vector<Eigen::Index> stiff_;     // where they are not zero
-  Eigen::MatrixXd compliance_;          // (n_v, stiff) what unit forces there do under the rows
-  Eigen::VectorXd evaluated_, base_;    // q of the last slope(), of the compliance
-  bool compliance_is_old_ = true;       // there was a slope since
+  Eigen::MatrixXd
+      compliance_; // (n_v, stiff) what unit forces there do under the rows
+  Eigen::VectorXd evaluated_, base_; // q of the last slope(), of the compliance
+  bool compliance_is_old_ = true;    // there was a slope since
   NewtonMatrix<double> real_;
   NewtonMatrix<Complex> complex_;
 };
