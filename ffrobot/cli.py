@@ -160,7 +160,7 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
     seconds = {**solution.seconds, "writing": time.perf_counter() - began}
     print_spatial_summary(solution, path, seconds, summary_console())
     for name, result in solution.analyses.items():
-        result.run.check_completed(scene_file)
+        result.run.check_completed()
         for text in result.run.warnings if strict else ():
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 

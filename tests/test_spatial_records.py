@@ -204,8 +204,23 @@ MISTAKES = {
         'joint "waist": expected one joint of this name',
     ),
     "kind that is not there yet": (
-        put("analysis", kind="fcid", shape="zero"),
-        'kind: expected "pcid" in space = "spatial", found "fcid", which is not available there yet',
+        put("analysis", kind="motors-only"),
+        'kind: expected "pcid", "fcid", "forward", "static" in space = "spatial", found "motors-only", which is not',
+    ),
+    "what is applied and not there yet": (
+        add("analysis", name="again", kind="forward", actuation="inverse", apply="trajectory"),
+        'analysis "again": apply: expected "joints" in space = "spatial", found "trajectory", which is not available',
+    ),
+    "shape of a rigid body": (
+        put("analysis", kind="fcid", shape="given", modal={"base": ["0.1*t"]}),
+        'analysis "inverse": modal: expected a flexible body, found "base", which is rigid',
+    ),
+    "shape without a value": (
+        lambda data: (
+            put("body", 1, rigid=None, link="links/upper.toml")(data),
+            put("analysis", kind="fcid", shape="given", modal={"hand": ["1/(t - 0.1)"]})(data),
+        ),
+        r'analysis "inverse": modal.hand\[0\]: expected a finite value during the whole run, found none at t = 0.1',
     ),
     "key that is not there yet": (
         lambda data: data.update(pzt=[{"body": "hand"}]),

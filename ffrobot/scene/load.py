@@ -11,6 +11,7 @@ from ..common.errors import InputError
 from ..common.toml_files import load_toml, parse_toml, read_text
 from ..common.validation import plain, validate
 from ..fe_models.link_file import LinkTable, read_link
+from .actuation_times import with_times_of_actuation
 from .checks import check_functions, problems
 from .scene import Scene, SceneKeys
 
@@ -47,7 +48,7 @@ def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # n
 def _scene(data: dict[str, Any], path: Path, text: str, objects: Mapping[str, object] | None = None) -> Scene:
     """The validated scene of `data`, which was read from `path` as `text`."""
     _refuse_unavailable(data, path)
-    keys = validate(SceneKeys, _with_times_of_actuation(data), path, objects)
+    keys = validate(SceneKeys, with_times_of_actuation(data), path, objects)
     found = [f"{path}: {problem}" for problem in problems(keys)]
     if found:
         raise InputError("\n".join(found))
@@ -65,17 +66,3 @@ def _refuse_unavailable(data: dict[str, Any], path: Path) -> None:
             f'{path}: space: expected "planar", found "spatial": only the command `ffrobot solve` takes scenes in space'
             " so far"
         )
-
-
-def _with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
-    """`data` with the `end` and `output_step` of forward analyses taken from their actuation where not given."""
-    try:
-        sources = {analysis["name"]: analysis for analysis in data["analysis"]}
-        analyses = []
-        for analysis in data["analysis"]:
-            source = sources.get(analysis.get("actuation"), {})
-            times = {key: source[key] for key in ("end", "output_step") if key in source}
-            analyses.append(times | analysis)
-    except (KeyError, TypeError, AttributeError):
-        return data  # malformed: validation says how
-    return data | {"analysis": analyses}

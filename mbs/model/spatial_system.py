@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from ...common.arrays import Array
@@ -22,6 +25,13 @@ def _moves(node: Node) -> bool:
     return bool(np.any(_rows_of(node.body, node.outer)[0]))
 
 
+class Drive(NamedTuple):
+    """A force of time on what it drives, by direction: generalized (n_v,)."""
+
+    direction: Array
+    size: TimeFunction
+
+
 class SpatialSystem:
     """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
 
@@ -31,7 +41,8 @@ class SpatialSystem:
         scene: what its rows follow, and what acts on it.
     """
 
-    def __init__(self, model: SpatialModel) -> None:
+    def __init__(self, model: SpatialModel, drives: Sequence[Drive] = ()) -> None:
+        """`drives` act beside the loads of the scene."""
         self.model, tree = model, model.tree
         self._markers: list[list[Section]] = [[] for _ in tree.nodes]
         self._ground: list[Section] = []
@@ -52,7 +63,7 @@ class SpatialSystem:
             bodies.append(body)
         ground = [_marker(section, np.zeros((6, 0)), section.position) for section in self._ground]
         self.core = _core.SpatialModel(bodies, ground, rows, [], np.array(model.scene.gravity))
-        self._along = [self._load(load) for load in model.scene.load if load.joint is not None]
+        self._along = [self._load(load) for load in model.scene.load if load.joint is not None] + list(drives)
         self.scene = self._follow()
 
     def _check(self) -> None:
@@ -90,12 +101,12 @@ class SpatialSystem:
             scene.add_load(direction, magnitude)
         return scene
 
-    def _load(self, load: SpatialLoad) -> tuple[Array, TimeFunction]:
+    def _load(self, load: SpatialLoad) -> Drive:
         """Direction (n_v,) and size of the moment of a joint."""
         assert load.joint is not None
         direction = np.zeros(self.model.tree.n_v)
         direction[self.model.tree.nodes[self.model.tree.carried[load.joint]].v] = self.model.sign(load.joint)
-        return direction, load.components["moment"]
+        return Drive(direction, load.components["moment"])
 
     def _place(self, section: Section) -> tuple[int, int]:
         """Body (−1: the ground) and number of the marker of a section there; made where it is new."""

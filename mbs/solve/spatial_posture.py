@@ -69,13 +69,13 @@ def solve_posture(model: SpatialModel, t: float, q: Array) -> Array | None:
     return q if left <= 1e3 * TOLERANCE else None
 
 
-def with_rates(model: SpatialModel, q: Array, v: Array) -> State:
-    """The state at q with the joints' rates moved onto Ċ = 0 at t = 0 by the least change, ṗ kept."""
+def with_rates(model: SpatialModel, q: Array, v: Array, t: float = 0.0) -> State:
+    """The state at q with the joints' rates moved onto Ċ = 0 at time t by the least change, ṗ kept."""
     if not model.rows:
         return State(q, v)
-    scales, at_start = _scales(model), np.zeros(1)
-    C_v = row_values(model, q[None], at_start)[1][0]
-    left = target_rates(model, q[None], at_start)[0] - C_v @ v
+    scales, now = _scales(model), np.array([t])
+    C_v = row_values(model, q[None], now)[1][0]
+    left = target_rates(model, q[None], now)[0] - C_v @ v
     return State(q, v + scales * np.linalg.lstsq(C_v * scales, left, rcond=1e-10)[0])
 
 

@@ -1,0 +1,58 @@
+"""Running the integrators of the core from an initial state in space to a run: all kinds that integrate do it here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...common.arrays import Array, as_list
+from .. import _core
+from ..model.spatial_model import SpatialModel
+from ..model.spatial_system import Drive, SpatialSystem
+from ..scene.analysis import IntegratedAnalysis
+from ..solve.integrators import METHODS
+from ..solve.state import State
+from .drive import STATUS
+from .spatial_run import SpatialRun
+
+INTEGRATORS = {"auto": "dop853", "dop853": "dop853", "dopri5": "dopri5"}
+"""What scenes may ask for: methods that need no Newton matrix, which the recursion does not give yet."""
+
+
+def spatial_drive(
+    model: SpatialModel,
+    analysis: IntegratedAnalysis,
+    start: State,
+    *,
+    drives: Sequence[Drive] = (),
+    warnings: tuple[str, ...] = (),
+    times: Array | None = None,
+) -> SpatialRun:
+    """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
+
+    `drives` act beside the loads of the scene. The rows of `model` hold.
+    """
+    times = analysis.times if times is None else times
+    system, began = SpatialSystem(model, drives), time.perf_counter()
+    integrator = INTEGRATORS[analysis.integrator]
+    controls = _core.IntegrationControls(
+        tolerance=analysis.tolerance,
+        max_steps=analysis.max_steps,
+        methods=[(METHODS[integrator], 1.0, 0.0)],
+        spectral_radius=analysis.spectral_radius,
+    )
+    (status, steps, evaluations), states, a, multipliers = _core.tree_motion(
+        system.core, system.scene, as_list(times), start.q, start.v, controls
+    )
+    q, v = (np.ascontiguousarray(part) for part in np.split(states, [model.tree.n_q], axis=1))
+
+    def again(others: Array) -> SpatialRun:
+        return spatial_drive(model, analysis, start, drives=drives, times=others)
+
+    return SpatialRun(
+        analysis, model, times[: len(q)], q, v, a, multipliers,
+        status=STATUS[status], integrator=integrator, steps=steps, evaluations=evaluations,
+        wall_seconds=time.perf_counter() - began, warnings=warnings, again=again,
+    )  # fmt: skip
