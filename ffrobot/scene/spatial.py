@@ -14,7 +14,6 @@ from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import did_you_mean, quoted, validate
 from ..fe_models.link_file import LinkTable, read_link
-from ..mbs.analysis.spatial_drive import INTEGRATORS
 from ..mbs.analysis.spatial_kinds import IN_SPACE
 from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND, NotEmpty
@@ -171,12 +170,10 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
 
 def _not_available_of(analysis: Analysis, scene: SpatialSceneKeys) -> Iterator[tuple[str, str]]:
     """Keys of an analysis that ask for what is not there yet, and what was expected and found."""
-    integrator, apply = getattr(analysis, "integrator", "auto"), getattr(analysis, "apply", None)
+    apply = getattr(analysis, "apply", None)
     not_yet = "which is not available there yet"
     if analysis.kind not in IN_SPACE:
         yield "kind", f'{quoted(IN_SPACE)} in space = "spatial", found "{analysis.kind}", {not_yet}'
-    elif integrator not in INTEGRATORS:
-        yield "integrator", f'{quoted(INTEGRATORS)} in space = "spatial", found "{integrator}", {not_yet}'
     if analysis.is_checked:
         yield "check", 'none in space = "spatial", found it: not available yet'
     if apply not in (None, *APPLICABLE):

@@ -17,8 +17,8 @@ from ..solve.state import State
 from .drive import STATUS
 from .spatial_run import SpatialRun
 
-INTEGRATORS = {"auto": "dop853", "dop853": "dop853", "dopri5": "dopri5"}
-"""What scenes may ask for: methods that need no Newton matrix, which the recursion does not give yet."""
+INTEGRATORS = {"auto": "dop853", **{name: name for name in METHODS}}
+"""The method that stands behind each name in scenes."""
 
 
 def spatial_drive(
