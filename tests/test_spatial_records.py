@@ -257,7 +257,7 @@ def test_mistakes_are_told(name):
 def test_planar_readers_refuse_scenes_in_space(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(ARM)
-    with pytest.raises(InputError, match='space: expected "planar", found "spatial": only the command `ffrobot solve`'):
+    with pytest.raises(InputError, match='space: expected "planar", found "spatial": scenes in space run by'):
         load_scene(path)
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -66,7 +66,14 @@ def load_spatial_scene(path: Path) -> SpatialScene:
 
     Raises `InputError` with one line for each wrong key: file, key, expected, found.
     """
-    scene = spatial_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
+    return available_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
+
+
+def available_scene(
+    data: dict[str, Any], path: Path, text: str, functions: Mapping[str, object] | None = None
+) -> SpatialScene:
+    """The validated scene of `data`, all of which the program can do. Raises `InputError` as `load_spatial_scene`."""
+    scene = spatial_scene(data, path, text, functions)
     check_available(scene)
     return scene
 
@@ -78,12 +85,14 @@ def check_available(scene: SpatialScene) -> None:
         raise InputError("\n".join(found))
 
 
-def spatial_scene(data: dict[str, object], path: Path, text: str) -> SpatialScene:
-    """The validated scene of `data`, which was read from `path` as `text`."""
+def spatial_scene(
+    data: dict[str, Any], path: Path, text: str, functions: Mapping[str, object] | None = None
+) -> SpatialScene:
+    """The validated scene of `data`, which was read from `path` as `text`; `functions` of Python by their names."""
     refused = [f"{path}: {problem}" for problem in _unavailable_keys(data)]
     if refused:
         raise InputError("\n".join(refused))
-    keys = validate(SpatialSceneKeys, with_times_of_actuation(data), path)
+    keys = validate(SpatialSceneKeys, with_times_of_actuation(data), path, functions)
     found = [f"{path}: {problem}" for problem in _problems(keys)]
     if found:
         raise InputError("\n".join(found))

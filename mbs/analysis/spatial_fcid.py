@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +13,7 @@ from ..fields.waypoints import spline
 from ..model.model import ZERO
 from ..model.spatial_model import SpatialModel
 from ..solve.spatial_posture import check_path, mobility, undeformed_posture
-from ..solve.spatial_prescribed import prescribed_motion
-from ..solve.spatial_statics import static_equilibrium
+from ..solve.spatial_prescribed import prescribed_motion, quasi_static_shape
 from ..solve.state import State
 from .fcid import Fcid, Shape, given_shape, shape_nodes
 from .spatial_run import SpatialContext, SpatialRun
@@ -36,7 +34,8 @@ def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
             f'{model.scene.path}: analysis "{analysis.name}": kind: expected as many trajectory components as the'
             f' mechanism has degrees of freedom ({found.freedom}) for "fcid", found {rows}'
         )
-    shape = _shape(model, analysis, start)
+    fits = sum(len(columns) for columns in model.motors.values()) == found.freedom
+    shape = _shape(model, analysis, start, by_motors=fits)
     run = _run(model, analysis, shape, start, analysis.times, warnings)
     return replace(run, wall_seconds=time.perf_counter() - began)
 
@@ -44,34 +43,31 @@ def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
 def _run(
     model: SpatialModel, analysis: Fcid, shape: Shape, start: State, times: Array, warnings: tuple[str, ...] = ()
 ) -> SpatialRun:
-    found = prescribed_motion(model, shape, times, start)
+    found = prescribed_motion(model, _sampled(shape, times), times, start)
 
     def again(others: Array) -> SpatialRun:
         return _run(model, analysis, shape, start, others)
 
     return SpatialRun(
-        analysis, model, times, found.q, found.v, found.a, found.multipliers, found.required,
-        warnings=warnings, again=again,
+        analysis, model, times, found.q, found.v, found.a, found.multipliers, found.required, warnings=warnings,
+        again=again,
     )  # fmt: skip
 
 
-def _shape(model: SpatialModel, analysis: Fcid, start: State) -> Shape:
-    """p(t) of every body of the tree, with its derivatives."""
+def _sampled(shape: Shape, times: Array) -> Array:
+    """p, ṗ and p̈ (3, T, n) of all bodies."""
+    functions = [function for of_body in shape for function in of_body]
+    samples = np.array([function.sample(times) for function in functions]).reshape(len(functions), 3, len(times))
+    return np.moveaxis(samples, 0, -1)
+
+
+def _shape(model: SpatialModel, analysis: Fcid, start: State, *, by_motors: bool) -> Shape:
+    """p(t) of every body of the tree, with its derivatives: of static ones a spline, as in the plane."""
     bodies = [node.body for node in model.tree.nodes]
     if analysis.shape == "given":
         return given_shape(model.scene.path, bodies, analysis)
     if analysis.shape == "static":
         nodes = shape_nodes(analysis)
-        p = _static_shapes(model, nodes, start)
-        functions = iter(spline(nodes, p))
+        functions = iter(spline(nodes, quasi_static_shape(model, nodes, start, by_motors=by_motors)))
         return [[next(functions) for _ in range(body.n_modes)] for body in bodies]
     return [[ZERO] * body.n_modes for body in bodies]
-
-
-def _static_shapes(model: SpatialModel, times: Sequence[float] | Array, start: State) -> Array:
-    """P (T, modes of all bodies) of the equilibrium at each of `times`."""
-    at, found = start, []
-    for t in times:
-        at = static_equilibrium(model, at, float(t))
-        found.append(np.concatenate([at.q[node.p_q] for node in model.tree.nodes]))
-    return np.array(found)

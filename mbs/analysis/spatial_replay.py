@@ -21,7 +21,7 @@ from .spatial_run import SpatialRun
 FEWEST_NODES = 401
 MOST_NODES = 200_000
 CHUNK = 2000  # states that are looked at at once
-SHARE = 0.1  # of the tolerance that the splines may take
+SHARE = 0.3  # of the tolerance that the splines may take
 GAIN = 32.0  # at least: by how much half the step makes a quintic spline better (64 where it is smooth)
 
 

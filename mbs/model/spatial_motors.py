@@ -31,8 +31,10 @@ def path_forces(model: SpatialModel, C_v: Array, multipliers: Array) -> Array:
     return found
 
 
-def motor_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array) -> MotorForces:
-    """Gᵀτ + EᵀF_p + C_mᵀν = `wanted` (T, n_v), with C_v (T, rows, n_v) at q (T, n_q).
+def split_forces(
+    model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array
+) -> tuple[dict[str, Array], Array]:
+    """Gᵀτ + EᵀF_p + C_mᵀν = `wanted` (T, n_v), with C_v (T, rows, n_v) at q (T, n_q): τ by joint, and EᵀF_p (T, n_v).
 
     In joint coordinates without loops τ are the components of the right side along the motors' coordinates and F_p
     those along the modes; loops share them out with ν.
@@ -47,17 +49,22 @@ def motor_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: A
     for name, numbers in model.motors.items():
         moments[name] = model.sign(name) * found[:, first : first + len(numbers)]
         first += len(numbers)
-    modal = {node.body.name: left[:, node.p_v] for node in model.tree.nodes}
     if model.scene.motors == "frame":
-        _move_to_frames(model, q, frames, moments, modal)
+        _move_to_frames(model, q, frames, moments, left)
+    return moments, left
+
+
+def motor_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array) -> MotorForces:
+    """The same, modal forces by body and in the modes of the modal body files."""
+    moments, left = split_forces(model, q, frames, C_v, wanted)
     stored = {
-        node.body.name: modal[node.body.name] @ np.linalg.pinv(node.body.modal_transform) for node in model.tree.nodes
+        node.body.name: left[:, node.p_v] @ np.linalg.pinv(node.body.modal_transform) for node in model.tree.nodes
     }
     return MotorForces(moments, stored)
 
 
 def _move_to_frames(
-    model: SpatialModel, q: Array, frames: Sequence[Motion], moments: Mapping[str, Array], modal: dict[str, Array]
+    model: SpatialModel, q: Array, frames: Sequence[Motion], moments: Mapping[str, Array], left: Array
 ) -> None:
     """Motors that turn frames, not sections: what they do less on the modes, modal forces do more."""
     tree = model.tree
@@ -69,9 +76,8 @@ def _move_to_frames(
         along = model.sign(joint.name) * moments[joint.name]
         for section, sign in ((node.outer, 1.0), (node.inner, -1.0)):
             if section.body >= 0:
-                body = tree.nodes[section.body].body.name
                 turn = np.einsum("ti,tij->tj", axis, _spin_of_modes(model, q, frames, section))
-                modal[body] = modal[body] + sign * along * turn
+                left[:, tree.nodes[section.body].p_v] += sign * along * turn
 
 
 def _spin_of_modes(model: SpatialModel, q: Array, frames: Sequence[Motion], section: Section) -> Array:
