@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from ...common.arrays import Array
@@ -13,6 +16,7 @@ from ..fields.orientations import OrientationLaw
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
 from .spatial_body import SpatialBody
 from .spatial_model import SpatialModel, SpatialRow
+from .spatial_transmission import rotor
 from .spatial_tree import Node, Section
 
 ZERO = _core.TimeFunction.constant(0.0)
@@ -24,6 +28,13 @@ def _moves(node: Node) -> bool:
     return bool(np.any(_rows_of(node.body, node.outer)[0]))
 
 
+class Drive(NamedTuple):
+    """A force of time on what it drives, by direction: generalized (n_v,)."""
+
+    direction: Array
+    size: TimeFunction
+
+
 class SpatialSystem:
     """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
 
@@ -33,7 +44,8 @@ class SpatialSystem:
         scene: what its rows follow, and what acts on it.
     """
 
-    def __init__(self, model: SpatialModel) -> None:
+    def __init__(self, model: SpatialModel, drives: Sequence[Drive] = ()) -> None:
+        """`drives` act beside the loads of the scene."""
         self.model, tree = model, model.tree
         self._markers: list[list[Section]] = [[] for _ in tree.nodes]
         self._ground: list[Section] = []
@@ -62,7 +74,7 @@ class SpatialSystem:
             ground[number].turns = True
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
         self.core = _core.SpatialModel(bodies, ground, rows, wrenches, np.array(model.scene.gravity))
-        self._along = [self._load(load) for load in model.scene.load if load.joint is not None]
+        self._along = [self._load(load) for load in model.scene.load if load.joint is not None] + list(drives)
         self.scene = self._follow()
 
     def _check(self) -> None:
@@ -121,12 +133,12 @@ class SpatialSystem:
             scene.turn_marker(number, _turning_law(law))
         return scene
 
-    def _load(self, load: SpatialLoad) -> tuple[Array, TimeFunction]:
+    def _load(self, load: SpatialLoad) -> Drive:
         """Direction (n_v,) and size of the moment of a joint."""
         assert load.joint is not None
         direction = np.zeros(self.model.tree.n_v)
         direction[self.model.tree.nodes[self.model.tree.carried[load.joint]].v] = self.model.sign(load.joint)
-        return direction, load.components["moment"]
+        return Drive(direction, load.components["moment"])
 
     def _point_load(self, load: SpatialLoad) -> tuple[int, dict[str, TimeFunction]]:
         """Number of the wrench, and its components over time."""
@@ -174,8 +186,8 @@ def _rotor(node: Node) -> tuple[float, float]:
     It sits on the first side and spins with N Ω_second − (N − 1) Ω_first; where that side is the outer one, with
     N' Ω_outer − (N' − 1) Ω_inner and N' = 1 − N.
     """
-    ratio = float(getattr(node.joint, "gear_ratio", 1.0))
-    return float(getattr(node.joint, "rotor_inertia", 0.0)), 1.0 - ratio if node.backwards else ratio
+    inertia, ratio = rotor(node)
+    return inertia, 1.0 - ratio if node.backwards else ratio
 
 
 def _turning_law(law: OrientationLaw) -> _core.TurningLaw:

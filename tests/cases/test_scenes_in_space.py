@@ -1,18 +1,13 @@
 """Scenes in space through `ffrobot solve`, against an independent code: all quantities to 1e-6 of their peaks."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import h5py
 import numpy as np
 import pytest
-import scene_of
+from space import close, write_scene
 from spatial_checkpoints import load
 
 from ffrobot import Results
 
-FOLDER = Path(scene_of.__file__).parent
 SOLVED = (
     "arm3_line_undeformed",
     "arm3_line_static",
@@ -26,12 +21,6 @@ SOLVED = (
 )
 
 
-def write_scene(name, folder):
-    command = [sys.executable, FOLDER / "scene_of.py", FOLDER / f"{name}.json", folder]
-    subprocess.run(command, check=True)
-    return folder / "scene.toml"
-
-
 @pytest.fixture(scope="module", params=SOLVED)
 def solved(request, tmp_path_factory, ffrobot):
     scene = write_scene(request.param, tmp_path_factory.mktemp(request.param))
@@ -40,11 +29,6 @@ def solved(request, tmp_path_factory, ffrobot):
     assert "warning" not in done.stdout
     with h5py.File(scene.with_suffix(".results.h5")) as file:
         yield load(request.param), file
-
-
-def close(found, expected, least=1e-12):
-    expected = np.array(expected)
-    np.testing.assert_allclose(found[()], expected, atol=1e-6 * max(np.abs(expected).max(), least))
 
 
 def test_times_and_status(solved):

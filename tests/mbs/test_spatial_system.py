@@ -1,5 +1,7 @@
 """The recursion, as scenes in space make it, against the oracle in absolute coordinates: random trees, all joints."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from spatial_rows import UNIT, About, Along, Ground, Section, Spinning
@@ -10,6 +12,8 @@ from ffrobot.common.errors import InputError
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.joints.transmission import Friction
+from ffrobot.mbs.model.spatial_accelerations import Accelerated
+from ffrobot.mbs.model.spatial_inverse import required_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 
 SMALL = 0.01  # modal coordinates: sections turn by about 0.1 rad
@@ -46,6 +50,10 @@ def systems(tree, turned=False, joint_keys=None, loads=(), acting=lambda plain: 
     for node, frame in zip(model.tree.nodes, model.tree.frames(q[None]), strict=True):
         R_2dot, omega_dot, p_2dot = mechanism.coordinates.rates(expected, node.body.name)
         nodes.append((node, p_2dot, np.concatenate([R_2dot, frame.F[0] @ omega_dot])))
+    state = Accelerated(model.tree, q[None], v[None], found.accelerations, model.tree.frames(q[None]))
+    left = required_forces(model, state, np.array([AT]))  # nothing, where nothing is prescribed
+    moved = required_forces(model, replace(state, a=np.zeros_like(state.a)), np.array([AT]))
+    assert np.abs(left).max(initial=0) < 1e-10 * np.abs(moved).max(initial=1)
     return found, nodes, (mechanism, absolute, velocity)
 
 
