@@ -52,7 +52,12 @@ def wrist(folder, pitch, start, keys=""):
 def results(path):
     with h5py.File(path.with_suffix(".results.h5")) as file:
         group = file["inverse"]
-        return group.attrs["status"], list(group.attrs["warnings"]), group["time"][()], group["joints/q2/coordinate"][()]
+        return (
+            group.attrs["status"],
+            list(group.attrs["warnings"]),
+            group["time"][()],
+            group["joints/q2/coordinate"][()],
+        )
 
 
 def test_a_singular_posture_ends_the_run(tmp_path, ffrobot):

@@ -13,63 +13,48 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double singular_ratio =
-    1e-6; // of Posture: below, joints cannot follow
+constexpr double singular_ratio = 1e-6; // of Posture: below, joints cannot follow
 
 } // namespace
 
-Load::Load(const VectorXd &direction, TimeFunction magnitude_)
-    : magnitude(std::move(magnitude_)) {
+Load::Load(const VectorXd &direction, TimeFunction magnitude_) : magnitude(std::move(magnitude_)) {
   for (Index i = 0; i < direction.size(); ++i)
     if (direction[i] != 0)
       along.emplace_back(static_cast<int>(i), direction[i]);
 }
 
 template <class Space>
-RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism,
-                                        const Scene &scene, double t,
+RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
                                         const double *q, const double *v)
-    : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)),
-      mechanism_(mechanism), scene_(scene), workspace_(mechanism),
-      measured_(mechanism), newton_(mechanism),
-      force_(VectorXd::Zero(mechanism.n_v)),
-      wrench_(VectorXd::Zero(Space::dim *
-                             static_cast<Index>(mechanism.wrenches.size()))),
-      target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))),
-      value_(target_), rate_(target_), correction_(force_),
-      state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)),
-      jets_(mechanism.rows.size()),
+    : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
+      workspace_(mechanism), measured_(mechanism), newton_(mechanism), force_(VectorXd::Zero(mechanism.n_v)),
+      wrench_(VectorXd::Zero(Space::dim * static_cast<Index>(mechanism.wrenches.size()))),
+      target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
+      correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
       target_time_(std::numeric_limits<double>::quiet_NaN()), norm_(mechanism),
-      shifted_(VectorXd::Zero(2 * mechanism.n_v)),
-      unused_(VectorXd::Zero(mechanism.n_v)) {
+      shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(VectorXd::Zero(mechanism.n_v)) {
   update_targets(t);
   keep_independent_rows(mechanism, q, v, workspace_);
   newton_.keep(workspace_.active);
   find_stiff_terms();
   for (const Node<Space> &node : mechanism.nodes)
     for (int k = 0; k < node.n(); ++k)
-      fastest_ = std::max(fastest_,
-                          std::sqrt(node.body.K[static_cast<std::size_t>(k)])),
-      steps_between_postures_ = 10;
+      fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
 }
 
 template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
   if (t == target_time_)
     return;
   for (std::size_t r = 0; r < scene_.targets.size(); ++r)
-    jets_[r] = scene_.targets[r](t),
-    target_[static_cast<Index>(r)] = jets_[r].acceleration;
+    jets_[r] = scene_.targets[r](t), target_[static_cast<Index>(r)] = jets_[r].acceleration;
   for (const DrivenMarker &driven : scene_.driven) {
     const auto i = static_cast<std::size_t>(driven.marker);
-    workspace_.turning[i] = measured_.turning[i] = newton_.turning[i] =
-        driven.law(t);
+    workspace_.turning[i] = measured_.turning[i] = newton_.turning[i] = driven.law(t);
   }
   target_time_ = t;
 }
 
-template <class Space>
-void RecursiveMotion<Space>::evaluate(double t, const double *q,
-                                      const double *v, double *a) {
+template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
   update_targets(t);
   Forces<double> forces;
   if (!scene_.loads.empty() || !scene_.joint_forces.empty()) {
@@ -80,22 +65,19 @@ void RecursiveMotion<Space>::evaluate(double t, const double *q,
         force_[i] += magnitude * share;
     }
     for (const JointForce &joint : scene_.joint_forces)
-      force_[joint.v] -= joint.stiffness * (q[joint.q] - joint.rest) +
-                         joint.friction.resistance(v[joint.v]);
+      force_[joint.v] -= joint.stiffness * (q[joint.q] - joint.rest) + joint.friction.resistance(v[joint.v]);
     forces.generalized = force_.data();
   }
   if (!scene_.point_loads.empty()) {
     wrench_.setZero();
     for (const PointLoad &load : scene_.point_loads)
-      wrench_[Space::dim * load.wrench + load.component] +=
-          load.magnitude(t).value;
+      wrench_[Space::dim * load.wrench + load.component] += load.magnitude(t).value;
     forces.wrench = wrench_.data();
   }
   accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
 }
 
-template <class Space>
-void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
+template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
   local().rate(z, z_dot);
   const double *q = local().state(z);
   evaluate(t, q, z + n_v(), z_dot + n_v());
@@ -103,9 +85,7 @@ void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
   compliance_is_old_ = true;
 }
 
-template <class Space>
-void RecursiveMotion<Space>::residuals(double t, const double *q,
-                                       const double *v) {
+template <class Space> void RecursiveMotion<Space>::residuals(double t, const double *q, const double *v) {
   update_targets(t);
   measure(mechanism_, q, v, measured_, value_.data(), rate_.data());
   for (std::size_t r = 0; r < jets_.size(); ++r) {
@@ -114,8 +94,7 @@ void RecursiveMotion<Space>::residuals(double t, const double *q,
   }
 }
 
-template <class Space>
-double RecursiveMotion<Space>::project(double t, double *q, double *v) {
+template <class Space> double RecursiveMotion<Space>::project(double t, double *q, double *v) {
   // As in core/system/system.cpp: rounding of positions, moved into fast modes,
   // is noise in their forces.
   constexpr double tolerance = 1e-12;
@@ -126,15 +105,11 @@ double RecursiveMotion<Space>::project(double t, double *q, double *v) {
   double left = 0, previous = std::numeric_limits<double>::infinity();
   for (int i = 0; i < most_iterations; ++i) {
     residuals(t, q, v);
-    const double scale_q = 1 + Eigen::Map<VectorXd>(q, mechanism_.n_q)
-                                   .template lpNorm<Eigen::Infinity>();
+    const double scale_q = 1 + Eigen::Map<VectorXd>(q, mechanism_.n_q).template lpNorm<Eigen::Infinity>();
     const double scale_v = 1 + v_.template lpNorm<Eigen::Infinity>();
     const double position = value_.template lpNorm<Eigen::Infinity>() / scale_q;
-    left =
-        std::max(position, rate_.template lpNorm<Eigen::Infinity>() / scale_v);
-    if (!(left > tolerance) ||
-        (left < 1e-11 &&
-         left > 0.2 * previous)) // done, at the rounding floor, or NaN
+    left = std::max(position, rate_.template lpNorm<Eigen::Infinity>() / scale_v);
+    if (!(left > tolerance) || (left < 1e-11 && left > 0.2 * previous)) // done, at the rounding floor, or NaN
       break;
     previous = left;
     if (i >= refresh_after)
@@ -149,8 +124,7 @@ double RecursiveMotion<Space>::project(double t, double *q, double *v) {
   return left;
 }
 
-template <class Space>
-bool RecursiveMotion<Space>::correct(double t, double *z) {
+template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z) {
   if (local().space().is_flat())
     return project(t, z, z + n_v()) < 1e-11;
   state_ = Eigen::Map<const VectorXd>(local().state(z), local().state_size());
@@ -159,32 +133,24 @@ bool RecursiveMotion<Space>::correct(double t, double *z) {
   return left < 1e-11;
 }
 
-template <class Space>
-double RecursiveMotion<Space>::error_size(double t, const double *z,
-                                          const double *e) {
+template <class Space> double RecursiveMotion<Space>::error_size(double t, const double *z, const double *e) {
   const double size = norm_.of_state(e);
   norm_.observe(workspace_);
   if (!norm_.observes() || std::isnan(size))
     return size;
   // Multipliers amplify errors of the state (stiffness times the error of a
   // fast mode): measure what e does to them.
-  shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) +
-             Eigen::Map<const VectorXd>(e, 2 * n_v());
-  evaluate(t, local().state(shifted_.data()), shifted_.data() + n_v(),
-           unused_.data());
+  shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + Eigen::Map<const VectorXd>(e, 2 * n_v());
+  evaluate(t, local().state(shifted_.data()), shifted_.data() + n_v(), unused_.data());
   const double of_forces = norm_.of_observed(workspace_);
   return of_forces <= size ? size : of_forces; // keeps NaN
 }
 
-template <class Space>
-double RecursiveMotion<Space>::change_size(const double *, const double *e,
-                                           double) const {
+template <class Space> double RecursiveMotion<Space>::change_size(const double *, const double *e, double) const {
   return norm_.of_state(e);
 }
 
-template <class Space>
-void RecursiveMotion<Space>::accepted(double t, const double *z,
-                                      const double *z_dot) {
+template <class Space> void RecursiveMotion<Space>::accepted(double t, const double *z, const double *z_dot) {
   if (accepted_ == 0)
     norm_.observe(workspace_);
   norm_.take(z, z_dot, workspace_);
@@ -193,8 +159,7 @@ void RecursiveMotion<Space>::accepted(double t, const double *z,
   ++accepted_;
 }
 
-template <class Space>
-void RecursiveMotion<Space>::watch_posture(double t, const double *q) {
+template <class Space> void RecursiveMotion<Space>::watch_posture(double t, const double *q) {
   update_targets(t);
   Posture posture = posture_at(mechanism_, *scene_.watch, q, measured_);
   if (posture.side * side_ < 0)
@@ -206,10 +171,8 @@ void RecursiveMotion<Space>::watch_posture(double t, const double *q) {
   }
 }
 
-template <class Space>
-bool RecursiveMotion<Space>::is_sensible(const double *z) const {
-  return least_ratio_ >= singular_ratio &&
-         Eigen::Map<const VectorXd>(z, 2 * n_v()).allFinite();
+template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z) const {
+  return least_ratio_ >= singular_ratio && Eigen::Map<const VectorXd>(z, 2 * n_v()).allFinite();
 }
 
 template class RecursiveMotion<Planar>;

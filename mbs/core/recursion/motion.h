@@ -63,14 +63,12 @@ public:
   // The mechanism and the scene must outlive this. Rows that depend on others
   // at time t and (q, v) are left out of the equations from there on; they are
   // to be consistent.
-  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene,
-                  double t, const double *q, const double *v);
+  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v);
 
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
   double error_size(double t, const double *z, const double *e) override;
-  double change_size(const double *z, const double *change,
-                     double rate) const override;
+  double change_size(const double *z, const double *change, double rate) const override;
   void accepted(double t, const double *z, const double *z_dot) override;
   bool is_sensible(const double *z) const override;
   double initial_step() const override { return 0.1 / fastest_; }
@@ -85,8 +83,7 @@ public:
   void solve(const double *r, const double *c, double *x) override;
   void solve(const Complex *r, Complex *x) override;
   void constrain(const double *x, double *c) override;
-  void constraint_values(double t, const double *z, double *value,
-                         double *rate) override;
+  void constraint_values(double t, const double *z, double *value, double *rate) override;
 
   // At a state y = (q, v): accelerations (n_v); multipliers are in
   // workspace().lambda
@@ -125,16 +122,14 @@ private:
   // the worst posture along the path, and when
   double least_ratio_ = 1, singular_at_ = 0;
   Eigen::VectorXd singular_posture_;
-  unsigned long accepted_ = 0, steps_between_postures_ =
-                                   1; // many where steps follow vibrations
+  unsigned long accepted_ = 0, steps_between_postures_ = 1; // many where steps follow vibrations
   int side_ = 0;
 
   Eigen::VectorXd stiffness_, damping_; // diagonals (n_v)
   std::vector<Eigen::Index> stiff_;     // where they are not zero
-  Eigen::MatrixXd
-      compliance_; // (n_v, stiff) what unit forces there do under the rows
-  Eigen::VectorXd evaluated_, base_; // q of the last slope(), of the compliance
-  bool compliance_is_old_ = true;    // there was a slope since
+  Eigen::MatrixXd compliance_;          // (n_v, stiff) what unit forces there do under the rows
+  Eigen::VectorXd evaluated_, base_;    // q of the last slope(), of the compliance
+  bool compliance_is_old_ = true;       // there was a slope since
   NewtonMatrix<double> real_;
   NewtonMatrix<Complex> complex_;
 };

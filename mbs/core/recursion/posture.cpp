@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 
+#include <algorithm>
+
 namespace ffrobot::recursion {
 
 using Eigen::Index;
@@ -11,14 +13,12 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double singular =
-    1e-10; // of the largest singular value: rank of the loops' rows
+constexpr double singular = 1e-10; // of the largest singular value: rank of the loops' rows
 
 // Rates of rows by the joints' velocities (rows, joint coordinates), lengths in
 // units of `length`
 template <class Space>
-MatrixXd gradients(const Mechanism<Space> &m, double length, const double *q,
-                   Workspace<Space, double> &w) {
+MatrixXd gradients(const Mechanism<Space> &m, double length, const double *q, Workspace<Space, double> &w) {
   const auto rows = static_cast<Index>(m.rows.size());
   VectorXd v = VectorXd::Zero(m.n_v), value(rows), rate(rows), at_rest(rows);
   measure(m, q, v.data(), w, value.data(),
@@ -37,19 +37,16 @@ MatrixXd gradients(const Mechanism<Space> &m, double length, const double *q,
     J.col(static_cast<Index>(j)) = columns[j];
   for (Index r = 0; r < rows; ++r) {
     const Row &row = m.rows[static_cast<std::size_t>(r)];
-    bool is_way =
-        row.model.kind == RowKind::point || row.model.kind == RowKind::slide;
+    bool is_way = row.model.kind == RowKind::point || row.model.kind == RowKind::slide;
     if (row.model.kind == RowKind::coordinate)
-      is_way = m.nodes[static_cast<std::size_t>(row.node)]
-                   .shape.freedoms.component[row.freedom] < Space::linear;
+      is_way = m.nodes[static_cast<std::size_t>(row.node)].shape.freedoms.component[row.freedom] < Space::linear;
     if (is_way)
       J.row(r) /= length;
   }
   return J;
 }
 
-MatrixXd rows_of(const MatrixXd &J, const std::vector<char> &is_path,
-                 bool path) {
+MatrixXd rows_of(const MatrixXd &J, const std::vector<char> &is_path, bool path) {
   std::vector<Index> chosen;
   for (std::size_t r = 0; r < is_path.size(); ++r)
     if ((is_path[r] != 0) == path)
@@ -70,29 +67,24 @@ MatrixXd null_space(const MatrixXd &J) {
 } // namespace
 
 template <class Space>
-Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch,
-                   const double *q, Workspace<Space, double> &w) {
-  const MatrixXd J = gradients(m, watch.length, q, w),
-                 path = rows_of(J, watch.is_path, true);
-  if (path.rows() == 0)
+Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w) {
+  if (std::none_of(watch.is_path.begin(), watch.is_path.end(), [](char is_path) { return is_path; }))
     return {};
-  const MatrixXd loops = rows_of(J, watch.is_path, false),
-                 followed = path * null_space(loops);
+  const MatrixXd J = gradients(m, watch.length, q, w), path = rows_of(J, watch.is_path, true);
+  const MatrixXd loops = rows_of(J, watch.is_path, false), followed = path * null_space(loops);
   if (followed.rows() > followed.cols())
     return {0, 0};
   const VectorXd values = followed.jacobiSvd().singularValues();
   Posture found;
   found.ratio = values[0] > 0 ? values[values.size() - 1] / values[0] : 0;
-  if (loops.rows() == 0 &&
-      followed.rows() ==
-          followed.cols()) // else the basis of freedoms has no side
+  if (loops.rows() == 0 && followed.rows() == followed.cols()) // else the basis of freedoms has no side
     found.side = followed.determinant() > 0 ? 1 : -1;
   return found;
 }
 
-template Posture posture_at(const Mechanism<Planar> &, const PostureWatch &,
-                            const double *, Workspace<Planar, double> &);
-template Posture posture_at(const Mechanism<Spatial> &, const PostureWatch &,
-                            const double *, Workspace<Spatial, double> &);
+template Posture posture_at(const Mechanism<Planar> &, const PostureWatch &, const double *,
+                            Workspace<Planar, double> &);
+template Posture posture_at(const Mechanism<Spatial> &, const PostureWatch &, const double *,
+                            Workspace<Spatial, double> &);
 
 } // namespace ffrobot::recursion

@@ -23,7 +23,6 @@ struct Posture {
 
 // At q; leaves the kinematics of `w` there, at rest.
 template <class Space>
-Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch,
-                   const double *q, Workspace<Space, double> &w);
+Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w);
 
 } // namespace ffrobot::recursion
