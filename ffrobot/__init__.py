@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from .fe_models.modal_body import ModalBody
     from .results.file import Results
     from .run.watcher import Watcher
-    from .scene.load import make_scene
+    from .scene.any_space import make_scene
     from .scene.scene import Scene
+    from .scene.spatial import SpatialScene
 
     __version__: str
 
@@ -43,8 +44,9 @@ _HOME = {
     "InputError": ".common.errors",
     "SolveError": ".common.errors",
     "ModalBody": ".fe_models.modal_body",
-    "make_scene": ".scene.load",
+    "make_scene": ".scene.any_space",
     "Scene": ".scene.scene",
+    "SpatialScene": ".scene.spatial",
     "Results": ".results.file",
     "Watcher": ".run.watcher",
 }
@@ -57,6 +59,7 @@ __all__ = [
     "Results",
     "Scene",
     "SolveError",
+    "SpatialScene",
     "Watcher",
     "fit_measured",
     "load_scene",

@@ -24,6 +24,7 @@ MOST = 100_000  # runs of a sweep, frames of a view
 
 if TYPE_CHECKING:
     from .run.solution import Solution
+    from .run.spatial import SpatialSolution
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -145,7 +146,7 @@ def _planar(*paths: Path) -> None:
 
 def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) -> None:
     """The same for a scene in space."""
-    from .common.errors import InputError, SolveError
+    from .common.errors import InputError, SolveError, StoppedError
     from .present.progress import Display
     from .present.spatial import print_spatial_summary
     from .present.summary import summary_console
@@ -154,15 +155,26 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
 
     if resume:
         raise InputError(f'{scene_file}: --resume: expected a planar scene, found space = "spatial": not available yet')
+    writing = 0.0
+
+    def keep(solution: SpatialSolution) -> None:
+        nonlocal writing
+        began = time.perf_counter()
+        write_spatial_results(solution, path)
+        writing = time.perf_counter() - began
+
     with Display() as display:
-        solution = solve_spatial(scene_file, display)
-    began = time.perf_counter()
-    write_spatial_results(solution, path)
-    seconds = {**solution.seconds, "writing": time.perf_counter() - began}
-    print_spatial_summary(solution, path, seconds, summary_console())
-    for name, result in solution.analyses.items():
-        result.run.check_completed(scene_file)
-        for text in result.run.warnings if strict else ():
+        solution = solve_spatial(scene_file, display, keep)
+    print_spatial_summary(solution, path, {**solution.seconds, "writing": writing}, summary_console())
+    try:
+        for result in solution.analyses.values():
+            result.run.check_completed()
+    except SolveError as error:
+        raise StoppedError(str(error), display.signal) if display.signal else error from None
+    if display.signal:
+        raise StoppedError(f"{scene_file}: stopped on request; what was computed is in {path}", display.signal)
+    for name, result in solution.analyses.items() if strict else ():
+        for text in result.run.warnings:
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 

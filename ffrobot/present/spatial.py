@@ -22,9 +22,10 @@ def print_spatial_summary(
     units = {joint.name: joint.units for joint in solution.scene.joint}
     for name, result in solution.analyses.items():
         run = result.run
-        off = f"{run.violation.max(initial=0.0):.1e}"
+        off = f"{result.motion.violation.max(initial=0.0):.1e}"
         table.add_row(name, run.analysis.kind, run.status, run.integrator, f"{run.steps}", f"{run.evaluations}", off)
-        for joint, moments in result.motion.motor_forces.moments.items():
+        found = result.motion.motor_forces
+        for joint, moments in {} if found is None else found.moments.items():
             for unit, values in zip(units[joint], moments.T, strict=True):
                 motors.add_row(name, joint, f"{np.abs(values).max():.5g}", "N·m" if unit == "rad" else "N")
     console.print(table)
