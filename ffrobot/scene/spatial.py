@@ -9,6 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
+from ..actuation.patches.spatial_records import SpatialPztLayout
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import did_you_mean, quoted, validate
@@ -26,7 +27,7 @@ AVAILABLE_KINDS = ("pcid",)
 
 # Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
 UNAVAILABLE = {
-    "": ("geometric_stiffening", "pzt", "actuation_points"),
+    "": ("geometric_stiffening", "actuation_points"),
     "body": ("modes", "pieces"),
     "trajectory": ("via", "profile", "shaper"),
     "load": ("pzt", "voltage", "force"),
@@ -36,12 +37,16 @@ UNAVAILABLE = {
 class SpatialSceneKeys(SpatialMechanismKeys):
     """Everything a scene file in space may contain."""
 
+    pzt: tuple[SpatialPztLayout, ...] = ()
+    """Layouts of piezoelectric patches; several on a body are told apart by their names."""
     analysis: Annotated[tuple[Analysis, ...], NotEmpty]
     """What is computed, in this order."""
 
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""
         yield from super().references()
+        for layout in self.pzt:
+            yield from under(f'pzt "{layout.label}"', layout.references())
         for analysis in self.analysis:
             yield from under(f'analysis "{analysis.name}"', analysis.references())
 
@@ -108,6 +113,9 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
         for name, count in Counter(record.name for record in getattr(scene, kind)).items():
             if count > 1:
                 yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
+    for label, count in Counter(layout.label for layout in scene.pzt).items():
+        if count > 1:
+            yield f'pzt "{label}": name: expected a name of its own for each layout on a body, found {count} of this'
     yield from _reference_problems(scene)
     for k, analysis in enumerate(scene.analysis):
         for problem in analysis.problems(Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS)):
@@ -120,6 +128,7 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
 
 def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     bodies, joints = [body.name for body in scene.body], {joint.name: joint for joint in scene.joint}
+    rigid = [body.name for body in scene.body if body.rigid is not None]
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
     for reference in scene.references():
@@ -135,6 +144,8 @@ def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f'{reference.key}: expected one of the bodies {quoted(bodies)}, found "{body}"' + did_you_mean(
                 body, bodies
             )
+        elif reference.kind == "flexible body" and name in rigid:
+            yield f'{reference.key}: expected a flexible body, found "{name}", which is rigid'
 
 
 def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
@@ -164,6 +175,9 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
         if trajectory.orientation is not None:
             label = f'trajectory "{trajectory.name}"'
             yield f"{label}: expected x, y, z or a joint, found an orientation, which is not available yet"
+    for layout in scene.pzt:
+        if layout.coupling != "rotation":
+            yield f'pzt "{layout.label}": coupling: expected "rotation", found "surface": not available in space yet'
     for k, load in enumerate(scene.load, 1):
         if load.point is not None:
             yield f"load no. {k}: point: expected a load on a joint, found a point, which is not available in space yet"
