@@ -148,6 +148,7 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
     from .present.progress import Display
     from .present.spatial import print_spatial_summary
     from .present.summary import summary_console
+    from .results.file import Results
     from .results.spatial import write_spatial_results
     from .run.spatial import solve_spatial
 
@@ -158,10 +159,12 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
     began = time.perf_counter()
     write_spatial_results(solution, path)
     seconds = {**solution.seconds, "writing": time.perf_counter() - began}
-    print_spatial_summary(solution, path, seconds, summary_console())
+    with Results(path) as results:
+        verdict = results.verdict
+    print_spatial_summary(solution, verdict, path, seconds, summary_console())
     for name, result in solution.analyses.items():
         result.run.check_completed(scene_file)
-        for text in result.run.warnings if strict else ():
+        for text in result.warnings if strict else ():
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
@@ -185,7 +188,6 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
     from .present.feasibility import print_feasibility
     from .present.summary import summary_console
 
-    _planar(results_file)
     with reading(results_file):
         print_feasibility(results_file, analysis, summary_console())
 

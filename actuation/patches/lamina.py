@@ -23,7 +23,7 @@ class Lamina(NamedTuple):
 
 
 class Fibres(NamedTuple):
-    """A layer of parallel fibres: E_1, E_2, G_12 in Pa, ν_12, d33 along and d31 across in m/V, angle from x to s in rad.
+    """A layer of parallel fibres: E_1, E_2, G_12 in Pa, ν_12, d33 along and d31 across in m/V, angle in rad from x.
 
     `spacing` of the electrodes along the fibres, m: a volt is a field of 1/spacing.
     """

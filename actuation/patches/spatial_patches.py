@@ -8,12 +8,12 @@ the modal forces are left as they are, and told as what voltages leave unmet.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, Integers
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.spatial_body import SpatialBody
@@ -37,14 +37,12 @@ class LinkPatches:
         orders: (n,) by layout, numbers (from 0) of modes.
         reach: of all patches side by side, over the modes in `order`.
         order: (n,) likewise.
-        to_file: (n, n) modal forces (T, n) on the modes of the modal body from those on the n.
     """
 
     arrays: Mapping[str, PatchArray]
     orders: Mapping[str, Indices]
     reach: Reach
     order: Indices
-    to_file: Array
 
     @property
     def unserved(self) -> Indices:
@@ -52,32 +50,30 @@ class LinkPatches:
         return np.sort(self.order[self.reach.served :])
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """By layout, of modal forces F_p (T, n) on the modes of the equations; `unmet` (T, n) by all, in their order."""
+        """By layout, of modal forces F_p (T, n) on the modes of the equations; `unmet` is what all layouts leave."""
         found = solve_voltages(self.reach, F_p[:, self.order])
         unmet = np.empty_like(F_p)
         unmet[:, self.order] = found.unmet
         ends = np.cumsum([len(array.edges) for array in self.arrays.values()])
-        parts = zip(self.arrays, *(np.split(x, ends[:-1], axis=1) for x in (found.required, found.within_limit)))
+        required, within = (np.split(x, ends[:-1], axis=1) for x in (found.required, found.within_limit))
         return {
-            name: Voltages(required, within, unmet[:, self.orders[name]], self.arrays[name].served)
-            for name, required, within in parts
+            name: Voltages(one, other, unmet[:, self.orders[name]], self.arrays[name].served)
+            for name, one, other in zip(self.arrays, required, within, strict=True)
         }
 
 
-def link_patches(
-    path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody, spatial: SpatialBody
-) -> LinkPatches:
+def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody, spatial: SpatialBody) -> LinkPatches:
     """Place the layouts of one link. Raises `InputError` for patches that do not fit it, or weights that do not."""
     placed = [_placed(path, layout, body) for layout in layouts]
     label = layouts[0].label if len(layouts) == 1 else layouts[0].body
     found = effects(_key(path, label), placed, body)
-    T, residual = spatial.modal_transform, np.asarray(body.residual)
+    T = spatial.modal_transform
     arrays, orders = {}, {}
     for one, of in zip(placed, found, strict=True):
         layout = one.layout
-        orders[layout.label], served = _order((of.Phi_V @ T).T, body.family, residual)
+        orders[layout.label], served = _order((of.Phi_V @ T).T, body.family, body.residual)
         arrays[layout.label] = _array(path, one, body, spatial, of, orders[layout.label], served)
-    return LinkPatches(arrays, orders, *_together(path, layouts, arrays, found, body, spatial), np.linalg.pinv(T))
+    return LinkPatches(arrays, orders, *_together(path, layouts, arrays, found, body, spatial))
 
 
 def _placed(path: Path, layout: SpatialPztLayout, body: ModalBody) -> Placed:
@@ -107,16 +103,15 @@ def _together(
 ) -> tuple[Reach, Indices]:
     """All patches side by side; what counts of modal forces left is told by the weights of a layout that is alone."""
     Phi_V = np.concatenate([(of.Phi_V @ spatial.modal_transform).T for of in found], axis=1)
-    order, served = _order(Phi_V, body.family, np.asarray(body.residual))
+    order, served = _order(Phi_V, body.family, body.residual)
     if len(layouts) == 1:
         array = arrays[layouts[0].label]
         reach = Reach(**{key: getattr(array, key) for key in ("Phi_V", "limit", "W_sqrt", "frequency", "served")})
     else:
         for layout in layouts:
             if layout.mode_weights is not None or layout.point_weights is not None:
-                raise InputError(
-                    f'{_key(path, layout.label)}: expected no weights beside other layouts on "{layout.body}", found them'
-                )
+                found_on = f'beside other layouts on "{layout.body}"'
+                raise InputError(f"{_key(path, layout.label)}: expected no weights {found_on}, found them")
         limit = np.concatenate([array.limit for array in arrays.values()])
         W_sqrt = served_first(served, *Phi_V.shape)
         frequency = np.sqrt(spatial.stiffness[order]) / (2 * np.pi)
@@ -126,11 +121,12 @@ def _together(
     return reach, order
 
 
-def _order(Phi_V: Array, family: Sequence[str], residual: Array) -> tuple[Indices, int]:
-    """Modes with eigenmodes of reached families first, then their attachment modes, then the rest; how many are first."""
+def _order(Phi_V: Array, family: Sequence[str], residual: Integers) -> tuple[Indices, int]:
+    """Eigenmodes of reached families first, then their attachment modes, then the rest; how many are first."""
     size = np.abs(Phi_V).max(axis=1)
     reached = {family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())}
-    rank = np.array([(2 if name not in reached else int(static)) for name, static in zip(family, residual, strict=True)])
+    known = zip(family, residual, strict=True)
+    rank = np.array([int(static) if name in reached else 2 for name, static in known])
     return np.argsort(rank, kind="stable"), int(np.count_nonzero(rank == 0))
 
 
@@ -152,7 +148,7 @@ def with_count(
         found = link_patches(path, [layout.model_copy(update=changed)], body, spatial)
     except InputError:  # across a step of the section, or weights for another number
         return None
-    return replace(found.arrays[layout.label])
+    return found.arrays[layout.label]
 
 
 def _key(path: Path, label: str) -> str:

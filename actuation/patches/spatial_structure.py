@@ -20,8 +20,8 @@ from .structure import StructureEffect
 def with_patches_in_space(spatial: SpatialBody, body: ModalBody, layouts: Sequence[SpatialPztLayout]) -> SpatialBody:
     """The link with mass and stiffness of its patches, as far as the layouts say so; it keeps its number of modes.
 
-    Mass lies on the axis, like that of a beam, with its moment of inertia about the axis, ∫ρ (η² + ζ²) dA. The stiffness
-    is that of the `composite` section.
+    Mass lies on the axis, like that of a beam, with its moment of inertia about the axis, ∫ρ (η² + ζ²) dA. The
+    stiffness is that of the `composite` section.
     """
     T, sections = spatial.modal_transform, link_sections(body)
     points, masses, spins = [], [], []

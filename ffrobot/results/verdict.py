@@ -107,7 +107,7 @@ def judge(file: h5py.File, analyses: Sequence[str], joints: Sequence[Mapping[str
 
 def _judge(name: str, group: h5py.Group, joints: Sequence[Mapping[str, str | float]]) -> AnalysisVerdict:
     motors = _motors(group, joints)
-    units = {str(joint["name"]): JOINT_TYPES[str(joint["type"])].force_unit for joint in joints}
+    units = force_units(group, joints)
     patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
     answer, feasible = _answer(group, motors, patches)
     about = group.attrs
@@ -128,10 +128,20 @@ def _judge(name: str, group: h5py.Group, joints: Sequence[Mapping[str, str | flo
     )
 
 
+def force_units(group: h5py.Group, joints: Sequence[Mapping[str, str | float]]) -> dict[str, str]:
+    """By motor, in the order of the joints of the scene: "N·m" or "N". Motors of one joint in space have numbers."""
+    if group.file.attrs.get("space") != "spatial":
+        return {str(joint["name"]): JOINT_TYPES[str(joint["type"])].force_unit for joint in joints}
+    entries = group.get("feasibility/joints", {})
+    names = [str(joint["name"]) for joint in joints]
+    ordered = sorted(entries, key=lambda name: (names.index(name if name in names else name.rpartition(" ")[0]), name))
+    return {name: str(entries[name].attrs["unit"]) for name in ordered}
+
+
 def _motors(group: h5py.Group, joints: Sequence[Mapping[str, str | float]]) -> dict[str, MotorFeasibility]:
     """As the analysis judged them; of kinds that do not, such as closed loops, from what their motors did."""
     if "feasibility" in group:
-        return read_motors(group["feasibility"], [str(joint["name"]) for joint in joints])
+        return read_motors(group["feasibility"], list(force_units(group, joints)))
     found, time = {}, group["time"][()]
     for joint in joints:
         entry = group.get(f"joints/{joint['name']}")

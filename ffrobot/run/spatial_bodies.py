@@ -36,7 +36,7 @@ class LoadedSpatialBody(Loaded):
 
 
 def load_spatial_bodies(scene: SpatialScene, stage: Callable[[str], None]) -> list[LoadedSpatialBody]:
-    """In the order of the scene, with payloads and patches; stage 1 runs where links are out of date, and tells `stage`.
+    """In the order of the scene, with payloads and patches; stage 1 runs where links are out of date: `stage` is told.
 
     Raises `InputError` for files that are none, and payloads and patches that do not fit.
     """
