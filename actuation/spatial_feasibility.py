@@ -29,17 +29,15 @@ class LinkInMotion:
 
     Attributes:
         modal: its modal body.
-        spatial: its equations, with n modes.
-        p: (T, n) modal coordinates.
-        F_p: (T, n) modal forces that patches would have to supply, on the modes of the equations.
-        to_file: (n, n) modal forces on the modes of the modal body from those.
+        spatial: its equations.
+        p: (T, n) coordinates of the modes of the modal body.
+        F_p: (T, n) modal forces on these that patches would have to supply.
     """
 
     modal: ModalBody
     spatial: SpatialBody
     p: Array
     F_p: Array
-    to_file: Array
 
 
 @dataclass(frozen=True)
@@ -79,10 +77,8 @@ def links_in_motion(motion: SpatialMotion, bodies: Mapping[str, ModalBody]) -> d
     """The links of a motion by name; `bodies` are their modal bodies."""
     found = {}
     for name, modal in bodies.items():
-        node = motion.node(name)
-        T = node.body.modal_transform
-        F_p = motion.motor_forces.modal[name] @ T
-        found[name] = LinkInMotion(modal, node.body, motion.q[:, node.p_q], F_p, np.linalg.pinv(T))
+        p, F_p = motion.body(name).modal, motion.motor_forces.modal[name]
+        found[name] = LinkInMotion(modal, motion.node(name).body, p, F_p)
     return found
 
 
@@ -99,9 +95,9 @@ def judge_in_space(
         link = links[body]
         for name, array in of_link.arrays.items():
             assert isinstance(array.layout, SpatialPztLayout)
-            order = of_link.orders[name]
+            modes = of_link.modes[name]
             trial = partial(with_count, path, array.layout, link.modal, link.spatial)
-            modal = ModalMotion(motion.time, link.p[:, order], link.F_p[:, order])
+            modal = ModalMotion(motion.time, modes.coordinates(link.p), modes.forces(link.F_p))
             judged[name] = judge_patches(array, voltages[name], modal, trial)
     return Feasibility(judge_motors_in_space(motion), judged), unsupplied_in_space(links, patches, voltages)
 
@@ -125,10 +121,10 @@ def unmet_in_space(
     """By link: F_p less what its patches do at the voltages that are required, without limits (T, n)."""
     found = {}
     for name, link in links.items():
-        left = link.F_p.copy()
-        for layout, array in patches[name].arrays.items() if name in patches else ():
-            left[:, patches[name].orders[layout]] -= voltages[layout].required @ array.Phi_V.T
-        found[name] = left
+        found[name] = link.F_p
+        if (of_link := patches.get(name)) is not None:
+            required = np.concatenate([voltages[layout].required for layout in of_link.arrays], axis=1)
+            found[name] = of_link.unmet(link.F_p, required)
     return found
 
 
@@ -154,5 +150,6 @@ def unsupplied_in_space(
 
 def _deflections(link: LinkInMotion, left: Array) -> Iterator[float]:
     """Largest over time, m, of each point of a link."""
+    left = left @ link.spatial.modal_transform
     for at in link.spatial.points.values():
         yield float(np.linalg.norm(left / link.spatial.stiffness @ at.translation.T, axis=1).max())

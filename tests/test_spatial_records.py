@@ -208,8 +208,8 @@ MISTAKES = {
         'kind: expected "pcid" in space = "spatial", found "fcid", which is not available there yet',
     ),
     "key that is not there yet": (
-        lambda data: data.update(pzt=[{"body": "hand"}]),
-        'pzt: expected no such key in space = "spatial", found it: not available there yet',
+        lambda data: data.update(actuation_points=[{"body": "hand"}]),
+        'actuation_points: expected no such key in space = "spatial", found it: not available there yet',
     ),
     "gear that gives": (
         put("joint", stiffness=100.0, rotor_inertia=1e-4),

@@ -60,9 +60,7 @@ def actuated_in_space(
     unmet = {}
     for name, of_link in patches.items():
         found = of_link.voltages(links[name].F_p)
-        first = next(iter(found))
-        left = np.empty_like(links[name].F_p)
-        left[:, of_link.orders[first]] = found[first].unmet
-        unmet[name] = left @ links[name].to_file
+        within = np.concatenate([of_layout.within_limit for of_layout in found.values()], axis=1)
+        unmet[name] = of_link.unmet(links[name].F_p, within)
         voltages |= found
     return SpatialActuation(voltages, unmet, *judge_in_space(scene.path, motion, links, patches, voltages))

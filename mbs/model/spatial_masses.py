@@ -54,20 +54,10 @@ def _with_integrals(body: SpatialBody, added: Mapping[str, Any]) -> SpatialBody:
 
 
 def _uncoupled(body: SpatialBody, m_ff: Array, added: Array | None = None) -> SpatialBody:
-    """The body in modal coordinates that make m_ff (n, n) the identity and K_ff, with what is `added`, diagonal again.
-
-    Modes that do not feel each other stay apart, so that the coordinates keep their families: those of a round link
-    that bend it in one plane and the other, with equal frequencies, are not mixed.
-    """
+    """The body in modal coordinates that make m_ff (n, n) the identity, and K_ff, with what is `added`, diagonal."""
     if not body.n_modes:
         return body
-    K = np.diag(body.stiffness) + (0.0 if added is None else added)
-    T, stiffness = np.zeros_like(m_ff), np.zeros(body.n_modes)
-    for block in _coupled_blocks(m_ff, K):
-        square = np.ix_(block, block)
-        L_inverse = np.linalg.inv(np.linalg.cholesky(m_ff[square]))
-        stiffness[block], vectors = np.linalg.eigh(L_inverse @ K[square] @ L_inverse.T)
-        T[square] = L_inverse.T @ vectors
+    T, stiffness = uncoupling(m_ff, np.diag(body.stiffness) + (0.0 if added is None else added))
     return replace(
         body,
         stiffness=stiffness,
@@ -85,6 +75,22 @@ def _uncoupled(body: SpatialBody, m_ff: Array, added: Array | None = None) -> Sp
         ),
         modal_transform=body.modal_transform @ T,
     )
+
+
+def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
+    """T (n, n) with TᵀMT = 1 and TᵀKT = diag(stiffness), and that stiffness (n,).
+
+    Modes that do not feel each other stay apart, so that the coordinates keep their families: those of a round link
+    that bend it in one plane and the other, with equal frequencies, are not mixed. Those that do are in ascending order
+    in the places that they had.
+    """
+    T, stiffness = np.zeros_like(M), np.zeros(len(M))
+    for block in _coupled_blocks(M, K):
+        square = np.ix_(block, block)
+        L_inverse = np.linalg.inv(np.linalg.cholesky(M[square]))
+        stiffness[block], vectors = np.linalg.eigh(L_inverse @ K[square] @ L_inverse.T)
+        T[square] = L_inverse.T @ vectors
+    return T, stiffness
 
 
 def _coupled_blocks(*matrices: Array) -> list[Indices]:
