@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from .patches.spatial_records import SpatialPztLayout
 from .patches.voltages import Voltages
 
 ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
-NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection
+NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad
 
 
 @dataclass(frozen=True)
@@ -49,19 +49,23 @@ class UnsuppliedInSpace:
         families: of each, those of the modes concerned, in words.
         with_patches: whether any link has patches.
         deflection: m, of each, the largest of a point by Φ K⁻¹ r, quasi-static, the link held as its modes are.
+        rotation: rad, likewise, of a section.
     """
 
     bodies: tuple[str, ...]
     families: tuple[str, ...]
     with_patches: bool
     deflection: tuple[float, ...]
+    rotation: tuple[float, ...]
 
     @property
     def in_words(self) -> str:
         """What it means, and what to do."""
         links = [
-            f"{body} ({families}), off by {1e3 * deflection:.2g} mm"
-            for body, families, deflection in zip(self.bodies, self.families, self.deflection, strict=True)
+            f"{body} ({families}), off by {1e3 * deflection:.2g} mm and {np.degrees(turn):.2g}°"
+            for body, families, deflection, turn in zip(
+                self.bodies, self.families, self.deflection, self.rotation, strict=True
+            )
         ]
         return (
             f"nothing supplies modal forces of {'; '.join(links)}, quasi-static, where {_whoever(self.with_patches)}:"
@@ -133,23 +137,23 @@ def unsupplied_in_space(
 ) -> UnsuppliedInSpace | None:
     """What no voltages supply; None where that bends no link."""
     largest = max((float(np.abs(link.F_p).max(initial=0.0)) for link in links.values()), default=0.0)
-    found: list[tuple[float, str, str]] = []
+    found: list[tuple[float, float, str, str]] = []
     for name, left in unmet_in_space(links, patches, voltages).items():
-        modal, peaks = links[name].modal, np.abs(left).max(axis=0)
-        deflection, counts = max(_deflections(links[name], left), default=0.0), peaks > ROUNDING * largest
-        if deflection > NEGLIGIBLE * modal.length and counts.any():
+        modal, counts = links[name].modal, np.abs(left).max(axis=0) > ROUNDING * largest
+        deflection, rotation = _largest_shift(links[name], left)
+        if max(deflection / modal.length, rotation) > NEGLIGIBLE and counts.any():
             of_modes = dict.fromkeys(family for family, one in zip(modal.family, counts, strict=True) if one)
-            found.append((deflection, name, ", ".join(of_modes)))
+            found.append((deflection, rotation, name, ", ".join(of_modes)))
     if not found:
         return None
     found.sort(reverse=True)
-    deflections = tuple(one[0] for one in found)
-    bodies, families = (tuple(str(one[k]) for one in found) for k in (1, 2))
-    return UnsuppliedInSpace(bodies, families, bool(patches), deflections)
+    deflections, rotations, bodies, families = zip(*found, strict=True)
+    return UnsuppliedInSpace(bodies, families, bool(patches), deflections, rotations)
 
 
-def _deflections(link: LinkInMotion, left: Array) -> Iterator[float]:
-    """Largest over time, m, of each point of a link."""
-    left = left @ link.spatial.modal_transform
-    for at in link.spatial.points.values():
-        yield float(np.linalg.norm(left / link.spatial.stiffness @ at.translation.T, axis=1).max())
+def _largest_shift(link: LinkInMotion, left: Array) -> tuple[float, float]:
+    """Of the points of a link over time, by modal forces (T, n): m, rad."""
+    p = left @ link.spatial.modal_transform / link.spatial.stiffness
+    shifts = [(p @ at.translation.T, p @ at.rotation.T) for at in link.spatial.points.values()]
+    deflection, rotation = (max(float(np.linalg.norm(shift[k], axis=1).max()) for shift in shifts) for k in range(2))
+    return deflection, rotation

@@ -94,7 +94,7 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | UnsuppliedInSpace | None:
         return None
     about = dict(group["unsupplied"].attrs)
     if "families" in about:
-        lists = {key: tuple(about[key]) for key in ("bodies", "families", "deflection")}
+        lists = {key: tuple(about[key]) for key in ("bodies", "families", "deflection", "rotation")}
         return UnsuppliedInSpace(**lists, with_patches=bool(about["with_patches"]))
     return Unsupplied(**(about | {"bodies": tuple(about["bodies"])}))
 
