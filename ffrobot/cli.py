@@ -150,6 +150,7 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
     from .present.progress import Display
     from .present.spatial import print_spatial_summary
     from .present.summary import summary_console
+    from .results.file import Results
     from .results.spatial import write_spatial_results
     from .run.spatial import solve_spatial
 
@@ -165,7 +166,9 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
 
     with Display() as display:
         solution = solve_spatial(scene_file, display, keep)
-    print_spatial_summary(solution, path, {**solution.seconds, "writing": writing}, summary_console())
+    with Results(path) as results:
+        verdict = results.verdict
+    print_spatial_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
     try:
         for result in solution.analyses.values():
             result.run.check_completed()
@@ -174,7 +177,7 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
     if display.signal:
         raise StoppedError(f"{scene_file}: stopped on request; what was computed is in {path}", display.signal)
     for name, result in solution.analyses.items() if strict else ():
-        for text in result.run.warnings:
+        for text in result.warnings:
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
@@ -198,7 +201,6 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
     from .present.feasibility import print_feasibility
     from .present.summary import summary_console
 
-    _planar(results_file)
     with reading(results_file):
         print_feasibility(results_file, analysis, summary_console())
 

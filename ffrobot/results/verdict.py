@@ -144,7 +144,7 @@ def _judge(name: str, group: h5py.Group, coordinates: Coordinates) -> AnalysisVe
 def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasibility]:
     """As the analysis judged them; of kinds that do not, such as closed loops, from what their motors did."""
     if "feasibility" in group:
-        return read_motors(group["feasibility"], [joint for joint, _ in coordinates.values()])
+        return read_motors(group["feasibility"], list(coordinates))
     found, time = {}, group["time"][()]
     for label, (joint, coordinate) in coordinates.items():
         entry = group.get(f"joints/{joint}")

@@ -11,7 +11,6 @@ from ...common.arrays import Array
 from ...common.rotations import about
 from ...common.tables import shown
 from ...mbs.fields.field_types import GROUND
-from ...scene.spatial import UNAVAILABLE_JOINT_KEYS
 from .bodies import Body, Mechanism
 from .flexible import FlexibleLink
 from .names import Names
@@ -151,8 +150,6 @@ class SceneOfRobot:
                 self.remarks.append(f"{label}: expected it not below 0")
             elif value and joint.type not in SINGLE:
                 self.remarks.append(f"{label}, of a {joint.type} joint")
-            elif value and ours in UNAVAILABLE_JOINT_KEYS:
-                self.remarks.append(f"{label}: friction is not available in space yet")
             elif value:
                 keys[ours] = value
         return keys
