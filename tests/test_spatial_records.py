@@ -227,10 +227,6 @@ MISTAKES = {
         add("load", point="hand.tip", mz="0.1*t"),
         "load no. 2: point: expected a load on a joint, found a point, which is not available in space yet",
     ),
-    "integrator that is not there yet": (
-        put("analysis", integrator="radau"),
-        'integrator: expected "auto", "dop853", "dopri5" in space = "spatial", found "radau"',
-    ),
     "nothing to follow": (lambda data: data.pop("trajectory"), r"expected at least one \\[\\[trajectory\\]\\]"),
 }
 

@@ -13,7 +13,6 @@ from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import did_you_mean, quoted, validate
 from ..fe_models.link_file import LinkTable, read_link
-from ..mbs.analysis.spatial_pcid import INTEGRATORS
 from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND, NotEmpty
 from ..mbs.fields.functions import check_domain
@@ -144,11 +143,6 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
             yield (
                 f'analysis "{analysis.name}": kind: expected {quoted(AVAILABLE_KINDS)} in space = "spatial", found'
                 f' "{analysis.kind}", which is not available there yet'
-            )
-        elif getattr(analysis, "integrator", "auto") not in INTEGRATORS:
-            yield (
-                f'analysis "{analysis.name}": integrator: expected {quoted(INTEGRATORS)} in space = "spatial", found'
-                f' "{getattr(analysis, "integrator", "")}", which is not available there yet'
             )
         elif analysis.is_checked:
             yield f'analysis "{analysis.name}": check: expected none in space = "spatial", found it: not available yet'

@@ -95,8 +95,8 @@ def run_spatial_pcid(model: SpatialModel, analysis: IntegratedAnalysis) -> Spati
     )  # fmt: skip
 
 
-INTEGRATORS = {"auto": "dop853", "dop853": "dop853", "dopri5": "dopri5"}
-"""What scenes may ask for: methods that need no Newton matrix, which the recursion does not give yet."""
+INTEGRATORS = {"auto": "dop853", **{name: name for name in METHODS}}
+"""The method that stands behind each name in scenes."""
 
 
 def _observed(system: SpatialSystem, times: Array, q: Array, v: Array) -> tuple[list[tuple[Array, Array]], Array]:

@@ -14,12 +14,14 @@ using Eigen::VectorXd;
 template <class Space>
 RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, const double *q,
                                         const double *v)
-    : OdeSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
-      workspace_(mechanism), measured_(mechanism), force_(VectorXd::Zero(mechanism.n_v)),
+    : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
+      workspace_(mechanism), measured_(mechanism), newton_(mechanism), force_(VectorXd::Zero(mechanism.n_v)),
       target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
       correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
       target_time_(std::numeric_limits<double>::quiet_NaN()) {
   keep_independent_rows(mechanism, q, v, workspace_);
+  newton_.keep(workspace_.active);
+  find_stiff_terms();
   int groups = 2; // ways of joints, angles of joints
   pace_ = {1e-3, 1e-3};
   const Index n = mechanism.n_v;
@@ -68,7 +70,10 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
 
 template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
   local().rate(z, z_dot);
-  evaluate(t, local().state(z), z + n_v(), z_dot + n_v());
+  const double *q = local().state(z);
+  evaluate(t, q, z + n_v(), z_dot + n_v());
+  evaluated_ = Eigen::Map<const VectorXd>(q, mechanism_.n_q);
+  compliance_is_old_ = true;
 }
 
 template <class Space> void RecursiveMotion<Space>::residuals(double t, const double *q, const double *v) {

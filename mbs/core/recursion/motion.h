@@ -1,9 +1,11 @@
-// The motion of a mechanism in joint coordinates as an OdeSystem: rows follow functions of time, forces act along
-// joints and on modes; after every step the state is moved back onto the rows with the columns of the recursion.
+// The motion of a mechanism in joint coordinates as a system that all methods integrate: rows follow functions of time,
+// forces act along joints and on modes; after every step the state is moved back onto the rows with the columns of the
+// recursion.
 #pragma once
 
 #include "core/constraint/constraint.h"
 #include "core/integrate/ode.h"
+#include "core/recursion/newton.h"
 #include "core/recursion/workspace.h"
 #include "core/space/configuration_space.h"
 #include "core/time_function/time_function.h"
@@ -30,7 +32,7 @@ struct Scene {
   std::vector<JointForce> joint_forces;
 };
 
-template <class Space> class RecursiveMotion final : public OdeSystem {
+template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
   // The mechanism and the scene must outlive this. Rows that depend on others at (q, v) are left out of the equations
   // from there on; they are to be consistent.
@@ -45,6 +47,17 @@ public:
   double initial_step() const override { return 0.1 / fastest_; }
   unsigned long evaluations() const override { return workspace_.evaluations; }
 
+  // implicit.cpp
+  Eigen::Index constraints() const override { return target_.size(); }
+  const Eigen::VectorXd &stiffness() const override { return stiffness_; }
+  const Eigen::VectorXd &damping() const override { return damping_; }
+  void factorise(double damping_factor, double stiffness_factor) override;
+  void factorise(Complex damping_factor, Complex stiffness_factor) override;
+  void solve(const double *r, const double *c, double *x) override;
+  void solve(const Complex *r, Complex *x) override;
+  void constrain(const double *x, double *c) override;
+  void constraint_values(double t, const double *z, double *value, double *rate) override;
+
   // At a state y = (q, v): accelerations (n_v); multipliers are in workspace().lambda
   void evaluate(double t, const double *q, const double *v, double *a);
   // Moves q (n_q) and v (n_v) onto the rows at time t; the largest residual left, relative to 1 m, 1 rad, 1 m/s
@@ -55,10 +68,13 @@ public:
 private:
   void update_targets(double t);
   void residuals(double t, const double *q, const double *v);
+  void find_stiff_terms();
+  void find_compliance();
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
-  Workspace<Space, double> workspace_, measured_; // of accelerations; of rows, which must not disturb these
+  // of accelerations; of rows and of Newton's method, which must not disturb these
+  Workspace<Space, double> workspace_, measured_, newton_;
   Eigen::VectorXd force_, target_, value_, rate_, correction_, state_;
   std::vector<Jet> jets_;
   double target_time_;
@@ -68,6 +84,14 @@ private:
   std::vector<double> peak_;
   std::vector<double> pace_; // 1/s, of each group: a rate counts as small below this times the peak of what it is of
   mutable std::vector<double> size_;
+
+  Eigen::VectorXd stiffness_, damping_; // diagonals (n_v)
+  std::vector<Eigen::Index> stiff_;     // where they are not zero
+  Eigen::MatrixXd compliance_;          // (n_v, stiff) what unit forces there do under the rows
+  Eigen::VectorXd evaluated_, base_;    // q of the last slope(), of the compliance
+  bool compliance_is_old_ = true;       // there was a slope since
+  NewtonMatrix<double> real_;
+  NewtonMatrix<Complex> complex_;
 };
 
 } // namespace ffrobot::recursion

@@ -128,9 +128,51 @@ def test_dependent_rows_are_found_and_left_out():
     assert np.count_nonzero(lambda_) == 3
 
 
-def test_an_implicit_method_is_refused():
-    rng = np.random.default_rng(0)
-    model = Mechanism([random_body(rng, 1, J.revolute)], ground(rng), np.zeros(3)).model()
-    radau = controls(methods=[(_core.MethodKind.radau, 1.0, 0.0)])
-    with pytest.raises(ValueError, match="explicit"):
-        _core.tree_motion(model, _core.TreeScene(), [0.0, 1.0], np.zeros(model.n_q), np.zeros(model.n_v), radau)
+RADAU = [(_core.MethodKind.radau, 1.0, 0.0)]
+GENERALIZED_ALPHA = [(_core.MethodKind.generalized_alpha, 1.0, 0.0)]
+
+
+def sprung_tree(rng):
+    """(model, scene, q, v): three damped links, the last in a moving plane, a stiff spring in the first joint."""
+    rows = [row(r.RowKind.point, (-1, 1), (2, 1), np.eye(3)[2])]
+    bodies = three_links(rng)
+    bodies[0].driven = True
+    bases = ground(rng, 2)
+    mechanism = Mechanism(bodies, bases, np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
+    model = mechanism.model()
+    q, v = np.zeros(model.n_q), np.zeros(model.n_v)
+    q[model.first[1][0]] = 1
+    value, _ = model.measure(q, v)
+    scene = _core.TreeScene()
+    scene.add_target(parse_expression(f"{float(value[0])!r}+0.1*sin(3*t)"))
+    joint_q, _, joint_v, _ = model.first[0]
+    scene.add_joint_force(joint_q, joint_v, 2e4, 0.0, 5.0, 0.0, 1.0)
+    q, v, left = _core.tree_projected(model, scene, 0.0, q, v)
+    assert left < 1e-12
+    return model, scene, q, v
+
+
+@pytest.mark.parametrize(("methods", "tolerance", "within"), [(RADAU, 1e-8, 1e-7), (GENERALIZED_ALPHA, 1e-5, 1e-4)])
+def test_implicit_methods_find_the_same_motion(methods, tolerance, within):
+    model, scene, q, v = sprung_tree(np.random.default_rng(11))
+    times = list(np.linspace(0, 0.2, 5))
+    _, expected, _, _ = _core.tree_motion(model, scene, times, q, v, controls(1e-11))
+    (status, _, _), states, _, _ = _core.tree_motion(model, scene, times, q, v, controls(tolerance, methods))
+    assert status == _core.IntegrationStatus.completed
+    assert relative(states[:, : model.n_q], expected[:, : model.n_q]) < within
+
+
+def test_steps_of_radau_are_not_bound_by_what_is_stiff():
+    """An overdamped joint: a tenth of the steps that the explicit method takes."""
+    rng = np.random.default_rng(12)
+    body = random_body(rng, 1, J.revolute)
+    body.driven = True
+    model = Mechanism([body], ground(rng), np.array([0, 0, -9.81])).model()
+    scene = _core.TreeScene()
+    joint_q, _, joint_v, _ = model.first[0]
+    scene.add_joint_force(joint_q, joint_v, 1e8, 0.0, 1e6, 0.0, 1.0)
+    q, v = np.zeros(model.n_q), np.zeros(model.n_v)
+    found = [_core.tree_motion(model, scene, [0.0, 0.05], q, v, controls(1e-6, method)) for method in (DOP853, RADAU)]
+    (_, explicit, _), (_, implicit, _) = found[0][0], found[1][0]
+    assert implicit < 0.1 * explicit
+    assert relative(found[1][1][-1][: model.n_q], found[0][1][-1][: model.n_q]) < 1e-5
