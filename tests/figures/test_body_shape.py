@@ -65,9 +65,8 @@ def test_modes_say_frequency_and_family(beam):
 
 
 def test_a_beam_is_drawn_at_all_its_stations(beam):
-    """Corners of its section on a ring at each, twisted ones too: 61 stations where the mesh has 21 nodes."""
+    """Corners of its section on a ring at each, twisted ones too."""
     figure = draw_modes(beam)
-    assert len(beam.stations.position) > len(beam.mesh.points)
     for axes in figure.axes:
         _, surface = axes.collections
         assert len(surface.get_paths()) >= 4 * (len(beam.stations.position) - 1)
