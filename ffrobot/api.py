@@ -207,6 +207,32 @@ def view_file(
         return view_file(path, Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths
 
 
+def write_movie(
+    results: AnyPath | Results,
+    path: AnyPath,
+    *,
+    analysis: str | None = None,
+    seconds: float | None = None,
+    scale: float | None = None,
+    in_space: bool = False,
+) -> None:
+    """Write a movie of the motion, .gif or .mp4: `ffrobot plot --movie`, `in_space` `ffrobot view --movie`.
+
+    Of one `analysis`, the first that goes through time if None; it plays for 8 s or so many `seconds`, with deflections
+    `scale` times as large, by default as large as can be seen.
+    """
+    from .common.extras import extras
+
+    with extras(), _files(results) as (file,):
+        from .pictures.figures.movie import write_motion
+        from .pictures.movie_file import SECONDS, MovieOptions
+        from .pictures.view import view_movie
+
+        (view_movie if in_space else write_motion)(
+            file, Path(path), MovieOptions(analysis, SECONDS if seconds is None else seconds, scale)
+        )
+
+
 @contextmanager
 def _files(*results: AnyPath | Results) -> Iterator[list[Path]]:
     """The files of results, to be read; of those in memory, temporary ones."""

@@ -12,9 +12,10 @@ from ..figures.figure_file import Curve, FigureRecord
 from ..figures.reading import curve_points
 from ..figures.shared import energy_figures, file_name
 from ..figures.standard import standard_figures
+from ..path_targets import Target, targets
 from ..torque_speed import limit_curves, limits_of
 from .charts import DASHES, Chart, limit_style, shades, style
-from .runs import Run, Target, runs, sources, targets
+from .runs import Run, runs, sources
 
 
 def history_charts(files: Sequence[Results]) -> list[Chart]:
@@ -89,7 +90,7 @@ def _path_errors(files: Sequence[Results]) -> list[Chart]:
     charts: dict[str, Chart] = {}
     for run in runs(files):
         time = run.results.time(run.analysis)
-        for target in targets(run):
+        for target in targets(run.results, run.analysis):
             name, title = target.trajectory, f"distance of {target.point} from its path"
             chart = charts.setdefault(name, Chart(file_name("error", name), title, "distance (mm)"))
             error = path_error(run, target)

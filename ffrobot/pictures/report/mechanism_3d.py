@@ -11,6 +11,7 @@ from ...common.arrays import Array, Indices
 from ...mbs.fields.field_types import GROUND
 from ..figures.palette import COLORS
 from ..motion import visible_exaggeration
+from ..path_targets import Target, targets
 from ..projection import SPACE
 from ..spatial.joints import Marker, joint_markers, tool_marker
 from ..spatial.motion import SpatialBodyMotion, spatial_motions
@@ -18,7 +19,7 @@ from ..spatial.shapes import surface_shape, thickened
 from .charts import encoded, plain
 from .mechanism import PLAYING_SECONDS, SLOWEST, Mechanism
 from .modes_3d import coarsened, triangles_of
-from .runs import Run, Target, targets
+from .runs import Run
 
 MAX_FRAMES = 1000
 MAX_TRIANGLES = 4000  # of a body
@@ -68,7 +69,7 @@ def _run_data(
     run: Run, bodies: list[SpatialBodyMotion], shift: list[Array], bar: float, notes: list[str]
 ) -> dict[str, Any]:
     scene = run.results.scene
-    wanted = targets(run)
+    wanted = targets(run.results, run.analysis)
     points = dict.fromkeys(target.point for target in wanted)
     return {
         "bodies": [_body_data(run, body, s, bar, notes) for body, s in zip(bodies, shift, strict=True)],

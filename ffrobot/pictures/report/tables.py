@@ -11,8 +11,9 @@ import numpy as np
 from ...common.arrays import Array
 from ...results.file import Results, status_in_words
 from ...results.joints import joint_coordinates
+from ..path_targets import targets
 from .histories import path_error
-from .runs import Run, sources, targets
+from .runs import Run, sources
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def peaks_table(runs: Sequence[Run]) -> Table:
 def _peaks(run: Run) -> Iterator[tuple[str, str, Array]]:
     """(quantity, unit, its values (T, …)) of a run."""
     results, analysis = run.results, run.analysis
-    for target in targets(run):
+    for target in targets(run.results, run.analysis):
         yield f"distance of {target.point} from its path", "mm", 1e3 * path_error(run, target)
     for joint in (keys["name"] for keys in results.scene.get("joint", [])):
         for coordinate in joint_coordinates(results.scene, joint):
