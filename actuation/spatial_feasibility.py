@@ -79,9 +79,10 @@ def _whoever(with_patches: bool) -> str:
 
 def links_in_motion(motion: SpatialMotion, bodies: Mapping[str, ModalBody]) -> dict[str, LinkInMotion]:
     """The links of a motion by name; `bodies` are their modal bodies."""
-    found = {}
+    forces, found = motion.motor_forces, {}
+    assert forces is not None
     for name, modal in bodies.items():
-        p, F_p = motion.body(name).modal, motion.motor_forces.modal[name]
+        p, F_p = motion.body(name).modal, forces.modal[name]
         found[name] = LinkInMotion(modal, motion.node(name).body, p, F_p)
     return found
 
@@ -108,11 +109,12 @@ def judge_in_space(
 
 def judge_motors_in_space(motion: SpatialMotion) -> dict[str, MotorFeasibility]:
     """What the motors have to do against their limits; those of several coordinates have a number behind the joint."""
-    found = {}
+    forces, found = motion.motor_forces, {}
+    assert forces is not None
     for joint in motion.model.scene.motor_joints:
         of_joint = motion.joint(joint.name)
         assert of_joint is not None
-        moments, rates = motion.motor_forces.moments[joint.name], of_joint[1]
+        moments, rates = forces.moments[joint.name], of_joint[1]
         for k, limits in enumerate(joint.motor_limits):
             name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
             found[name] = judge_motion(motion.time, moments[:, k], rates[:, k], limits)

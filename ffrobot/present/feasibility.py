@@ -40,10 +40,11 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
 
 def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
     from ..results.actuators import read_motors, read_unsupplied
-    from ..results.verdict import force_units
+    from ..results.joints import labelled_coordinates
 
     yield f'analysis "{name}" ({group.attrs["kind"]})'
-    units = force_units(group, tomllib.loads(group.file.attrs["scene"]).get("joint", []))
+    coordinates = labelled_coordinates(tomllib.loads(group.file.attrs["scene"]))
+    units = {label: one.force_unit for label, (_, one) in coordinates.items()}
     if motors := read_motors(group["feasibility"], list(units)):
         yield _motors(motors, units)
         spikes = ((name, motor.spike_in_words(units[name])) for name, motor in motors.items())

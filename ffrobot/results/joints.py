@@ -70,6 +70,16 @@ def joint_coordinates(scene: Scene, name: str) -> tuple[Coordinate, ...]:
     )
 
 
+Coordinates = Mapping[str, tuple[str, Coordinate]]
+"""Joint and coordinate by label: the joint's name, with a number where it has several coordinates."""
+
+
+def labelled_coordinates(scene: Scene) -> Coordinates:
+    """Those of all joints, in the order of the scene."""
+    names = [str(joint["name"]) for joint in scene.get("joint", [])]
+    return {f"{name}{one.label}": (name, one) for name in names for one in joint_coordinates(scene, name)}
+
+
 def _units(scene: Scene, keys: Mapping[str, Any]) -> tuple[str, ...]:
     if is_spatial(scene):
         return SPATIAL_JOINT_TYPES[str(keys["type"])].units

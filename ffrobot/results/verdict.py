@@ -11,14 +11,10 @@ import numpy as np
 from ..actuation.motors import MotorFeasibility, judge_motion
 from ..common.arrays import Array
 from .actuators import read_motors, read_unsupplied
-from .joints import Coordinate, Scene, joint_coordinates
+from .joints import Coordinates, Scene, labelled_coordinates
 
 Place = tuple[float, str, float]
 """A largest value, where it is, and when (s)."""
-
-
-Coordinates = Mapping[str, tuple[str, Coordinate]]
-"""Joint and coordinate by the name of its motor: the joint's, with a number where it has several coordinates."""
 
 
 @dataclass(frozen=True)
@@ -109,11 +105,7 @@ class Verdict:
 
 def judge(file: h5py.File, analyses: Sequence[str], scene: Scene) -> Verdict:
     """The verdict of the `analyses` of a results file of a `scene`."""
-    coordinates = {
-        f"{joint['name']}{coordinate.label}": (str(joint["name"]), coordinate)
-        for joint in scene.get("joint", [])
-        for coordinate in joint_coordinates(scene, joint["name"])
-    }
+    coordinates = labelled_coordinates(scene)
     return Verdict(tuple(_judge(name, file[name], coordinates) for name in analyses))
 
 

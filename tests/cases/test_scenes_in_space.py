@@ -87,7 +87,7 @@ def test_bodies_and_points(solved):
         close(file[f"inverse/points/{name}/deflection"], [sample["points"][name]["deflection"] for sample in samples])
 
 
-@pytest.mark.parametrize("command", ["feasibility", "linear"])
+@pytest.mark.parametrize("command", ["linear"])
 def test_readers_of_planar_results_say_so(solved, ffrobot, command):
     done = ffrobot(command, solved[1].filename)
     assert done.returncode == 2
