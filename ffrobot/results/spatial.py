@@ -10,6 +10,7 @@ import numpy as np
 from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial import SpatialResult, SpatialSolution
 from .spatial_actuation import write_actuation
 from .write import write_head
@@ -44,6 +45,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     for key in ("integrator", "steps", "evaluations", "wall_seconds", "status"):
         group.attrs[key] = getattr(run, key)
     group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
+    if joints := resolving_joints(motion.model):
+        group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     group["time"] = run.time
     _write_bodies(group, result)
     _write_joints(group, result)

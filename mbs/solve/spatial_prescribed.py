@@ -12,7 +12,7 @@ from ..model.spatial_accelerations import Accelerated, row_accelerations
 from ..model.spatial_inverse import required_forces
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import split_forces
-from .spatial_posture import solve_postures
+from .spatial_posture import BoolArray, solve_postures
 from .state import State
 
 ONE_BY_ONE = 50  # groups of neighbours, each looked for from the last posture of the one before it
@@ -30,8 +30,12 @@ class Prescribed(NamedTuple):
     multipliers: Array
 
 
-def prescribed_motion(model: SpatialModel, modes: Array, times: Array, start: State) -> Prescribed:
+def prescribed_motion(
+    model: SpatialModel, modes: Array, times: Array, start: State, near: Array | None = None
+) -> Prescribed:
     """At `times` (T,), with `modes` (3, T, n): p, ṗ and p̈ of all bodies, from a posture near the first.
+
+    `near` (T, n_q): joints close to what is looked for, where they are known; all times are then solved at once.
 
     As many rows as joints have freedoms are independent. The multipliers are those that go with joints that move
     freely: what is left of the forces on the modes holds the shape.
@@ -41,7 +45,12 @@ def prescribed_motion(model: SpatialModel, modes: Array, times: Array, start: St
     tree, joints = model.tree, model.tree.joint_columns
     q, v, a = np.tile(start.q, (len(times), 1)), *np.zeros((2, len(times), tree.n_v))
     q[:, _modal_places(model)], v[:, ~joints], a[:, ~joints] = modes
-    q = _postures(model, times, q)
+    if near is None:
+        q = _postures(model, times, q)
+    else:
+        q[:, joint_places(model)] = near[:, joint_places(model)]
+        q, is_met = solve_postures(model, times, q)
+        _check_met(model, times, is_met)
     C_v = row_values(model, q, times)[1]
     by_joints = np.linalg.pinv(C_v[:, :, joints])
     rates = target_rates(model, q, times) - np.einsum("tij,tj->ti", C_v, v)
@@ -88,6 +97,20 @@ def _modal_places(model: SpatialModel) -> Array:
     return np.concatenate([np.arange(node.p_q.start, node.p_q.stop) for node in model.tree.nodes])
 
 
+def joint_places(model: SpatialModel) -> Array:
+    """Where the joints of all bodies stand in q."""
+    return np.concatenate([np.arange(node.q.start, node.q.stop) for node in model.tree.nodes])
+
+
+def _check_met(model: SpatialModel, times: Array, is_met: BoolArray) -> None:
+    """Raise `SolveError` for the first of the times (T,) at which no posture was found."""
+    if not is_met.all():
+        raise SolveError(
+            f"{model.scene.path}: no posture was found at t = {times[int(is_met.argmin())]:g} s: the prescribed shape"
+            " takes the trajectories out of reach"
+        )
+
+
 def _postures(model: SpatialModel, times: Array, q: Array) -> Array:
     """Q (T, n_q) with joints that meet the rows, modes kept: some one after the other, those between from these."""
     modes = _modal_places(model)
@@ -97,10 +120,6 @@ def _postures(model: SpatialModel, times: Array, q: Array) -> Array:
         guess[:] = at
         guess[:, modes] = q[k : k + stride, modes]
         some, is_met = solve_postures(model, times[k : k + stride], guess)
-        if not is_met.all():
-            raise SolveError(
-                f"{model.scene.path}: no posture was found at t = {times[k + int(is_met.argmin())]:g} s: the prescribed"
-                " shape takes the trajectories out of reach"
-            )
+        _check_met(model, times[k : k + stride], is_met)
         found[k : k + stride], at = some, some[-1]
     return found
