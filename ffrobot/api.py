@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from os import PathLike
 from pathlib import Path
@@ -15,14 +15,16 @@ if TYPE_CHECKING:
     from .fit import Fit
     from .results.file import Results
     from .run.solution import Solution
+    from .run.spatial import SpatialSolution
     from .run.watcher import Watcher
-    from .scene.scene import Scene
+    from .scene.any_space import AnyScene
+    from .scene.spatial import SpatialScene
 
 AnyPath = str | PathLike[str]
 
 
 def solve(
-    scene: Scene | AnyPath,
+    scene: AnyScene | AnyPath,
     output: AnyPath | None = None,
     watcher: Watcher | None = None,
     *,
@@ -50,14 +52,20 @@ def solve(
     from .scene.scene import Scene
 
     path = None if output is None else Path(output)
-    inputs = files_of(Path(scene)) if not isinstance(scene, Scene) else files_of_tables(scene.path, scene.text)
+    inputs = files_of(Path(scene)) if isinstance(scene, str | PathLike) else files_of_tables(scene.path, scene.text)
     if path is not None:
         with protected(inputs):
             check_output(path, FORMAT)
     elif resume:
         raise InputError("solve: resume: expected the output of the run that was stopped, found none")
-    if not isinstance(scene, Scene):
+    if isinstance(scene, str | PathLike):
         scene = load_scene(scene, allow_python=allow_python)
+    if scene.space == "spatial":
+        from .scene.spatial import SpatialScene
+
+        assert isinstance(scene, SpatialScene)
+        return _solve_spatial(scene, path, watcher, inputs, resume=resume)
+    assert isinstance(scene, Scene)
 
     def keep(solution: Solution) -> None:
         if path is not None:
@@ -78,13 +86,41 @@ def solve(
     return Results.from_image(results_image(solution), solution.scene.path)
 
 
-def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
+def _solve_spatial(
+    scene: SpatialScene, path: Path | None, watcher: Watcher | None, inputs: Iterable[Path], *, resume: bool
+) -> Results:
+    """The same of a scene in space."""
+    from .common.errors import FfrobotWarning, InputError
+    from .common.outputs import protected
+    from .results.file import Results
+    from .results.spatial import spatial_image, write_spatial_results
+    from .run.spatial import solve_spatial
+    from .run.watcher import Watcher
+
+    if resume:
+        raise InputError(f'{scene.path}: resume: expected a planar scene, found space = "spatial": not available yet')
+
+    def keep(solution: SpatialSolution) -> None:
+        if path is not None:
+            with protected(inputs):
+                write_spatial_results(solution, path)
+
+    solution = solve_spatial(scene, watcher or Watcher(), keep)
+    for name, result in solution.analyses.items():
+        for text in result.run.warnings:
+            warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=3)
+    for result in solution.analyses.values():
+        result.run.check_completed()
+    return Results(path) if path is not None else Results.from_image(spatial_image(solution), scene.path)
+
+
+def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> AnyScene:
     """Read and validate a scene file, `allow_python` as in `solve`. Raises `InputError`, a line for each wrong key."""
     from .common.python_files import python_allowed
-    from .scene.load import load_scene
+    from .scene.any_space import load_any_scene
 
     with python_allowed(Path(place) for place in allow_python):
-        return load_scene(Path(path))
+        return load_any_scene(Path(path))
 
 
 def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
@@ -169,6 +205,32 @@ def view_file(
 
     with _files(file) as (path,):
         return view_file(path, Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths
+
+
+def write_movie(
+    results: AnyPath | Results,
+    path: AnyPath,
+    *,
+    analysis: str | None = None,
+    seconds: float | None = None,
+    scale: float | None = None,
+    in_space: bool = False,
+) -> None:
+    """Write a movie of the motion, .gif or .mp4: `ffrobot plot --movie`, `in_space` `ffrobot view --movie`.
+
+    Of one `analysis`, the first that goes through time if None; it plays for 8 s or so many `seconds`, with deflections
+    `scale` times as large, by default as large as can be seen.
+    """
+    from .common.extras import extras
+
+    with extras(), _files(results) as (file,):
+        from .pictures.figures.movie import write_motion
+        from .pictures.movie_file import SECONDS, MovieOptions
+        from .pictures.view import view_movie
+
+        (view_movie if in_space else write_motion)(
+            file, Path(path), MovieOptions(analysis, SECONDS if seconds is None else seconds, scale)
+        )
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -16,6 +16,7 @@ from .bench.command import bench
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first, on_first
+from .exchange.command import export, import_
 from .present.failures import describe, ready_streams, without_output
 from .present.logs import FILE, LOGGER, logging_options, python_option
 
@@ -23,6 +24,20 @@ MOST = 100_000  # runs of a sweep, frames of a view
 
 if TYPE_CHECKING:
     from .run.solution import Solution
+    from .run.spatial import SpatialSolution
+
+
+def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Which movie, of what, and how."""
+    seconds = click.FloatRange(0.1, 600.0)
+    for option in (
+        click.option("--movie", metavar="FILE.gif|.mp4", type=FILE, help="Write a movie of the motion, no other file."),
+        click.option("--seconds", metavar="S", type=seconds, default=8.0, help="That the movie plays [8]."),
+        click.option("--analysis", metavar="NAME", help="Movie, or grid, of this analysis only."),
+        click.option("--scale", metavar="S", type=float, help="Of deflections as drawn [as large as can be seen]."),
+    ):
+        command = option(command)
+    return command
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -144,24 +159,38 @@ def _planar(*paths: Path) -> None:
 
 def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) -> None:
     """The same for a scene in space."""
-    from .common.errors import InputError, SolveError
+    from .common.errors import InputError, SolveError, StoppedError
     from .present.progress import Display
     from .present.spatial import print_spatial_summary
     from .present.summary import summary_console
+    from .results.file import Results
     from .results.spatial import write_spatial_results
     from .run.spatial import solve_spatial
 
     if resume:
         raise InputError(f'{scene_file}: --resume: expected a planar scene, found space = "spatial": not available yet')
+    writing = 0.0
+
+    def keep(solution: SpatialSolution) -> None:
+        nonlocal writing
+        began = time.perf_counter()
+        write_spatial_results(solution, path)
+        writing = time.perf_counter() - began
+
     with Display() as display:
-        solution = solve_spatial(scene_file, display)
-    began = time.perf_counter()
-    write_spatial_results(solution, path)
-    seconds = {**solution.seconds, "writing": time.perf_counter() - began}
-    print_spatial_summary(solution, path, seconds, summary_console())
-    for name, result in solution.analyses.items():
-        result.run.check_completed(scene_file)
-        for text in result.run.warnings if strict else ():
+        solution = solve_spatial(scene_file, display, keep)
+    with Results(path) as results:
+        verdict = results.verdict
+    print_spatial_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
+    try:
+        for result in solution.analyses.values():
+            result.run.check_completed()
+    except SolveError as error:
+        raise StoppedError(str(error), display.signal) if display.signal else error from None
+    if display.signal:
+        raise StoppedError(f"{scene_file}: stopped on request; what was computed is in {path}", display.signal)
+    for name, result in solution.analyses.items() if strict else ():
+        for text in result.warnings:
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
@@ -185,7 +214,6 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
     from .present.feasibility import print_feasibility
     from .present.summary import summary_console
 
-    _planar(results_file)
     with reading(results_file):
         print_feasibility(results_file, analysis, summary_console())
 
@@ -195,43 +223,70 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
 @click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several [png,pdf].")
 @click.option("--only", metavar="NAME", multiple=True, help='Figures of this name, or like "moment_*"; repeatable.')
-def plot(file: Path, output: Path | None, formats: str, only: tuple[str, ...]) -> None:
+@movie_options
+def plot(
+    file: Path,
+    output: Path | None,
+    formats: str,
+    only: tuple[str, ...],
+    movie: Path | None,
+    **options: Any,  # noqa: ANN401 (the fields of MovieOptions)
+) -> None:
     """Draw the figures of a results file, or mesh and modes of a modal body file.
 
-    Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn.
+    Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn. With
+    --movie, the motion in the plane instead.
     """
     from .common.hdf5 import reading
+    from .pictures.figures.movie import write_motion
     from .pictures.figures.plot import plot_file
+    from .pictures.movie_file import MovieOptions
 
-    _planar(file)
     with reading(file):
+        if movie is not None:
+            _tell([movie], write_motion(file, movie, MovieOptions(**options)))
+            return
         paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","), only)
-    for path in paths:
-        click.echo(path)
+    _tell(paths)
 
 
 @cli.command()
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the files; FILE.view if absent.")
-@click.option("--analysis", metavar="NAME", help="Of this analysis only.")
 @click.option("--frames", metavar="N", type=click.IntRange(1, MOST), default=201, help="Time steps at most [201].")
 @click.option("--time", metavar="SECONDS", type=float, help="Of the picture [where deflections are largest].")
-@click.option("--scale", metavar="S", type=float, help="Of deflections in the picture [as large as can be seen].")
 @click.option("--pictures/--no-pictures", default=None, help="PNG pictures too [where PyVista can draw].")
-def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN401 (the fields of Options)
+@movie_options
+def view(
+    file: Path,
+    output: Path | None,
+    movie: Path | None,
+    seconds: float,
+    **options: Any,  # noqa: ANN401 (the fields of Options)
+) -> None:
     """Write links and motions in space: VTKHDF and XDMF files for ParaView, pictures by PyVista.
 
-    Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies.
+    Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies. With
+    --movie, a movie by PyVista instead.
     """
     from .common.hdf5 import reading
-    from .pictures.view import Options, view_file
+    from .pictures.movie_file import MovieOptions
+    from .pictures.view import Options, view_file, view_movie
 
-    _planar(file)
     with reading(file):
+        if movie is not None:
+            wanted = MovieOptions(options["analysis"], seconds, options["scale"])
+            _tell([movie], view_movie(file, movie, wanted))
+            return
         viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
-    for path in viewed.paths:
+    _tell(viewed.paths, viewed.notes)
+
+
+def _tell(paths: Iterable[Path], notes: Iterable[str] = ()) -> None:
+    """What was written, and what was not as it should be."""
+    for path in paths:
         click.echo(path)
-    for note in viewed.notes:
+    for note in notes:
         click.echo(f"ffrobot: {note}", err=True)
 
 
@@ -247,7 +302,6 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
-    _planar(*results_files)
     with reading(*results_files):
         write_report(results_files, path)
     click.echo(path)
@@ -382,6 +436,8 @@ def schema(kind: str) -> None:
 
 
 cli.add_command(bench)
+cli.add_command(import_)
+cli.add_command(export)
 
 
 def _protect(paths: Iterable[Path]) -> None:

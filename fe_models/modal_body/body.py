@@ -321,6 +321,9 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         shapes += [(f"measured.{name}", value, (n,)) for name, value in vars(body.measured).items()]
     if body.stations.rigidity is not None:
         shapes.append(("stations.rigidity", body.stations.rigidity, (k, 2)))
+    for name in ("width", "out_of_plane_rigidity", "torsional_rigidity"):
+        if (values := getattr(body.stations, name)) is not None:
+            shapes.append((f"stations.{name}", values, (k,)))
     if body.mesh.edges is not None:
         shapes.append(("mesh.edges", body.mesh.edges, (len(body.mesh.edges), 2)))
     if (outline := body.stations.outline) is not None:

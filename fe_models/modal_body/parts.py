@@ -47,6 +47,9 @@ class Stations:
         outline: (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not
             known.
         rigidity: (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known.
+        width: (k,) extent along z in m, likewise.
+        out_of_plane_rigidity: (k,) EI in N·m² of bending along z, likewise.
+        torsional_rigidity: (k,) GJ in N·m², likewise.
     """
 
     position: Array
@@ -56,6 +59,9 @@ class Stations:
     element: Integers | None = None
     outline: Array | None = None
     rigidity: Array | None = None
+    width: Array | None = None
+    out_of_plane_rigidity: Array | None = None
+    torsional_rigidity: Array | None = None
 
     def __post_init__(self) -> None:
         freeze(self)

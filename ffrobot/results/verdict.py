@@ -10,9 +10,8 @@ import numpy as np
 
 from ..actuation.motors import MotorFeasibility, judge_motion
 from ..common.arrays import Array
-from ..mbs.joints.joints import JOINT_TYPES
-from ..mbs.joints.transmission import MotorLimits
 from .actuators import read_motors, read_unsupplied
+from .joints import Coordinates, Scene, labelled_coordinates
 
 Place = tuple[float, str, float]
 """A largest value, where it is, and when (s)."""
@@ -104,14 +103,15 @@ class Verdict:
             yield from one.lines()
 
 
-def judge(file: h5py.File, analyses: Sequence[str], joints: Sequence[Mapping[str, str | float]]) -> Verdict:
-    """The verdict of the `analyses` of a results file; `joints` as the scene has them."""
-    return Verdict(tuple(_judge(name, file[name], joints) for name in analyses))
+def judge(file: h5py.File, analyses: Sequence[str], scene: Scene) -> Verdict:
+    """The verdict of the `analyses` of a results file of a `scene`."""
+    coordinates = labelled_coordinates(scene)
+    return Verdict(tuple(_judge(name, file[name], coordinates) for name in analyses))
 
 
-def _judge(name: str, group: h5py.Group, joints: Sequence[Mapping[str, str | float]]) -> AnalysisVerdict:
-    motors = _motors(group, joints)
-    units = {str(joint["name"]): JOINT_TYPES[str(joint["type"])].force_unit for joint in joints}
+def _judge(name: str, group: h5py.Group, coordinates: Coordinates) -> AnalysisVerdict:
+    motors = _motors(group, coordinates)
+    units = {label: coordinate.force_unit for label, (_, coordinate) in coordinates.items()}
     patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
     answer, feasible = _answer(group, motors, patches)
     about = group.attrs
@@ -133,16 +133,16 @@ def _judge(name: str, group: h5py.Group, joints: Sequence[Mapping[str, str | flo
     )
 
 
-def _motors(group: h5py.Group, joints: Sequence[Mapping[str, str | float]]) -> dict[str, MotorFeasibility]:
+def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasibility]:
     """As the analysis judged them; of kinds that do not, such as closed loops, from what their motors did."""
     if "feasibility" in group:
-        return read_motors(group["feasibility"], [str(joint["name"]) for joint in joints])
+        return read_motors(group["feasibility"], list(coordinates))
     found, time = {}, group["time"][()]
-    for joint in joints:
-        entry = group.get(f"joints/{joint['name']}")
+    for label, (joint, coordinate) in coordinates.items():
+        entry = group.get(f"joints/{joint}")
         if entry is not None and "moment" in entry and "rate" in entry:
-            limits = MotorLimits(*(float(joint.get(f"{what}_limit", np.inf)) for what in ("moment", "speed", "power")))
-            found[str(joint["name"])] = judge_motion(time, entry["moment"][()], entry["rate"][()], limits)
+            moment, rate = (coordinate.of(entry[dataset][()]) for dataset in ("moment", "rate"))
+            found[label] = judge_motion(time, moment, rate, coordinate.limits)
     return found
 
 
