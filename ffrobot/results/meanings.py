@@ -46,7 +46,8 @@ joints/*/coordinate | rad, m | of the second body on the first
 joints/*/rate | rad/s, m/s | of the coordinate
 joints/*/moment | N m, N | of the motor, at the joint
 joints/*/motor_moment | N m, N | of the motor, before its gear
-joints/*/motor_angle | rad | of the motor, behind its gear
+joints/*/motor_angle | rad | of the motor, behind its gear that gives
+joints/*/motor_rate | rad/s | likewise
 joints/*/gear_moment | N m | that the gear transmits
 joints/*/reaction | N | on the second body
 joints/*/reaction_moment | N m | on the second body
@@ -76,6 +77,8 @@ energy/kinetic | J | of all bodies
 energy/strain | J | of all links
 energy/gravitational | J | of all bodies
 energy/dissipated_power | W | by damping and friction
+momentum/linear | kg m/s | of all bodies
+momentum/angular | kg m²/s | of all bodies, about the origin
 constraint_violation | | of position, velocity, acceleration; relative
 resume/** | | what --resume needs
 zero_dynamics/time | s | of the zeros
@@ -132,7 +135,10 @@ stations/rotation | rad/(m √kg) | per unit of each mode
 stations/height | m | of the section, along y
 stations/element | | stations of each element
 stations/outline | m | corners of the section
-stations/rigidity | N, N m² | EA and EI
+stations/rigidity | N, N m² | EA and EI of in-plane bending
+stations/width | m | of the section, along z
+stations/out_of_plane_rigidity | N m² | EI of bending along z
+stations/torsional_rigidity | N m² | GJ
 mesh/points | m | for pictures
 mesh/cells | | points of each cell
 mesh/edges | | points of edges

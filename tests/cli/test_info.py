@@ -6,8 +6,8 @@ import pytest
 from ffrobot.present.info import describe
 from ffrobot.results.meanings import MODAL_BODY, RESULTS, meaning
 
-# inverse and forward motion, patches, linear models
-CASES = ("two_link_patched", "two_link_linear")
+# inverse and forward motion, patches, linear models, gears that give, motion in space
+CASES = ("two_link_patched", "two_link_linear", "compliant_arm", "slider_crank_3d")
 
 
 def datasets(group):
