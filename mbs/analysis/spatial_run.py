@@ -30,6 +30,7 @@ class SpatialRun:
         steps, evaluations: how many.
         wall_seconds: of all.
         warnings: on what is left open.
+        cause: why it ended early, where more is known than its status says.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
     """
 
@@ -48,6 +49,7 @@ class SpatialRun:
     evaluations: int = 0
     wall_seconds: float = 0.0
     warnings: tuple[str, ...] = ()
+    cause: str = ""
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
 
     @property
@@ -67,7 +69,7 @@ class SpatialRun:
             reached = self.time[-1] if len(self.time) else 0.0
             raise SolveError(
                 f'{self.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
-                f" ({self.status}): {ADVICE[self.status]}{how_to_go_on}"
+                f" ({self.status}): {self.cause or ADVICE[self.status]}{how_to_go_on}"
             )
 
 

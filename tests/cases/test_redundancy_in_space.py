@@ -97,17 +97,17 @@ def test_least_torque_is_the_least_of_whole_motions(tmp_path):
         (joint,) = found.attributes("inverse")["resolved_by"]
         time, angle, least = found["inverse/time"], found[f"inverse/joints/{joint}/coordinate"], integral(found)
     del tables["redundancy"]
-    sums, sizes = [], (-0.1, 0.1)
+    sums, sizes = [], (-0.1, 0.0, 0.1)
     tables["trajectory"].append({"name": "held", "joint": joint, "value": "0"})
-    curve = np.polynomial.Polynomial.fit(time, angle, 12)
-    assert np.abs(curve(time) - angle).max() < 1e-6
-    powers = curve.convert().coef
+    curve = np.polynomial.Polynomial.fit(time, angle, 20)  # of t/0.2 − 1
+    assert np.abs(curve(time) - angle).max() < 1e-5
     for epsilon in sizes:
-        more = powers + epsilon / 0.4**2 * np.eye(len(powers))[2]
-        tables["trajectory"][-1]["value"] = " + ".join(f"({c!r})*t**{k}" for k, c in enumerate(more.tolist()))
+        terms = [f"({c!r})*(t/0.2 - 1)**{k}" for k, c in enumerate(curve.coef.tolist())]
+        tables["trajectory"][-1]["value"] = " + ".join([*terms, f"({epsilon!r})*(t/0.4)**2"])
         with solve(tables, tmp_path) as found:
             sums.append(integral(found))
-    a, b = (sums[0] + sums[1] - 2 * least) / 2, (sums[1] - sums[0]) / 2  # of ε/0.1
+    a, b = (sums[0] + sums[2]) / 2 - sums[1], (sums[2] - sums[0]) / 2  # of ε/0.1
+    assert sums[1] == pytest.approx(least, rel=1e-4)
     assert a > 1e-3 * least
     assert abs(b / (2 * a)) < 0.03
     with solve(arm(RUN | {"end": 0.4, "tolerance": 1e-7}, redundancy="least-motion"), tmp_path) as found:
