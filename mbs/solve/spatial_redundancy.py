@@ -26,7 +26,7 @@ OWNER = "redundancy"  # of the rows that this adds
 NODES = 401  # of the splines that joints follow
 TOLERANCE = 1e-9  # of the motion with rigid links
 INTERVALS = 4  # of the splines among which that of least moments is
-STRIDE = 16  # of these nodes at which moments count
+STRIDE = 20  # of these nodes at which moments count
 OUT_OF_REACH = 1e3
 RANK = 1e-6  # of the largest singular value
 TELLS = 0.02  # share of a motion left free that joints must have at all times to tell it
@@ -123,6 +123,7 @@ def _least_torque(model: SpatialModel, nodes: Sequence[Node], times: Array, q: A
     least over a whole motion: what is least at every time alone makes joints run away (J. M. Hollerbach, K. C. Suh,
     IEEE J. Robotics and Automation 3, 1987).
     """
+    from scipy.integrate import simpson
     from scipy.interpolate import BSpline
     from scipy.optimize import least_squares
 
@@ -130,7 +131,7 @@ def _least_torque(model: SpatialModel, nodes: Sequence[Node], times: Array, q: A
     knots = np.concatenate([np.zeros(5), np.linspace(0.0, end, INTERVALS + 1), np.full(5, end)])
     basis = [BSpline.design_matrix(t, knots, 5).toarray()[:, 2:] for t in (times, times[::STRIDE])]
     places, scales = [node.q.start for node in nodes], joint_scales(model)
-    weights = np.sqrt(np.gradient(times[::STRIDE]))[:, None] * scales
+    weights = np.sqrt(simpson(np.eye(len(times[::STRIDE])), x=times[::STRIDE]))[:, None] * scales
     still, start = np.zeros((3, len(weights), int(np.count_nonzero(~model.tree.joint_columns)))), q[::STRIDE]
 
     def moved(c: Array, which: int) -> Array:
@@ -144,7 +145,8 @@ def _least_torque(model: SpatialModel, nodes: Sequence[Node], times: Array, q: A
             motion = prescribed_motion(held, still, times[::STRIDE], State(start[0], 0 * scales), near=moved(c, 1))
         except SolveError:  # out of reach: worse than anything within it
             return np.full(weights.size, OUT_OF_REACH)
-        return (weights * motion.required).ravel() / size
+        found: Array = (weights * motion.required).ravel() / size
+        return found
 
     size = 1.0
     size = float(np.linalg.norm(moments(np.zeros((count - 2) * len(places))))) or 1.0
