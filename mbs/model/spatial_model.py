@@ -78,11 +78,14 @@ class SpatialModel:
                     f"{self.scene.path}: {joint.label}: motor: expected a joint of the tree, found the one at which the"
                     " loop is cut; list it before the others of its loop"
                 )
-            node = self.tree.nodes[self.tree.carried[joint.name]]
-            indices = np.arange(node.v.start, node.v.stop)
-            ordered = joint.coordinates(indices)
-            found[joint.name] = ordered[::-1] if node.backwards and joint.type == "universal" else ordered
+            found[joint.name] = self.columns(joint.name)
         return found
+
+    def columns(self, joint: str) -> Array:
+        """Indices in v of the coordinates of a joint of the tree, in the scene's order; none of a spherical one."""
+        node = self.tree.nodes[self.tree.carried[joint]]
+        ordered = node.joint.coordinates(np.arange(node.v.start, node.v.stop))[: len(node.joint.units)]
+        return ordered[::-1] if node.backwards and node.joint.type == "universal" else ordered
 
     def sign(self, joint: str) -> float:
         """−1 where the tree has a joint's coordinates the other way round."""

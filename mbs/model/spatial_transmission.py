@@ -80,3 +80,13 @@ def resistance(tree: SpatialTree, v: Array) -> Array:
             rate = v[:, column]
             found[:, column] = friction.viscous * rate + friction.coulomb * np.tanh(rate / friction.speed)
     return found
+
+
+def resistance_slope(tree: SpatialTree, v: Array) -> Array:
+    """Its derivative (T, n_v) by v, coordinate by coordinate: c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s)."""
+    found = np.zeros_like(v)
+    for node in tree.nodes:
+        for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
+            steady = np.tanh(v[:, column] / friction.speed)
+            found[:, column] = friction.viscous + friction.coulomb / friction.speed * (1.0 - steady**2)
+    return found

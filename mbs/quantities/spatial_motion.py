@@ -144,7 +144,7 @@ class SpatialMotion:
     @cached_property
     def motor_forces(self) -> MotorForces | None:
         """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is followed."""
-        if not self.followed:
+        if not any(row.is_trajectory for row in self.model.rows):
             return None
         return motor_forces(self.model, self.q, self.frames, self.rows[1], self.supplied)
 
