@@ -21,6 +21,7 @@ from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_inverse import required_forces
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_system import SpatialSystem
+from ..model.spatial_transmission import compliance
 from ..model.spatial_tree import Node
 from .linearisation import DEPENDENT, LinearMechanism
 
@@ -114,6 +115,11 @@ def _check(model: SpatialModel) -> None:
             f'{path}: motors: expected "section" for linear models in space, found "frame": not available yet'
         )
     for node in model.tree.nodes:
+        if compliance(node) is not None:
+            raise InputError(
+                f"{path}: {node.joint.label}: stiffness: expected gears that do not give for linear models in space,"
+                " found one that does: not available yet"
+            )
         if node.backwards and node.joint.type == "planar":  # its coordinates are not linear in the tree's
             raise InputError(
                 f"{path}: {node.joint.label}: between: expected the side nearer to the ground first for linear models,"
