@@ -131,7 +131,7 @@ def state_space(mechanism: LinearMechanism, voltages: Mapping[str, Array]) -> Li
     f = len(mechanism.M)
     motors = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
     forces = {name: column for name, column in mechanism.inputs.items() if name not in motors}
-    inputs = motors | voltages | forces
+    inputs = {**motors, **voltages, **forces}
     modal = {name: row for name, row in zip(mechanism.names, np.eye(f), strict=True) if name.startswith("modal/")}
     outputs = dict(mechanism.outputs) | modal
     columns = np.column_stack([mechanism.K, mechanism.D, *inputs.values()])

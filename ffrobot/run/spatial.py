@@ -14,6 +14,7 @@ from ..actuation.spatial_kinds import IN_SPACE
 from ..common.errors import of_file
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
+from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ..mbs.quantities.spatial_energy import Energies, Momentum, energies, momentum
@@ -166,7 +167,8 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
         run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest
     )  # fmt: skip
     actuation = None
-    if motion.motor_forces is not None:  # else nothing is asked of motors and patches
+    is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
+    if is_judged:  # else nothing is asked of motors and patches
         actuation = actuated_in_space(solution.scene, motion, solution.bodies, solution.patches)
     return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion), actuation)
 

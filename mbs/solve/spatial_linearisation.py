@@ -30,7 +30,7 @@ class SpatialLinearisation:
     """What is the same at every posture: joints alone hold; given forces along s act, and loads.
 
     `model` has no rows of trajectories. Independent are the motors' coordinates where loops leave them so, then other
-    joint coordinates, those first that the loops determine worst at `q` (QR with pivoting), and all modes. `points`
+    joint coordinates, and modes, those first that the loops determine worst at `q` (QR with pivoting). `points`
     ("BODY.POINT") are in- and outputs.
     """
 
@@ -49,38 +49,43 @@ class SpatialLinearisation:
         """
         tree, s = self.model.tree, self.independent
         state = Accelerated(tree, q[None], v[None], a[None], tree.frames(q[None]))
-        drives = required_forces(self.model, state, np.array([t]))[0]
-        core = self.system.derivatives(t, q, v, drives)
-        H, N = self._followers(t, core.value_q, core.rate_q)
+        H, determine = self._followers(state, t)
+        force = H.T @ required_forces(self.model, state, np.array([t]))[0]
+        along_s = np.zeros(tree.n_v)
+        along_s[s] = force
+        core, N = self.system.derivatives(t, q, v, along_s), np.zeros_like(H)
+        N[np.setdiff1d(np.arange(tree.n_v), s)] = -determine @ core.rate_q @ H
         B, B_dot = _bracket(tree.nodes, v), _bracket(tree.nodes, a)[s]
         H_dot = N - H @ B[s] @ H
         by_rate = core.a_v[s] @ H + B[s] @ H
         by_s = core.a_q[s] @ H + core.a_v[s] @ H_dot + B_dot @ H + B[s] @ (H_dot + B @ H)
         M = np.linalg.inv(core.a_f[np.ix_(s, s)])
-        H, H_dot, sides = H * self._signs, H_dot * self._signs, self._signs[:, None] * self._signs
+        sides: Array = self._signs[:, None] * self._signs
+        H, H_dot = H * self._signs, H_dot * self._signs
         return LinearMechanism(
             t, q, v, a, sides * (M + M.T) / 2, -sides * (M @ by_rate), -sides * (M @ by_s),
-            self._inputs(state, H), self._outputs(state, H), H, H_dot, H.T @ drives, np.zeros(0), self.names,
+            self._inputs(state, H), self._outputs(state, H), H, H_dot, self._signs * force, np.zeros(0), self.names,
         )  # fmt: skip
 
-    def _followers(self, t: float, C_q: Array, C_dot_q: Array) -> tuple[Array, Array]:
-        """H and N (n_v, f): δ = H δs and δv = H δv_s + N δs."""
+    def _followers(self, state: Accelerated, t: float) -> tuple[Array, Array]:
+        """H (n_v, f), and what gives the coordinates that follow from the rates that rows would get (n_v − f, rows)."""
         n_v, s = self.model.tree.n_v, self.independent
-        H, N = np.zeros((n_v, len(s))), np.zeros((n_v, len(s)))
+        H = np.zeros((n_v, len(s)))
         H[s, np.arange(len(s))] = 1.0
         others = np.setdiff1d(np.arange(n_v), s)
-        if len(others):
-            sizes = np.linalg.svd(C_q[:, others], compute_uv=False)
-            if not sizes[len(others) - 1] > DEPENDENT * sizes[0]:
-                joints = ", ".join(name for name in self.names if not name.startswith("modal/"))
-                raise SolveError(
-                    f"{self.model.scene.path}: linear model at t = {t:g} s: {joints} do not determine the posture there"
-                    " (a singular one)"
-                )
-            determine = np.linalg.pinv(C_q[:, others])
-            H[others] = -determine @ C_q[:, s]
-            N[others] = -determine @ (C_dot_q @ H)
-        return H, N
+        C_v = row_values(self.model, state.q, np.array([t]), state.frames)[1][0]
+        if not len(others):
+            return H, np.zeros((0, len(C_v)))
+        sizes = np.linalg.svd(C_v[:, others], compute_uv=False)
+        if not sizes[-1] > DEPENDENT * sizes[0]:
+            joints = ", ".join(name for name in self.names if not name.startswith("modal/"))
+            raise SolveError(
+                f"{self.model.scene.path}: linear model at t = {t:g} s: {joints} do not determine the posture there (a"
+                " singular one)"
+            )
+        determine = np.linalg.pinv(C_v[:, others])
+        H[others] = -determine @ C_v[:, s]
+        return H, determine
 
     def _inputs(self, state: Accelerated, H: Array) -> Mapping[str, Array]:
         """By s: a unit of each motor, and of forces on points along x, y, z."""
@@ -101,7 +106,7 @@ class SpatialLinearisation:
         }
 
     def _places(self, state: Accelerated, H: Array) -> dict[str, Array]:
-        found = {}
+        found: dict[str, Array] = {}
         for point in self.points:
             L = self.model.tree.motion(self.model.tree.section(point, np.eye(3)), state.q, state.frames).L[0]
             found |= {f"{point}/{axis}": L[k] @ H for k, axis in enumerate("xyz")}
@@ -158,15 +163,16 @@ def _independent(model: SpatialModel, q: Array) -> Indices:
     motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(np.intp)
     others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
     left = row_values(model, q[None], np.zeros(1))[1][0]
-    chosen = []
-    for group in (others, motors):  # what loops determine best is dependent, motors last
-        free = group
+    size, free = np.abs(left).max(initial=0.0), []
+    for group in (others, motors, modes):  # what loops determine best is dependent, motors and modes last
+        rank, order = 0, np.arange(len(group))
         if len(left) and len(group):
             Q, R, order = qr(left[:, group], pivoting=True)
-            rank = int(np.count_nonzero(np.abs(np.diag(R)) > DEPENDENT * max(1.0, np.abs(left[:, group]).max())))
-            free, left = np.sort(group[order[rank:]]), Q[:, rank:].T @ left
-        chosen.append(free)
-    return np.concatenate([chosen[1], chosen[0], modes]).astype(np.intp)
+            rank = int(np.count_nonzero(np.abs(np.diag(R)) > DEPENDENT * size))
+            left = Q[:, rank:].T @ left
+        free.append(np.sort(group[order[rank:]]))
+    chosen: Indices = np.concatenate([free[1], free[0], free[2]]).astype(np.intp)
+    return chosen
 
 
 def _bracket(nodes: Sequence[Node], v: Array) -> Array:

@@ -80,13 +80,13 @@ def test_motions_beside_a_motion(types):
     tree, q, v = motion.model.tree, motion.q[0], motion.v[0]
     linearisation = SpatialLinearisation(motion.model, q)
     found = linearisation.at(0.0, q, v, motion.a[0])
-    s, h, epsilon = linearisation.independent, 2e-3, 1e-5
+    s, h, epsilon = linearisation.independent, 2e-4, 3e-5
     signs = found.transformation[s].diagonal()
     ds, ds_dot = rng.standard_normal((2, len(s)))
     dq, dv = found.transformation @ ds, found.transformation @ ds_dot + found.transformation_rate @ ds
     times = h * np.arange(7)
     controls = _core.IntegrationControls(
-        tolerance=1e-12, max_steps=100000, methods=[(_core.MethodKind.dop853, 1.0, 0.0)], spectral_radius=1.0
+        tolerance=1e-13, max_steps=100000, methods=[(_core.MethodKind.dop853, 1.0, 0.0)], spectral_radius=1.0
     )
 
     def states(size):
@@ -97,9 +97,9 @@ def test_motions_beside_a_motion(types):
     beside = [states(size) for size in (epsilon, -epsilon)]
     path = np.array([_difference(tree, one, other)[s] for one, other in zip(*beside, strict=True)]) / (2 * epsilon)
     derivatives = np.polyfit(times / h, signs * path, 6)
-    np.testing.assert_allclose(derivatives[-2] / h, ds_dot, rtol=0, atol=2e-4 * np.abs(ds_dot).max())
+    np.testing.assert_allclose(derivatives[-2] / h, ds_dot, rtol=0, atol=1e-6 * np.abs(ds_dot).max())
     expected = -np.linalg.solve(found.M, found.D @ ds_dot + found.K @ ds)
-    np.testing.assert_allclose(2 * derivatives[-3] / h**2, expected, rtol=0, atol=2e-3 * np.abs(expected).max())
+    np.testing.assert_allclose(2 * derivatives[-3] / h**2, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
 def _difference(tree, q1, q0):
