@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Booleans
 from ...common.errors import InputError
 from ...common.rotations import logarithm
 from ...common.validation import did_you_mean, quoted
@@ -64,7 +64,7 @@ class SpatialModel:
     rows: tuple[SpatialRow, ...]
 
     @property
-    def loop_rows(self) -> Array:
+    def loop_rows(self) -> Booleans:
         """(rows,) which rows close loops."""
         return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
 

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import gears_of_motion
@@ -125,7 +125,8 @@ class SpatialMotion:
         h = 1e-6  # of a linear map, but for planar joints
         ahead, behind = (node.joint.turned_around(x + s * x_dot) for s in (h, -h))
         linear = node.joint.type != "planar"
-        return node.joint.turned_around(x), node.joint.turned_around(x_dot) if linear else (ahead - behind) / (2 * h)
+        rate = node.joint.turned_around(x_dot) if linear else as_floats((ahead - behind) / (2 * h))
+        return node.joint.turned_around(x), rate
 
     def path_force(self, trajectory: str) -> Array:
         """−λ (T, m) of its rows: forces on the point, then moments on the section about global axes."""
