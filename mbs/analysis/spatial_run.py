@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ...common.arrays import Array
@@ -10,7 +10,7 @@ from ...common.errors import SolveError
 from ..model.spatial_model import SpatialModel
 from ..scene.analysis import Analysis
 from .drive import Progress
-from .outcome import ADVICE
+from .outcome import ADVICE, Details
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,7 @@ class SpatialRun:
         wall_seconds: of all.
         warnings: on what is left open.
         cause: why it ended early, where more is known than its status says.
+        details: what only its kind finds.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
     """
 
@@ -50,6 +51,7 @@ class SpatialRun:
     wall_seconds: float = 0.0
     warnings: tuple[str, ...] = ()
     cause: str = ""
+    details: Details = field(default=Details(), repr=False)
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
 
     @property
@@ -57,7 +59,7 @@ class SpatialRun:
         """Whether it ended before its last time."""
         return self.status != "completed"
 
-    def rows(self, chosen: slice) -> SpatialRun:
+    def rows(self, chosen: slice | Sequence[int]) -> SpatialRun:
         """These outputs alone."""
         names = ("time", "q", "v", "a", "multipliers", "required")
         of_time = {name: getattr(self, name) for name in names}
