@@ -16,7 +16,7 @@ def test_replays_are_told_by_their_distance_from_the_path(two_link, replay):
     off = 1e3 * np.linalg.norm(np.subtract(*tips), axis=1)
     said = re.fullmatch(r"link2\.tip off its path by (\S+) mm at most, (\S+) mm RMS", results.verdict[replay].answer)
     np.testing.assert_allclose(
-        [float(value) for value in said.groups()], [off.max(), np.sqrt(np.mean(off**2))], rtol=1e-3
+        [float(value) for value in said.groups()], [off.max(), np.sqrt(np.mean(off**2))], rtol=1e-3, atol=1e-6
     )
     assert f"{replay}: {said.group()}" in re.sub(r"\s+", " ", two_link.stdout)
 

@@ -18,18 +18,20 @@ def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, floa
 
     Of points whose path was given, along the axes for which it was.
     """
-    source = group.parent.get(str(group.attrs.get("actuation", "")))
-    if source is None or "control" in group:
+    name = str(group.attrs.get("actuation", ""))  # of an analysis that takes none: empty
+    if not name or "control" in group:
         return
-    shared, now, then = np.intersect1d(
-        *(one["time"][()].round(SAME_TIME) for one in (group, source)), return_indices=True
-    )
+    source = group.parent.get(name)
+    if source is None:
+        return
+    times, path_times = (one["time"][()].round(SAME_TIME) for one in (group, source))
+    shared, now, then = np.intersect1d(times, path_times, return_indices=True)
     for record in scene.get("trajectory", ()):
-        point, name = f"points/{record.get('point')}/position", f"trajectories/{record['name']}"
-        if not len(shared) or point not in group or name not in source:
+        point, path = f"points/{record.get('point')}/position", f"trajectories/{record['name']}"
+        if not len(shared) or point not in group or path not in source:
             continue
-        places = [(k, AXES.index(axis)) for k, axis in enumerate(source[name].attrs["components"]) if axis in AXES]
-        target, position = source[f"{name}/target"][()][then], group[point][()][now]
+        places = [(k, AXES.index(axis)) for k, axis in enumerate(source[path].attrs["components"]) if axis in AXES]
+        target, position = source[f"{path}/target"][()][then], group[point][()][now]
         off = np.sqrt(sum((position[:, axis] - target[:, k]) ** 2 for k, axis in places))
         if places:
             yield str(record["point"]), float(off.max()), float(np.sqrt(np.mean(off**2)))
@@ -38,8 +40,6 @@ def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, floa
 def off_path_in_words(group: h5py.Group, scene: Scene) -> str:
     """As text; empty where there is nothing of that kind."""
     found = off_path(group, scene)
-    return ", ".join(f"{name} off its path by {_mm(most)} at most, {_mm(rms)} RMS" for name, most, rms in found)
-
-
-def _mm(length: float) -> str:
-    return f"{1e3 * length:.4g} mm" if length > 1e-9 else "less than 1 nm"
+    return ", ".join(
+        f"{name} off its path by {1e3 * most:.4g} mm at most, {1e3 * rms:.4g} mm RMS" for name, most, rms in found
+    )
