@@ -128,7 +128,7 @@ def advice(
     if found.is_stable and found.gain < NARROW:
         texts.append(
             f"the linear model of the loop is hardly stable at start, middle and end of the path (gains may grow"
-            f" {found.gain:.3g}-fold), and likely not between: smaller gains, or a shorter sample_time or delay"
+            f" {found.gain:.3g}-fold), and may not be between: smaller gains, or a shorter sample_time or delay"
         )
     elif found.is_stable:
         texts.append(

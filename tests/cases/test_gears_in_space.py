@@ -121,7 +121,7 @@ def test_planar_arm_with_gears_that_give_in_space(tmp_path):
                     np.testing.assert_allclose(
                         space[name], plane[name], atol=share * max(np.abs(plane[name]).max(), least), rtol=0
                     )
-            judged = (one[f"inverse/feasibility/joints/{joint}"].attrs["speed"] for one in (space, plane))
+            judged = (one.attributes(f"inverse/feasibility/joints/{joint}")["speed"] for one in (space, plane))
             np.testing.assert_allclose(*judged, rtol=1e-5)
             for key in ("coordinate", "motor_angle"):
                 name = f"run/joints/{joint}/{key}"
