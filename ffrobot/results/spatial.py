@@ -99,9 +99,8 @@ def _write_joints(group: h5py.Group, result: SpatialResult) -> None:
 
 def _write_gear(entry: h5py.Group, motion: SpatialMotion, joint: str) -> None:
     """What a gear that gives adds to a joint."""
-    angle = motion.motor_angle(joint)
-    if angle is not None:
-        entry["motor_angle"] = angle
+    if (motor := motion.motor_motion(joint)) is not None:
+        entry["motor_angle"], entry["motor_rate"] = motor
     if (gear := motion.gears.get(joint)) is not None:
         entry["gear_moment"] = gear.gear_moment
         entry.attrs["unresolved"] = gear.unresolved
