@@ -34,6 +34,15 @@ def left_jacobian(vectors: Array) -> Array:
     return np.eye(3) + _of_skew(vectors, 2, 3)
 
 
+def left_jacobian_rate(vectors: Array, rates: Array) -> Array:
+    """(dJ_l/dt) φ̇ (…, 3) = ȧ φ×φ̇ + ḃ φ×(φ×φ̇) + b φ̇×(φ×φ̇), with J_l = I + a φ~ + b φ~²."""
+    x, x_dot = np.sum(np.square(vectors), axis=-1)[..., None], 2 * np.sum(vectors * rates, axis=-1)[..., None]
+    across = np.cross(vectors, rates)
+    (_, a_slope), (b, b_slope) = series(2, x), series(3, x)
+    found: Array = x_dot * (a_slope * across + b_slope * np.cross(vectors, across)) + b * np.cross(rates, across)
+    return found
+
+
 def series(m: int, x: Array) -> tuple[Array, Array]:
     """Σ (−x)ᵏ/(2k + m)! of x = φ² and its derivative: (1 − cos φ)/φ² for m = 2, (φ − sin φ)/φ³ for m = 3."""
     coefficients = _SERIES[m]

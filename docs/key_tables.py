@@ -17,9 +17,9 @@ INTRODUCTION = {
     "scene": "What stage 2 reads. SI units, angles in rad; files are named relative to the scene's folder. Values that"
     " the program cannot do yet are refused, with a message that says so."
     " Axes and signs: [conventions](conventions.md).",
-    "spatial": 'What stage 2 reads where `space = "spatial"`. SI units, angles in rad. `ffrobot solve` takes inverse'
-    " dynamics (pcid) along places and joint coordinates so far; what it cannot do yet is refused, with a message that"
-    " says so.",
+    "spatial": 'What stage 2 reads where `space = "spatial"`. SI units, angles in rad. `ffrobot solve` runs static,'
+    " pcid, fcid and forward analyses, with the keys of planar scenes; what it cannot do yet is refused, with a message"
+    " that says so.",
     "figures": "What `ffrobot plot` draws: a file `figures.toml` beside the results. Without it, the standard figures.",
 }
 HERE = Path(__file__).parent / "reference"

@@ -19,17 +19,29 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .api import load_scene, make_link, plot_results, read_modal_body, solve, view_file, write_movie, write_report
+    from .api import (
+        fit_measured,
+        load_scene,
+        make_link,
+        plot_results,
+        read_modal_body,
+        solve,
+        view_file,
+        write_movie,
+        write_report,
+    )
     from .common.errors import FfrobotError, FfrobotWarning, InputError, SolveError
     from .fe_models.modal_body import ModalBody
     from .results.file import Results
     from .run.watcher import Watcher
-    from .scene.load import make_scene
+    from .scene.any_space import make_scene
     from .scene.scene import Scene
+    from .scene.spatial import SpatialScene
 
     __version__: str
 
 _HOME = {
+    "fit_measured": ".api",
     "load_scene": ".api",
     "make_link": ".api",
     "plot_results": ".api",
@@ -43,8 +55,9 @@ _HOME = {
     "InputError": ".common.errors",
     "SolveError": ".common.errors",
     "ModalBody": ".fe_models.modal_body",
-    "make_scene": ".scene.load",
+    "make_scene": ".scene.any_space",
     "Scene": ".scene.scene",
+    "SpatialScene": ".scene.spatial",
     "Results": ".results.file",
     "Watcher": ".run.watcher",
 }
@@ -57,7 +70,9 @@ __all__ = [
     "Results",
     "Scene",
     "SolveError",
+    "SpatialScene",
     "Watcher",
+    "fit_measured",
     "load_scene",
     "make_link",
     "make_scene",

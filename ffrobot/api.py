@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
+    from .fit import Fit
     from .results.file import Results
     from .run.solution import Solution
+    from .run.spatial import SpatialSolution
     from .run.watcher import Watcher
-    from .scene.scene import Scene
+    from .scene.any_space import AnyScene
+    from .scene.spatial import SpatialScene
 
 AnyPath = str | PathLike[str]
 
 
 def solve(
-    scene: Scene | AnyPath,
+    scene: AnyScene | AnyPath,
     output: AnyPath | None = None,
     watcher: Watcher | None = None,
     *,
@@ -49,14 +52,20 @@ def solve(
     from .scene.scene import Scene
 
     path = None if output is None else Path(output)
-    inputs = files_of(Path(scene)) if not isinstance(scene, Scene) else files_of_tables(scene.path, scene.text)
+    inputs = files_of(Path(scene)) if isinstance(scene, str | PathLike) else files_of_tables(scene.path, scene.text)
     if path is not None:
         with protected(inputs):
             check_output(path, FORMAT)
     elif resume:
         raise InputError("solve: resume: expected the output of the run that was stopped, found none")
-    if not isinstance(scene, Scene):
+    if isinstance(scene, str | PathLike):
         scene = load_scene(scene, allow_python=allow_python)
+    if scene.space == "spatial":
+        from .scene.spatial import SpatialScene
+
+        assert isinstance(scene, SpatialScene)
+        return _solve_spatial(scene, path, watcher, inputs, resume=resume)
+    assert isinstance(scene, Scene)
 
     def keep(solution: Solution) -> None:
         if path is not None:
@@ -77,13 +86,41 @@ def solve(
     return Results.from_image(results_image(solution), solution.scene.path)
 
 
-def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
+def _solve_spatial(
+    scene: SpatialScene, path: Path | None, watcher: Watcher | None, inputs: Iterable[Path], *, resume: bool
+) -> Results:
+    """The same of a scene in space."""
+    from .common.errors import FfrobotWarning, InputError
+    from .common.outputs import protected
+    from .results.file import Results
+    from .results.spatial import spatial_image, write_spatial_results
+    from .run.spatial import solve_spatial
+    from .run.watcher import Watcher
+
+    if resume:
+        raise InputError(f'{scene.path}: resume: expected a planar scene, found space = "spatial": not available yet')
+
+    def keep(solution: SpatialSolution) -> None:
+        if path is not None:
+            with protected(inputs):
+                write_spatial_results(solution, path)
+
+    solution = solve_spatial(scene, watcher or Watcher(), keep)
+    for name, result in solution.analyses.items():
+        for text in result.run.warnings:
+            warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=3)
+    for result in solution.analyses.values():
+        result.run.check_completed()
+    return Results(path) if path is not None else Results.from_image(spatial_image(solution), scene.path)
+
+
+def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> AnyScene:
     """Read and validate a scene file, `allow_python` as in `solve`. Raises `InputError`, a line for each wrong key."""
     from .common.python_files import python_allowed
-    from .scene.load import load_scene
+    from .scene.any_space import load_any_scene
 
     with python_allowed(Path(place) for place in allow_python):
-        return load_scene(Path(path))
+        return load_any_scene(Path(path))
 
 
 def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
@@ -97,6 +134,22 @@ def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, 
 
     source = LinkTable(plain(link), Path("<link made in Python>")) if isinstance(link, Mapping) else Path(link)
     return make_link(source, None if output is None else Path(output), force)
+
+
+def fit_measured(
+    file: AnyPath,
+    measured: AnyPath,
+    vary: Sequence[str],
+    output: AnyPath | None = None,
+    *,
+    motors: Literal["free", "held"] | None = None,
+    force: bool = False,
+) -> Fit:
+    """Fit keys of a link or a scene file to measured natural frequencies: `ffrobot fit`. See `fit.fitting`."""
+    from .fit import fit_measured
+
+    where = None if output is None else Path(output)
+    return fit_measured(Path(file), Path(measured), vary, where, motors=motors, force=force)
 
 
 def read_modal_body(path: AnyPath) -> ModalBody:

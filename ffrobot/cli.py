@@ -8,7 +8,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -16,6 +16,7 @@ from .bench.command import bench
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first, on_first
+from .exchange.command import export, import_
 from .present.failures import describe, ready_streams, without_output
 from .present.logs import FILE, LOGGER, logging_options, python_option
 
@@ -23,6 +24,7 @@ MOST = 100_000  # runs of a sweep, frames of a view
 
 if TYPE_CHECKING:
     from .run.solution import Solution
+    from .run.spatial import SpatialSolution
 
 
 def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -157,24 +159,38 @@ def _planar(*paths: Path) -> None:
 
 def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) -> None:
     """The same for a scene in space."""
-    from .common.errors import InputError, SolveError
+    from .common.errors import InputError, SolveError, StoppedError
     from .present.progress import Display
     from .present.spatial import print_spatial_summary
     from .present.summary import summary_console
+    from .results.file import Results
     from .results.spatial import write_spatial_results
     from .run.spatial import solve_spatial
 
     if resume:
         raise InputError(f'{scene_file}: --resume: expected a planar scene, found space = "spatial": not available yet')
+    writing = 0.0
+
+    def keep(solution: SpatialSolution) -> None:
+        nonlocal writing
+        began = time.perf_counter()
+        write_spatial_results(solution, path)
+        writing = time.perf_counter() - began
+
     with Display() as display:
-        solution = solve_spatial(scene_file, display)
-    began = time.perf_counter()
-    write_spatial_results(solution, path)
-    seconds = {**solution.seconds, "writing": time.perf_counter() - began}
-    print_spatial_summary(solution, path, seconds, summary_console())
-    for name, result in solution.analyses.items():
-        result.run.check_completed(scene_file)
-        for text in result.run.warnings if strict else ():
+        solution = solve_spatial(scene_file, display, keep)
+    with Results(path) as results:
+        verdict = results.verdict
+    print_spatial_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
+    try:
+        for result in solution.analyses.values():
+            result.run.check_completed()
+    except SolveError as error:
+        raise StoppedError(str(error), display.signal) if display.signal else error from None
+    if display.signal:
+        raise StoppedError(f"{scene_file}: stopped on request; what was computed is in {path}", display.signal)
+    for name, result in solution.analyses.items() if strict else ():
+        for text in result.warnings:
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
@@ -198,7 +214,6 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
     from .present.feasibility import print_feasibility
     from .present.summary import summary_console
 
-    _planar(results_file)
     with reading(results_file):
         print_feasibility(results_file, analysis, summary_console())
 
@@ -227,7 +242,6 @@ def plot(
     from .pictures.figures.plot import plot_file
     from .pictures.movie_file import MovieOptions
 
-    _planar(file)
     with reading(file):
         if movie is not None:
             _tell([movie], write_motion(file, movie, MovieOptions(**options)))
@@ -259,7 +273,6 @@ def view(
     from .pictures.movie_file import MovieOptions
     from .pictures.view import Options, view_file, view_movie
 
-    _planar(file)
     with reading(file):
         if movie is not None:
             wanted = MovieOptions(options["analysis"], seconds, options["scale"])
@@ -289,7 +302,6 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
-    _planar(*results_files)
     with reading(*results_files):
         write_report(results_files, path)
     click.echo(path)
@@ -371,6 +383,43 @@ def sweep(
 
 
 @cli.command()
+@click.argument("file", metavar="LINK.toml|SCENE.toml", type=FILE)
+@click.option("--measured", metavar="MODES.csv", type=FILE, required=True, help="Table: mode, frequency (Hz), …")
+@click.option("--vary", metavar="KEY,KEY …", multiple=True, required=True, help="Keys to fit; repeatable.")
+@click.option("--motors", type=click.Choice(["free", "held"]), help="Of a robot, as it was measured [free].")
+@click.option("-o", "--output", metavar="FILE.toml", type=FILE, help="Where to write [FILE.fitted.toml].")
+@click.option("--force", is_flag=True, help="Replace files of an earlier fit.")
+@python_option
+@logging_options
+def fit(
+    file: Path,
+    measured: Path,
+    vary: tuple[str, ...],
+    motors: Literal["free", "held"] | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Fit keys of a link or a scene to measured natural frequencies; new files have what was found.
+
+    \b
+    ffrobot fit arm.toml --measured modes.csv --vary material.youngs_modulus
+    ffrobot fit scene.toml --measured robot.csv --vary joint.elbow.stiffness,links.arm.material.youngs_modulus
+
+    A link vibrates under its reference condition, a robot at the start of its scene. KEY=KEY: changed by one factor.
+    Says how sure the values are; keys that the frequencies cannot tell apart are refused.
+    """  # noqa: D301 (click wants the backspace itself)
+    from .fit.fitting import fit_measured
+    from .fit.table import print_fit
+    from .present.summary import summary_console
+    from .run.inputs import files_of
+
+    _protect([*files_of(file), measured])
+    keys = [key for text in vary for key in text.split(",")]
+    found = fit_measured(file, measured, keys, output, motors=motors, force=force)
+    print_fit(found, summary_console())
+
+
+@cli.command()
 @click.argument("kind", type=click.Choice(["link", "scene", "spatial", "figures"]))
 def schema(kind: str) -> None:
     """Print the JSON schema of link, scene or figures files, or of scenes in space, for editors.
@@ -387,6 +436,8 @@ def schema(kind: str) -> None:
 
 
 cli.add_command(bench)
+cli.add_command(import_)
+cli.add_command(export)
 
 
 def _protect(paths: Iterable[Path]) -> None:

@@ -204,12 +204,27 @@ MISTAKES = {
         'joint "waist": expected one joint of this name',
     ),
     "kind that is not there yet": (
-        put("analysis", kind="fcid", shape="zero"),
-        'kind: expected "pcid" in space = "spatial", found "fcid", which is not available there yet',
+        put("analysis", kind="motors-only"),
+        'kind: expected "pcid", "fcid", "forward", "static" in space = "spatial", found "motors-only", which is not',
+    ),
+    "what is applied and not there yet": (
+        add("analysis", name="again", kind="forward", actuation="inverse", apply="trajectory"),
+        'analysis "again": apply: expected "joints" in space = "spatial", found "trajectory", which is not available',
+    ),
+    "shape of a rigid body": (
+        put("analysis", kind="fcid", shape="given", modal={"base": ["0.1*t"]}),
+        'analysis "inverse": modal: expected a flexible body, found "base", which is rigid',
+    ),
+    "shape without a value": (
+        lambda data: (
+            put("body", 1, rigid=None, link="links/upper.toml")(data),
+            put("analysis", kind="fcid", shape="given", modal={"hand": ["1/(t - 0.1)"]})(data),
+        ),
+        r'analysis "inverse": modal.hand\[0\]: expected a finite value during the whole run, found none at t = 0.1',
     ),
     "key that is not there yet": (
-        lambda data: data.update(pzt=[{"body": "hand"}]),
-        'pzt: expected no such key in space = "spatial", found it: not available there yet',
+        lambda data: data.update(actuation_points=[{"body": "hand"}]),
+        'actuation_points: expected no such key in space = "spatial", found it: not available there yet',
     ),
     "gear that gives": (
         put("joint", stiffness=100.0, rotor_inertia=1e-4),
@@ -218,14 +233,6 @@ MISTAKES = {
     "load on a joint with two coordinates": (
         add("load", joint="wrist", moment="1.0"),
         'load no. 2: joint: expected one with a single coordinate, found "wrist", a universal',
-    ),
-    "orientation, which is not there yet": (
-        put("trajectory", rpy=["0", "0", "t"]),
-        'trajectory "tool": expected x, y, z or a joint, found an orientation, which is not available yet',
-    ),
-    "load on a point, which is not there yet": (
-        add("load", point="hand.tip", mz="0.1*t"),
-        "load no. 2: point: expected a load on a joint, found a point, which is not available in space yet",
     ),
     "nothing to follow": (lambda data: data.pop("trajectory"), r"expected at least one \\[\\[trajectory\\]\\]"),
 }
@@ -242,7 +249,7 @@ def test_mistakes_are_told(name):
 def test_planar_readers_refuse_scenes_in_space(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(ARM)
-    with pytest.raises(InputError, match='space: expected "planar", found "spatial": only the command `ffrobot solve`'):
+    with pytest.raises(InputError, match='space: expected "planar", found "spatial": scenes in space run by'):
         load_scene(path)
 
 

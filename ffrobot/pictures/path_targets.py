@@ -9,10 +9,12 @@ import numpy as np
 from ..common.arrays import Array
 from ..results.file import Results
 
+PLACES = ("x", "y", "z")  # components of trajectories that are places
+
 
 @dataclass(frozen=True)
 class Target:
-    """Where a point should be: the `columns` (0 for x, 1 for y) of its position, (T, m) in m."""
+    """Where a point should be: the `columns` (0 for x, 1 for y, 2 for z) of its position, (T, m) in m."""
 
     trajectory: str
     point: str
@@ -35,6 +37,7 @@ def targets(results: Results, analysis: str) -> list[Target]:
             continue
         wanted, common = results.data(f"{groups[holder]}/target"), min(len(results.time(holder)), len(time))
         if np.allclose(time[:common], results.time(holder)[:common], rtol=0, atol=1e-12):
-            columns = tuple("xy".index(c) for c in results.attributes(groups[holder])["components"])
-            found.append(Target(trajectory["name"], trajectory["point"], columns, wanted[:common]))
+            components = [str(c) for c in results.attributes(groups[holder])["components"]]
+            columns = tuple(PLACES.index(c) for c in components if c in PLACES)
+            found.append(Target(trajectory["name"], trajectory["point"], columns, wanted[:common, : len(columns)]))
     return found

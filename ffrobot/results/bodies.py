@@ -9,7 +9,7 @@ import h5py
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.truncation import modes_kept
-from ..mbs.quantities.observation import body_motion, energies, point_motion, stored_coordinates
+from ..mbs.quantities.observation import body_motion, energies, modal_force, point_motion, stored_coordinates
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.validity import Bending
 
@@ -20,6 +20,8 @@ def write_motion(group: h5py.Group, outcome: Outcome) -> None:
     for body in outcome.assembly.model.links:
         for key, values in vars(body_motion(outcome, body)).items():
             group[f"bodies/{body.name}/{key}"] = values
+        if (F_p := modal_force(outcome, body)) is not None:
+            group[f"bodies/{body.name}/modal_force"] = F_p
         transform = stored_coordinates(body)
         about = "modes of the modal body file"
         if transform is not None:

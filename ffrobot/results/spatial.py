@@ -10,21 +10,25 @@ import numpy as np
 from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..run.spatial import SpatialResult, SpatialSolution
+from .spatial_actuation import write_actuation
 from .write import write_head
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
     """Write every analysis of a solution to `path`. Raises `SolveError` where that fails; no half file is left."""
-    write_atomically(path, sealed(_image(solution)), "results file")
+    write_atomically(path, sealed(spatial_image(solution)), "results file")
 
 
-def _image(solution: SpatialSolution) -> bytes:
+def spatial_image(solution: SpatialSolution) -> bytes:
+    """The content of the results file of a solution."""
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         write_head(file, solution.scene.name, solution.scene.text, solution.bodies)
         file.attrs["space"] = "spatial"
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
             _write_analysis(file.create_group(name), result)
+            if result.actuation is not None:
+                write_actuation(file[name], solution, result.actuation)
         file.flush()
         image: bytes = file.id.get_file_image()
     return image
@@ -32,20 +36,26 @@ def _image(solution: SpatialSolution) -> bytes:
 
 def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     run, motion = result.run, result.motion
-    group.attrs.update({"kind": run.analysis.kind, "tolerance": run.analysis.tolerance})
+    analysis = run.analysis
+    group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
+    group.attrs["actuation"] = (analysis.source or "") if analysis.takes_actuation else ""
+    group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
     for key in ("integrator", "steps", "evaluations", "wall_seconds", "status"):
         group.attrs[key] = getattr(run, key)
-    group.attrs.create("warnings", list(run.warnings), dtype=h5py.string_dtype())
+    group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
     group["time"] = run.time
     _write_bodies(group, result)
     _write_joints(group, result)
-    for trajectory in motion.model.scene.trajectory:
-        group[f"trajectories/{trajectory.name}/force"] = motion.path_force(trajectory.name)
-        entry = group[f"trajectories/{trajectory.name}"]
+    for trajectory in motion.followed:
+        entry = group.create_group(f"trajectories/{trajectory.name}")
+        entry["force"] = motion.path_force(trajectory.name)
         entry.attrs["components"] = list(trajectory.components)
-    for key, values in zip(("kinetic", "strain", "gravitational"), run.energy.T, strict=True):
-        group[f"energy/{key}"] = values
-    violation = group.create_dataset("constraint_violation", data=run.violation)
+        if functions := list(trajectory.components.values()):
+            entry["target"] = np.stack([function.sample(run.time)[0] for function in functions], axis=1)
+    for part in ("energies", "momentum"):
+        for key, values in vars(getattr(result, part)).items():
+            group[f"{'energy' if part == 'energies' else part}/{key}"] = values
+    violation = group.create_dataset("constraint_violation", data=motion.violation)
     violation.attrs["columns"] = ["position", "velocity"]
 
 
@@ -55,7 +65,8 @@ def _write_bodies(group: h5py.Group, result: SpatialResult) -> None:
         name = node.body.name
         for key, values in vars(motion.body(name)).items():
             group[f"bodies/{name}/{key}"] = values
-        group[f"bodies/{name}/modal_force"] = motion.motor_forces.modal[name]
+        if motion.motor_forces is not None:
+            group[f"bodies/{name}/modal_force"] = motion.motor_forces.modal[name]
         for label in node.body.points:
             for key, values in vars(motion.point(f"{name}.{label}")).items():
                 group[f"points/{name}.{label}/{key}"] = values
@@ -72,5 +83,6 @@ def _write_joints(group: h5py.Group, result: SpatialResult) -> None:
             entry["coordinate"], entry["rate"] = (
                 np.squeeze(values, 1) if len(joint.units) == 1 else values for values in found
             )
-        if (moment := motion.motor_forces.moments.get(joint.name)) is not None:
+        moment = None if motion.motor_forces is None else motion.motor_forces.moments.get(joint.name)
+        if moment is not None:
             entry["moment"] = np.squeeze(moment, 1) if len(joint.units) == 1 else moment

@@ -2,28 +2,54 @@
 
 from __future__ import annotations
 
+import logging
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..mbs.analysis.spatial_pcid import SpatialRun, run_spatial_pcid
+from ..actuation.patches.spatial_patches import LinkPatches
+from ..common.errors import of_file
+from ..fe_models.modal_body import ModalBody
+from ..mbs.analysis.spatial_kinds import IN_SPACE
+from ..mbs.analysis.spatial_run import SpatialContext, SpatialRun
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
+from ..mbs.quantities.spatial_energy import Energies, Momentum, energies, momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.spatial_reactions import Wrench, reactions
-from ..mbs.scene.analysis import IntegratedAnalysis
+from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
+from .spatial_actuation import SpatialActuation, actuated_in_space, patches_in_space
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
-from .watcher import Watcher
+from .watcher import Interruption, Watcher
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class SpatialResult:
-    """What was computed of one analysis: the run, its motion, and forces in joints by name."""
+    """What was computed of one analysis.
+
+    Attributes:
+        run: how it went, and states.
+        motion: what is read off them.
+        reactions: forces in joints by name.
+        energies, momentum: of the robot.
+        actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
+    """
 
     run: SpatialRun
     motion: SpatialMotion
     reactions: Mapping[str, Wrench]
+    energies: Energies
+    momentum: Momentum
+    actuation: SpatialActuation | None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why results may be wrong, or not mean what they seem to, a text each."""
+        missed = None if self.actuation is None else self.actuation.unsupplied
+        return self.run.warnings if missed is None else (*self.run.warnings, missed.in_words)
 
 
 @dataclass(frozen=True)
@@ -33,43 +59,117 @@ class SpatialSolution:
     Attributes:
         scene, model: what was solved.
         bodies: by name.
+        patches: by body.
         analyses: by name, in the order of the scene.
         seconds: wall time by stage.
+        failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
     """
 
     scene: SpatialScene
     model: SpatialModel
     bodies: Mapping[str, LoadedSpatialBody]
+    patches: Mapping[str, LinkPatches]
     analyses: Mapping[str, SpatialResult]
     seconds: Mapping[str, float]
+    failure: Exception | None = None
+
+    @property
+    def links(self) -> dict[str, ModalBody]:
+        """The modal bodies of the flexible bodies, as their files have them."""
+        return {name: body.modal for name, body in self.bodies.items() if body.modal is not None}
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What links cannot do, one line each."""
-        return tuple(
+        """What patches do to the stiffness of their links, and what links cannot do, one line each."""
+        stiffness = (array.stiffness_in_words for of in self.patches.values() for array in of.arrays.values())
+        return tuple(stiffness) + tuple(
             f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"
             for name, body in self.bodies.items()
             if body.rigid_in
         )
 
 
-def solve_spatial(path: Path, watcher: Watcher) -> SpatialSolution:
-    """Run every analysis of a scene file in space; stage 1 runs first for links that are not up to date.
+Keep = Callable[[SpatialSolution], None]
 
+
+def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | None = None) -> SpatialSolution:
+    """Run every analysis of a scene, or of a scene file, in space; stage 1 runs first for links that are out of date.
+
+    An analysis that does not reach its end is kept as far as it got, and ends the run (`SpatialRun.check_completed`).
+    So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
-    scene, began = load_spatial_scene(path), time.perf_counter()
+    if isinstance(scene, Path):
+        scene = load_spatial_scene(scene)
+    began = time.perf_counter()
     loaded = load_spatial_bodies(scene, watcher.stage)
     seconds = {"bodies": time.perf_counter() - began}
     model = build_spatial_model(scene, [body.spatial for body in loaded])
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
-    analyses = {}
-    for analysis in scene.analysis:
-        assert isinstance(analysis, IntegratedAnalysis)
-        watcher.stage(analysis.name)
+    patches = patches_in_space(scene, bodies)
+    solution = SpatialSolution(scene, model, bodies, patches, {}, seconds)
+    with Interruption(watcher.stopping) as interruption:
+        solution = _run_all(solution, watcher, interruption)
+        if keep is not None and solution.analyses:
+            keep(solution)
+    if solution.failure is not None:
+        raise solution.failure
+    return solution
+
+
+def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
+    """The analyses up to the first that fails."""
+    results: dict[str, SpatialResult] = {}
+    seconds = dict(solution.seconds)
+    for analysis in solution.scene.analysis:
+        if interruption.requested and results:
+            break
+        watcher.stage(f'analysis "{analysis.name}"')
         began = time.perf_counter()
-        run = run_spatial_pcid(model, analysis)  # the only kind there is yet: see scene.spatial.AVAILABLE_KINDS
-        motion = SpatialMotion(model, run.time, run.q, run.v, run.a, run.multipliers)
-        analyses[analysis.name] = SpatialResult(run, motion, reactions(motion, run.frames))
+        try:
+            with of_file(solution.scene.path):
+                run = IN_SPACE[analysis.kind](_context(solution, analysis, results, watcher, interruption), analysis)
+                results[analysis.name] = _evaluated(solution, run)
+        except Exception as error:  # raised once the analyses before it are kept
+            if not results:
+                raise
+            return replace(solution, analyses=results, seconds=seconds, failure=error)
         seconds[analysis.name] = time.perf_counter() - began
-    return SpatialSolution(scene, model, bodies, analyses, seconds)
+        _log(run)
+        if run.failed:
+            break
+    return replace(solution, analyses=results, seconds=seconds)
+
+
+def _context(
+    solution: SpatialSolution,
+    analysis: Analysis,
+    results: Mapping[str, SpatialResult],
+    watcher: Watcher,
+    interruption: Interruption,
+) -> SpatialContext:
+    end = analysis.last_time
+
+    def progress(t: float) -> bool:
+        return watcher.advance(t, end) and not interruption.requested
+
+    return SpatialContext(solution.model, {name: result.run for name, result in results.items()}, progress)
+
+
+def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
+    """What is read off a run."""
+    motion = SpatialMotion(
+        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest
+    )  # fmt: skip
+    actuation = None
+    if motion.motor_forces is not None:  # else nothing is asked of motors and patches
+        actuation = actuated_in_space(solution.scene, motion, solution.bodies, solution.patches)
+    return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion), actuation)
+
+
+def _log(run: SpatialRun) -> None:
+    logger.info(
+        'analysis "%s": %s at t = %g s, %d steps, %d evaluations, %.3f s; integrator %s',
+        run.analysis.name, run.status, run.time[-1] if len(run.time) else 0.0, run.steps, run.evaluations,
+        run.wall_seconds, run.integrator,
+    )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from ..common.errors import InputError
 from ..common.toml_files import load_toml, parse_toml, read_text
 from ..common.validation import plain, validate
 from ..fe_models.link_file import LinkTable, read_link
+from .actuation_times import with_times_of_actuation
 from .checks import check_functions, problems
 from .scene import Scene, SceneKeys
 
@@ -26,13 +28,18 @@ def load_scene(path: Path) -> Scene:
     return _scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
 
 
-def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)
-    """A scene from Python, with the keys of a scene file: tables are dictionaries, arrays of tables lists of them.
+@dataclass(frozen=True)
+class MadeInPython:
+    """Tables from Python as those of a file: `functions` by the text that stands for them."""
 
-    Files it names are looked for in `folder`. NumPy numbers and arrays, tuples and paths may stand for numbers, lists
-    and text; keys that are None are left out. Functions may stand for expressions: see `time_functions.user_function`.
-    Raises `InputError` as `load_scene` does.
-    """
+    data: dict[str, Any]
+    path: Path
+    text: str
+    functions: Mapping[str, object]
+
+
+def made_in_python(folder: PathLike[str] | str, keys: Mapping[str, Any]) -> MadeInPython:
+    """The keys of a scene as a file in `folder` would have them. Raises `InputError` for what no file can hold."""
     import tomli_w
 
     path = Path(folder) / MADE_IN_PYTHON
@@ -41,13 +48,23 @@ def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # n
         text = tomli_w.dumps(plain(keys, functions))
     except (TypeError, RecursionError) as error:
         raise InputError(f"{path}: expected numbers, text, lists and tables, found something else: {error}") from None
-    return _scene(parse_toml(text, path, "scene"), path, text, functions)
+    return MadeInPython(parse_toml(text, path, "scene"), path, text, functions)
+
+
+def made_scene(made: MadeInPython) -> Scene:
+    """The validated planar scene. Raises `InputError` as `load_scene` does."""
+    return _scene(made.data, made.path, made.text, made.functions)
+
+
+def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)
+    """A planar scene from Python: see `any_space.make_scene`."""
+    return made_scene(made_in_python(folder, keys))
 
 
 def _scene(data: dict[str, Any], path: Path, text: str, objects: Mapping[str, object] | None = None) -> Scene:
     """The validated scene of `data`, which was read from `path` as `text`."""
     _refuse_unavailable(data, path)
-    keys = validate(SceneKeys, _with_times_of_actuation(data), path, objects)
+    keys = validate(SceneKeys, with_times_of_actuation(data), path, objects)
     found = [f"{path}: {problem}" for problem in problems(keys)]
     if found:
         raise InputError("\n".join(found))
@@ -62,20 +79,6 @@ def _refuse_unavailable(data: dict[str, Any], path: Path) -> None:
     """Say so plainly, before the keys of what is not there yet are called wrong."""
     if data.get("space") == "spatial":
         raise InputError(
-            f'{path}: space: expected "planar", found "spatial": only the command `ffrobot solve` takes scenes in space'
-            " so far"
+            f'{path}: space: expected "planar", found "spatial": scenes in space run by `ffrobot solve`, `ffrobot'
+            " sweep` and `ffrobot.solve` so far"
         )
-
-
-def _with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
-    """`data` with the `end` and `output_step` of forward analyses taken from their actuation where not given."""
-    try:
-        sources = {analysis["name"]: analysis for analysis in data["analysis"]}
-        analyses = []
-        for analysis in data["analysis"]:
-            source = sources.get(analysis.get("actuation"), {})
-            times = {key: source[key] for key in ("end", "output_step") if key in source}
-            analyses.append(times | analysis)
-    except (KeyError, TypeError, AttributeError):
-        return data  # malformed: validation says how
-    return data | {"analysis": analyses}

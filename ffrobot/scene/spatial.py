@@ -3,29 +3,34 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
+from ..actuation.patches.spatial_records import SpatialPztLayout
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import did_you_mean, quoted, validate
 from ..fe_models.link_file import LinkTable, read_link
+from ..mbs.analysis.spatial_kinds import IN_SPACE
 from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND, NotEmpty
 from ..mbs.fields.functions import check_domain
 from ..mbs.fields.references import Reference, under
 from ..mbs.scene.analysis import Surroundings
 from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys, SpatialMechanismScene
+from ..mbs.scene.spatial.trajectories import SpatialTrajectory
+from .actuation_times import with_times_of_actuation
 from .kinds import KINDS, Analysis
 
-AVAILABLE_KINDS = ("pcid",)
+APPLICABLE = ("joints",)  # values of `apply`
 
 # Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
 UNAVAILABLE = {
-    "": ("geometric_stiffening", "pzt", "actuation_points"),
+    "": ("geometric_stiffening", "actuation_points"),
     "body": ("modes", "pieces"),
     "trajectory": ("via", "profile", "shaper"),
     "load": ("pzt", "voltage", "force"),
@@ -35,12 +40,16 @@ UNAVAILABLE = {
 class SpatialSceneKeys(SpatialMechanismKeys):
     """Everything a scene file in space may contain."""
 
+    pzt: tuple[SpatialPztLayout, ...] = ()
+    """Layouts of piezoelectric patches; several on a body are told apart by their names."""
     analysis: Annotated[tuple[Analysis, ...], NotEmpty]
     """What is computed, in this order."""
 
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""
         yield from super().references()
+        for layout in self.pzt:
+            yield from under(f'pzt "{layout.label}"', layout.references())
         for analysis in self.analysis:
             yield from under(f'analysis "{analysis.name}"', analysis.references())
 
@@ -62,7 +71,14 @@ def load_spatial_scene(path: Path) -> SpatialScene:
 
     Raises `InputError` with one line for each wrong key: file, key, expected, found.
     """
-    scene = spatial_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
+    return available_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
+
+
+def available_scene(
+    data: dict[str, Any], path: Path, text: str, functions: Mapping[str, object] | None = None
+) -> SpatialScene:
+    """The validated scene of `data`, all of which the program can do. Raises `InputError` as `load_spatial_scene`."""
+    scene = spatial_scene(data, path, text, functions)
     check_available(scene)
     return scene
 
@@ -74,12 +90,14 @@ def check_available(scene: SpatialScene) -> None:
         raise InputError("\n".join(found))
 
 
-def spatial_scene(data: dict[str, object], path: Path, text: str) -> SpatialScene:
-    """The validated scene of `data`, which was read from `path` as `text`."""
+def spatial_scene(
+    data: dict[str, Any], path: Path, text: str, functions: Mapping[str, object] | None = None
+) -> SpatialScene:
+    """The validated scene of `data`, which was read from `path` as `text`; `functions` of Python by their names."""
     refused = [f"{path}: {problem}" for problem in _unavailable_keys(data)]
     if refused:
         raise InputError("\n".join(refused))
-    keys = validate(SpatialSceneKeys, data, path)
+    keys = validate(SpatialSceneKeys, with_times_of_actuation(data), path, functions)
     found = [f"{path}: {problem}" for problem in _problems(keys)]
     if found:
         raise InputError("\n".join(found))
@@ -107,6 +125,9 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
         for name, count in Counter(record.name for record in getattr(scene, kind)).items():
             if count > 1:
                 yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
+    for label, count in Counter(layout.label for layout in scene.pzt).items():
+        if count > 1:
+            yield f'pzt "{label}": name: expected a name of its own for each layout on a body, found {count} of this'
     yield from _reference_problems(scene)
     for k, analysis in enumerate(scene.analysis):
         for problem in analysis.problems(Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS)):
@@ -119,6 +140,7 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
 
 def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     bodies, joints = [body.name for body in scene.body], {joint.name: joint for joint in scene.joint}
+    rigid = [body.name for body in scene.body if body.rigid is not None]
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
     for reference in scene.references():
@@ -134,58 +156,69 @@ def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f'{reference.key}: expected one of the bodies {quoted(bodies)}, found "{body}"' + did_you_mean(
                 body, bodies
             )
+        elif reference.kind == "flexible body" and name in rigid:
+            yield f'{reference.key}: expected a flexible body, found "{name}", which is rigid'
 
 
 def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
     """The list of what the records can say and the program cannot do yet."""
     for analysis in scene.analysis:
-        if analysis.kind not in AVAILABLE_KINDS:
-            yield (
-                f'analysis "{analysis.name}": kind: expected {quoted(AVAILABLE_KINDS)} in space = "spatial", found'
-                f' "{analysis.kind}", which is not available there yet'
-            )
-        elif analysis.is_checked:
-            yield f'analysis "{analysis.name}": check: expected none in space = "spatial", found it: not available yet'
+        for key, problem in _not_available_of(analysis, scene):
+            yield f'analysis "{analysis.name}": {key}: expected {problem}'
     for joint in scene.joint:
         if getattr(joint, "stiffness", None) is not None:
             yield f'{joint.label}: stiffness: expected none in space = "spatial", found it: not available there yet'
         if not joint.units and getattr(joint, "motor", False):
             yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
-        for key in ("rotor_inertia", "viscous_friction", "coulomb_friction"):
-            if getattr(joint, key, 0.0):
-                yield f'{joint.label}: {key}: expected none in space = "spatial", found it: not available there yet'
-    for trajectory in scene.trajectory:
-        if trajectory.orientation is not None:
-            label = f'trajectory "{trajectory.name}"'
-            yield f"{label}: expected x, y, z or a joint, found an orientation, which is not available yet"
+    for layout in scene.pzt:
+        if layout.coupling != "rotation":
+            yield f'pzt "{layout.label}": coupling: expected "rotation", found "surface": not available in space yet'
     for k, load in enumerate(scene.load, 1):
-        if load.point is not None:
-            yield f"load no. {k}: point: expected a load on a joint, found a point, which is not available in space yet"
         loaded = next((joint for joint in scene.joint if joint.name == load.joint), None)
         if loaded is not None and len(loaded.units) != 1:
             yield f'load no. {k}: joint: expected one with a single coordinate, found "{loaded.name}", a {loaded.type}'
+
+
+def _not_available_of(analysis: Analysis, scene: SpatialSceneKeys) -> Iterator[tuple[str, str]]:
+    """Keys of an analysis that ask for what is not there yet, and what was expected and found."""
+    apply = getattr(analysis, "apply", None)
+    not_yet = "which is not available there yet"
+    if analysis.kind not in IN_SPACE:
+        yield "kind", f'{quoted(IN_SPACE)} in space = "spatial", found "{analysis.kind}", {not_yet}'
+    if analysis.is_checked:
+        yield "check", 'none in space = "spatial", found it: not available yet'
+    if apply not in (None, *APPLICABLE):
+        yield "apply", f'{quoted(APPLICABLE)} in space = "spatial", found "{apply}", {not_yet}'
+    if apply == "joints" and scene.motors == "frame":
+        yield "apply", 'motors = "section" beside "joints" in space = "spatial", found "frame": not available yet'
 
 
 def _check_functions(scene: SpatialSceneKeys, path: Path) -> None:
     """Raise `InputError` for a function of time without a value at an output time at which it is needed."""
     for analysis in scene.analysis:
         times = np.clip(analysis.times, 0.0, analysis.last_time)
-        for trajectory in scene.trajectory:
-            label = f'{path}: trajectory "{trajectory.name}"'
-            functions = [(f"{label}: {component}", function) for component, function in trajectory.components.items()]
-            law = trajectory.orientation
-            functions += [] if law is None else [(f"{label}: {law.kind}", function) for function in law.functions]
-            for key, function in functions:
-                check_domain(function, times, key, 2)
-                if len(times) > 1:
-                    check_derivatives(function, float(times[-1]), key)
-            if law is not None and law.kind == "direction":
-                sizes = np.linalg.norm([function.sample(times)[0] for function in law.functions], axis=0)
-                if sizes.min() < 1e-9:
-                    raise InputError(
-                        f"{label}: direction: expected a direction at all times, found none at t ="
-                        f" {times[sizes.argmin()]:.9g} s"
-                    )
+        for trajectory in scene.trajectory if analysis.follows_trajectories else ():
+            _check_path(trajectory, times, f'{path}: trajectory "{trajectory.name}"')
         for k, load in enumerate(scene.load, 1):
             for component, function in load.components.items():
                 check_domain(function, times, f"{path}: load no. {k}: {component}", 0)
+        for key, function, derivatives in analysis.prescribed():
+            check_domain(function, times, f'{path}: analysis "{analysis.name}": {key}', derivatives)
+
+
+def _check_path(trajectory: SpatialTrajectory, times: Array, label: str) -> None:
+    """Of one trajectory at `times` (T,), with its derivatives."""
+    functions = [(f"{label}: {component}", function) for component, function in trajectory.components.items()]
+    law = trajectory.orientation
+    functions += [] if law is None else [(f"{label}: {law.kind}", function) for function in law.functions]
+    for key, function in functions:
+        check_domain(function, times, key, 2)
+        if len(times) > 1:
+            check_derivatives(function, float(times[-1]), key)
+    if law is not None and law.kind == "direction":
+        sizes = np.linalg.norm([function.sample(times)[0] for function in law.functions], axis=0)
+        if sizes.min() < 1e-9:
+            raise InputError(
+                f"{label}: direction: expected a direction at all times, found none at t ="
+                f" {times[sizes.argmin()]:.9g} s"
+            )

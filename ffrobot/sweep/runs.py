@@ -38,6 +38,9 @@ REDUCTIONS: Mapping[str, Callable[[Array], Any]] = {
 STANDARD = ("joints/{}/moment", "pzt/{}/required_voltage", "pzt/{}/voltage", "points/{}/deflection")
 """Histories of which the largest value is in every table."""
 
+PER_COORDINATE = ("coordinate", "rate", "moment")
+"""Datasets of joints whose columns are coordinates of one joint, no vector."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -138,12 +141,14 @@ def _standard(results: Results, analysis: str) -> Iterator[str]:
 
 
 def _reduce(results: Results, name: str, reduction: str) -> float:
-    """Of a history, of the lengths of planar vectors (T, 2), or of the largest of several columns; NaN if absent."""
+    """Of a history, of the lengths of vectors (T, 2 or 3), or of the largest of several columns; NaN if absent."""
     try:
         values = results.data(name)
     except InputError:
         return float("nan")
-    is_vector = values.shape[1] == 2 and "pzt" not in name.split("/")
+    parts = name.split("/")
+    dimension = 3 if results.scene.get("space") == "spatial" else 2
+    is_vector = values.shape[1] == dimension and "pzt" not in parts and parts[-1] not in PER_COORDINATE
     history = np.linalg.norm(values, axis=1) if is_vector else values[:, 0]
     if values.shape[1] > 1 and not is_vector:
         history = np.abs(values).max(axis=1)

@@ -177,13 +177,13 @@ def _check_first(sweep: Sweep) -> None:
     from tempfile import TemporaryDirectory
 
     from ..fe_models.link_file import read_link
-    from ..scene.load import load_scene
+    from ..scene.any_space import load_any_scene
 
     with TemporaryDirectory() as folder:
         run = Run(0, sweep.points[0], Path(folder))
         try:
             with python_allowed(sweep.allow_python):
-                scene = load_scene(_files(sweep, run).write(run.folder))
+                scene = load_any_scene(_files(sweep, run).write(run.folder))
             for body in scene.body:
                 if body.link is not None:
                     read_link(body.link)

@@ -20,6 +20,7 @@ from ..fields.references import Reference
 from ..fields.waypoints import spline
 from ..model.model import ZERO, Model
 from ..model.planar_body import PlanarBody
+from ..model.spatial_body import SpatialBody
 from ..model.system import MechanismSystem
 from ..scene.analysis import Check, Need, TimedAnalysis
 from ..solve.initial_state import undeformed_state
@@ -145,7 +146,7 @@ def prescribed_shape(
     """p(t) of every body, with its derivatives."""
     bodies = assembly.model.bodies
     if analysis.shape == "given":
-        return _given(assembly.model.scene.path, bodies, analysis)
+        return given_shape(assembly.model.scene.path, bodies, analysis)
     if analysis.shape == "static":
         return _static(assembly, analysis, guess, resolver)
     return [[ZERO] * body.n_modes for body in bodies]
@@ -153,7 +154,7 @@ def prescribed_shape(
 
 def _static(assembly: MechanismSystem, analysis: Fcid, guess: Array, resolver: _core.ActuatorForces | None) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
-    nodes = _nodes(analysis)
+    nodes = shape_nodes(analysis)
     p = _core.static_shape(assembly.system, as_list(nodes), guess, resolver)
     if len(p) < len(nodes):
         raise SolveError(
@@ -163,11 +164,12 @@ def _static(assembly: MechanismSystem, analysis: Fcid, guess: Array, resolver: _
     return _by_body(assembly.model.bodies, spline(nodes, p))
 
 
-def _nodes(analysis: Fcid) -> Array:
+def shape_nodes(analysis: Fcid) -> Array:
+    """Times (T,), s, between which shapes are splines."""
     return as_floats(np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1)))
 
 
-def _given(scene_path: Path, bodies: Sequence[PlanarBody], analysis: Fcid) -> Shape:
+def given_shape(scene_path: Path, bodies: Sequence[PlanarBody | SpatialBody], analysis: Fcid) -> Shape:
     """The expressions of the scene; by way of a spline where the modes were made anew (payloads, patches)."""
     given: Mapping[str, tuple[TimeFunction, ...]] = analysis.modal or {}
     shape: Shape = []
@@ -184,7 +186,7 @@ def _given(scene_path: Path, bodies: Sequence[PlanarBody], analysis: Fcid) -> Sh
         if np.array_equal(body.modal_transform, np.eye(in_file)[:, selected]):
             shape.append([functions[k] for k in selected])
         else:
-            nodes = _nodes(analysis)
+            nodes = shape_nodes(analysis)
             p = np.column_stack([function.sample(nodes)[0] for function in functions])
             shape.append(spline(nodes, np.linalg.lstsq(body.modal_transform, p.T, rcond=None)[0].T))
     return shape

@@ -18,7 +18,7 @@ from ..model.system import MechanismSystem
 from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
 
-_ADVICE = {
+ADVICE = {
     "step underflow": "no step is small enough there",
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
     "interrupted": "stopped on request",
@@ -294,5 +294,5 @@ class Outcome:
             reached = self.time[-1] if run.time_reached is None else run.time_reached
             raise SolveError(
                 f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
-                f" ({run.status}): {run.cause or _ADVICE[run.status]}{how_to_go_on}"
+                f" ({run.status}): {run.cause or ADVICE[run.status]}{how_to_go_on}"
             )

@@ -105,6 +105,16 @@ template <class Space> void bind_model(nb::module_ &m, const char *name, const c
             return keep_independent_rows(model.mechanism, q.data(), v.data(), model.w);
           },
           "q"_a, "v"_a, "Indices of rows that do not depend on others at a state; the rest is left out from now on.")
+      .def(
+          "turn_marker",
+          [](Model<Space> &model, int marker, const Eigen::Matrix3d &A, const Eigen::Vector3d &omega,
+             const Eigen::Vector3d &alpha) {
+            if (marker < 0 || marker >= static_cast<int>(model.w.turning.size()))
+              throw nb::value_error("marker: expected one of the ground");
+            model.w.turning[static_cast<std::size_t>(marker)] = {A, omega, alpha};
+          },
+          "marker"_a, "A"_a, "omega"_a, "alpha"_a,
+          "How a marker of the ground that turns stands and turns in the evaluations that follow, global axes.")
       .def("measure", &row_values<Space>, "q"_a, "v"_a, "Values and rates of rows.")
       .def("response", &answer_of<Space>, "q"_a, "residual"_a,
            "-M^-1 C^T (C M^-1 C^T)^-1 residual, at the state of the last evaluation.")

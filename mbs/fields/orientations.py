@@ -9,7 +9,15 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.rotations import about, exponential, left_jacobian, logarithm, of_quaternion, quaternions, series
+from ...common.rotations import (
+    about,
+    exponential,
+    left_jacobian,
+    left_jacobian_rate,
+    logarithm,
+    of_quaternion,
+    quaternions,
+)
 from .._core import TimeFunction
 from .waypoints import Waypoints
 
@@ -72,16 +80,7 @@ def _rates_of_vector(psi: Array, psi_dot: Array, psi_2dot: Array) -> tuple[Array
     """ω = J_l ψ̇, α = J_l ψ̈ + (dJ_l/dt) ψ̇, the last by the exact derivative of exp along ψ̇."""
     J_l = left_jacobian(psi)
     omega = np.einsum("tij,tj->ti", J_l, psi_dot)
-    return omega, np.einsum("tij,tj->ti", J_l, psi_2dot) + _jacobian_rate(psi, psi_dot)
-
-
-def _jacobian_rate(psi: Array, psi_dot: Array) -> Array:
-    """(dJ_l/dt) ψ̇ = ȧ ψ×ψ̇ + ḃ ψ×(ψ×ψ̇) + b ψ̇×(ψ×ψ̇), with J_l = I + a ψ~ + b ψ~²."""
-    x, x_dot = np.sum(psi * psi, axis=-1)[:, None], 2 * np.sum(psi * psi_dot, axis=-1)[:, None]
-    across = np.cross(psi, psi_dot)
-    (_, a_slope), (b, b_slope) = series(2, x), series(3, x)
-    found: Array = x_dot * (a_slope * across + b_slope * np.cross(psi, across)) + b * np.cross(psi_dot, across)
-    return found
+    return omega, np.einsum("tij,tj->ti", J_l, psi_2dot) + left_jacobian_rate(psi, psi_dot)
 
 
 def _rates_of_rpy(x: Array, x_dot: Array, x_2dot: Array) -> tuple[Array, Array]:

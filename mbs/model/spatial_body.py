@@ -88,6 +88,12 @@ class SpatialBody:
         h[0] += self.h_spin
         return h
 
+    @property
+    def spin_slope(self) -> Array:
+        """H (3, n, n), skew: H_a = ε_abc S̄_bc, so that h_a(p) = h0_a + pᵀH_a."""
+        S: Array = self.S_bar_kl
+        return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
+
 
 def from_modal_body(name: str, body: ModalBody) -> SpatialBody:
     """All modes of a modal body.

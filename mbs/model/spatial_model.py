@@ -150,9 +150,11 @@ def _coordinate_row(scene: SpatialMechanismScene, tree: SpatialTree, path: Spati
     )  # fmt: skip
 
 
-def row_values(model: SpatialModel, q: Array, times: Array) -> tuple[Array, Array]:
-    """C (T, rows) at q (T, n_q) and `times` (T,), and its Jacobian C_v (T, rows, n_v)."""
-    frames = model.tree.frames(q)
+def row_values(
+    model: SpatialModel, q: Array, times: Array, frames: Sequence[Motion] | None = None
+) -> tuple[Array, Array]:
+    """C (T, rows) at q (T, n_q) and `times` (T,), and its Jacobian C_v (T, rows, n_v); `frames` of q where known."""
+    frames = model.tree.frames(q) if frames is None else frames
     values, gradients = np.zeros((len(q), len(model.rows))), np.zeros((len(q), len(model.rows), model.tree.n_v))
     for k, row in enumerate(model.rows):
         a, b = (model.tree.motion(section, q, frames) for section in (row.a, row.b))

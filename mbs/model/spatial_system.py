@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.rotations import exponential
 from .. import _core
 from .._core import TimeFunction
-from ..scene.spatial.loads import SpatialLoad
+from ..fields.orientations import OrientationLaw
+from ..scene.spatial.loads import OF_POINT, SpatialLoad
 from .spatial_body import SpatialBody
 from .spatial_model import SpatialModel, SpatialRow
+from .spatial_transmission import rotor
 from .spatial_tree import Node, Section
 
 ZERO = _core.TimeFunction.constant(0.0)
@@ -22,6 +28,13 @@ def _moves(node: Node) -> bool:
     return bool(np.any(_rows_of(node.body, node.outer)[0]))
 
 
+class Drive(NamedTuple):
+    """A force of time on what it drives, by direction: generalized (n_v,)."""
+
+    direction: Array
+    size: TimeFunction
+
+
 class SpatialSystem:
     """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
 
@@ -31,14 +44,19 @@ class SpatialSystem:
         scene: what its rows follow, and what acts on it.
     """
 
-    def __init__(self, model: SpatialModel) -> None:
+    def __init__(self, model: SpatialModel, drives: Sequence[Drive] = ()) -> None:
+        """`drives` act beside the loads of the scene."""
         self.model, tree = model, model.tree
         self._markers: list[list[Section]] = [[] for _ in tree.nodes]
         self._ground: list[Section] = []
+        self._turning: list[tuple[int, OrientationLaw]] = []
         sides = [(self._place(node.inner), self._place(node.outer)) for node in tree.nodes]
         rows = [self._row(row) for row in model.rows]
         driven = {name for name in model.motors} | {load.joint for load in model.scene.load}
         driven |= {trajectory.joint for trajectory in model.scene.trajectory}
+        driven |= {node.joint.name for node in tree.nodes if node.joint.frictions}
+        self._wrenches: list[tuple[int, int]] = []
+        self._at_points = [self._point_load(load) for load in model.scene.load if load.point is not None]
         self._check()
         bodies = []
         for number, (node, (inner, outer)) in enumerate(zip(tree.nodes, sides, strict=True)):
@@ -48,17 +66,26 @@ class SpatialSystem:
             body.lead = float(getattr(node.joint, "rise", 0.0))
             # Else the core may take the frame's coordinates where modes turn the section: same motion, other numbers.
             body.driven = node.joint.name in driven or _moves(node)
+            body.rotor_inertia, body.gear_ratio = _rotor(node)
             body.data = _data(node.body, self._markers[number])
             bodies.append(body)
         ground = [_marker(section, np.zeros((6, 0)), section.position) for section in self._ground]
-        self.core = _core.SpatialModel(bodies, ground, rows, [], np.array(model.scene.gravity))
-        self._along = [self._load(load) for load in model.scene.load if load.joint is not None]
+        for number, _ in self._turning:
+            ground[number].turns = True
+        wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
+        self.core = _core.SpatialModel(bodies, ground, rows, wrenches, np.array(model.scene.gravity))
+        self._along = [self._load(load) for load in model.scene.load if load.joint is not None] + list(drives)
         self.scene = self._follow()
 
     def _check(self) -> None:
         """Raise `InputError` for what the core does not take."""
         path, rows = self.model.scene.path, self.model.rows
         for node in self.model.tree.nodes:
+            if node.joint.type == "planar" and node.joint.frictions and node.backwards:
+                raise InputError(
+                    f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a planar"
+                    " joint has friction, found it second"
+                )
             if node.joint.type == "free" and _moves(node):
                 raise InputError(
                     f"{path}: {node.joint.label}: expected a point that modes do not move, found"
@@ -70,6 +97,13 @@ class SpatialSystem:
                 f"{path}: expected at most {MOST_ROWS} rows of paths and cut loops in all, found {len(rows)}: scenes in"
                 " space with more of them are not available yet"
             )
+
+    def turn_markers(self, t: float) -> None:
+        """Put the orientations that rows follow where they are at time t, for `core`'s next evaluations."""
+        for number, law in self._turning:
+            at = np.array([t])
+            omega, alpha = law.rates(at)
+            self.core.turn_marker(number, law.sample(at)[0], omega[0], alpha[0])
 
     def target(self, t: float) -> Array:
         """Second derivatives that the rows follow at time t (rows,)."""
@@ -88,14 +122,38 @@ class SpatialSystem:
             scene.add_target(ZERO if row.target is None else row.target)
         for direction, magnitude in self._along:
             scene.add_load(direction, magnitude)
+        for wrench, components in self._at_points:
+            for name, magnitude in components.items():
+                scene.add_point_load(wrench, OF_POINT.index(name), magnitude)
+        for node in self.model.tree.nodes:
+            for number, friction in enumerate(node.joint.frictions):  # the same along all of a joint's coordinates
+                at = node.q.start + number, node.v.start + number
+                scene.add_joint_force(*at, 0.0, 0.0, friction.viscous, friction.coulomb, friction.speed)
+        for number, law in self._turning:
+            scene.turn_marker(number, _turning_law(law))
         return scene
 
-    def _load(self, load: SpatialLoad) -> tuple[Array, TimeFunction]:
+    def _load(self, load: SpatialLoad) -> Drive:
         """Direction (n_v,) and size of the moment of a joint."""
         assert load.joint is not None
         direction = np.zeros(self.model.tree.n_v)
         direction[self.model.tree.nodes[self.model.tree.carried[load.joint]].v] = self.model.sign(load.joint)
-        return direction, load.components["moment"]
+        return Drive(direction, load.components["moment"])
+
+    def _point_load(self, load: SpatialLoad) -> tuple[int, dict[str, TimeFunction]]:
+        """Number of the wrench, and its components over time."""
+        assert load.point is not None
+        self._wrenches.append(self._place(self.model.tree.section(load.point, np.eye(3))))
+        return len(self._wrenches) - 1, load.components
+
+    def _turning_marker(self, law: OrientationLaw) -> int:
+        """Number of the ground's marker that turns as `law` says; made where it is new."""
+        for number, known in self._turning:
+            if known is law:
+                return number
+        self._ground.append(Section(-1, f"turning {len(self._turning)}", np.eye(3), np.zeros(3)))
+        self._turning.append((len(self._ground) - 1, law))
+        return len(self._ground) - 1
 
     def _place(self, section: Section) -> tuple[int, int]:
         """Body (−1: the ground) and number of the marker of a section there; made where it is new."""
@@ -113,9 +171,28 @@ class SpatialSystem:
         if row.kind == "coordinate":
             found.coordinate = row.coordinate
             return found
-        found.a, found.b = (_core.MarkerAt(*self._place(section)) for section in (row.a, row.b))
+        a, b = self._place(row.a), self._place(row.b)
+        if row.law is not None:  # see SpatialRow: of "dot" rows it is that of b
+            turning = (-1, self._turning_marker(row.law))
+            a, b = (a, turning) if row.kind == "dot" else (turning, b)
+        found.a, found.b = _core.MarkerAt(*a), _core.MarkerAt(*b)
         found.f, found.g = np.array(row.f), np.array(row.g)
         return found
+
+
+def _rotor(node: Node) -> tuple[float, float]:
+    """Inertia of the rotor in a joint and its ratio on the inner section.
+
+    It sits on the first side and spins with N Ω_second − (N − 1) Ω_first; where that side is the outer one, with
+    N' Ω_outer − (N' − 1) Ω_inner and N' = 1 − N.
+    """
+    inertia, ratio = rotor(node)
+    return inertia, 1.0 - ratio if node.backwards else ratio
+
+
+def _turning_law(law: OrientationLaw) -> _core.TurningLaw:
+    kind = getattr(_core.OrientationKind, law.kind)
+    return _core.TurningLaw(kind, list(law.functions), exponential(np.array(law.reference)))
 
 
 def _data(body: SpatialBody, markers: list[Section]) -> _core.SpatialData:

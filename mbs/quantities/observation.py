@@ -62,6 +62,15 @@ def stored_coordinates(body: PlanarBody) -> Array | None:
     return body.modal_transform if n < n_file else None
 
 
+def modal_force(outcome: Outcome, body: PlanarBody) -> Array | None:
+    """F_p (T, n), what patches would have to supply, in the coordinates of `BodyMotion.modal`; None where not known."""
+    if outcome.F_p is None:
+        return None
+    F_p = outcome.F_p[:, outcome.modal_columns(body.name)]
+    T = body.modal_transform if stored_coordinates(body) is None else np.eye(body.n_modes)
+    return np.asarray(F_p @ np.linalg.pinv(T))  # the same work on δp
+
+
 def modes_of_file(outcome: Outcome, body: PlanarBody) -> Array:
     """P (T, n_file) in the modes of the modal body file."""
     return np.asarray(outcome.q[:, outcome.coordinates(body.name)][:, 3:] @ body.modal_transform.T)

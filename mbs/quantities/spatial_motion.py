@@ -5,16 +5,18 @@ All arrays are over the output times (T, …), SI units, global axes unless a na
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.rotations import left_jacobian, quaternions
-from ..model.spatial_model import SpatialModel, row_values
-from ..model.spatial_tree import Motion, Node, Section
+from ...common.rotations import quaternions
+from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_model import SpatialModel, row_values, target_rates
+from ..model.spatial_motors import MotorForces, motor_forces, path_forces
+from ..model.spatial_tree import Motion, Node
+from ..scene.spatial.trajectories import SpatialTrajectory
 
 
 @dataclass(frozen=True)
@@ -42,16 +44,12 @@ class PointMotion:
 
 
 @dataclass(frozen=True)
-class MotorForces:
-    """τ (T, k) by joint, N·m or N, on its second side, and F_p (T, n) by body, what patches would have to supply."""
-
-    moments: Mapping[str, Array]
-    modal: Mapping[str, Array]
-
-
-@dataclass(frozen=True)
 class SpatialMotion:
-    """States q (T, n_q), v and a (T, n_v) of a model's tree, and multipliers (T, rows) of its rows, at `time` (T,)."""
+    """States q (T, n_q), v and a (T, n_v) of a model's tree, and multipliers (T, rows) of its rows, at `time` (T,).
+
+    `required` (T, n_v): generalized forces that prescribed motion takes, of links that are held to a shape as well.
+    `is_at_rest`: targets stand still, as in an equilibrium.
+    """
 
     model: SpatialModel
     time: Array
@@ -59,16 +57,34 @@ class SpatialMotion:
     v: Array
     a: Array
     multipliers: Array
+    required: Array | None = None
+    is_at_rest: bool = False
 
     @cached_property
     def frames(self) -> list[Motion]:
         """Of all bodies, in the order of the tree."""
         return self.model.tree.frames(self.q)
 
+    @property
+    def accelerated(self) -> Accelerated:
+        """The same with what accelerations are read off."""
+        return Accelerated(self.model.tree, self.q, self.v, self.a, self.frames)
+
     @cached_property
     def rows(self) -> tuple[Array, Array]:
         """C (T, rows) and C_v (T, rows, n_v)."""
-        return row_values(self.model, self.q, self.time)
+        return row_values(self.model, self.q, self.time, self.frames)
+
+    @cached_property
+    def violation(self) -> Array:
+        """(T, 2) largest of |C| (m, rad) and |Ċ| of all rows; of the one state of a static analysis, C alone."""
+        C, C_v = self.rows
+        off = np.zeros((len(self.time), 2))
+        off[:, 0] = np.abs(C).max(axis=1, initial=0.0)
+        if not self.is_at_rest:
+            rate = np.einsum("tij,tj->ti", C_v, self.v) - target_rates(self.model, self.q, self.time)
+            off[:, 1] = np.abs(rate).max(axis=1, initial=0.0)
+        return off
 
     def node(self, body: str) -> Node:
         """The node of a body."""
@@ -115,57 +131,22 @@ class SpatialMotion:
         return -self.multipliers[:, chosen]
 
     @cached_property
-    def motor_forces(self) -> MotorForces:
-        """What motors and modal forces do in place of the path's forces: Gᵀτ + EᵀF_p + C_mᵀν = −C_sᵀλ_s.
+    def supplied(self) -> Array:
+        """(T, n_v) what actuators supply along v: see `mbs.model.spatial_motors.path_forces`."""
+        return path_forces(self.model, self.rows[1], self.multipliers) if self.required is None else self.required
 
-        In joint coordinates without loops τ are the components of the right side along the motors' coordinates and F_p
-        those along the modes; loops share them out with ν.
-        """
-        model, C_v, is_loop = self.model, self.rows[1], self.model.loop_rows
-        wanted = -np.einsum("tij,ti->tj", C_v[:, ~is_loop], self.multipliers[:, ~is_loop])
-        columns = {name: model.sign(name) for name in model.motors}
-        joints, motors = model.tree.joint_columns, np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)])
-        G = np.eye(model.tree.n_v)[motors.astype(int)]
-        loops = C_v[:, is_loop]
-        rows = np.concatenate([loops, np.broadcast_to(G, (len(self.time), *G.shape))], axis=1)
-        found = np.array(
-            [
-                np.linalg.lstsq(of_one.T, right, rcond=None)[0]
-                for of_one, right in zip(rows[:, :, joints], wanted[:, joints], strict=True)
-            ]
-        ).reshape(len(self.time), -1)
-        left = wanted - np.einsum("tij,ti->tj", rows, found)
-        moments, first = {}, loops.shape[1]
-        for name, numbers in model.motors.items():
-            moments[name] = columns[name] * found[:, first : first + len(numbers)]
-            first += len(numbers)
-        modal = {node.body.name: left[:, node.p_v] for node in model.tree.nodes}
-        if model.scene.motors == "frame":
-            self._move_to_frames(moments, modal)
-        stored = {name: values @ np.linalg.pinv(self.node(name).body.modal_transform) for name, values in modal.items()}
-        return MotorForces(moments, stored)
+    @property
+    def followed(self) -> list[SpatialTrajectory]:
+        """The trajectories that hold in it: all, or none."""
+        held = {row.owner for row in self.model.rows if row.is_trajectory}
+        return [trajectory for trajectory in self.model.scene.trajectory if trajectory.name in held]
 
-    def _move_to_frames(self, moments: Mapping[str, Array], modal: dict[str, Array]) -> None:
-        """Motors that turn frames, not sections: what they do less on the modes, modal forces do more."""
-        for joint in self.model.scene.motor_joints:
-            if joint.units != ("rad",):
-                continue
-            node = self.model.tree.nodes[self.model.tree.carried[joint.name]]
-            axis = self.model.tree.motion(node.inner, self.q, self.frames).F[:, :, 2]
-            along = self.model.sign(joint.name) * moments[joint.name]
-            for section, sign in ((node.outer, 1.0), (node.inner, -1.0)):
-                if section.body >= 0:
-                    body = self.model.tree.nodes[section.body].body.name
-                    turn = np.einsum("ti,tij->tj", axis, self._spin_of_modes(section))
-                    modal[body] = modal[body] + sign * along * turn
-
-    def _spin_of_modes(self, section: Section) -> Array:
-        """A J_l Φ_r (T, 3, n): the section's angular velocity by ṗ."""
-        node = self.model.tree.nodes[section.body]
-        Phi_r = node.body.points[section.point].rotation
-        phi = self.q[:, node.p_q] @ Phi_r.T
-        found: Array = self.frames[section.body].F @ left_jacobian(phi) @ Phi_r
-        return found
+    @cached_property
+    def motor_forces(self) -> MotorForces | None:
+        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is followed."""
+        if not self.followed:
+            return None
+        return motor_forces(self.model, self.q, self.frames, self.rows[1], self.supplied)
 
 
 def continuous(e: Array) -> Array:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
 from .._core import TimeFunction
+from ..model.spatial_inverse import body_forces
 from ..model.spatial_model import SpatialRow
-from ..model.spatial_tree import Node
+from ..model.spatial_transmission import rotors
 from .spatial_motion import SpatialMotion
 
 
@@ -29,21 +30,16 @@ class Wrench(NamedTuple):
         return Wrench(self.force + sign * other.force, self.moment + sign * other.moment)
 
 
-Accelerations = Sequence[tuple[Array, Array]]
-"""Of the frames of all bodies, in the order of the tree: R̈ and α (T, 3), global axes."""
-
-
-def reactions(motion: SpatialMotion, accelerations: Accelerations) -> Mapping[str, Wrench]:
+def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
     """By joint: force on its second side, and moment about where that side is, N and N·m.
 
     A joint of the tree carries what its body and all that hangs on it need, less what else acts there; one that closes
     a loop has its multipliers.
     """
-    tree = motion.model.tree
-    totals = [
-        _needed(motion, node, *of_frame).seen_from(frame.r)
-        for node, of_frame, frame in zip(tree.nodes, accelerations, motion.frames, strict=True)
-    ]
+    tree, state, gravity, totals = motion.model.tree, motion.accelerated, np.array(motion.model.scene.gravity), []
+    for node, of_frame, frame in zip(tree.nodes, state.of_frames(), motion.frames, strict=True):
+        needed = body_forces(node, state, of_frame, gravity)
+        totals.append(Wrench(needed.force, needed.moment).seen_from(frame.r))
     loops: dict[str, Wrench] = {}
     for k, row in enumerate(motion.model.rows):
         on_a, on_b = _of_row(motion, row, -motion.multipliers[:, k])
@@ -57,6 +53,10 @@ def reactions(motion: SpatialMotion, accelerations: Accelerations) -> Mapping[st
         if load.point is not None:
             number = tree.index[load.point.partition(".")[0]]
             totals[number] = totals[number].plus(_of_load(motion, load.point, load.components), -1.0)
+    for rotor in rotors(state):  # the body that carries it turns its angular momentum
+        if rotor.first.body >= 0:
+            moment = rotor.torque[:, None] * rotor.axis + rotor.gyroscopic
+            totals[rotor.first.body] = totals[rotor.first.body].plus(Wrench(np.zeros_like(moment), moment))
     found = dict(loops)
     for number in reversed(range(len(tree.nodes))):
         node = tree.nodes[number]
@@ -67,41 +67,6 @@ def reactions(motion: SpatialMotion, accelerations: Accelerations) -> Mapping[st
         acting = Wrench(sign * totals[number].force, sign * totals[number].moment)
         found[node.joint.name] = acting.seen_from(-at)
     return found
-
-
-def _needed(motion: SpatialMotion, node: Node, R_2dot: Array, alpha: Array) -> Wrench:
-    """Force, and moment about the frame's origin, by which the body moves as it does under gravity.
-
-    The equations of (R, θ) of one body: m R̈ + A (α × s + ω × (ω × s) + 2 ω × S̄ṗ + S̄p̈) − m g, and
-    s × Aᵀ(R̈ − g) + J α + h p̈ + J̇ ω + ω × (J ω + h ṗ), in body axes.
-    """
-    body, A, g = (
-        node.body,
-        motion.frames[motion.model.tree.index[node.body.name]].F,
-        np.array(motion.model.scene.gravity),
-    )
-    p, p_dot, p_2dot = motion.q[:, node.p_q], motion.v[:, node.p_v], motion.a[:, node.p_v]
-    spin = np.einsum("tij,tj->ti", motion.frames[motion.model.tree.index[body.name]].L[:, 3:], motion.v)
-    w, w_dot, pull = (np.einsum("tji,tj->ti", A, x) for x in (spin, alpha, R_2dot - g))
-    s, J, J_dot, h = _inertia(node, p, p_dot)
-    own = np.cross(w_dot, s) + np.cross(w, np.cross(w, s)) + 2 * np.cross(w, p_dot @ body.S_bar.T)
-    force = body.mass * pull + own + p_2dot @ body.S_bar.T
-    turning = np.einsum("tij,tj->ti", J, w) + np.einsum("tin,tn->ti", h, p_dot)
-    moment = np.cross(s, pull) + np.einsum("tij,tj->ti", J, w_dot) + np.einsum("tin,tn->ti", h, p_2dot)
-    moment = moment + np.einsum("tij,tj->ti", J_dot, w) + np.cross(w, turning)
-    return Wrench(np.einsum("tij,tj->ti", A, force), np.einsum("tij,tj->ti", A, moment))
-
-
-def _inertia(node: Node, p: Array, p_dot: Array) -> tuple[Array, Array, Array, Array]:
-    """S (T, 3), J, J̇ (T, 3, 3) and h (T, 3, n) of the bent body, in body axes."""
-    body = node.body
-    S, slope, spin = body.S_bar_kl, body.inertia_slope, body.spin
-    G = np.einsum("ij,kkmn->ijmn", np.eye(3), S) - 0.5 * (S + S.transpose(1, 0, 2, 3))
-    H = np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
-    Gp = np.einsum("ijmn,tn->tijm", G, p)
-    J = body.inertia + np.einsum("ijn,tn->tij", slope, p) + np.einsum("tijm,tm->tij", Gp, p)
-    J_dot = np.einsum("ijn,tn->tij", slope, p_dot) + 2 * np.einsum("tijm,tm->tij", Gp, p_dot)
-    return body.first_moment + p @ body.S_bar.T, J, J_dot, spin + np.einsum("amn,tm->tan", H, p)
 
 
 def _of_row(motion: SpatialMotion, row: SpatialRow, size: Array) -> tuple[Wrench, Wrench]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...common.arrays import Array
 from ...common.errors import InputError
@@ -14,9 +15,12 @@ from ..joints.spatial.joint import SpatialJoint
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from .state import State
 
+BoolArray = NDArray[np.bool_]
+
 TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
 SINGULAR = 1e-6  # ratio of singular values below which a posture counts as singular
 NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
+MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
 MOVES = 1e-6  # share of a joint in a motion that is left free
 MOST_ITERATIONS = 60
 LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
@@ -51,31 +55,40 @@ def undeformed_posture(model: SpatialModel) -> State:
 
 def solve_posture(model: SpatialModel, t: float, q: Array) -> Array | None:
     """Q (n_q,) moved onto C(q, t) = 0 by least steps of the joints, p kept; None where that does not converge."""
+    found, is_met = solve_postures(model, np.array([t]), q[None])
+    return found[0] if is_met[0] else None
+
+
+def solve_postures(model: SpatialModel, times: Array, q: Array) -> tuple[Array, BoolArray]:
+    """Q (T, n_q) moved onto C(q, t) = 0 at `times` (T,) as in `solve_posture`, and of which that converged (T,)."""
+    q, left = np.array(q), np.full(len(q), np.inf)
     if not model.rows:
-        return q
+        return q, np.ones(len(q), dtype=bool)
     scales, length = _scales(model), robot_size(model)
     row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
-    times, left = np.array([t]), np.inf
+    going = np.arange(len(q))
     for _ in range(MOST_ITERATIONS):
-        C, C_v = (array[0] for array in row_values(model, q[None], times))
-        left = float(np.abs(C / row_scales).max())
-        if left <= TOLERANCE:
-            return q
-        if not np.isfinite(left):
-            return None
-        step = np.linalg.lstsq(C_v * scales / row_scales[:, None], -C / row_scales, rcond=1e-10)[0]
-        step *= min(1.0, LARGEST_TURN / max(float(np.abs(step).max()), 1e-300))
-        q = model.tree.integrate(q, step * scales)
-    return q if left <= 1e3 * TOLERANCE else None
+        C, C_v = row_values(model, q[going], times[going])
+        left[going] = np.abs(C / row_scales).max(axis=1)
+        on = (left[going] > TOLERANCE) & np.isfinite(left[going])
+        going = going[on]
+        if not len(going):
+            break
+        inverse = np.linalg.pinv(C_v[on] * scales / row_scales[:, None], rcond=1e-10)
+        step = -np.einsum("tij,tj->ti", inverse, C[on] / row_scales)
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        step *= np.minimum(1.0, LARGEST_TURN / np.maximum(longest, 1e-300))
+        q[going] = model.tree.integrate(q[going], step * scales)
+    return q, left <= 1e3 * TOLERANCE
 
 
-def with_rates(model: SpatialModel, q: Array, v: Array) -> State:
-    """The state at q with the joints' rates moved onto Ċ = 0 at t = 0 by the least change, ṗ kept."""
+def with_rates(model: SpatialModel, q: Array, v: Array, t: float = 0.0) -> State:
+    """The state at q with the joints' rates moved onto Ċ = 0 at time t by the least change, ṗ kept."""
     if not model.rows:
         return State(q, v)
-    scales, at_start = _scales(model), np.zeros(1)
-    C_v = row_values(model, q[None], at_start)[1][0]
-    left = target_rates(model, q[None], at_start)[0] - C_v @ v
+    scales, now = _scales(model), np.array([t])
+    C_v = row_values(model, q[None], now)[1][0]
+    left = target_rates(model, q[None], now)[0] - C_v @ v
     return State(q, v + scales * np.linalg.lstsq(C_v * scales, left, rcond=1e-10)[0])
 
 
@@ -153,6 +166,22 @@ def mobility(model: SpatialModel, q: Array) -> Mobility:
     names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
     ratio = float(values[-1] / values[0]) if len(values) and values[0] > 0 else 1.0
     return Mobility(free.shape[1], followed, ratio, tuple(dict.fromkeys(names[moving].tolist())), loop_rank)
+
+
+def told_posture(model: SpatialModel, ratio: float, t: float, q: Array) -> str:
+    """What to say of the worst posture q (n_q,) on a path, at time t, where its ratio is that; "" where it is fine."""
+    if not ratio < NEARLY_SINGULAR:
+        return ""
+    joints, is_loop = model.tree.joint_columns, model.loop_rows
+    scales, length = _scales(model)[joints], robot_size(model)
+    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows]).reshape(-1, 1)
+    J = row_values(model, q[None], np.array([t]))[1][0][:, joints] * scales / row_scales
+    free, _ = _null_space(J[is_loop])
+    least = np.abs(free @ np.linalg.svd(J[~is_loop] @ free)[2][-1])
+    names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
+    moving = quoted(dict.fromkeys(names[least > MOVING * least.max()].tolist()))
+    how = "a singular posture" if ratio < SINGULAR else f"nearly a singular posture (ratio {ratio:.1e})"
+    return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
 
 
 def _null_space(J: Array) -> tuple[Array, int]:

@@ -1,4 +1,4 @@
-"""Static equilibrium in space under gravity, given loads and the constraints at t = 0."""
+"""Static equilibrium in space under gravity, given loads and the constraints at one time."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
+from ..model.spatial_inverse import given_forces
 from ..model.spatial_model import SpatialModel, row_values
-from ..model.spatial_tree import Section
-from .spatial_posture import robot_size, with_rates
+from .spatial_posture import robot_size, undeformed_posture, with_rates
 from .state import State
 
 MOST_ITERATIONS = 60
@@ -27,37 +27,44 @@ def forces_at_rest(model: SpatialModel, q: Array, t: float = 0.0) -> Array:
         found += frame.L[:, :3].transpose(0, 2, 1) @ (node.body.mass * gravity)
         found += np.einsum("tij,ti->tj", frame.L[:, 3:], np.cross(s, gravity))
         found[:, node.p_v] += np.einsum("tji,j->ti", frame.F, gravity) @ node.body.S_bar - node.body.stiffness * p
-    for load in model.scene.load:
-        values = {name: function(t)[0] for name, function in load.components.items()}
-        if load.point is not None:
-            section = tree.section(load.point, np.eye(3))
-            L = tree.motion(Section(*section), q, frames).L
-            wrench = np.array([values.get(name, 0.0) for name in ("x", "y", "z", "mx", "my", "mz")])
-            found += np.einsum("tij,i->tj", L, wrench)
-        elif load.joint is not None:
-            node = tree.nodes[tree.carried[load.joint]]
-            found[:, node.v] += (-1.0 if node.backwards else 1.0) * values["moment"]
+    return found + given_forces(model, q, frames, np.full(len(q), t))
+
+
+def initial_state(model: SpatialModel) -> State:
+    """The state that the scene starts from: links undeformed, or in equilibrium.
+
+    Raises `InputError` where no posture meets the rows, `SolveError` where there is no equilibrium near it.
+    """
+    start = undeformed_posture(model)
+    return static_equilibrium(model, start) if model.scene.initial.state == "static" else start
+
+
+def holding_multipliers(model: SpatialModel, q: Array) -> Array:
+    """λ (rows,) with C_vᵀλ = Q at rest at q (n_q,), t = 0; of least size where rows depend on others."""
+    sizes = _sizes(model)
+    C_v = row_values(model, q[None], np.zeros(1))[1][0]
+    found: Array = np.linalg.lstsq(C_v.T * sizes[:, None], forces_at_rest(model, q[None])[0] * sizes, rcond=1e-12)[0]
     return found
 
 
-def static_equilibrium(model: SpatialModel, start: State) -> State:
-    """Solve Q(q) − C_vᵀλ = 0, C(q, 0) = 0 by Newton from `start`; v is kept on Ċ = 0.
+def static_equilibrium(model: SpatialModel, start: State, t: float = 0.0) -> State:
+    """Solve Q(q, t) − C_vᵀλ = 0, C(q, t) = 0 by Newton from `start`; v is kept on Ċ = 0.
 
     Raises `SolveError` where there is no equilibrium near the start.
     """
     tree, n, m, length = model.tree, model.tree.n_v, len(model.rows), robot_size(model)
     sizes = _sizes(model)
     row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
-    q, times = start.q, np.zeros(1)
-    C_v = row_values(model, q[None], times)[1][0]
-    multipliers = np.linalg.lstsq(C_v.T * sizes[:, None], forces_at_rest(model, q[None])[0] * sizes, rcond=None)[0]
+    q = start.q
+    C_v = row_values(model, q[None], np.array([t]))[1][0]
+    multipliers = np.linalg.lstsq(C_v.T * sizes[:, None], forces_at_rest(model, q[None], t)[0] * sizes, rcond=None)[0]
     for _ in range(MOST_ITERATIONS):
-        residual, size = _residual(model, q[None], multipliers, row_scales)
+        residual, size = _residual(model, q[None], t, multipliers, row_scales)
         if np.abs(residual[0, :n] * sizes).max() <= TOLERANCE * size and (
             not m or np.abs(residual[0, n:]).max() <= TOLERANCE
         ):
-            return with_rates(model, q, start.v)
-        jacobian = _jacobian(model, q, multipliers, sizes, row_scales)
+            return with_rates(model, q, start.v, t)
+        jacobian = _jacobian(model, q, t, multipliers, sizes, row_scales)
         step = -np.linalg.lstsq(jacobian, residual[0] * np.concatenate([sizes, np.ones(m)]), rcond=1e-14)[0]
         if not np.all(np.isfinite(step)):
             break
@@ -85,24 +92,24 @@ def _force_scale(size: float, row_scales: Array) -> Array:
     return scale
 
 
-def _residual(model: SpatialModel, q: Array, multipliers: Array, row_scales: Array) -> tuple[Array, float]:
+def _residual(model: SpatialModel, q: Array, t: float, multipliers: Array, row_scales: Array) -> tuple[Array, float]:
     """(T, n_v + rows): forces left, and C over its natural sizes; and the size of the largest force term."""
-    C, C_v = row_values(model, q, np.zeros(len(q)))
-    Q, held, sizes = forces_at_rest(model, q), np.einsum("tij,i->tj", C_v, multipliers), _sizes(model)
+    C, C_v = row_values(model, q, np.full(len(q), t))
+    Q, held, sizes = forces_at_rest(model, q, t), np.einsum("tij,i->tj", C_v, multipliers), _sizes(model)
     size = max(float(np.abs(Q * sizes).max()), float(np.abs(held * sizes).max(initial=0.0)))
     return np.concatenate([Q - held, C / row_scales], axis=1), size
 
 
-def _jacobian(model: SpatialModel, q: Array, multipliers: Array, sizes: Array, row_scales: Array) -> Array:
+def _jacobian(model: SpatialModel, q: Array, t: float, multipliers: Array, sizes: Array, row_scales: Array) -> Array:
     """Derivative of the residual, forces times `sizes`, by steps in natural sizes (differences) and multipliers."""
     n, m, tree = model.tree.n_v, len(model.rows), model.tree
     ahead, behind = (
-        _residual(model, tree.integrate(q, sign * DIFFERENCE * np.diag(sizes)), multipliers, row_scales)[0]
+        _residual(model, tree.integrate(q, sign * DIFFERENCE * np.diag(sizes)), t, multipliers, row_scales)[0]
         for sign in (1.0, -1.0)
     )
     by_q = ((ahead - behind) / (2 * DIFFERENCE)).T
-    C_v = row_values(model, q[None], np.zeros(1))[1][0]
-    _, size = _residual(model, q[None], multipliers, row_scales)
+    C_v = row_values(model, q[None], np.array([t]))[1][0]
+    _, size = _residual(model, q[None], t, multipliers, row_scales)
     by_multipliers = np.concatenate([-C_v.T * _force_scale(size, row_scales), np.zeros((m, m))])
     scaled = np.concatenate([by_q[:n] * sizes[:, None], by_q[n:]])
     return np.hstack([scaled, np.concatenate([by_multipliers[:n] * sizes[:, None], by_multipliers[n:]])])

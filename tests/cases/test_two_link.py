@@ -41,6 +41,20 @@ def test_voltages(request, motors, name):
     check_column(case, "inverse", name, times, [VOLTAGES[name][i] for i in rows], RELATIVE)
 
 
+def test_modal_forces_are_what_voltages_make_and_leave(two_link):
+    """F_p = Φ_V V + what is unmet, with Φ_V from the rotations of the link's modes at the edges of its patches."""
+    for link in PZT:
+        group, body = two_link.file["inverse"], read_modal_body(two_link.folder / f"{link}.h5")
+        pzt = group[f"pzt/{link}"]
+        turns = [
+            body.interpolate(edges[1]).rotation[2] - body.interpolate(edges[0]).rotation[2] for edges in pzt["edges"]
+        ]
+        Phi_V = np.array(turns).T * pzt["moment_per_volt"][()]
+        F_p = group[f"bodies/{link}/modal_force"][()]
+        found = pzt["voltage"][()] @ Phi_V.T + pzt["residual_force"][()]
+        np.testing.assert_allclose(found, F_p, atol=1e-9 * np.abs(F_p).max())
+
+
 def test_layout(two_link):
     analyses = {"inverse": "pcid", "forward": "forward", "joints_only": "forward"}
     check_layout(two_link, analyses, TIMES, flexible={"link1": 10, "link2": 10}, rigid={})

@@ -61,7 +61,7 @@ def joint_table(joint, turned):
     return keys
 
 
-def tree_model(tree, joints, initial=None, trajectory=()):
+def tree_model(tree, joints, initial=None, trajectory=(), load=()):
     """The model of a scene with these tables of joints, and the bodies of a `Tree`."""
     scene = SpatialMechanismScene(
         name="test",
@@ -70,6 +70,7 @@ def tree_model(tree, joints, initial=None, trajectory=()):
         body=tuple({"name": body.name, "rigid": as_tuples(PLACEHOLDER)} for body in tree.bodies),
         joint=tuple(as_tuples(joint) for joint in joints),
         trajectory=tuple(trajectory),
+        load=tuple(load),
         initial=as_tuples(initial or {}),
         path=Path("scene.toml"),
         text="",

@@ -42,6 +42,9 @@ function repaint(element) {
   return Plotly.relayout(element, { "font.color": colors.font.color, ...Object.fromEntries(Object.entries(colors).filter(([key]) => key !== "font")) });
 }
 
+// Every `step`-th of values, from `offset` on.
+const every = (values, step, offset) => Array.from(values).filter((_, i) => i % step === offset);
+
 // Charts are drawn when they come near the window: a page of many opens at once.
 const CHARTS = JSON.parse(document.getElementById("chart-data").textContent);
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..body_surface import drawn_mode
-from ..projection import RIGHT, UP, VIEWER
+from ..projection import LINK, SPACE, View
 
 SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels
 PANEL = (700, 360)  # pixels, of a mode
@@ -50,13 +50,14 @@ def _draw_motion(job: dict[str, Any]) -> None:
     name = SHOWN[job["color"]][0]
     limit = round_above(max(float(np.nanmax(shown[name], initial=0.0)) for _, shown in grids))
     size = float(np.ptp(everything, axis=0).max()) or 1.0
+    view = SPACE if job["in_space"] else LINK
     for k, (grid, shown) in enumerate(grids):
         plotter = pyvista.Plotter(off_screen=True, window_size=MOVIE_SIZE if job["movie"] else SIZE)
         if job["scale"] != 1.0 and not job["movie"]:
             _add_ghost(plotter, grid)
         _add(plotter, shown, name, limit, ROD * size, BAR)
         _add_joints(plotter, job["joints"][k], job["ground"], size, float(np.ptp(everything[:, 2])))
-        _finish(plotter, job["title"].format(time=f"{job['times'][k]:.4g}"), everything, BAR_ROOM)
+        _finish(plotter, job["title"].format(time=f"{job['times'][k]:.4g}"), everything, view, BAR_ROOM)
         plotter.screenshot(str(Path(job["path"]) / f"{k:05d}.png") if job["movie"] else job["path"])
         plotter.close()
 
@@ -88,7 +89,7 @@ def _draw_modes(job: dict[str, Any]) -> None:
         shown["size"] = size
         _add_ghost(plotter, grid)
         _add(plotter, shown, "size", 1.0, ROD * job["length"], None)
-        _finish(plotter, name, shown.points)
+        _finish(plotter, name, shown.points, LINK)
     plotter.screenshot(job["path"])
     plotter.close()
 
@@ -152,8 +153,8 @@ def _add_joints(plotter: Any, joints: list[list[float]], ground: list[list[float
         plotter.add_mesh(stand, color=METAL, ambient=0.3)
 
 
-def _finish(plotter: Any, title: str, points: Array, room: float = 0.0) -> None:  # noqa: ANN401
-    """Title, directions, and the view of the other pictures of links: x to the right, y up, from the front.
+def _finish(plotter: Any, title: str, points: Array, view: View, room: float = 0.0) -> None:  # noqa: ANN401
+    """Title, directions, and the view of the other pictures.
 
     `room` is the part of the height at the bottom that is for a colour bar.
     """
@@ -161,14 +162,14 @@ def _finish(plotter: Any, title: str, points: Array, room: float = 0.0) -> None:
     plotter.add_text(title, font_size=9, color="black", position="upper_left")
     plotter.add_axes(color="black")
     plotter.enable_parallel_projection()
-    plotter.view_vector(VIEWER, UP)
-    corners = np.stack([points @ RIGHT, points @ UP, points @ VIEWER], axis=1)
+    plotter.view_vector(view.viewer, view.up)
+    corners = points @ np.stack(view, axis=1)
     low, high = corners.min(axis=0), corners.max(axis=0)
     width, height = plotter.renderer.GetSize()
     half = 0.5 * MARGIN * max((high - low)[1] / (1.0 - room), (high - low)[0] * height / width)
     middle = 0.5 * (low + high) - np.array([0.0, room * half, 0.0])
-    plotter.camera.focal_point = middle @ [RIGHT, UP, VIEWER]
-    plotter.camera.position = (middle + np.array([0.0, 0.0, 10.0 * half])) @ [RIGHT, UP, VIEWER]
+    plotter.camera.focal_point = middle @ view
+    plotter.camera.position = (middle + np.array([0.0, 0.0, 10.0 * half])) @ view
     plotter.camera.parallel_scale = half
     plotter.reset_camera_clipping_range()
     plotter.enable_anti_aliasing("ssaa")

@@ -30,6 +30,7 @@ class Picture:
         times: of these, in s; the title's `{time}`.
         scale: of deflections; None for a modal body, whose modes are drawn.
         length: of a modal body, in m.
+        in_space: whether z goes up, as in scenes in space.
         color: "deflection" or "von_mises".
         joints: for each of the steps where joints turn, exaggerated, in m.
         ground: where joints sit on the ground, in m.
@@ -43,6 +44,7 @@ class Picture:
     times: tuple[float, ...] = (0.0,)
     scale: float | None = None
     length: float = 0.0
+    in_space: bool = False
     color: str = "deflection"
     joints: tuple[tuple[Place, ...], ...] = ((),)
     ground: tuple[Place, ...] = ()

@@ -16,10 +16,11 @@ from ...common.validation import did_you_mean
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from ..drawn_body import ground_points
-from ..figures.standard import file_name
+from ..figures.shared import file_name
 from ..motion import visible_exaggeration
 from .grids import joint_places, modes_grid, results_grid
 from .pictures import Picture, draw_pictures
+from .spatial_grids import spatial_results_grid
 from .vtkhdf import Grid, vtkhdf_image
 from .xdmf import xdmf_text
 
@@ -96,7 +97,8 @@ def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
     with Results(path) as results:
         for analysis in _analyses(results, options.analysis):
             frames = _frames(results, analysis, options.frames)
-            grid, name = results_grid(results, analysis, frames, notes), file_name(analysis)
+            grid_of = spatial_results_grid if results.is_spatial else results_grid
+            grid, name = grid_of(results, analysis, frames, notes), file_name(analysis)
             pictures = [_snapshot(results, analysis, frames, grid, options, color) for color in _colors(grid)]
             pictures[0] = replace(pictures[0], path=f"{name}.png")
             yield name, grid, [pictures[0], *(replace(other, path=f"{name}.stress.png") for other in pictures[1:])]
@@ -147,16 +149,21 @@ def motion_picture(
 ) -> Picture:
     """Of the steps of a grid, which shows the outputs `frames` of an analysis."""
     assert grid.time is not None
-    at, exaggeration = joint_places(results, analysis, frames[list(steps)])
-    joints = at + (scale - 1.0) * exaggeration
     name, exaggerated = f"{results.name}: {analysis}", "" if scale == 1.0 else f", deformation x {scale:g}"
     braces = name.replace("{", "{{").replace("}", "}}")
-    return Picture(
+    picture = Picture(
         f"{braces}, t = {{time}} s{exaggerated}",
         steps=steps,
         times=tuple(float(t) for t in grid.time[list(steps)]),
         scale=scale,
         color=color,
+    )
+    if results.is_spatial:
+        return replace(picture, in_space=True, joints=((),) * len(steps))
+    at, exaggeration = joint_places(results, analysis, frames[list(steps)])
+    joints = at + (scale - 1.0) * exaggeration
+    return replace(
+        picture,
         joints=tuple(tuple(map(tuple, places)) for places in joints.tolist()),
         ground=tuple((float(x), float(y), 0.0) for x, y in ground_points([results.scene])),
     )

@@ -23,7 +23,8 @@ void bind_data(nb::module_ &m) {
       .def(nb::init<>())
       .def_rw("position", &SpatialMarker::position)
       .def_rw("triad", &SpatialMarker::triad)
-      .def_rw("Phi", &SpatialMarker::Phi);
+      .def_rw("Phi", &SpatialMarker::Phi)
+      .def_rw("turns", &SpatialMarker::turns);
   nb::class_<PlanarData>(m, "PlanarData")
       .def(nb::init<>())
       .def_rw("mass", &PlanarData::mass)
@@ -89,6 +90,7 @@ void bind_rows(nb::module_ &m) {
       .def_ro("r", &FrameMotion::r)
       .def_ro("v", &FrameMotion::v)
       .def_ro("a", &FrameMotion::a)
+      .def_ro("a_origin", &FrameMotion::a_origin)
       .def_ro("omega", &FrameMotion::omega)
       .def_ro("alpha", &FrameMotion::alpha)
       .def_ro("R", &FrameMotion::R)

@@ -137,6 +137,7 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
     softs += node.inboard >= 0 ? 2 * d : 0;
   }
   ports.resize(static_cast<std::size_t>(m.ports));
+  turning.resize(m.ground.size());
   cross.resize(static_cast<std::size_t>(m.crosses) * d), soft.resize(softs);
   force.assign(static_cast<std::size_t>(m.ports) * d * stride + 8, T(0.)), bias = force;
   answer.assign(static_cast<std::size_t>(m.slots) * stride + 8, T(0.));

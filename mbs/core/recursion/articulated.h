@@ -475,6 +475,9 @@ inline void hand_over(const Mechanism<Space> &m, const Node<Space> &node, Worksp
   multiply<d, T>(M, hinge.c, by_velocity);
   for (int i = 0; i < d; ++i)
     H[i].add(0, by_velocity[i]);
+  if constexpr (d == 6)
+    if (node.rotor_inertia > 0)
+      H[3].add(0, hinge.gyro[0]), H[4].add(0, hinge.gyro[1]);
   Cols P[d];
   Space::template Turn<T>::add_moment(hinge.r, H);
   hinge.turn.apply(H, P);

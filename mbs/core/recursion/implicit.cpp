@@ -81,9 +81,14 @@ template <class Space> void RecursiveMotion<Space>::solve(const Complex *r, Comp
   complex_.solve(r, x);
 }
 
-// Rates of rows are linear in velocities.
+// Rates of rows are linear in velocities, but for those of markers that turn.
 template <class Space> void RecursiveMotion<Space>::constrain(const double *x, double *c) {
   measure(mechanism_, base_.data(), x, measured_, value_.data(), c);
+  if (scene_.driven.empty())
+    return;
+  const VectorXd rest = VectorXd::Zero(n_v());
+  measure(mechanism_, base_.data(), rest.data(), measured_, value_.data(), rate_.data());
+  Eigen::Map<VectorXd>(c, rate_.size()) -= rate_;
 }
 
 template <class Space>

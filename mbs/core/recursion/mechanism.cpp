@@ -33,6 +33,13 @@ SpatialData at_marker(const SpatialData &data, const SpatialMarker &m) {
   return spatial::moved(data, m.position, m.triad);
 }
 
+// Of the body's data, where its frame is at a marker: in axes of that
+Eigen::Vector3d origin_from(const PlanarMarker &m) {
+  const Eigen::Vector2d x = -(Eigen::Rotation2D<double>(-m.angle) * m.position);
+  return {x[0], x[1], 0};
+}
+Eigen::Vector3d origin_from(const SpatialMarker &m) { return -(m.triad.transpose() * m.position); }
+
 // Whether a frame fixed at the inboard marker is where the joint holds the section: modes move the section at most in
 // ways that the joint leaves free, and nothing asks for the joint's coordinate.
 template <class Space> bool frame_sits_at_joint(const BodyModel<typename Space::Data> &body, const JointShape &shape) {
@@ -77,6 +84,9 @@ void check(const BodyModel<Data> &body, std::size_t index, std::size_t ground_ma
     refuse(name + ": rotor_inertia: expected a revolute joint under a rotor");
 }
 
+bool turns(const PlanarMarker &) { return false; }
+bool turns(const SpatialMarker &marker) { return marker.turns; }
+
 } // namespace
 
 template <class Space>
@@ -111,6 +121,8 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
   // What hangs on what: a port for each child, ports of rows and wrenches where there is none yet
   for (std::size_t i = 0; i < count; ++i) {
     check(bodies[i], i, ground.size(), bodies, Space::dim);
+    if (bodies[i].parent < 0 && turns(ground[static_cast<std::size_t>(bodies[i].parent_marker)]))
+      refuse("body " + bodies[i].name + ": parent_marker: expected one that stands still, got one that turns");
     nodes[i].parent = bodies[i].parent, nodes[i].parent_port = bodies[i].parent_marker;
     if (bodies[i].parent >= 0) {
       auto &ports_there = used[static_cast<std::size_t>(bodies[i].parent)];
@@ -122,6 +134,10 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     Row row{model, {}, {}, -1, 0};
     if (model.kind != RowKind::coordinate)
       row.a = attach(model.a, used), row.b = attach(model.b, used);
+    const auto follows = [&](const Attachment &at) {
+      return at.node < 0 && turns(ground[static_cast<std::size_t>(at.port)]);
+    };
+    row.follows = model.kind != RowKind::coordinate && (follows(row.a) || follows(row.b));
     rows.push_back(row);
   }
   for (const MarkerAt &at : loaded)
@@ -148,7 +164,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     const Marker inboard = model.data.markers[static_cast<std::size_t>(model.inboard_marker)];
     node.outboard = static_cast<int>(used[i].size());
     if (sits)
-      model.data = at_marker(model.data, inboard);
+      model.data = at_marker(model.data, inboard), node.origin = origin_from(inboard);
     else
       node.inboard = node.outboard, used[i].push_back(model.inboard_marker);
     node.body = typename Space::Body(model.data, used[i]);

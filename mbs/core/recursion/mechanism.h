@@ -29,6 +29,7 @@ template <class Space> struct Node {
   int first_cross = 0;   // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
   bool is_pin = false;   // plane: a revolute joint at the frame, at most one port, which passes forces only
   bool has_rows = false; // constraint rows that are coordinates of the joint
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero(); // of the body's data, in axes of the frame
 
   int n() const { return body.n; }
   int body_width() const { return body.row_count(); } // rows of W
@@ -59,6 +60,7 @@ struct Row {
   Attachment a, b;
   int node = -1, freedom = 0; // of a row that is a joint coordinate
   bool moves = false;         // its direction does
+  bool follows = false;       // a side is a marker of the ground that turns
   double lift = 0;            // what it measures of gravity, one end being on the ground
 };
 

@@ -22,6 +22,7 @@ struct SpatialMarker {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Matrix3d triad = Eigen::Matrix3d::Identity(); // columns: its axes
   Eigen::MatrixXd Phi;                                 // (6, n)
+  bool turns = false; // of the ground: its axes follow an orientation in time; rows alone may attach there
 };
 
 // Empty matrices are zero; an empty m_xy is the identity.
@@ -72,7 +73,7 @@ struct MarkerAt {
 };
 
 // Constraint rows between two markers: what is zero, or follows a target. In the plane axes have two components, and
-// `rotation` is the difference of angles.
+// `rotation` is the difference of angles; in space it is f . log(A_b A_a^T), which is meant to stay zero.
 enum class RowKind {
   point,      // n . (r_b - r_a), n in global axes
   slide,      // n . (r_b - r_a), n in axes of section a

@@ -11,39 +11,35 @@ namespace ffrobot::recursion {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+namespace {
+
+constexpr double singular_ratio = 1e-6; // of Posture: below, joints cannot follow
+
+} // namespace
+
+Load::Load(const VectorXd &direction, TimeFunction magnitude_) : magnitude(std::move(magnitude_)) {
+  for (Index i = 0; i < direction.size(); ++i)
+    if (direction[i] != 0)
+      along.emplace_back(static_cast<int>(i), direction[i]);
+}
+
 template <class Space>
-RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, const double *q,
-                                        const double *v)
+RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
+                                        const double *q, const double *v)
     : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
       workspace_(mechanism), measured_(mechanism), newton_(mechanism), force_(VectorXd::Zero(mechanism.n_v)),
+      wrench_(VectorXd::Zero(Space::dim * static_cast<Index>(mechanism.wrenches.size()))),
       target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
       correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
-      target_time_(std::numeric_limits<double>::quiet_NaN()) {
+      target_time_(std::numeric_limits<double>::quiet_NaN()), norm_(mechanism),
+      shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(VectorXd::Zero(mechanism.n_v)) {
+  update_targets(t);
   keep_independent_rows(mechanism, q, v, workspace_);
   newton_.keep(workspace_.active);
   find_stiff_terms();
-  int groups = 2; // ways of joints, angles of joints
-  pace_ = {1e-3, 1e-3};
-  const Index n = mechanism.n_v;
-  group_.assign(static_cast<std::size_t>(2 * n), 0);
-  for (const Node<Space> &node : mechanism.nodes) {
-    for (int k = 0; k < node.shape.freedoms.count; ++k)
-      group_[static_cast<std::size_t>(node.v + k)] = node.shape.freedoms.component[k] < Space::linear ? 0 : 1;
-    double lowest = std::numeric_limits<double>::infinity();
-    for (int k = 0; k < node.n(); ++k) {
-      group_[static_cast<std::size_t>(node.p_v() + k)] = groups;
-      lowest = std::min(lowest, std::sqrt(node.body.K[static_cast<std::size_t>(k)]));
-    }
-    groups += node.n() > 0 ? 1 : 0;
-    if (node.n() > 0)
-      pace_.push_back(lowest);
+  for (const Node<Space> &node : mechanism.nodes)
     for (int k = 0; k < node.n(); ++k)
-      fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)]));
-  }
-  for (Index i = 0; i < n; ++i)
-    group_[static_cast<std::size_t>(n + i)] = group_[static_cast<std::size_t>(i)] + groups;
-  peak_.assign(static_cast<std::size_t>(2 * groups), 0.0);
-  size_ = peak_;
+      fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
 }
 
 template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
@@ -51,6 +47,10 @@ template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
     return;
   for (std::size_t r = 0; r < scene_.targets.size(); ++r)
     jets_[r] = scene_.targets[r](t), target_[static_cast<Index>(r)] = jets_[r].acceleration;
+  for (const DrivenMarker &driven : scene_.driven) {
+    const auto i = static_cast<std::size_t>(driven.marker);
+    workspace_.turning[i] = measured_.turning[i] = newton_.turning[i] = driven.law(t);
+  }
   target_time_ = t;
 }
 
@@ -59,11 +59,20 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
   Forces<double> forces;
   if (!scene_.loads.empty() || !scene_.joint_forces.empty()) {
     force_.setZero();
-    for (const Load &load : scene_.loads)
-      force_ += load.magnitude(t).value * load.direction;
+    for (const Load &load : scene_.loads) {
+      const double magnitude = load.magnitude(t).value;
+      for (const auto &[i, share] : load.along)
+        force_[i] += magnitude * share;
+    }
     for (const JointForce &joint : scene_.joint_forces)
       force_[joint.v] -= joint.stiffness * (q[joint.q] - joint.rest) + joint.friction.resistance(v[joint.v]);
     forces.generalized = force_.data();
+  }
+  if (!scene_.point_loads.empty()) {
+    wrench_.setZero();
+    for (const PointLoad &load : scene_.point_loads)
+      wrench_[Space::dim * load.wrench + load.component] += load.magnitude(t).value;
+    forces.wrench = wrench_.data();
   }
   accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
 }
@@ -86,7 +95,8 @@ template <class Space> void RecursiveMotion<Space>::residuals(double t, const do
 }
 
 template <class Space> double RecursiveMotion<Space>::project(double t, double *q, double *v) {
-  // As in core/system/system.cpp: rounding of positions, moved into fast modes, is noise in their forces.
+  // As in core/system/system.cpp: rounding of positions, moved into fast modes,
+  // is noise in their forces.
   constexpr double tolerance = 1e-12;
   constexpr int refresh_after = 3, most_iterations = 12;
   if (mechanism_.rows.empty())
@@ -123,36 +133,46 @@ template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z)
   return left < 1e-11;
 }
 
-template <class Space> double RecursiveMotion<Space>::error_size(double, const double *z, const double *e) {
-  return change_size(z, e, 0);
+template <class Space> double RecursiveMotion<Space>::error_size(double t, const double *z, const double *e) {
+  const double size = norm_.of_state(e);
+  norm_.observe(workspace_);
+  if (!norm_.observes() || std::isnan(size))
+    return size;
+  // Multipliers amplify errors of the state (stiffness times the error of a
+  // fast mode): measure what e does to them.
+  shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + Eigen::Map<const VectorXd>(e, 2 * n_v());
+  evaluate(t, local().state(shifted_.data()), shifted_.data() + n_v(), unused_.data());
+  const double of_forces = norm_.of_observed(workspace_);
+  return of_forces <= size ? size : of_forces; // keeps NaN
 }
 
 template <class Space> double RecursiveMotion<Space>::change_size(const double *, const double *e, double) const {
-  std::fill(size_.begin(), size_.end(), 0.0);
-  for (std::size_t i = 0; i < group_.size(); ++i)
-    size_[static_cast<std::size_t>(group_[i])] += e[i] * e[i];
-  double worst = 0;
-  for (std::size_t g = 0; g < size_.size(); ++g)
-    if (const double size = std::sqrt(size_[g]) / std::max(peak_[g], 1e-12); !(size <= worst))
-      worst = size; // keeps NaN
-  return worst;
+  return norm_.of_state(e);
 }
 
-template <class Space> void RecursiveMotion<Space>::accepted(double, const double *z, const double *) {
-  std::fill(size_.begin(), size_.end(), 0.0);
-  for (std::size_t i = 0; i < group_.size(); ++i)
-    size_[static_cast<std::size_t>(group_[i])] += z[i] * z[i];
-  for (std::size_t g = 0; g < size_.size(); ++g)
-    peak_[g] = std::max(peak_[g], std::sqrt(size_[g]));
-  // Rotation vectors start at zero in every step: an angle is compared with one radian at least.
-  peak_[1] = std::max(peak_[1], 1.0);
-  // At rest, as in equilibrium, all rates are zero: their errors are then compared with rates that would be slow.
-  for (std::size_t g = 0; g < pace_.size(); ++g)
-    peak_[pace_.size() + g] = std::max(peak_[pace_.size() + g], pace_[g] * peak_[g]);
+template <class Space> void RecursiveMotion<Space>::accepted(double t, const double *z, const double *z_dot) {
+  if (accepted_ == 0)
+    norm_.observe(workspace_);
+  norm_.take(z, z_dot, workspace_);
+  if (scene_.watch && accepted_ % steps_between_postures_ == 0)
+    watch_posture(t, local().state(z));
+  ++accepted_;
+}
+
+template <class Space> void RecursiveMotion<Space>::watch_posture(double t, const double *q) {
+  update_targets(t);
+  Posture posture = posture_at(mechanism_, *scene_.watch, q, measured_);
+  if (posture.side * side_ < 0)
+    posture.ratio = 0; // between this posture and the last
+  side_ = posture.side;
+  if (posture.ratio < least_ratio_) {
+    least_ratio_ = posture.ratio, singular_at_ = t;
+    singular_posture_ = Eigen::Map<const VectorXd>(q, mechanism_.n_q);
+  }
 }
 
 template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z) const {
-  return Eigen::Map<const VectorXd>(z, 2 * n_v()).allFinite();
+  return least_ratio_ >= singular_ratio && Eigen::Map<const VectorXd>(z, 2 * n_v()).allFinite();
 }
 
 template class RecursiveMotion<Planar>;

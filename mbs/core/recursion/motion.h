@@ -1,24 +1,47 @@
-// The motion of a mechanism in joint coordinates as a system that all methods integrate: rows follow functions of time,
-// forces act along joints and on modes; after every step the state is moved back onto the rows with the columns of the
-// recursion.
+// The motion of a mechanism in joint coordinates as a system that all methods
+// integrate: rows follow functions of time, forces act along joints and on
+// modes; after every step the state is moved back onto the rows with the
+// columns of the recursion.
 #pragma once
 
 #include "core/constraint/constraint.h"
 #include "core/integrate/ode.h"
+#include "core/recursion/motion_norm.h"
 #include "core/recursion/newton.h"
+#include "core/recursion/posture.h"
 #include "core/recursion/workspace.h"
 #include "core/space/configuration_space.h"
 #include "core/time_function/time_function.h"
 
+#include <optional>
+
 namespace ffrobot::recursion {
 
-// `magnitude`(t) times `direction` (n_v), generalized forces: joint moments, modal forces of patches.
+// `magnitude`(t) times a direction in generalized forces: joint moments, modal
+// forces of patches.
 struct Load {
-  Eigen::VectorXd direction;
+  Load(const Eigen::VectorXd &direction,
+       TimeFunction magnitude_); // direction (n_v)
+
+  std::vector<std::pair<int, double>> along; // entries of v that it acts on
   TimeFunction magnitude;
 };
 
-// Along a joint's coordinate: spring about `rest`, viscous and Coulomb friction.
+// `magnitude`(t) along a component of the force (N), then the moment (N m),
+// global axes, on a wrench of the mechanism.
+struct PointLoad {
+  int wrench = 0, component = 0;
+  TimeFunction magnitude;
+};
+
+// How a marker of the ground turns.
+struct DrivenMarker {
+  int marker = 0;
+  OrientationLaw law;
+};
+
+// Along a joint's coordinate: spring about `rest`, viscous and Coulomb
+// friction.
 struct JointForce {
   int q = 0, v = 0;     // of the coordinate
   double stiffness = 0; // N m/rad, N/m
@@ -29,14 +52,18 @@ struct JointForce {
 struct Scene {
   std::vector<TimeFunction> targets; // of rows: value, rate and acceleration
   std::vector<Load> loads;
+  std::vector<PointLoad> point_loads;
   std::vector<JointForce> joint_forces;
+  std::vector<DrivenMarker> driven;
+  std::optional<PostureWatch> watch;
 };
 
 template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
-  // The mechanism and the scene must outlive this. Rows that depend on others at (q, v) are left out of the equations
-  // from there on; they are to be consistent.
-  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, const double *q, const double *v);
+  // The mechanism and the scene must outlive this. Rows that depend on others
+  // at time t and (q, v) are left out of the equations from there on; they are
+  // to be consistent.
+  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v);
 
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
@@ -58,32 +85,45 @@ public:
   void constrain(const double *x, double *c) override;
   void constraint_values(double t, const double *z, double *value, double *rate) override;
 
-  // At a state y = (q, v): accelerations (n_v); multipliers are in workspace().lambda
+  // At a state y = (q, v): accelerations (n_v); multipliers are in
+  // workspace().lambda
   void evaluate(double t, const double *q, const double *v, double *a);
-  // Moves q (n_q) and v (n_v) onto the rows at time t; the largest residual left, relative to 1 m, 1 rad, 1 m/s
+  // Moves q (n_q) and v (n_v) onto the rows at time t; the largest residual
+  // left, relative to 1 m, 1 rad, 1 m/s
   double project(double t, double *q, double *v);
 
+  // Of the scene's watch: the smallest ratio of posture_at() so far, when, and
+  // q there; 1 before the first.
+  double least_ratio() const { return least_ratio_; }
+  double singular_at() const { return singular_at_; }
+  const Eigen::VectorXd &singular_posture() const { return singular_posture_; }
+
   const Workspace<Space, double> &workspace() const { return workspace_; }
+  Workspace<Space, double> &workspace() { return workspace_; }
 
 private:
   void update_targets(double t);
   void residuals(double t, const double *q, const double *v);
   void find_stiff_terms();
   void find_compliance();
+  void watch_posture(double t, const double *q);
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
-  // of accelerations; of rows and of Newton's method, which must not disturb these
+  // of accelerations; of rows and of Newton's method, which must not disturb
+  // these
   Workspace<Space, double> workspace_, measured_, newton_;
-  Eigen::VectorXd force_, target_, value_, rate_, correction_, state_;
+  Eigen::VectorXd force_, wrench_, target_, value_, rate_, correction_, state_;
   std::vector<Jet> jets_;
   double target_time_;
   double fastest_ = 1; // 1/s
-  // Errors are judged against the largest values so far of what is alike: all joints' ways, angles, each body's modes.
-  std::vector<int> group_; // of each of 2 n_v entries of z
-  std::vector<double> peak_;
-  std::vector<double> pace_; // 1/s, of each group: a rate counts as small below this times the peak of what it is of
-  mutable std::vector<double> size_;
+  MotionNorm<Space> norm_;
+  Eigen::VectorXd shifted_, unused_;
+  // the worst posture along the path, and when
+  double least_ratio_ = 1, singular_at_ = 0;
+  Eigen::VectorXd singular_posture_;
+  unsigned long accepted_ = 0, steps_between_postures_ = 1; // many where steps follow vibrations
+  int side_ = 0;
 
   Eigen::VectorXd stiffness_, damping_; // diagonals (n_v)
   std::vector<Eigen::Index> stiff_;     // where they are not zero

@@ -62,6 +62,17 @@ Inertia inertia_of(const spatial::Body &b, const double *p, const double *v, spa
   return to;
 }
 
+// z of the section that the joint holds
+template <class Space>
+Vector3d joint_axis(const Mechanism<Space> &m, std::size_t i, const Workspace<Space, double> &w) {
+  const Node<Space> &node = m.nodes[i];
+  if (node.inboard < 0)
+    return axes(w.frames[i]).col(2);
+  Pose<double> section;
+  section_pose(node.body, node.inboard, w.bodies[i], w.frames[i], section);
+  return axes(section).col(2);
+}
+
 } // namespace
 
 template <class Space>
@@ -76,7 +87,10 @@ std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *
     const Pose<double> &frame = w.frames[i];
     const auto [a, alpha] = parts(w.bodies[i]);
     const Matrix3d R = axes(frame);
-    all.push_back({vector(frame.r), vector(frame.v), R * a + g, vector(frame.omega), R * alpha, R, frame.angle});
+    const Vector3d acceleration = R * a + g, turning = R * alpha, omega = vector(frame.omega);
+    const Vector3d d = R * m.nodes[i].origin;
+    const Vector3d at_origin = acceleration + turning.cross(d) + omega.cross(omega.cross(d));
+    all.push_back({vector(frame.r), vector(frame.v), acceleration, omega, turning, R, frame.angle, at_origin});
   }
   return all;
 }
@@ -105,6 +119,11 @@ Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Works
     sum.gravitational -= g.dot(body.mass * r + R * body.s);
     sum.momentum += R * linear;
     sum.angular_momentum += R * angular + r.cross(R * linear);
+    if (node.rotor_inertia > 0) {
+      const double spin = w.hinges[i].spin;
+      sum.kinetic += 0.5 * node.rotor_inertia * spin * spin;
+      sum.angular_momentum += node.rotor_inertia * spin * joint_axis(m, i, w);
+    }
   }
   return sum;
 }

@@ -6,19 +6,20 @@
 namespace ffrobot::recursion {
 
 // Frames of all bodies after accelerations(): rows (3) of position, velocity, acceleration, angular velocity, angular
-// acceleration; R: body axes to global ones. In the plane the third components are angles' and zero.
+// acceleration; R: body axes to global ones. In the plane the third components are angles' and zero. Frames may sit at
+// joints (mechanism.h): a_origin is the acceleration of the origin of the body's data.
 struct FrameMotion {
   Eigen::Vector3d r, v, a, omega, alpha;
   Eigen::Matrix3d R;
   double angle = 0; // in the plane, full turns counted
+  Eigen::Vector3d a_origin;
 };
 
 template <class Space>
 std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
                                        Workspace<Space, double> &w);
 
-// Kinetic, strain and gravitational energy (J), and momentum: linear, angular about the origin (3 each). Without
-// rotors.
+// Kinetic, strain and gravitational energy (J), and momentum: linear, angular about the origin (3 each).
 struct Totals {
   double kinetic = 0, strain = 0, gravitational = 0;
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();

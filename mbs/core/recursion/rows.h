@@ -148,14 +148,44 @@ FFROBOT_APART void locate(const Mechanism<Space> &m, const T *q, Workspace<Space
 template <class Space, class T>
 FFROBOT_INLINE void attachment_pose(const Mechanism<Space> &m, const Attachment &at, const Workspace<Space, T> &w,
                                     Pose<T> &to) {
-  if (at.node < 0)
-    ground_pose(m.ground[at.port], to);
-  else
+  if (at.node >= 0) {
     section_pose(m.nodes[at.node].body, at.port, w.bodies[at.node], w.frames[at.node], to);
+    return;
+  }
+  ground_pose(m.ground[at.port], to);
+  if constexpr (Space::dim == 6)
+    if (m.ground[at.port].turns) {
+      const Turning &axes = w.turning[at.port];
+      for (int i = 0; i < 3; ++i) {
+        to.omega[i] = T(axes.omega[i]);
+        for (int j = 0; j < 3; ++j)
+          to.R[i][j] = T(axes.A(i, j));
+      }
+    }
+}
+
+// What a moment does with the angular acceleration of a marker that turns as it is told
+template <class Space, class T>
+FFROBOT_INLINE T by_turning(const Mechanism<Space> &m, const Attachment &at, const Workspace<Space, T> &w,
+                            const T *moment) {
+  if constexpr (Space::dim == 6)
+    if (at.node < 0 && m.ground[at.port].turns)
+      return dot(w.turning[at.port].alpha.data(), moment);
+  return T(0.);
 }
 
 // --- rows: value, rate, and second derivative
 //     force . (r_b_ddot - r_a_ddot) + moment_b . Omega_b_dot - moment_a . Omega_a_dot + bias
+
+// n . log(B A^T)
+template <class T> inline T turn_about(const T *n, const T (&A)[3][3], const T (&B)[3][3]) {
+  T R[3][3], x[3];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      R[i][j] = dot(B[i], A[j]);
+  logarithm(R, x);
+  return dot(n, x);
+}
 
 template <class T> struct RowMotion {
   T value, rate, bias;
@@ -176,8 +206,12 @@ FFROBOT_APART void row_motion(const Mechanism<Space> &m, const Row &row, const W
   if (row.model.kind == RowKind::rotation)
     for (int i = 0; i < 3; ++i)
       to.moment_b[i] = to.moment_a[i] = n[i];
+  const auto add_turning = [&] {
+    if (row.follows)
+      to.bias += by_turning(m, row.b, w, to.moment_b) - by_turning(m, row.a, w, to.moment_a);
+  };
   if (!located)
-    return;
+    return add_turning();
   Pose<T> a, b;
   attachment_pose(m, row.a, w, a), attachment_pose(m, row.b, w, b);
   T d[3], d_dot[3];
@@ -191,7 +225,11 @@ FFROBOT_APART void row_motion(const Mechanism<Space> &m, const Row &row, const W
     T omega[3];
     for (int i = 0; i < 3; ++i)
       omega[i] = b.omega[i] - a.omega[i];
-    to.value = (b.angle - a.angle) * n[2], to.rate = dot(n, omega);
+    to.rate = dot(n, omega);
+    if constexpr (Space::dim == 3)
+      to.value = (b.angle - a.angle) * n[2];
+    else
+      to.value = turn_about(n, a.R, b.R);
     break;
   }
   case RowKind::slide: {
@@ -217,6 +255,7 @@ FFROBOT_APART void row_motion(const Mechanism<Space> &m, const Row &row, const W
   case RowKind::coordinate:
     break;
   }
+  add_turning();
 }
 
 // A force and a moment (global axes) in axes of a port
@@ -295,8 +334,8 @@ FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &force
     const Row &row = m.rows[w.active[k]];
     if (row.model.kind == RowKind::coordinate)
       continue;
-    if (row.moves) {
-      row_motion(m, row, w, true, motion);
+    if (row.moves || row.follows) {
+      row_motion(m, row, w, row.moves, motion);
       T along(0.);
       for (int i = 0; i < Space::linear; ++i)
         along += m.gravity[i] * motion.force[i];

@@ -9,6 +9,11 @@ namespace ffrobot::recursion {
 
 FFROBOT_INLINE void sine_and_cosine(double x, double &s, double &c) { s = std::sin(x), c = std::cos(x); }
 
+// angle/sine of an angle from 0 to pi
+FFROBOT_INLINE double angle_by_sine(double sine, double cosine) {
+  return sine > 1e-9 ? std::atan2(sine, cosine) / sine : 1.;
+}
+
 template <class A, class B, class C> FFROBOT_INLINE void cross(const A *a, const B *b, C *c) {
   c[0] = a[1] * b[2] - a[2] * b[1];
   c[1] = a[2] * b[0] - a[0] * b[2];
@@ -32,6 +37,15 @@ template <class A, class B, class C> FFROBOT_INLINE void product(const A &a, con
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       c[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+}
+
+// Rotation vector x of R = exp(x~), which is no half turn
+template <class M, class X> FFROBOT_INLINE void logarithm(const M &R, X *x) {
+  for (int i = 0; i < 3; ++i)
+    x[i] = 0.5 * (R[(i + 2) % 3][(i + 1) % 3] - R[(i + 1) % 3][(i + 2) % 3]);
+  const X factor = angle_by_sine(std::sqrt(dot(x, x)), 0.5 * (R[0][0] + R[1][1] + R[2][2] - 1.));
+  for (int i = 0; i < 3; ++i)
+    x[i] = factor * x[i];
 }
 
 // y = M x of rows

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/recursion/mechanism.h"
+#include "core/recursion/orientation.h"
 
 #include <string>
 
@@ -22,8 +23,10 @@ template <class Space, class T> struct Hinge {
   Pack<T, d> Lambda[d];                     // what the port feels: f = Lambda A + bias
   Pack<T, d> U[d];                          // by freedoms, the last eliminated first
   T D_inverse[d];
-  T A[d];   // of the section
-  T pin[2]; // U/D of a pin, in place of all that
+  T A[d];    // of the section
+  T pin[2];  // U/D of a pin, in place of all that
+  T spin;    // rad/s of its rotor about z
+  T gyro[2]; // moment on the inner section about x, y by which the rotor resists turning with it, opposite sign
 };
 
 template <class Space, class T> struct PortWork {
@@ -67,6 +70,7 @@ template <class Space, class T> struct Workspace {
   Aligned<T> lambda;              // (all rows)
   Aligned<T> y;                   // (columns): 1, multipliers of active rows
   std::vector<Pose<T>> frames;    // of nodes
+  std::vector<Turning> turning;   // of ground markers, in space: those that turn are to be kept up to date
   unsigned long evaluations = 0;
 
   void keep(std::vector<int> rows); // these alone

@@ -82,6 +82,10 @@ class SpatialJoint(JointKeys):
     def motion(self, q: Array) -> Array:
         """(…, 6, freedoms): velocity and angular velocity of the outer triad by v, in axes of the inner one."""
 
+    def motion_rate(self, q: Array, v: Array) -> Array:
+        """(…, 6): Ṡ v in axes of the inner triad, what v̇ = 0 leaves of the acceleration; S is `motion`."""
+        return np.zeros((*q.shape[:-1], 6))
+
     def turned_around(self, coordinates: Array) -> Array:
         """Coordinates (…, k) with the sides exchanged: of the first on the second; done twice, the same again."""
         return -coordinates

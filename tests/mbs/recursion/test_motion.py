@@ -7,15 +7,21 @@ from mechanisms import assemble, core_run, relative
 from points_in_space import J, Mechanism, r
 from random_bodies import ground, random_body, row, three_links
 from recursion_trees import tree_of
+from rotations import exponential
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
+from ffrobot.mbs.fields.orientations import OrientationLaw
 
 DOP853 = [(_core.MethodKind.dop853, 1.0, 0.0)]
 
 
 def controls(tolerance=1e-10, methods=DOP853):
     return _core.IntegrationControls(tolerance=tolerance, max_steps=0, methods=methods, spectral_radius=0.8)
+
+
+def on(t):
+    return True
 
 
 def scene_of(tree):
@@ -38,15 +44,15 @@ def test_inverse_dynamics_of_plane_trees(name):
     q, v, left = _core.tree_projected(model, scene, 0.0, q, v)
     assert left < 1e-12
     times = np.linspace(0, 0.3, 4)
-    (status, _, _), states, _, lambda_ = _core.tree_motion(model, scene, list(times), q, v, controls())
-    assert status == _core.IntegrationStatus.completed
+    run = _core.tree_motion(model, scene, list(times), q, v, controls(), on)
+    assert run.status == _core.IntegrationStatus.completed
     Q, V, _ = tree.from_tree(q, v)
     expected = core_run(assembly, Q, V, times, tolerance=1e-10)
     for i in range(len(times)):
-        Q, V, _ = tree.from_tree(states[i, : model.n_q], states[i, model.n_q :])
+        Q, V, _ = tree.from_tree(run.states[i, : model.n_q], run.states[i, model.n_q :])
         assert relative(Q, expected.q[i]) < 1e-8
         _, expected_lambda = assembly.system.evaluate(times[i], Q, V)
-        assert relative(lambda_[i], expected_lambda[tree.rows]) < 1e-8
+        assert relative(run.multipliers[i], expected_lambda[tree.rows]) < 1e-8
 
 
 def test_rows_are_kept_along_a_motion_in_space():
@@ -68,9 +74,9 @@ def test_rows_are_kept_along_a_motion_in_space():
     q, v, left = _core.tree_projected(model, scene, 0.0, q, v)
     assert left < 1e-12
     times = list(np.linspace(0, 0.5, 6))
-    (status, _, _), states, _, _ = _core.tree_motion(model, scene, times, q, v, controls(1e-8))
-    assert status == _core.IntegrationStatus.completed
-    for t, y in zip(times, states, strict=True):
+    run = _core.tree_motion(model, scene, times, q, v, controls(1e-8), on)
+    assert run.status == _core.IntegrationStatus.completed
+    for t, y in zip(times, run.states, strict=True):
         at, rate = model.measure(y[: model.n_q], y[model.n_q :])
         assert np.abs(at - value - (0.05 * np.sin(3 * t) - 0.1 * t**2)).max() < 1e-9  # dense output
         assert np.abs(rate - (0.15 * np.cos(3 * t) - 0.2 * t)).max() < 1e-6
@@ -85,7 +91,7 @@ def test_a_free_rigid_body_turns_as_jacobi_says():
     body.name, body.joint, body.data = "top", J.free, data
     model = r.SpatialModel([body], [r.SpatialMarker()], [], [], np.zeros(3))
     q, v = np.array([0, 0, 0, 1.0, 0, 0, 0]), np.array([0, 0, 0, 3.0, 0, 4.0])
-    _, states, _, _ = _core.tree_motion(model, _core.TreeScene(), [0.0, 4.0], q, v, controls(1e-12))
+    states = _core.tree_motion(model, _core.TreeScene(), [0.0, 4.0], q, v, controls(1e-12), on).states
     assert np.abs(states[-1, -3:] - [2.64241551, -1.49727169, 3.92456121]).max() < 1e-8
     assert abs(np.linalg.norm(states[-1, 3:7]) - 1) < 1e-13
 
@@ -101,7 +107,7 @@ def test_a_flexible_tree_keeps_momentum_and_energy():
     for body, (_, p_q, *_) in zip(bodies, model.first, strict=True):
         if body.joint in (J.spherical, J.free):
             q[p_q - 4 : p_q] = [1, 0, 0, 0]
-    _, states, _, _ = _core.tree_motion(model, _core.TreeScene(), [0.0, 1.0], q, v, controls(1e-11))
+    states = _core.tree_motion(model, _core.TreeScene(), [0.0, 1.0], q, v, controls(1e-11), on).states
 
     def kept(y):
         totals = model.totals(y[: model.n_q], y[model.n_q :])
@@ -126,6 +132,76 @@ def test_dependent_rows_are_found_and_left_out():
     expected, _ = mechanism.model().evaluate(q, v, np.ones(3), None, None)
     assert relative(a, expected) < 1e-12
     assert np.count_nonzero(lambda_) == 3
+
+
+LAWS = {
+    "turning a reference": OrientationLaw("rotation_vector", ("0.8*sin(t)", "t**2", "1-2*t"), (0.3, -2.0, 1.1)),
+    "through no turn": OrientationLaw("rotation_vector", ("0", "t-0.7", "0"), (0.0, 0.0, 0.0)),
+    "nearly two turns": OrientationLaw("rotation_vector", ("5+t", "2*t", "-3"), (0.0, 0.0, 0.0)),
+    "roll, pitch, yaw": OrientationLaw("rpy", ("t", "1.2*cos(3*t)", "2-t**3"), (0.0, 0.0, 0.0)),
+    "one direction": OrientationLaw("direction", ("1+t", "sin(2*t)", "-3*t**2"), (0.0, 0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_orientations_are_those_of_the_scene(name):
+    """Those of `OrientationLaw`, whose rates are checked by differences; of a direction, its axis."""
+    law = LAWS[name]
+    functions = [parse_expression(text) for text in law.functions]
+    law = OrientationLaw(law.kind, tuple(functions), law.reference)
+    core = _core.TurningLaw(getattr(_core.OrientationKind, law.kind), functions, exponential(np.array(law.reference)))
+    for t in (0.0, 0.7, 1.3):
+        A, omega, alpha = core(t)
+        expected, (expected_omega, expected_alpha) = law.sample(np.array([t]))[0], law.rates(np.array([t]))
+        columns = [2] if law.kind == "direction" else [0, 1, 2]
+        np.testing.assert_allclose(A[:, columns], expected[:, columns], atol=1e-14)
+        np.testing.assert_allclose(omega, expected_omega[0], atol=1e-13)
+        np.testing.assert_allclose(alpha, expected_alpha[0], atol=3e-13)
+
+
+def test_a_section_follows_an_orientation():
+    """A flexible arm on a free base: three rows about axes that turn as told hold, with their rates."""
+    rng = np.random.default_rng(4)
+    turning, rows = r.SpatialMarker(), [row(r.RowKind.rotation, (-1, 1), (1, 1), axis)[0] for axis in np.eye(3)]
+    turning.turns = True
+    bodies = [random_body(rng, 2, J.free).core("a"), random_body(rng, 3, J.revolute).core("b")]
+    bodies[1].parent, bodies[1].parent_marker = 0, 1
+    model = r.SpatialModel(bodies, [r.SpatialMarker(), turning], rows, [], np.array([0, 0, -9.81]))
+    q, v = np.zeros(model.n_q), np.zeros(model.n_v)
+    q[3] = 1
+    model.turn_marker(1, np.eye(3), np.zeros(3), np.zeros(3))
+    reference, _ = model.measure(q, v)
+    functions = [parse_expression(text) for text in ("0.6*t**2", "sin(t)-t", "0.3*t**3")]
+    law = _core.TurningLaw(_core.OrientationKind.rotation_vector, functions, exponential(reference))
+    scene = _core.TreeScene()
+    for _ in rows:
+        scene.add_target(parse_expression("0"))
+    scene.turn_marker(1, law)
+    times = list(np.linspace(0, 0.5, 6))
+    run = _core.tree_motion(model, scene, times, q, v, controls(1e-9), on)
+    assert run.status == _core.IntegrationStatus.completed
+    for t, y in zip(times, run.states, strict=True):
+        model.turn_marker(1, *law(t))
+        value, rate = model.measure(y[: model.n_q], y[model.n_q :])
+        assert np.abs(value).max() < 1e-9  # dense output
+        assert np.abs(rate).max() < 1e-6
+
+
+def test_a_run_ends_where_it_is_told_to():
+    """What there was is kept; an exception of the caller comes through."""
+    rng = np.random.default_rng(0)
+    model = Mechanism([random_body(rng, 2, J.revolute)], ground(rng), np.array([0, 0, -9.81])).model()
+    q, v, times = np.zeros(model.n_q), 0.1 * np.ones(model.n_v), list(np.linspace(0, 500, 5001))
+    asked = []
+    run = _core.tree_motion(
+        model, _core.TreeScene(), times, q, v, controls(), lambda t: asked.append(t) or len(asked) < 3
+    )
+    assert run.status == _core.IntegrationStatus.interrupted
+    assert len(asked) == 3
+    assert run.time_reached == asked[-1] < 500
+    assert 0 < len(run.states) == len(run.multipliers) == len(run.energy) == np.searchsorted(times, asked[-1], "right")
+    with pytest.raises(ZeroDivisionError):
+        _core.tree_motion(model, _core.TreeScene(), times, q, v, controls(), lambda t: 1 / 0)
 
 
 RADAU = [(_core.MethodKind.radau, 1.0, 0.0)]
@@ -156,10 +232,10 @@ def sprung_tree(rng):
 def test_implicit_methods_find_the_same_motion(methods, tolerance, within):
     model, scene, q, v = sprung_tree(np.random.default_rng(11))
     times = list(np.linspace(0, 0.2, 5))
-    _, expected, _, _ = _core.tree_motion(model, scene, times, q, v, controls(1e-11))
-    (status, _, _), states, _, _ = _core.tree_motion(model, scene, times, q, v, controls(tolerance, methods))
-    assert status == _core.IntegrationStatus.completed
-    assert relative(states[:, : model.n_q], expected[:, : model.n_q]) < within
+    expected = _core.tree_motion(model, scene, times, q, v, controls(1e-11), on)
+    found = _core.tree_motion(model, scene, times, q, v, controls(tolerance, methods), on)
+    assert found.status == _core.IntegrationStatus.completed
+    assert relative(found.states[:, : model.n_q], expected.states[:, : model.n_q]) < within
 
 
 def test_steps_of_radau_are_not_bound_by_what_is_stiff():
@@ -172,7 +248,8 @@ def test_steps_of_radau_are_not_bound_by_what_is_stiff():
     joint_q, _, joint_v, _ = model.first[0]
     scene.add_joint_force(joint_q, joint_v, 1e8, 0.0, 1e6, 0.0, 1.0)
     q, v = np.zeros(model.n_q), np.zeros(model.n_v)
-    found = [_core.tree_motion(model, scene, [0.0, 0.05], q, v, controls(1e-6, method)) for method in (DOP853, RADAU)]
-    (_, explicit, _), (_, implicit, _) = found[0][0], found[1][0]
-    assert implicit < 0.1 * explicit
-    assert relative(found[1][1][-1][: model.n_q], found[0][1][-1][: model.n_q]) < 1e-5
+    explicit, implicit = (
+        _core.tree_motion(model, scene, [0.0, 0.05], q, v, controls(1e-6, method), on) for method in (DOP853, RADAU)
+    )
+    assert implicit.steps < 0.1 * explicit.steps
+    assert relative(implicit.states[-1, : model.n_q], explicit.states[-1, : model.n_q]) < 1e-5

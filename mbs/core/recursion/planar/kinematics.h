@@ -83,6 +83,8 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
       s.absolute_sine = p.absolute_sine * cosine + p.absolute_cosine * sine;
     } else
       s.absolute_cosine = cosine, s.absolute_sine = sine;
+    if (node.rotor_inertia > 0)
+      hinge.spin = omega + node.gear_ratio * v[node.v];
     if (node.joint == JointKind::revolute)
       s.omega = omega + v[node.v];
     else {

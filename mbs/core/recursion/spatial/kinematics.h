@@ -62,6 +62,14 @@ FFROBOT_INLINE void turn_revolute(const InnerSection<T> &inner, const T &q, cons
   omega[2] += v;
 }
 
+// A rotor on the inner section: its angular momentum J spin z turns with that section.
+template <class T>
+FFROBOT_INLINE void spin_rotor(const Node<Spatial> &node, const T &v, const T *omega, Hinge<Spatial, T> &hinge) {
+  hinge.spin = omega[2] + (node.gear_ratio - 1) * v;
+  hinge.gyro[0] = node.rotor_inertia * hinge.spin * omega[1];
+  hinge.gyro[1] = -(node.rotor_inertia * hinge.spin * omega[0]);
+}
+
 template <class T>
 inline void turn_any(const Node<Spatial> &node, const InnerSection<T> &inner, const T *q, const T *v,
                      Hinge<Spatial, T> &hinge, T *omega) {
@@ -105,6 +113,8 @@ FFROBOT_APART void kinematics(const Mechanism<Spatial> &m, const T *q, const T *
       spatial::turn_revolute(inner, q[node.q], v[node.v], hinge, s.omega);
     else
       spatial::turn_any(node, inner, q + node.q, v + node.v, hinge, s.omega);
+    if (node.rotor_inertia > 0)
+      spatial::spin_rotor(node, v[node.v], s.omega, hinge);
     product(inner.axes, hinge.turn.R, s.absolute);
     if (node.inboard >= 0) { // from the section to the frame
       const spatial::PortMotion<T> &port = s.ports[node.inboard];

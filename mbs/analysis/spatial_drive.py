@@ -1,0 +1,63 @@
+"""Running the integrators of the core from an initial state in space to a run: all kinds that integrate do it here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...common.arrays import Array, as_list
+from .. import _core
+from ..model.spatial_model import SpatialModel
+from ..model.spatial_system import Drive, SpatialSystem
+from ..scene.analysis import IntegratedAnalysis
+from ..solve.integrators import METHODS
+from ..solve.spatial_limits import left_ranges
+from ..solve.spatial_posture import robot_size, told_posture
+from ..solve.state import State
+from .drive import STATUS, Progress
+from .spatial_run import SpatialRun
+
+INTEGRATORS = {"auto": "dop853", **{name: name for name in METHODS}}
+"""The method that stands behind each name in scenes."""
+
+
+def spatial_drive(
+    model: SpatialModel,
+    analysis: IntegratedAnalysis,
+    start: State,
+    progress: Progress,
+    *,
+    drives: Sequence[Drive] = (),
+    warnings: tuple[str, ...] = (),
+    times: Array | None = None,
+) -> SpatialRun:
+    """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
+
+    `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where `progress` says so, and in
+    a posture in which the joints cannot follow the path, with a warning.
+    """
+    times = analysis.times if times is None else times
+    system, began = SpatialSystem(model, drives), time.perf_counter()
+    integrator = INTEGRATORS[analysis.integrator]
+    controls = _core.IntegrationControls(
+        tolerance=analysis.tolerance,
+        max_steps=analysis.max_steps,
+        methods=[(METHODS[integrator], 1.0, 0.0)],
+        spectral_radius=analysis.spectral_radius,
+    )
+    system.scene.watch_posture((~model.loop_rows).tolist(), robot_size(model))
+    run = _core.tree_motion(system.core, system.scene, as_list(times), start.q, start.v, controls, progress)
+    q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
+    posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture)
+    told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q))
+
+    def again(others: Array) -> SpatialRun:
+        return spatial_drive(model, analysis, start, progress, drives=drives, times=others)
+
+    return SpatialRun(
+        analysis, model, times[: len(q)], q, v, run.accelerations, run.multipliers,
+        status=STATUS[run.status], integrator=integrator, steps=run.steps, evaluations=run.evaluations,
+        wall_seconds=time.perf_counter() - began, warnings=told, again=again,
+    )  # fmt: skip

@@ -1,0 +1,73 @@
+"""Fully constrained inverse dynamics in space: p(t) is prescribed too, and all is algebraic (Shaban 2022, sec. 5.1)."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ..fields.waypoints import spline
+from ..model.model import ZERO
+from ..model.spatial_model import SpatialModel
+from ..solve.spatial_posture import check_path, mobility, undeformed_posture
+from ..solve.spatial_prescribed import prescribed_motion, quasi_static_shape
+from ..solve.state import State
+from .fcid import Fcid, Shape, given_shape, shape_nodes
+from .spatial_run import SpatialContext, SpatialRun
+
+
+def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
+    """Motion and forces for the trajectories and the shape that the analysis prescribes.
+
+    Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
+    `SolveError` where no posture, or no static shape, is found.
+    """
+    model, began = context.model, time.perf_counter()
+    start = undeformed_posture(model)
+    warnings = tuple(check_path(model, start.q))
+    found, rows = mobility(model, start.q), int(np.count_nonzero(~model.loop_rows))
+    if rows != found.freedom:
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": kind: expected as many trajectory components as the'
+            f' mechanism has degrees of freedom ({found.freedom}) for "fcid", found {rows}'
+        )
+    fits = sum(len(columns) for columns in model.motors.values()) == found.freedom
+    shape = _shape(model, analysis, start, by_motors=fits)
+    run = _run(model, analysis, shape, start, analysis.times, warnings)
+    return replace(run, wall_seconds=time.perf_counter() - began)
+
+
+def _run(
+    model: SpatialModel, analysis: Fcid, shape: Shape, start: State, times: Array, warnings: tuple[str, ...] = ()
+) -> SpatialRun:
+    found = prescribed_motion(model, _sampled(shape, times), times, start)
+
+    def again(others: Array) -> SpatialRun:
+        return _run(model, analysis, shape, start, others)
+
+    return SpatialRun(
+        analysis, model, times, found.q, found.v, found.a, found.multipliers, found.required, warnings=warnings,
+        again=again,
+    )  # fmt: skip
+
+
+def _sampled(shape: Shape, times: Array) -> Array:
+    """p, ṗ and p̈ (3, T, n) of all bodies."""
+    functions = [function for of_body in shape for function in of_body]
+    samples = np.array([function.sample(times) for function in functions]).reshape(len(functions), 3, len(times))
+    return np.moveaxis(samples, 0, -1)
+
+
+def _shape(model: SpatialModel, analysis: Fcid, start: State, *, by_motors: bool) -> Shape:
+    """p(t) of every body of the tree, with its derivatives: of static ones a spline, as in the plane."""
+    bodies = [node.body for node in model.tree.nodes]
+    if analysis.shape == "given":
+        return given_shape(model.scene.path, bodies, analysis)
+    if analysis.shape == "static":
+        nodes = shape_nodes(analysis)
+        functions = iter(spline(nodes, quasi_static_shape(model, nodes, start, by_motors=by_motors)))
+        return [[next(functions) for _ in range(body.n_modes)] for body in bodies]
+    return [[ZERO] * body.n_modes for body in bodies]

@@ -1,0 +1,20 @@
+"""THE list of kinds of analysis that scenes in space have, and what runs them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from .spatial_fcid import run_spatial_fcid
+from .spatial_forward import run_spatial_forward
+from .spatial_pcid import run_spatial_pcid
+from .spatial_run import SpatialContext, SpatialRun
+from .spatial_static import run_spatial_static
+
+IN_SPACE: Mapping[str, Callable[[SpatialContext, Any], SpatialRun]] = {
+    "pcid": run_spatial_pcid,
+    "fcid": run_spatial_fcid,
+    "forward": run_spatial_forward,
+    "static": run_spatial_static,
+}
+"""By `kind`; each takes the record of its kind, which is that of planar scenes."""

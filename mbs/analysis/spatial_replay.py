@@ -1,0 +1,61 @@
+"""What an inverse analysis in space found, as functions of time that act again.
+
+Forces are sampled on finer and finer grids until splines through every second value meet the others: samples at the
+outputs alone would alias fast modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from .._core import TimeFunction
+from ..fields.waypoints import spline
+from ..model.spatial_model import row_values
+from ..model.spatial_motors import MotorForces, motor_forces, path_forces
+from .spatial_run import SpatialRun
+
+FEWEST_NODES = 401
+MOST_NODES = 200_000
+CHUNK = 2000  # states that are looked at at once
+SHARE = 0.3  # of the tolerance that the splines may take
+GAIN = 32.0  # at least: by how much half the step makes a quintic spline better (64 where it is smooth)
+
+
+class Replayed(NamedTuple):
+    """Functions of time of each column, and how far they are off (share of the largest value, mean over time)."""
+
+    functions: list[TimeFunction]
+    unresolved: float
+
+
+def replayed(source: SpatialRun, read: Callable[[SpatialRun], Array], end: float, tolerance: float) -> Replayed:
+    """What `read` (T, columns) finds of a run, up to `end` (s), to a share of the tolerance where that can be had."""
+    assert source.again is not None
+    count = 2 * max(FEWEST_NODES // 2, source.steps) + 1
+    while True:
+        nodes = as_floats(np.linspace(0.0, end, count))
+        values = _in_parts(source.again(nodes), read)
+        peak = float(np.abs(values).max(initial=0.0))
+        rough = np.array([f.sample(nodes[1::2])[0] for f in spline(nodes[::2], values[::2])]).T
+        off = float(np.abs(rough - values[1::2]).mean(axis=0).max(initial=0.0)) if values.size else 0.0
+        unresolved = off / GAIN / peak if peak > 0 else 0.0
+        if unresolved <= SHARE * tolerance or 2 * count - 1 > MOST_NODES:
+            return Replayed(spline(nodes, values), unresolved)
+        count = 2 * count - 1
+
+
+def motor_forces_of(run: SpatialRun) -> MotorForces:
+    """τ and F_p of a run (see `mbs.model.spatial_motors`)."""
+    frames = run.model.tree.frames(run.q)
+    C_v = row_values(run.model, run.q, run.time, frames)[1]
+    wanted = path_forces(run.model, C_v, run.multipliers) if run.required is None else run.required
+    return motor_forces(run.model, run.q, frames, C_v, wanted)
+
+
+def _in_parts(run: SpatialRun, read: Callable[[SpatialRun], Array]) -> Array:
+    """`read` of a long run, part by part: Jacobians of all states at once would not fit into memory."""
+    return np.concatenate([read(run.rows(slice(k, k + CHUNK))) for k in range(0, len(run.time), CHUNK)])

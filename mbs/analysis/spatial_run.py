@@ -1,0 +1,91 @@
+"""What an analysis of a scene in space starts from, and what it computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from ...common.arrays import Array
+from ...common.errors import SolveError
+from ..model.spatial_model import SpatialModel
+from ..scene.analysis import Analysis
+from .drive import Progress
+from .outcome import ADVICE
+
+
+@dataclass(frozen=True)
+class SpatialRun:
+    """The motion that an analysis in space found, at outputs as far as it got.
+
+    Attributes:
+        analysis: that asked for it.
+        model: with the rows that held in it.
+        time: (T,) s.
+        q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree.
+        multipliers: (T, rows).
+        required: (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are all.
+        is_at_rest: whether targets stand still, as in an equilibrium.
+        status: how it ended.
+        integrator: its name.
+        steps, evaluations: how many.
+        wall_seconds: of all.
+        warnings: on what is left open.
+        again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
+    """
+
+    analysis: Analysis
+    model: SpatialModel
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    required: Array | None = None
+    is_at_rest: bool = False
+    status: str = "completed"
+    integrator: str = "none"
+    steps: int = 0
+    evaluations: int = 0
+    wall_seconds: float = 0.0
+    warnings: tuple[str, ...] = ()
+    again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
+
+    @property
+    def failed(self) -> bool:
+        """Whether it ended before its last time."""
+        return self.status != "completed"
+
+    def rows(self, chosen: slice) -> SpatialRun:
+        """These outputs alone."""
+        names = ("time", "q", "v", "a", "multipliers", "required")
+        of_time = {name: getattr(self, name) for name in names}
+        return replace(self, **{name: values[chosen] for name, values in of_time.items() if values is not None})
+
+    def check_completed(self, how_to_go_on: str = "") -> None:
+        """Raise `SolveError` with advice where it ended early."""
+        if self.failed:
+            reached = self.time[-1] if len(self.time) else 0.0
+            raise SolveError(
+                f'{self.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
+                f" ({self.status}): {ADVICE[self.status]}{how_to_go_on}"
+            )
+
+
+@dataclass(frozen=True)
+class SpatialContext:
+    """What the run of an analysis in space starts from.
+
+    Attributes:
+        model: the robot, with the rows of all joints that close loops and of all trajectories.
+        runs: of the analyses before, by name.
+        progress: see `drive.Progress`.
+    """
+
+    model: SpatialModel
+    runs: Mapping[str, SpatialRun]
+    progress: Progress
+
+
+def without_paths(model: SpatialModel) -> SpatialModel:
+    """The robot alone: joints hold, nothing is followed."""
+    return replace(model, rows=tuple(row for row in model.rows if not row.is_trajectory))

@@ -1,0 +1,26 @@
+"""Equilibrium in space under gravity, loads and the trajectories at t = 0, with the moments that hold it."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from ..scene.analysis import Analysis
+from ..solve.spatial_posture import undeformed_posture
+from ..solve.spatial_statics import holding_multipliers, static_equilibrium
+from .spatial_run import SpatialContext, SpatialRun
+
+
+def run_spatial_static(context: SpatialContext, analysis: Analysis) -> SpatialRun:
+    """The equilibrium at the one time t = 0: at rest, however fast the trajectories are there.
+
+    Raises `SolveError` where there is none.
+    """
+    model, began = context.model, time.perf_counter()
+    q = static_equilibrium(model, undeformed_posture(model)).q[None]
+    at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
+    return SpatialRun(
+        analysis, model, times, q, at_rest, at_rest, holding_multipliers(model, q[0])[None],
+        is_at_rest=True, wall_seconds=time.perf_counter() - began,
+    )  # fmt: skip

@@ -1,0 +1,149 @@
+#include "core/recursion/motion_norm.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace ffrobot::recursion {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double small_force = 1e-3; // of the largest: forces below count like this one
+constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
+constexpr double nothing = 1e-12;
+
+template <class Space> bool is_moment(const Mechanism<Space> &m, const Row &row) {
+  if (row.model.kind != RowKind::coordinate)
+    return row.model.kind == RowKind::rotation || row.model.kind == RowKind::dot;
+  return m.nodes[static_cast<std::size_t>(row.node)].shape.freedoms.component[row.freedom] >= Space::linear;
+}
+
+double farthest(const planar::Body &b) {
+  double r = 0;
+  for (const planar::Port &port : b.ports)
+    r = std::max(r, std::hypot(port.x, port.y));
+  return r;
+}
+double farthest(const spatial::Body &b) {
+  double r = 0;
+  for (const spatial::Port &port : b.ports)
+    r = std::max(r, std::hypot(port.r[0], port.r[1], port.r[2]));
+  return r;
+}
+
+} // namespace
+
+template <class Space>
+MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism) : mechanism_(mechanism), pace_{slow, slow} {
+  const auto n = static_cast<std::size_t>(mechanism.n_v);
+  group_.assign(2 * n, 0), frequency_.assign(n, 0);
+  for (const Node<Space> &node : mechanism.nodes) {
+    length_ = std::max(length_, farthest(node.body));
+    for (int k = 0; k < node.shape.freedoms.count; ++k)
+      group_[static_cast<std::size_t>(node.v + k)] = node.shape.freedoms.component[k] < Space::linear ? 0 : 1;
+    double lowest = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < node.n(); ++k) {
+      const auto i = static_cast<std::size_t>(node.p_v() + k);
+      group_[i] = static_cast<int>(pace_.size());
+      frequency_[i] = std::sqrt(node.body.K[static_cast<std::size_t>(k)]);
+      lowest = std::min(lowest, frequency_[i]);
+    }
+    if (node.n() > 0)
+      pace_.push_back(lowest);
+  }
+  length_ = length_ > 0 ? length_ : 1;
+  for (std::size_t i = 0; i < n; ++i)
+    group_[n + i] = group_[i] + static_cast<int>(pace_.size());
+  size_ = peak_ = std::vector<double>(2 * pace_.size(), 0.0);
+  std::map<std::pair<std::string, bool>, int> known;
+  for (const Row &row : mechanism.rows) {
+    const auto key = std::pair(row.model.name, is_moment(mechanism, row));
+    const auto [at, is_new] = known.emplace(key, static_cast<int>(known.size()));
+    if (is_new)
+      per_force_.push_back(key.second ? length_ : 1);
+    multiplier_group_.push_back(at->second);
+  }
+  force_now_ = force_error_ = force_peak_ = std::vector<double>(per_force_.size(), 0.0);
+  observed_ = change_ = VectorXd::Zero(static_cast<Index>(mechanism.rows.size()));
+}
+
+template <class Space> double MotionNorm<Space>::of_state(const double *e) const {
+  std::fill(size_.begin(), size_.end(), 0.0);
+  for (std::size_t i = 0; i < group_.size(); ++i)
+    size_[static_cast<std::size_t>(group_[i])] += e[i] * e[i];
+  double worst = 0;
+  for (std::size_t g = 0; g < size_.size(); ++g)
+    if (const double size = std::sqrt(size_[g]) / std::max(peak_[g], nothing); !(size <= worst))
+      worst = size; // keeps NaN
+  return worst;
+}
+
+template <class Space>
+void MotionNorm<Space>::sizes_of_multipliers(const VectorXd &values, std::vector<double> &size) const {
+  std::fill(size.begin(), size.end(), 0.0);
+  for (std::size_t r = 0; r < multiplier_group_.size(); ++r)
+    size[static_cast<std::size_t>(multiplier_group_[r])] += std::pow(values[static_cast<Index>(r)], 2);
+  for (double &x : size)
+    x = std::sqrt(x);
+}
+
+template <class Space> void MotionNorm<Space>::observe(const Workspace<Space, double> &w) {
+  observed_ = Eigen::Map<const VectorXd>(w.lambda.data(), observed_.size());
+}
+
+template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Space, double> &w) {
+  change_ = Eigen::Map<const VectorXd>(w.lambda.data(), observed_.size()) - observed_;
+  sizes_of_multipliers(observed_, force_now_), sizes_of_multipliers(change_, force_error_);
+  double largest = inertial_, worst = 0;
+  for (std::size_t g = 0; g < per_force_.size(); ++g)
+    largest = std::max(largest, force_peak_[g] / per_force_[g]);
+  for (std::size_t g = 0; g < per_force_.size(); ++g) {
+    const double scale = std::max({force_peak_[g], force_now_[g], small_force * largest * per_force_[g], nothing});
+    if (const double size = force_error_[g] / scale; !(size <= worst))
+      worst = size; // keeps NaN
+  }
+  return worst;
+}
+
+template <class Space>
+void MotionNorm<Space>::take(const double *z, const double *z_dot, const Workspace<Space, double> &w) {
+  const std::size_t n = frequency_.size();
+  std::vector<double> of_forces(size_.size(), 0.0); // what the forces on modes will do to them
+  std::fill(size_.begin(), size_.end(), 0.0);
+  for (std::size_t i = 0; i < group_.size(); ++i)
+    size_[static_cast<std::size_t>(group_[i])] += z[i] * z[i];
+  for (std::size_t i = 0; i < n; ++i)
+    if (frequency_[i] > 0) {
+      const double rate = z_dot[n + i] / frequency_[i], way = rate / frequency_[i];
+      of_forces[static_cast<std::size_t>(group_[i])] += way * way;
+      of_forces[static_cast<std::size_t>(group_[n + i])] += rate * rate;
+    }
+  for (std::size_t g = 0; g < size_.size(); ++g)
+    peak_[g] = std::max({peak_[g], std::sqrt(size_[g]), std::sqrt(of_forces[g])});
+  // Rotation vectors start at zero in every step: an angle is compared with one radian at least, a way with a length.
+  peak_[0] = std::max(peak_[0], length_), peak_[1] = std::max(peak_[1], 1.0);
+  // At rest, as in equilibrium, all rates are zero: their errors are then compared with rates that would be slow.
+  for (std::size_t g = 0; g < pace_.size(); ++g)
+    peak_[pace_.size() + g] = std::max(peak_[pace_.size() + g], pace_[g] * peak_[g]);
+  sizes_of_multipliers(observed_, force_now_);
+  for (std::size_t g = 0; g < force_peak_.size(); ++g)
+    force_peak_[g] = std::max(force_peak_[g], force_now_[g]);
+  double inertial = 0;
+  for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
+    const auto &A = w.bodies[i].A;
+    double square = 0;
+    for (int k = 0; k < Space::linear; ++k)
+      square += A[k] * A[k];
+    inertial += mechanism_.nodes[i].body.mass * std::sqrt(square);
+  }
+  inertial_ = std::max(inertial_, inertial);
+}
+
+template class MotionNorm<Planar>;
+template class MotionNorm<Spatial>;
+
+} // namespace ffrobot::recursion

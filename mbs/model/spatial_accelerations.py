@@ -1,0 +1,156 @@
+"""Accelerations of a tree in space at given q, v and v̇: of frames, sections, and rows of constraints.
+
+Nothing here asks for forces: it is what turns prescribed motion into prescribed accelerations. Arrays are over states
+(T, …), in global axes, SI units. With ω = A ω̄, u = x + Φp in axes of the body and a section's turning φ = Φ_r p:
+r̈ = R̈ + ω̇ × Au + ω × (ω × Au) + 2ω × AΦṗ + AΦp̈ and Ω̇ = ω̇ + A(J_l φ̈ + J̇_l φ̇) + ω × A J_l φ̇.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import left_jacobian, left_jacobian_rate
+from .spatial_model import SpatialModel, SpatialRow
+from .spatial_tree import Motion, Node, Section, SpatialTree
+
+
+class Acceleration(NamedTuple):
+    """Of a triad: r̈ and Ω̇ (T, 3)."""
+
+    r: Array
+    Omega: Array
+
+
+@dataclass(frozen=True)
+class Accelerated:
+    """States q (T, n_q), v and a (T, n_v) of a tree, with the motion of its frames."""
+
+    tree: SpatialTree
+    q: Array
+    v: Array
+    a: Array
+    frames: Sequence[Motion]
+
+    def velocity(self, at: Motion) -> tuple[Array, Array]:
+        """ṙ and Ω (T, 3) of a triad."""
+        both = np.einsum("tij,tj->ti", at.L, self.v)
+        return both[:, :3], both[:, 3:]
+
+    def of_frames(self) -> list[Acceleration]:
+        """Of each body's frame, in the order of the tree."""
+        found: list[Acceleration] = []
+        for node in self.tree.nodes:
+            found.append(self._of_frame(node, self._of_outer(node, found)))
+        return found
+
+    def of_section(self, section: Section, frames: Sequence[Acceleration]) -> Acceleration:
+        """Of a section's triad, from those of the frames."""
+        if section.body < 0:
+            zero = np.zeros((len(self.q), 3))
+            return Acceleration(zero, zero)
+        node, frame, of_frame = self.tree.nodes[section.body], self.frames[section.body], frames[section.body]
+        omega = self.velocity(frame)[1]
+        bent = self._bent(node, section, frame.F)
+        r = of_frame.r + np.cross(of_frame.Omega, bent.arm) + _swept(omega, bent)
+        return Acceleration(r, of_frame.Omega + bent.spin_rate + np.cross(omega, bent.spin))
+
+    def _of_outer(self, node: Node, frames: Sequence[Acceleration]) -> Acceleration:
+        """Of the joint's triad on the body that it carries, from the inner one."""
+        inner = self.tree.motion(node.inner, self.q, self.frames)
+        of_inner, Omega = self.of_section(node.inner, frames), self.velocity(inner)[1]
+        q, v, v_dot = self.q[:, node.q], self.v[:, node.v], self.a[:, node.v]
+        S = node.joint.motion(q)
+        d = np.einsum("tij,tj->ti", inner.F, node.joint.place(q).d)
+        relative = np.einsum("tij,tj->ti", S, v)
+        change = np.einsum("tij,tj->ti", S, v_dot) + node.joint.motion_rate(q, v)
+        way, turn, way_rate, turn_rate = (
+            np.einsum("tij,tj->ti", inner.F, x[:, part])
+            for x in (relative, change)
+            for part in (slice(0, 3), slice(3, 6))
+        )
+        r = of_inner.r + np.cross(of_inner.Omega, d) + np.cross(Omega, np.cross(Omega, d) + 2 * way) + way_rate
+        return Acceleration(r, of_inner.Omega + np.cross(Omega, turn) + turn_rate)
+
+    def _of_frame(self, node: Node, outer: Acceleration) -> Acceleration:
+        """Of the body's frame, from its section at the joint."""
+        frame = self.frames[self.tree.index[node.body.name]]
+        omega, bent = self.velocity(frame)[1], self._bent(node, node.outer, frame.F)
+        Omega = outer.Omega - bent.spin_rate - np.cross(omega, bent.spin)
+        return Acceleration(outer.r - np.cross(Omega, bent.arm) - _swept(omega, bent), Omega)
+
+    def _bent(self, node: Node, section: Section, A: Array) -> _Bent:
+        """What the modes do at a section, in global axes."""
+        p, p_dot, p_2dot = self.q[:, node.p_q], self.v[:, node.p_v], self.a[:, node.p_v]
+        if not section.point:
+            return _Bent(*np.zeros((5, len(p), 3)))
+        at = node.body.points[section.point]
+        phi, phi_dot, phi_2dot = (x @ at.rotation.T for x in (p, p_dot, p_2dot))
+        J_l = left_jacobian(phi)
+        spin = np.einsum("tij,tj->ti", J_l, phi_dot)
+        spin_rate = np.einsum("tij,tj->ti", J_l, phi_2dot) + left_jacobian_rate(phi, phi_dot)
+        u, u_dot, u_2dot = at.position + p @ at.translation.T, p_dot @ at.translation.T, p_2dot @ at.translation.T
+        return _Bent(*(np.einsum("tij,tj->ti", A, x) for x in (u, u_dot, u_2dot, spin, spin_rate)))
+
+
+class _Bent(NamedTuple):
+    """A u, A Φṗ, A Φp̈, A J_l φ̇, A (J_l φ̈ + J̇_l φ̇): (T, 3) each."""
+
+    arm: Array
+    rate: Array
+    change: Array
+    spin: Array
+    spin_rate: Array
+
+
+def _swept(omega: Array, bent: _Bent) -> Array:
+    """R̈ of a section less that of its frame, but for the part of ω̇."""
+    found: Array = np.cross(omega, np.cross(omega, bent.arm) + 2 * bent.rate) + bent.change
+    return found
+
+
+def row_accelerations(model: SpatialModel, state: Accelerated, times: Array) -> Array:
+    """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
+    frames = state.of_frames()
+    found = np.zeros((len(times), len(model.rows)))
+    for k, row in enumerate(model.rows):
+        found[:, k] = _row(row, state, frames, times)
+    return found
+
+
+def _row(row: SpatialRow, state: Accelerated, frames: Sequence[Acceleration], times: Array) -> Array:
+    target = 0.0 if row.target is None else row.target.sample(times)[2]
+    if row.kind == "coordinate":
+        found: Array = row.sign * state.a[:, row.coordinate] - target
+        return found
+    a, b = (state.tree.motion(section, state.q, state.frames) for section in (row.a, row.b))
+    of_a, of_b = (state.of_section(section, frames) for section in (row.a, row.b))
+    if row.kind == "rotation":
+        assert row.law is not None
+        found = (of_b.Omega - row.law.rates(times)[1]) @ row.f
+        return found
+    (v_a, w_a), (v_b, w_b) = state.velocity(a), state.velocity(b)
+    if row.kind == "point":
+        found = (of_b.r - of_a.r) @ row.f - target
+        return found
+    f = np.einsum("tij,j->ti", a.F, row.f)
+    if row.kind == "slide":
+        return _product_rate(f, w_a, of_a.Omega, b.r - a.r, v_b - v_a, of_b.r - of_a.r) - target
+    if row.law is None:
+        g, turning, change = b.F @ row.g, w_b, of_b.Omega
+    else:
+        g, (turning, change) = row.law.sample(times)[:, :, 2], row.law.rates(times)
+    g_dot = np.cross(turning, g)
+    return _product_rate(f, w_a, of_a.Omega, g, g_dot, np.cross(change, g) + np.cross(turning, g_dot))
+
+
+def _product_rate(f: Array, omega: Array, alpha: Array, d: Array, d_dot: Array, d_2dot: Array) -> Array:
+    """d²/dt² of f·d (T,), where f turns with ω, ω̇."""
+    f_dot = np.cross(omega, f)
+    f_2dot = np.cross(alpha, f) + np.cross(omega, f_dot)
+    found: Array = np.sum(f_2dot * d + 2 * f_dot * d_dot + f * d_2dot, axis=-1)
+    return found

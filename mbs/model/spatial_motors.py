@@ -1,0 +1,89 @@
+"""What motors and modal forces do in place of the forces on a path: the split of generalized forces in space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import left_jacobian
+from .spatial_model import SpatialModel
+from .spatial_tree import Motion, Section
+
+
+@dataclass(frozen=True)
+class MotorForces:
+    """τ (T, k) by joint, N·m or N, on its second side, and F_p (T, n) by body, what patches would have to supply.
+
+    F_p belongs to the modes of the modal body file.
+    """
+
+    moments: Mapping[str, Array]
+    modal: Mapping[str, Array]
+
+
+def path_forces(model: SpatialModel, C_v: Array, multipliers: Array) -> Array:
+    """−C_sᵀλ_s (T, n_v): what the forces on the paths do along v, with C_v (T, rows, n_v) and λ (T, rows)."""
+    path = ~model.loop_rows
+    found: Array = -np.einsum("tij,ti->tj", C_v[:, path], multipliers[:, path])
+    return found
+
+
+def split_forces(
+    model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array
+) -> tuple[dict[str, Array], Array]:
+    """Gᵀτ + EᵀF_p + C_mᵀν = `wanted` (T, n_v), with C_v (T, rows, n_v) at q (T, n_q): τ by joint, and EᵀF_p (T, n_v).
+
+    In joint coordinates without loops τ are the components of the right side along the motors' coordinates and F_p
+    those along the modes; loops share them out with ν.
+    """
+    joints, loops = model.tree.joint_columns, C_v[:, model.loop_rows]
+    motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(int)
+    G = np.broadcast_to(np.eye(model.tree.n_v)[motors], (len(q), len(motors), model.tree.n_v))
+    rows = np.concatenate([loops, G], axis=1)
+    found = np.einsum("tji,tj->ti", np.linalg.pinv(rows[:, :, joints]), wanted[:, joints])
+    left = wanted - np.einsum("tij,ti->tj", rows, found)
+    moments, first = {}, loops.shape[1]
+    for name, numbers in model.motors.items():
+        moments[name] = model.sign(name) * found[:, first : first + len(numbers)]
+        first += len(numbers)
+    if model.scene.motors == "frame":
+        _move_to_frames(model, q, frames, moments, left)
+    return moments, left
+
+
+def motor_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array) -> MotorForces:
+    """The same, modal forces by body and in the modes of the modal body files."""
+    moments, left = split_forces(model, q, frames, C_v, wanted)
+    stored = {
+        node.body.name: left[:, node.p_v] @ np.linalg.pinv(node.body.modal_transform) for node in model.tree.nodes
+    }
+    return MotorForces(moments, stored)
+
+
+def _move_to_frames(
+    model: SpatialModel, q: Array, frames: Sequence[Motion], moments: Mapping[str, Array], left: Array
+) -> None:
+    """Motors that turn frames, not sections: what they do less on the modes, modal forces do more."""
+    tree = model.tree
+    for joint in model.scene.motor_joints:
+        if joint.units != ("rad",):
+            continue
+        node = tree.nodes[tree.carried[joint.name]]
+        axis = tree.motion(node.inner, q, frames).F[:, :, 2]
+        along = model.sign(joint.name) * moments[joint.name]
+        for section, sign in ((node.outer, 1.0), (node.inner, -1.0)):
+            if section.body >= 0:
+                turn = np.einsum("ti,tij->tj", axis, _spin_of_modes(model, q, frames, section))
+                left[:, tree.nodes[section.body].p_v] += sign * along * turn
+
+
+def _spin_of_modes(model: SpatialModel, q: Array, frames: Sequence[Motion], section: Section) -> Array:
+    """A J_l Φ_r (T, 3, n): the section's angular velocity by ṗ."""
+    node = model.tree.nodes[section.body]
+    Phi_r = node.body.points[section.point].rotation if section.point else np.zeros((3, node.body.n_modes))
+    phi = q[:, node.p_q] @ Phi_r.T
+    found: Array = frames[section.body].F @ left_jacobian(phi) @ Phi_r
+    return found

@@ -1,0 +1,82 @@
+"""What sits in joints in space as they are built: friction along coordinates, and geared rotors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from .spatial_accelerations import Accelerated
+from .spatial_tree import Node, Section, SpatialTree
+
+
+class RotorMotion(NamedTuple):
+    """Of a rotor with inertia J on the first side of a joint, behind a gear of ratio N, over states (T, …).
+
+    Attributes:
+        first, second: the joint's sides, the first of which carries it.
+        ratio: N.
+        inertia: J in kg·m².
+        axis: z (T, 3) of both, global axes.
+        spin: u = z·(N Ω_second − (N − 1) Ω_first), rad/s, (T,).
+        torque: J u̇ (T,), N·m.
+        gyroscopic: J u Ω_first × z (T, 3), N·m: with J u̇ z the rate of its angular momentum.
+    """
+
+    first: Section
+    second: Section
+    ratio: float
+    inertia: float
+    axis: Array
+    spin: Array
+    torque: Array
+    gyroscopic: Array
+
+
+def rotor(node: Node) -> tuple[float, float]:
+    """Inertia J (kg·m²) of the rotor in the joint that carries a body, 0 without one, and its ratio N."""
+    return float(getattr(node.joint, "rotor_inertia", 0.0)), float(getattr(node.joint, "gear_ratio", 1.0))
+
+
+def rotors(state: Accelerated) -> Iterator[RotorMotion]:
+    """Of all rotors of a tree."""
+    of_frames = None
+    for node in state.tree.nodes:
+        inertia, ratio = rotor(node)
+        if not inertia:
+            continue
+        of_frames = state.of_frames() if of_frames is None else of_frames
+        first, second = (node.outer, node.inner) if node.backwards else (node.inner, node.outer)
+        at = [state.tree.motion(section, state.q, state.frames) for section in (first, second)]
+        Omega, Omega_dot = (
+            [state.velocity(motion)[1] for motion in at],
+            [state.of_section(section, of_frames).Omega for section in (first, second)],
+        )
+        z = at[0].F[:, :, 2]
+        spin, rate = (np.sum(z * (ratio * x[1] - (ratio - 1) * x[0]), axis=1) for x in (Omega, Omega_dot))
+        turning = inertia * spin[:, None] * np.cross(Omega[0], z)
+        yield RotorMotion(first, second, ratio, inertia, z, spin, inertia * rate, turning)
+
+
+def rotor_forces(state: Accelerated) -> Array:
+    """Generalized forces (T, n_v) that the motion of all rotors takes."""
+    found = np.zeros_like(state.v)
+    for one in rotors(state):
+        on_second = one.ratio * one.torque[:, None] * one.axis
+        on_first = one.gyroscopic - (one.ratio - 1) * one.torque[:, None] * one.axis
+        for section, moment in ((one.first, on_first), (one.second, on_second)):
+            L = state.tree.motion(section, state.q, state.frames).L
+            found += np.einsum("tij,ti->tj", L[:, 3:], moment)
+    return found
+
+
+def resistance(tree: SpatialTree, v: Array) -> Array:
+    """Friction (T, n_v) along all coordinates, c γ̇ + τ_c tanh(γ̇/γ̇_s); what it dissipates is v times that."""
+    found = np.zeros_like(v)
+    for node in tree.nodes:
+        for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
+            rate = v[:, column]
+            found[:, column] = friction.viscous * rate + friction.coulomb * np.tanh(rate / friction.speed)
+    return found

@@ -1,0 +1,73 @@
+"""Energies and momentum of a motion in space, over the output times (T, …), SI units, global axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array
+from ..model.spatial_inverse import bent_inertia
+from ..model.spatial_transmission import resistance, rotors
+from .spatial_motion import SpatialMotion
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Kinetic, strain and gravitational energy (T,) J, and the power (T,) W that damping of modes and friction take."""
+
+    kinetic: Array
+    strain: Array
+    gravitational: Array
+    dissipated_power: Array
+
+
+@dataclass(frozen=True)
+class Momentum:
+    """Linear (T, 3) kg·m/s, and angular about the global origin (T, 3) kg·m²/s."""
+
+    linear: Array
+    angular: Array
+
+
+def energies(motion: SpatialMotion) -> Energies:
+    """Of all bodies: ½ (m Ṙ² + ωᵀJω + ṗᵀṗ) + Ṙ·(ω × s + S̄ṗ) + ω·hṗ, in axes of the body; ½ pᵀKp; −g·(mR + As)."""
+    count, gravity = len(motion.time), np.array(motion.model.scene.gravity)
+    kinetic, strain, gravitational, dissipated = np.zeros((4, count))
+    for node, frame in zip(motion.model.tree.nodes, motion.frames, strict=True):
+        body, p, p_dot = node.body, motion.q[:, node.p_q], motion.v[:, node.p_v]
+        u, omega = _body_velocities(motion, frame.F, frame.L)
+        s, J, _, h = bent_inertia(body, p)
+        spin = np.einsum("tij,tj->ti", J, omega) + 2 * np.einsum("tin,tn->ti", h, p_dot)
+        kinetic += 0.5 * np.sum(omega * spin, axis=1) + 0.5 * np.sum(p_dot * p_dot, axis=1)
+        kinetic += np.sum(u * (0.5 * body.mass * u + np.cross(omega, s) + p_dot @ body.S_bar.T), axis=1)
+        strain += 0.5 * np.square(p) @ body.stiffness
+        gravitational -= (body.mass * frame.r + np.einsum("tij,tj->ti", frame.F, s)) @ gravity
+        dissipated += np.einsum("ti,ij,tj->t", p_dot, body.damping, p_dot)
+    dissipated += np.sum(motion.v * resistance(motion.model.tree, motion.v), axis=1)
+    for rotor in rotors(motion.accelerated):
+        kinetic += 0.5 * rotor.inertia * rotor.spin**2
+    return Energies(kinetic, strain, gravitational, dissipated)
+
+
+def momentum(motion: SpatialMotion) -> Momentum:
+    """Of all bodies: A (m Ṙ + ω × s + S̄ṗ), and R × that + A (s × Ṙ + Jω + hṗ), in axes of the body."""
+    linear, angular = np.zeros((2, len(motion.time), 3))
+    for node, frame in zip(motion.model.tree.nodes, motion.frames, strict=True):
+        body, p, p_dot = node.body, motion.q[:, node.p_q], motion.v[:, node.p_v]
+        u, omega = _body_velocities(motion, frame.F, frame.L)
+        s, J, _, h = bent_inertia(body, p)
+        own = body.mass * u + np.cross(omega, s) + p_dot @ body.S_bar.T
+        spin = np.cross(s, u) + np.einsum("tij,tj->ti", J, omega) + np.einsum("tin,tn->ti", h, p_dot)
+        own, spin = (np.einsum("tij,tj->ti", frame.F, x) for x in (own, spin))
+        linear += own
+        angular += spin + np.cross(frame.r, own)
+    for rotor in rotors(motion.accelerated):
+        angular += rotor.inertia * rotor.spin[:, None] * rotor.axis
+    return Momentum(linear, angular)
+
+
+def _body_velocities(motion: SpatialMotion, A: Array, L: Array) -> tuple[Array, Array]:
+    """Ṙ and ω (T, 3) in axes of the body."""
+    both = np.einsum("tij,tj->ti", L, motion.v)
+    return np.einsum("tji,tj->ti", A, both[:, :3]), np.einsum("tji,tj->ti", A, both[:, 3:])

@@ -1,0 +1,106 @@
+"""Motion in space that is wholly prescribed: modal coordinates by functions of time, joints by the rows of paths."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import SolveError
+from ..model.spatial_accelerations import Accelerated, row_accelerations
+from ..model.spatial_inverse import required_forces
+from ..model.spatial_model import SpatialModel, row_values, target_rates
+from ..model.spatial_motors import split_forces
+from .spatial_posture import solve_postures
+from .state import State
+
+ONE_BY_ONE = 50  # groups of neighbours, each looked for from the last posture of the one before it
+MOST_ITERATIONS = 100
+SETTLED = 1e-13  # steps of a static shape, of its size
+
+
+class Prescribed(NamedTuple):
+    """States q (T, n_q), v and a (T, n_v), the forces M v̇ − Q (T, n_v) that they take, and multipliers (T, rows)."""
+
+    q: Array
+    v: Array
+    a: Array
+    required: Array
+    multipliers: Array
+
+
+def prescribed_motion(model: SpatialModel, modes: Array, times: Array, start: State) -> Prescribed:
+    """At `times` (T,), with `modes` (3, T, n): p, ṗ and p̈ of all bodies, from a posture near the first.
+
+    As many rows as joints have freedoms are independent. The multipliers are those that go with joints that move
+    freely: what is left of the forces on the modes holds the shape.
+
+    Raises `SolveError` where no posture meets the rows.
+    """
+    tree, joints = model.tree, model.tree.joint_columns
+    q, v, a = np.tile(start.q, (len(times), 1)), *np.zeros((2, len(times), tree.n_v))
+    q[:, _modal_places(model)], v[:, ~joints], a[:, ~joints] = modes
+    q = _postures(model, times, q)
+    C_v = row_values(model, q, times)[1]
+    by_joints = np.linalg.pinv(C_v[:, :, joints])
+    rates = target_rates(model, q, times) - np.einsum("tij,tj->ti", C_v, v)
+    v[:, joints] = np.einsum("tij,tj->ti", by_joints, rates)
+    frames = tree.frames(q)
+    bias = row_accelerations(model, Accelerated(tree, q, v, a, frames), times)
+    a[:, joints] = -np.einsum("tij,tj->ti", by_joints, bias)
+    required = required_forces(model, Accelerated(tree, q, v, a, frames), times)
+    multipliers = -np.einsum("tji,tj->ti", by_joints, required[:, joints])
+    return Prescribed(q, v, a, required, multipliers)
+
+
+def quasi_static_shape(model: SpatialModel, times: Array, start: State, *, by_motors: bool) -> Array:
+    """Of all bodies p (T, n) at `times` (T,), with which motors alone move the robot along its paths, ṗ = p̈ = 0.
+
+    Without `by_motors`, with which the forces on the paths do. By p ← p − F_p/K until nothing changes.
+    Raises `SolveError` where that does not converge: links too soft for their loads.
+    """
+    joints, p = model.tree.joint_columns, np.zeros((3, len(times), int(np.count_nonzero(~model.tree.joint_columns))))
+    K = np.concatenate([node.body.stiffness for node in model.tree.nodes])
+    for _ in range(MOST_ITERATIONS):
+        found = prescribed_motion(model, p, times, start)
+        frames = model.tree.frames(found.q)
+        C_v = row_values(model, found.q, times, frames)[1]
+        if by_motors:
+            left = split_forces(model, found.q, frames, C_v, found.required)[1]
+        else:
+            left = found.required + np.einsum("tij,ti->tj", C_v, found.multipliers)
+        step = left[:, ~joints] / K
+        p[0] -= step
+        if not np.all(np.isfinite(p)):
+            break
+        if np.all(np.linalg.norm(step, axis=1) <= SETTLED * np.linalg.norm(p[0], axis=1)):
+            shape: Array = p[0]
+            return shape
+    raise SolveError(
+        f"{model.scene.path}: no static shape was found between t = {times[0]:g} and {times[-1]:g} s: the links are too"
+        " soft for their loads there"
+    )
+
+
+def _modal_places(model: SpatialModel) -> Array:
+    """Where the modes of all bodies stand in q."""
+    return np.concatenate([np.arange(node.p_q.start, node.p_q.stop) for node in model.tree.nodes])
+
+
+def _postures(model: SpatialModel, times: Array, q: Array) -> Array:
+    """Q (T, n_q) with joints that meet the rows, modes kept: some one after the other, those between from these."""
+    modes = _modal_places(model)
+    found, at, stride = np.zeros_like(q), q[0], -(-len(times) // ONE_BY_ONE)
+    for k in range(0, len(times), stride):
+        guess = q[k : k + stride].copy()
+        guess[:] = at
+        guess[:, modes] = q[k : k + stride, modes]
+        some, is_met = solve_postures(model, times[k : k + stride], guess)
+        if not is_met.all():
+            raise SolveError(
+                f"{model.scene.path}: no posture was found at t = {times[k + int(is_met.argmin())]:g} s: the prescribed"
+                " shape takes the trajectories out of reach"
+            )
+        found[k : k + stride], at = some, some[-1]
+    return found

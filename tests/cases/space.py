@@ -1,0 +1,37 @@
+"""Scene files of the checkpoints in space, and how closely datasets have to meet their numbers."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import scene_of
+
+FOLDER = Path(scene_of.__file__).parent
+
+
+def write_scene(name, folder, *changes, more=""):
+    """The scene of a checkpoint in a folder, with `changes` (old, new) to its text and `more` after it."""
+    command = [sys.executable, FOLDER / "scene_of.py", FOLDER / f"{name}.json", folder]
+    subprocess.run(command, check=True)
+    scene = folder / "scene.toml"
+    text = scene.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    scene.write_text(text + more)
+    return scene
+
+
+def solved(ffrobot, scene):
+    """The results of a scene, which has to run."""
+    done = ffrobot("solve", scene)
+    assert done.returncode == 0, done.stderr
+    return h5py.File(scene.with_suffix(".results.h5"))
+
+
+def close(found, expected, least=1e-12):
+    """To 1e-6 of the peak, which is `least` at the least."""
+    expected = np.array(expected)
+    np.testing.assert_allclose(found[()], expected, atol=1e-6 * max(np.abs(expected).max(), least))

@@ -1,0 +1,90 @@
+"""Loads on points, friction and rotors in space through `ffrobot solve`, against forces written by hand."""
+
+import h5py
+import numpy as np
+
+SCENE = """
+name = "loads"
+space = "spatial"
+gravity = [0.0, 0.0, -9.81]
+
+[[body]]
+name = "carriage"
+[body.rigid]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+center = [0.0, 0.0, 0.0]
+points = { mount = [0.0, 0.0, 0.0], side = [0.3, 0.0, 0.0] }
+
+[[body]]
+name = "wheel"
+[body.rigid]
+mass = 1.0
+inertia = [0.02, 0.03, 0.05]
+center = [0.0, 0.0, 0.0]
+points = { hub = [0.0, 0.0, 0.0], rim = [0.0, 0.25, 0.0] }
+
+[[joint]]
+name = "lift"
+type = "prismatic"
+between = ["ground", "carriage.mount"]
+axis = [0.0, 0.0, 1.0]
+viscous_friction = 3.0
+coulomb_friction = 0.5
+friction_speed = 0.05
+
+[[joint]]
+name = "turn"
+type = "revolute"
+between = ["carriage.side", "wheel.hub"]
+axis = [0.0, 0.0, 1.0]
+viscous_friction = 0.2
+rotor_inertia = 1e-3
+gear_ratio = 20.0
+
+[[trajectory]]
+name = "way"
+joint = "lift"
+value = "0.1*sin(3*t)"
+
+[[trajectory]]
+name = "angle"
+joint = "turn"
+value = "0.5*t**2"
+
+[[load]]
+point = "wheel.rim"
+x = "4*cos(t)"
+z = "-7*t"
+mz = "0.3"
+
+[[analysis]]
+name = "inverse"
+kind = "pcid"
+end = 1.0
+output_step = 0.1
+tolerance = 1e-9
+"""
+
+
+def test_motors_carry_loads_friction_and_rotors(tmp_path, ffrobot):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    done = ffrobot("solve", path)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(path.with_suffix(".results.h5")) as file:
+        t = file["inverse/time"][()]
+        lift, turn = (file[f"inverse/joints/{name}/moment"][()] for name in ("lift", "turn"))
+        reaction, moment = (file[f"inverse/joints/lift/{key}"][()] for key in ("reaction", "reaction_moment"))
+        dissipated, kinetic = (file[f"inverse/energy/{key}"][()] for key in ("dissipated_power", "kinetic"))
+    rate, acceleration = 0.3 * np.cos(3 * t), -0.9 * np.sin(3 * t)
+    friction = 3.0 * rate + 0.5 * np.tanh(rate / 0.05)
+    np.testing.assert_allclose(lift, 3.0 * (acceleration + 9.81) + friction + 7 * t, rtol=1e-8)
+    arm = -0.25 * np.cos(0.5 * t**2)  # of the force along x, about z
+    np.testing.assert_allclose(turn, 0.05 + 1e-3 * 20**2 + 0.2 * t - 0.3 - arm * 4 * np.cos(t), atol=1e-7)
+    np.testing.assert_allclose(
+        moment[:, 2], 0.05 + 1e-3 * 20 - 0.3 - arm * 4 * np.cos(t), atol=1e-7
+    )  # the rotor's, too
+    np.testing.assert_allclose(dissipated, friction * rate + 0.2 * t**2, atol=1e-7)
+    np.testing.assert_allclose(kinetic, 1.5 * rate**2 + 0.5 * (0.05 + 1e-3 * 20**2) * t**2, atol=1e-7)
+    np.testing.assert_allclose(reaction[:, 0], -4 * np.cos(t), atol=1e-7)

@@ -1,0 +1,84 @@
+"""Inverse dynamics by the equations of each body, energies and momentum, against the recursion: random trees."""
+
+import numpy as np
+import pytest
+from spatial_scenes import as_scene, coordinates, tree_model
+from spatial_trees import TYPES, random_tree
+
+from ffrobot.mbs.model.spatial_accelerations import Accelerated, row_accelerations
+from ffrobot.mbs.model.spatial_inverse import required_forces
+from ffrobot.mbs.model.spatial_model import row_values
+from ffrobot.mbs.model.spatial_motors import path_forces
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.quantities.spatial_energy import energies, momentum
+from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
+
+SMALL = 0.01  # modal coordinates: sections turn by about 0.1 rad
+NOW = np.zeros(1)
+
+
+def moving(rng, types, kinds, loops=0):
+    """A random tree at random velocities, and what the recursion makes of it: motion of one instant, and its core."""
+    tree = random_tree(rng, types, kinds, chain=True, size=SMALL, loops=loops)
+    plain, tables = as_scene(tree, False)
+    model, mechanism = tree_model(plain, tables), plain.mechanism()
+    system = SpatialSystem(model)
+    q = model.tree.at_rest(coordinates(model, plain, False))
+    for node in model.tree.nodes:
+        q[node.p_q] = mechanism.coordinates.parts(tree.q, node.body.name)[2]
+    v = rng.standard_normal(model.tree.n_v)
+    C_v = row_values(model, q[None], NOW)[1][0]
+    v -= np.linalg.pinv(C_v, rcond=1e-10) @ (C_v @ v)
+    if len(model.rows):
+        system.core.keep_independent_rows(q, v)
+    a, multipliers = system.core.evaluate(q, v, np.zeros(len(model.rows)), None, None)
+    return SpatialMotion(model, NOW, q[None], v[None], a[None], multipliers[None]), system
+
+
+@pytest.mark.parametrize("joint", TYPES)
+def test_accelerations_take_no_force(joint):
+    """M v̇ − Q of what the recursion finds is nothing, mode by mode and joint by joint."""
+    kinds = ("rigid", "beam") if joint == "free" else ("rigid", "solid", "beam", "supported beam")
+    rng = np.random.default_rng(TYPES.index(joint))
+    for _ in range(5):
+        motion, _ = moving(rng, [joint] * 3, kinds)
+        left = required_forces(motion.model, motion.accelerated, NOW)
+        still = required_forces(
+            motion.model, Accelerated(motion.model.tree, motion.q, 0 * motion.v, motion.a, motion.frames), NOW
+        )
+        np.testing.assert_allclose(left, 0, atol=1e-10 * np.abs(motion.a).max())
+        if np.abs(motion.v).max() > 0.1 and left.size > 3:
+            assert np.abs(still).max() > 1e-3  # velocities matter here
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rows_of_loops_keep_their_accelerations(seed):
+    motion, _ = moving(np.random.default_rng(seed), ["revolute"] * 3, ("rigid", "solid", "beam"), loops=1)
+    assert motion.model.rows
+    left = row_accelerations(motion.model, motion.accelerated, NOW)
+    np.testing.assert_allclose(left, 0, atol=1e-8 * np.abs(motion.a).max())
+    held = np.einsum("tij,ti->tj", motion.rows[1], motion.multipliers)
+    found = required_forces(motion.model, motion.accelerated, NOW) + held
+    np.testing.assert_allclose(found, 0, atol=1e-9 * max(np.abs(held).max(), np.abs(motion.a).max()))
+    np.testing.assert_array_equal(path_forces(motion.model, motion.rows[1], motion.multipliers), 0)
+
+
+@pytest.mark.parametrize("joint", TYPES)
+def test_energies_and_momentum_are_those_of_the_recursion(joint):
+    kinds = ("rigid", "beam") if joint == "free" else ("rigid", "solid", "beam", "supported beam")
+    motion, system = moving(np.random.default_rng(50 + TYPES.index(joint)), [joint] * 3, kinds)
+    totals = system.core.totals(motion.q[0], motion.v[0])
+    found, moving_on = energies(motion), momentum(motion)
+    for key in ("kinetic", "strain", "gravitational"):
+        np.testing.assert_allclose(getattr(found, key)[0], getattr(totals, key), rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(moving_on.linear[0], totals.momentum, atol=1e-10)
+    np.testing.assert_allclose(moving_on.angular[0], totals.angular_momentum, atol=1e-10)
+
+
+def test_damping_takes_what_its_forces_do():
+    motion, _ = moving(np.random.default_rng(7), ["revolute"] * 2, ("beam",))
+    expected = sum(
+        motion.v[0, node.p_v] @ node.body.damping @ motion.v[0, node.p_v] for node in motion.model.tree.nodes
+    )
+    np.testing.assert_allclose(energies(motion).dissipated_power, [expected])
+    assert expected > 0
