@@ -10,7 +10,8 @@ from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import PictureMesh
 from ffrobot.fe_models.modal_body_file import write_modal_body
-from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes, round_below
+from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
+from ffrobot.pictures.figures.parallel import round_below
 from ffrobot.pictures.figures.plot import plot_file, plot_modal_body
 
 LINK = """

@@ -3,8 +3,6 @@
 
 const TYPED = { f4: Float32Array, i4: Int32Array };
 const typedArray = (entry) => new TYPED[entry.dtype](Uint8Array.from(atob(entry.bdata), (c) => c.charCodeAt(0)).buffer);
-const AXIS_LENGTH = 0.07 * MECHANISM.size, TOOL_LENGTH = 0.09 * MECHANISM.size;
-const TOOL_COLORS = ["#D55E00", "#009E73", "#0072B2"]; // of x, y, z
 
 for (const run of MECHANISM.runs) {
   for (const body of run.bodies) {
@@ -65,9 +63,9 @@ function traces(run, t, s) {
   const k = outputAt(run, t);
   return [
     ...run.bodies.map((body) => surface(body, k, s)),
-    arms(run.joints, null, k, s, -AXIS_LENGTH, AXIS_LENGTH),
+    arms(run.joints, null, k, s, -MECHANISM.axis_length, MECHANISM.axis_length),
     coordinates(run.joints.map((joint) => markerAt(joint, k, s))),
-    ...[0, 1, 2].map((j) => arms(run.tools, j, k, s, 0, TOOL_LENGTH)),
+    ...[0, 1, 2].map((j) => arms(run.tools, j, k, s, 0, MECHANISM.tool_length)),
     ...run.tools.map((tool) => coordinates(Array.from({ length: k + 1 }, (_, output) => markerAt(tool, output, 1)))),
   ];
 }
@@ -86,7 +84,7 @@ function styles(run) {
     ...bodies,
     { ...line, name: "axes of joints", line: { color: pageColor("--axis"), width: 4 }, hoverinfo: "skip" },
     { ...line, mode: "markers", text: names, marker: { color: pageColor("--ink"), size: 3 }, hovertemplate: "%{text}<extra></extra>" },
-    ...["x", "y", "z"].map((axis, j) => ({ ...line, line: { color: TOOL_COLORS[j], width: 6 }, name: axis, hoverinfo: "name" })),
+    ...["x", "y", "z"].map((axis, j) => ({ ...line, line: { color: MECHANISM.tool_colors[j], width: 6 }, name: axis, hoverinfo: "name" })),
     ...run.tools.map((tool) => ({ ...line, name: tool.name, line: { color: run.color, width: 3 }, hoverinfo: "name" })),
   ].map((trace) => ({ ...trace, visible: run.visible ? true : "legendonly" }));
 }
