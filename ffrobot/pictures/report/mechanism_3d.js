@@ -70,7 +70,6 @@ function traces(run, t, s) {
   ];
 }
 
-
 function styles(run) {
   const group = { legendgroup: run.label, showlegend: false }, line = { type: "scatter3d", mode: "lines", ...group };
   const lighting = { ambient: 0.8, diffuse: 0.6, specular: 0.2, facenormalsepsilon: 0, vertexnormalsepsilon: 0 };
@@ -107,19 +106,29 @@ function scenery() {
   return [ground, ...Object.values(wanted)];
 }
 
+const FILLED = 1.55, WIDEST = 1.5; // what is seen of the height, in Plotly's unit, beside the labels; width to height, on paper too
 const still = scenery();
 const first = []; // number of the first trace of each run
+
+// How long a metre is, in Plotly's unit: the box of the axes fills the picture, as the viewer sees it, on paper too.
+function metre() {
+  const [x, y, z] = MECHANISM.viewer, across = Math.hypot(x, y), sides = MECHANISM.range.map(([a, b]) => b - a);
+  const seen = (...along) => sides.reduce((sum, side, c) => sum + side * Math.abs(along[c]), 0);
+  const width = seen(y / across, x / across, 0), height = seen((z * x) / across, (z * y) / across, across);
+  return FILLED / Math.max(height, width / Math.min(stage.clientWidth / stage.clientHeight, WIDEST));
+}
 
 // Axes of the scene in the colours of the page; one metre is as long on each.
 function sceneAxes() {
   const longest = Math.max(...MECHANISM.range.map(([a, b]) => b - a)), found = { aspectmode: "manual", aspectratio: {} };
+  const unit = metre();
   ["x", "y", "z"].forEach((name, c) => {
     const [a, b] = MECHANISM.range[c];
     found[`${name}axis`] = {
-      range: [a, b], title: { text: `${name} (m)` }, color: pageColor("--ink"), gridcolor: pageColor("--grid"),
-      zerolinecolor: pageColor("--line"), showbackground: false, showspikes: false, nticks: 2 + Math.round((6 * (b - a)) / longest),
+      ...axisInSpace(), range: [a, b], title: { text: `${name} (m)` }, showbackground: false, showspikes: false,
+      nticks: 2 + Math.round((6 * (b - a)) / longest),
     };
-    found.aspectratio[name] = (1.3 * (b - a)) / longest;
+    found.aspectratio[name] = unit * (b - a);
   });
   return found;
 }
