@@ -121,3 +121,15 @@ def test_page_of_a_solid_stays_small(page, solid_arm):
     begin = text.index('id="modes-3d-data"')
     assert text.index("</script>", begin) - begin < 0.5e6
     assert len(text) < 6e6
+
+
+def test_dark_pages_have_dark_pictures(shown):
+    """When the reader's system turns dark, a corner of the picture does."""
+    media = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
+    shown.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+    try:
+        shown.wait("modeStage.layout.paper_bgcolor === '#14181f'")
+        image = Image.open(io.BytesIO(shown.screenshot("#modes-3d"))).convert("RGB")
+        assert image.getpixel((4, image.height - 5)) == (0x14, 0x18, 0x1F)
+    finally:
+        shown.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})

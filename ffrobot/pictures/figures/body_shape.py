@@ -56,7 +56,7 @@ def draw_modes(body: ModalBody) -> Figure:
     count = min(body.mode_count, MODES)
     rows = -(-count // COLUMNS)
     figure = Figure(figsize=(WIDTH, 1.9 * rows), layout="constrained")
-    outline = projected(points, LINK)[_outline(points, cells)]
+    outline = projected(points, LINK)[_outline(points, cells, LINK.viewer)]
     margin = AMPLITUDE * body.length * np.array([[0.0, 1.0, 1.0], [0.0, -1.0, -1.0]])
     frame = projected((points[:, None] + margin).reshape(-1, 3), LINK)
     for k in range(count):
@@ -118,8 +118,8 @@ def _sides(cells: Integers) -> Integers:
     return np.asarray(np.sort(sides, axis=1), dtype=np.int64)
 
 
-def _outline(points: Array, cells: Integers) -> Integers:
-    """(e, 2) the edges along which a surface folds or ends; of a line, all of it."""
+def _outline(points: Array, cells: Integers, viewer: Array | None = None) -> Integers:
+    """(e, 2) the edges along which a surface folds or ends, or turns away from a viewer; of a line, all of it."""
     corners = cells.shape[1]
     if corners == 2:
         return cells
@@ -129,7 +129,10 @@ def _outline(points: Array, cells: Integers) -> Integers:
     order = np.lexsort(edges.T)
     edges, owner = edges[order], owner[order]
     paired = np.flatnonzero(np.all(edges[1:] == edges[:-1], axis=1))
-    smooth = np.abs(np.einsum("ei,ei->e", normal[owner[paired]], normal[owner[paired + 1]])) > FOLD
+    one, other = normal[owner[paired]], normal[owner[paired + 1]]
+    smooth = np.abs(np.einsum("ei,ei->e", one, other)) > FOLD
+    if viewer is not None:
+        smooth &= (one @ viewer > 0.0) == (other @ viewer > 0.0)
     inner = np.zeros(len(edges), dtype=bool)
     inner[paired[smooth]] = inner[paired[smooth] + 1] = True
     # A fold is listed by both of its cells; once is enough.
