@@ -16,7 +16,7 @@ from ..fields.orientations import OrientationLaw
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
 from .spatial_body import SpatialBody
 from .spatial_model import SpatialModel, SpatialRow
-from .spatial_transmission import rotor
+from .spatial_transmission import resistance, resistance_slope, rotor
 from .spatial_tree import Node, Section
 
 ZERO = _core.TimeFunction.constant(0.0)
@@ -33,6 +33,22 @@ class Drive(NamedTuple):
 
     direction: Array
     size: TimeFunction
+
+
+class Derivatives(NamedTuple):
+    """By increments δ of q, by v and by generalized forces, all along v (n_v).
+
+    Attributes:
+        a_q, a_v, a_f: (n_v, n_v) of accelerations; joints with friction resist more the faster they are.
+        value_q: (rows, n_v) of the values of rows, and of their rates by v.
+        rate_q: (rows, n_v) of their rates.
+    """
+
+    a_q: Array
+    a_v: Array
+    a_f: Array
+    value_q: Array
+    rate_q: Array
 
 
 class SpatialSystem:
@@ -55,6 +71,7 @@ class SpatialSystem:
         driven = {name for name in model.motors} | {load.joint for load in model.scene.load}
         driven |= {trajectory.joint for trajectory in model.scene.trajectory}
         driven |= {node.joint.name for node in tree.nodes if node.joint.frictions}
+        driven |= {gear.joint.joint.name for gear in tree.gears}
         self._wrenches: list[tuple[int, int]] = []
         self._at_points = [self._point_load(load) for load in model.scene.load if load.point is not None]
         self._check()
@@ -115,6 +132,24 @@ class SpatialSystem:
             return None
         return sum((function(t)[0] * direction for direction, function in self._along), np.zeros(self.model.tree.n_v))
 
+    def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> Derivatives:
+        """How accelerations and rows answer to small changes of q, v and forces, at time t under the scene's loads.
+
+        `supplied` (n_v,) acts beside loads and friction. Rows that depend on others at q, v are left out.
+        """
+        self.turn_markers(t)
+        self.core.keep_independent_rows(q, v)
+        rest = -resistance(self.model.tree, v[None])[0]
+        loads = self.force(t)
+        force = supplied + rest + (0.0 if loads is None else loads)
+        wrench = np.zeros((len(self._wrenches), len(OF_POINT)))
+        for number, components in self._at_points:
+            for name, magnitude in components.items():
+                wrench[number, OF_POINT.index(name)] += magnitude(t)[0]
+        found = self.core.derivatives(q, v, self.target(t), force, wrench.ravel())
+        slope = resistance_slope(self.model.tree, v[None])[0]
+        return Derivatives(found.a_q, found.a_v - found.a_f * slope, found.a_f, found.value_q, found.rate_q)
+
     def _follow(self) -> _core.TreeScene:
         """Targets of the rows, and given forces along joints."""
         scene = _core.TreeScene()
@@ -129,6 +164,9 @@ class SpatialSystem:
             for number, friction in enumerate(node.joint.frictions):  # the same along all of a joint's coordinates
                 at = node.q.start + number, node.v.start + number
                 scene.add_joint_force(*at, 0.0, 0.0, friction.viscous, friction.coulomb, friction.speed)
+        for gear in self.model.tree.gears:
+            motor, joint = ((node.q.start, node.v.start) for node in (gear.motor, gear.joint))
+            scene.add_gear(motor, joint, gear.sign, gear.stiffness, gear.damping)
         for number, law in self._turning:
             scene.turn_marker(number, _turning_law(law))
         return scene
@@ -137,7 +175,7 @@ class SpatialSystem:
         """Direction (n_v,) and size of the moment of a joint."""
         assert load.joint is not None
         direction = np.zeros(self.model.tree.n_v)
-        direction[self.model.tree.nodes[self.model.tree.carried[load.joint]].v] = self.model.sign(load.joint)
+        direction[self.model.driven(load.joint).v] = self.model.sign(load.joint)
         return Drive(direction, load.components["moment"])
 
     def _point_load(self, load: SpatialLoad) -> tuple[int, dict[str, TimeFunction]]:

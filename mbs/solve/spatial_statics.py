@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
 from ..model.spatial_inverse import given_forces
 from ..model.spatial_model import SpatialModel, row_values
+from ..model.spatial_transmission import gear_forces
 from .spatial_posture import robot_size, undeformed_posture, with_rates
 from .state import State
 
@@ -27,6 +28,7 @@ def forces_at_rest(model: SpatialModel, q: Array, t: float = 0.0) -> Array:
         found += frame.L[:, :3].transpose(0, 2, 1) @ (node.body.mass * gravity)
         found += np.einsum("tij,ti->tj", frame.L[:, 3:], np.cross(s, gravity))
         found[:, node.p_v] += np.einsum("tji,j->ti", frame.F, gravity) @ node.body.S_bar - node.body.stiffness * p
+    found += gear_forces(tree, q, np.zeros_like(found))
     return found + given_forces(model, q, frames, np.full(len(q), t))
 
 
@@ -88,8 +90,7 @@ def _sizes(model: SpatialModel) -> Array:
 
 
 def _force_scale(size: float, row_scales: Array) -> Array:
-    scale: Array = max(size, 1e-300) / row_scales
-    return scale
+    return as_floats(max(size, 1e-300) / row_scales)
 
 
 def _residual(model: SpatialModel, q: Array, t: float, multipliers: Array, row_scales: Array) -> tuple[Array, float]:

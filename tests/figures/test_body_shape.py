@@ -128,7 +128,7 @@ def test_round_bodies_have_the_outline_that_the_viewer_sees():
     """An open tube of 24 sides has no folds; from z it ends where y is least and largest."""
     angle = 2 * np.pi * (np.arange(24) + 0.5) / 24
     ring = np.stack([np.zeros(24), np.cos(angle), np.sin(angle)], axis=1)
-    points, k = np.concatenate([ring, ring + [1.0, 0.0, 0.0]]), np.arange(24)
+    points, k = np.concatenate([ring, ring + np.eye(3)[0]]), np.arange(24)
     after = (k + 1) % 24
     tube = np.stack([k, after, 24 + after, 24 + k], axis=1)
     assert len(_outline(points, tube)) == 2 * 24  # its ends

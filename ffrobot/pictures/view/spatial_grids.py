@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Indices
+from ...common.arrays import Indices, as_rows
 from ...results.file import Results
 from ..path_targets import targets
 from ..spatial.joints import Marker, ground_places, joint_markers, tool_marker
@@ -54,14 +54,14 @@ def spatial_marks(results: Results, analysis: str, frames: Indices, scale: float
 
     def directed(marker: Marker, k: int) -> list[list[float]]:
         """Its place, and its directions."""
-        return [marker.exaggerated(scale)[k].tolist(), *marker.directions[k].tolist()]
+        return as_rows(np.stack([marker.exaggerated(scale)[k], *marker.directions[k]]))
 
     return {
         "in_space": True,
-        "joints": [[joint.exaggerated(scale)[k].tolist() for joint in joints] for k in outputs],
+        "joints": [[directed(joint, k)[0] for joint in joints] for k in outputs],
         "axes": [
             [[at, axis] for at, *axes in (directed(joint, k) for joint in joints) for axis in axes] for k in outputs
         ],
         "tools": [[directed(tool, k) for tool in tools] for k in outputs],
-        "ground": ground_places([results.scene]).tolist(),
+        "ground": as_rows(ground_places([results.scene])),
     }

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Indices
+from ...common.arrays import Indices, as_rows
 from ...common.errors import InputError, SolveError
 from ...common.files import check_folder, write_atomically
 from ...common.validation import did_you_mean
@@ -165,7 +165,7 @@ def motion_picture(
     nothing: list[list[list[list[float]]]] = [[] for _ in steps]
     return replace(
         picture,
-        joints=joints.tolist(),
+        joints=[as_rows(places) for places in joints],
         axes=nothing,
         tools=nothing,
         ground=[(x, y, 0.0) for x, y in ground_points([results.scene])],
