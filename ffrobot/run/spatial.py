@@ -12,9 +12,10 @@ from ..common.errors import of_file
 from ..mbs.analysis.spatial_kinds import IN_SPACE
 from ..mbs.analysis.spatial_run import SpatialContext, SpatialRun
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
+from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.quantities.spatial_energy import Energies, Momentum, energies, momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
-from ..mbs.quantities.spatial_reactions import Wrench, reactions
+from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
@@ -132,7 +133,7 @@ def _context(
 def _evaluated(run: SpatialRun) -> SpatialResult:
     """What is read off a run."""
     motion = SpatialMotion(
-        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest
+        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied
     )  # fmt: skip
     return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion))
 

@@ -25,7 +25,7 @@ from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from .actuation_times import with_times_of_actuation
 from .kinds import KINDS, Analysis
 
-APPLICABLE = ("joints",)  # values of `apply`
+APPLICABLE = ("joints", "trajectory")  # values of `apply`
 
 # Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
 UNAVAILABLE = {

@@ -16,6 +16,7 @@ from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.spatial_model import row_values
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
+from ..model.spatial_wrench import row_wrenches
 from .spatial_run import SpatialRun
 
 FEWEST_NODES = 401
@@ -54,6 +55,23 @@ def motor_forces_of(run: SpatialRun) -> MotorForces:
     C_v = row_values(run.model, run.q, run.time, frames)[1]
     wanted = path_forces(run.model, C_v, run.multipliers) if run.required is None else run.required
     return motor_forces(run.model, run.q, frames, C_v, wanted)
+
+
+def path_wrenches(run: SpatialRun) -> dict[str, Array]:
+    """What a path does on its point: force and moment (T, 6) about there, by point, of a run's motion."""
+    tree, frames = run.model.tree, run.model.tree.frames(run.q)
+    found: dict[str, Array] = {}
+    paths = {path.name: path for path in run.model.scene.trajectory if path.point is not None}
+    for k, row in enumerate(run.model.rows):
+        if not row.is_trajectory or row.owner not in paths:
+            continue
+        point = paths[row.owner].point
+        assert point is not None
+        of_a, of_b = row_wrenches(tree, row, -run.multipliers[:, k], run.q, run.time, frames)
+        arm = tree.motion(tree.section(point, np.eye(3)), run.q, frames).r
+        acting = (of_b if row.a.body < 0 else of_a).seen_from(-arm)
+        found[point] = found.get(point, 0.0) + np.hstack([acting.force, acting.moment])
+    return found
 
 
 def _in_parts(run: SpatialRun, read: Callable[[SpatialRun], Array]) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from ..model.spatial_model import SpatialModel
+from ..model.spatial_system import PointDrive
 from ..scene.analysis import Analysis
 from .drive import Progress
 from .outcome import ADVICE
@@ -25,6 +26,7 @@ class SpatialRun:
         multipliers: (T, rows).
         required: (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are all.
         is_at_rest: whether targets stand still, as in an equilibrium.
+        applied: forces on points beside the loads of the scene.
         status: how it ended.
         integrator: its name.
         steps, evaluations: how many.
@@ -42,6 +44,7 @@ class SpatialRun:
     multipliers: Array
     required: Array | None = None
     is_at_rest: bool = False
+    applied: tuple[PointDrive, ...] = ()
     status: str = "completed"
     integrator: str = "none"
     steps: int = 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +35,13 @@ class Drive(NamedTuple):
     size: TimeFunction
 
 
+class PointDrive(NamedTuple):
+    """Forces and moments of time on "BODY.POINT", by component ("x" … "mz"), global axes."""
+
+    point: str
+    components: Mapping[str, TimeFunction]
+
+
 class SpatialSystem:
     """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
 
@@ -44,7 +51,9 @@ class SpatialSystem:
         scene: what its rows follow, and what acts on it.
     """
 
-    def __init__(self, model: SpatialModel, drives: Sequence[Drive] = ()) -> None:
+    def __init__(
+        self, model: SpatialModel, drives: Sequence[Drive] = (), point_drives: Sequence[PointDrive] = ()
+    ) -> None:
         """`drives` act beside the loads of the scene."""
         self.model, tree = model, model.tree
         self._markers: list[list[Section]] = [[] for _ in tree.nodes]
@@ -56,7 +65,8 @@ class SpatialSystem:
         driven |= {trajectory.joint for trajectory in model.scene.trajectory}
         driven |= {node.joint.name for node in tree.nodes if node.joint.frictions}
         self._wrenches: list[tuple[int, int]] = []
-        self._at_points = [self._point_load(load) for load in model.scene.load if load.point is not None]
+        loads = [PointDrive(load.point, load.components) for load in model.scene.load if load.point is not None]
+        self._at_points = [self._point_drive(drive) for drive in (*loads, *point_drives)]
         self._check()
         bodies = []
         for number, (node, (inner, outer)) in enumerate(zip(tree.nodes, sides, strict=True)):
@@ -140,11 +150,10 @@ class SpatialSystem:
         direction[self.model.tree.nodes[self.model.tree.carried[load.joint]].v] = self.model.sign(load.joint)
         return Drive(direction, load.components["moment"])
 
-    def _point_load(self, load: SpatialLoad) -> tuple[int, dict[str, TimeFunction]]:
+    def _point_drive(self, drive: PointDrive) -> tuple[int, Mapping[str, TimeFunction]]:
         """Number of the wrench, and its components over time."""
-        assert load.point is not None
-        self._wrenches.append(self._place(self.model.tree.section(load.point, np.eye(3))))
-        return len(self._wrenches) - 1, load.components
+        self._wrenches.append(self._place(self.model.tree.section(drive.point, np.eye(3))))
+        return len(self._wrenches) - 1, drive.components
 
     def _turning_marker(self, law: OrientationLaw) -> int:
         """Number of the ground's marker that turns as `law` says; made where it is new."""

@@ -15,6 +15,7 @@ from ...common.rotations import quaternions
 from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
+from ..model.spatial_system import PointDrive
 from ..model.spatial_tree import Motion, Node
 from ..scene.spatial.trajectories import SpatialTrajectory
 
@@ -48,7 +49,7 @@ class SpatialMotion:
     """States q (T, n_q), v and a (T, n_v) of a model's tree, and multipliers (T, rows) of its rows, at `time` (T,).
 
     `required` (T, n_v): generalized forces that prescribed motion takes, of links that are held to a shape as well.
-    `is_at_rest`: targets stand still, as in an equilibrium.
+    `is_at_rest`: targets stand still, as in an equilibrium. `applied`: forces on points beside the scene's loads.
     """
 
     model: SpatialModel
@@ -59,6 +60,7 @@ class SpatialMotion:
     multipliers: Array
     required: Array | None = None
     is_at_rest: bool = False
+    applied: tuple[PointDrive, ...] = ()
 
     @cached_property
     def frames(self) -> list[Motion]:
