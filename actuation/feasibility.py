@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.analysis.outcome import Outcome
 from .motors import MotorFeasibility, first_time
 from .patches.patches import PatchArray
 from .patches.voltages import Voltages, voltage_gain
@@ -119,25 +119,34 @@ class Feasibility:
         }
 
 
+class ModalMotion(NamedTuple):
+    """Modal coordinates p and forces F_p (T, n) in the order of the modes of patches, at `time` (T,) s."""
+
+    time: Array
+    p: Array
+    F_p: Array
+
+
 def judge_patches(
-    patches: PatchArray, voltages: Voltages, outcome: Outcome, with_count: Callable[[int], PatchArray | None]
+    patches: PatchArray,
+    voltages: Voltages,
+    motion: ModalMotion,
+    with_count: Callable[[int], PatchArray | None],
 ) -> PatchFeasibility:
-    """Required against available of the patches of one body.
+    """Required against available of the patches of one layout.
 
     `with_count(k)` makes an array of k such patches, evenly spread; None where they have no room.
     """
-    assert outcome.F_p is not None
-    F_p = outcome.F_p[:, outcome.modal_columns(patches.body)]
-    p = outcome.q[:, outcome.coordinates(patches.body)][:, 3:]
+    time, p, F_p = motion
     required = np.abs(voltages.required).max(axis=0)
     curvature = np.abs(p @ patches.turn).max(axis=0) / patches.layout.length
     return PatchFeasibility(
         required_moment=np.abs(patches.moment_per_volt) * required,
         available_moment=np.abs(patches.moment_per_volt) * patches.limit,
-        saturation_time=first_time(outcome.time, np.abs(voltages.required) > patches.limit),
+        saturation_time=first_time(time, np.abs(voltages.required) > patches.limit),
         field=required / patches.layout.thickness,
         limited_field=np.abs(voltages.within_limit).max(axis=0) / patches.layout.thickness,
-        strain=patches.surface_distance * curvature,
+        strain=patches.lever * patches.surface_distance * curvature,
         mode_required=np.abs(F_p[:, : patches.served]).max(axis=0),
         mode_available=np.abs(patches.Phi_V[: patches.served]) @ patches.limit,
         remedies=_remedies(patches, required, F_p, with_count),

@@ -12,6 +12,7 @@ EXTRAS: Mapping[str, str] = {
     "plotly": "report",
     "jinja2": "report",
     "pyvista": "view",
+    "imageio_ffmpeg": "movie",
     "pandas": "pandas",
     "control": "control",
 }

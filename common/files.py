@@ -87,6 +87,13 @@ def check_output(path: Path, file_format: str) -> None:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
 
 
+def check_new_file(path: Path, *, replace: bool) -> None:
+    """Refuse an output of text that would cost another file, unless that is to be replaced. Raises `InputError`."""
+    check_not_an_input(path)
+    if path.exists() and not (replace and path.is_file()):
+        raise InputError(f"{path}: output: expected a new name, or --force to replace it, found a file there")
+
+
 def check_folder(folder: Path) -> None:
     """Refuse an output folder whose place a file has; one that is absent is made later. Raises `InputError`."""
     check_not_an_input(folder)

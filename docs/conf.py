@@ -11,6 +11,7 @@ import ffrobot
 sys.path.insert(0, str(Path(__file__).parent))
 
 from benchmark_tables import write_benchmark_tables
+from gallery import read_on_site, write_case_pages
 from key_tables import write_key_tables
 
 project = "ffrobot"
@@ -21,6 +22,8 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["gallery.css"]
 html_title = f"ffrobot {version}"
 autodoc_typehints = "description"
 autodoc_use_type_comments = False  # there are none, and Python 3.13 looks for them in the wrong file
@@ -30,8 +33,14 @@ exclude_patterns = ["_build"]
 def setup(app: Any) -> None:  # noqa: ANN401 (Sphinx)
     """Write the pages that are generated, before Sphinx looks for pages."""
     app.connect("builder-inited", lambda app: _write_pages(Path(app.srcdir)))
+    app.connect("source-read", _read)
 
 
 def _write_pages(folder: Path) -> None:
     write_key_tables(folder / "reference")
+    write_case_pages(folder / "cases")
     write_benchmark_tables(folder / "benchmarks", folder / "reference" / "measured.md")
+
+
+def _read(app: Any, name: str, source: list[str]) -> None:  # noqa: ANN401 (Sphinx)
+    source[0] = read_on_site(name, source[0])

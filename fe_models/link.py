@@ -22,6 +22,7 @@ from ..mesh.kept_parts import kept_path
 from .link_file import LinkSource, link_path, read_link
 from .link_records import BeamLink, Link, SolidLink
 from .modal_body import ModalBody
+from .modal_body.measured import with_measured
 from .modal_body_file import FORMAT, read_modal_body, write_modal_body
 from .stages import input_hash, modes_hash, restated
 
@@ -95,6 +96,20 @@ def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> L
     return _compute(link, link_path(source), path, digest, start, progress, beside)
 
 
+def computed_modal_body(source: LinkSource) -> ModalBody:
+    """The modal body of a link by its finite element model alone, whatever was measured; kept nowhere.
+
+    Raises:
+        InputError: the link file is wrong.
+        SolveError: the modes cannot be computed.
+    """
+    link, path = read_link(source), link_path(source)
+    compute = _computation(link, path, remesh=False)
+    with of_file(path), ending_at_once():
+        body: ModalBody = compute(link, path, _silent)
+    return body
+
+
 def _beside(source: LinkSource) -> list[Path]:
     """Where `make_link` puts the modal body of a link file."""
     return [source.with_suffix(".h5")] if isinstance(source, Path) else []
@@ -137,7 +152,7 @@ def _compute(
 
     def make() -> ModalBody:
         with of_file(source_path), ending_at_once():
-            body = compute(link, source_path, progress or _silent)
+            body = with_measured(compute(link, source_path, progress or _silent), link)
         return replace(body, input_hash=digest, modes_hash=modes_hash(link))
 
     if processes() > 1 and isinstance(link, BeamLink):  # too small to share out

@@ -20,7 +20,7 @@ from ..common.toml_files import load_toml
 from ..common.validation import validate
 from ..mesh.records import RectangleSection, SectionRecord, TubeSection
 from .beam.section_stress import contains
-from .link_records import BeamLink, Link, Material, OrthotropicMaterial, SolidLink
+from .link_records import FAMILIES, BeamLink, Link, Material, OrthotropicMaterial, SolidLink, read_measured
 from .modal_body.attachment_modes import DEFAULT_COUNT
 from .solid.constitutive import is_stable
 
@@ -71,6 +71,7 @@ def _beam_link(link: BeamLink, path: Path) -> BeamLink:
     _check_beam_mesh(link, path)
     _check_beam_interfaces(link, path)
     _check_modes(link, path)
+    _check_measured(link, path)
     _check_beam_material(link, path)
     _check_beam_stress(link, path)
     return link
@@ -81,6 +82,7 @@ def _solid_link(link: SolidLink, path: Path) -> SolidLink:
     _check_solid_mesh(link, path)
     _check_solid_interfaces(link, path)
     _check_modes(link, path)
+    _check_measured(link, path)
     _check_solid_materials(link, path)
     _check_surface_patches(link, path)
     return link
@@ -169,6 +171,14 @@ def _check_modes(link: Link, path: Path) -> None:
     number = modes.count or len(modes.indices or ()) or sum(DEFAULT_COUNT[family] for family in link.families)
     if isinstance(damping.ratio, tuple) and len(damping.ratio) != number:
         _reject(path, "damping.ratio", f"one number, or one for each of the {number} modes", len(damping.ratio))
+
+
+def _check_measured(link: Link, path: Path) -> None:
+    if link.measured is None:
+        return
+    rows = read_measured(link.measured.table, FAMILIES)
+    if link.damping.of == "robot" and any(row.damping_ratio is not None for row in rows):
+        _reject(path, "measured", 'no damping_ratio beside damping.of = "robot"', f"some in {link.measured.table}")
 
 
 def _check_beam_material(link: BeamLink, path: Path) -> None:

@@ -16,7 +16,7 @@ from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.hdf5 import open_checked, read
-from .modal_body import Interface, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
+from .modal_body import Interface, MeasuredValues, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -129,6 +129,8 @@ def _optional(file: h5py.File) -> dict[str, Any]:
         found["residual"] = np.asarray(file["modes/residual"][()], dtype=np.int64)
     if "damping_of" in file["modes"].attrs:
         found["damping_of"] = _text(file["modes"].attrs["damping_of"])
+    if "measured" in file["modes"]:
+        found["measured"] = MeasuredValues(**_arrays(file["modes/measured"], MeasuredValues))
     if "surface_patches" in file:
         found["surface_patches"] = OutlinedPatches(**_arrays(file["surface_patches"], OutlinedPatches))
     return found
@@ -177,6 +179,10 @@ def _image(body: ModalBody) -> bytes:
         _write_arrays(file, {"modes/residual": body.residual})
         if body.damping_of != "link":
             file["modes"].attrs["damping_of"] = body.damping_of
+        if body.measured is not None:
+            group = file.create_group("modes/measured")
+            group.attrs["what"] = body.measured.in_words()
+            _write_arrays(group, vars(body.measured))
         _write_arrays(file.create_group("geometric_stiffness"), dict(sorted(body.geometric_stiffness.items())))
         for name, interface in sorted(body.interfaces.items()):
             _write_arrays(file.create_group(f"interfaces/{name}"), vars(interface))

@@ -59,6 +59,11 @@ def _beam(link: Link, path: Path) -> BeamLink:
             f'{path}: modes.family: expected "in-plane-bending" among those of a body in pieces, found'
             f" {', '.join(link.families)}"
         )
+    if link.measured is not None:
+        raise InputError(
+            f"{path}: measured: expected none of a body in pieces, since they are of the modes of the whole link, found"
+            f" {link.measured.table}"
+        )
     return link
 
 

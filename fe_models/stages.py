@@ -4,7 +4,7 @@
 |---|---|
 | mesh (solids that gmsh meshes: `mesh.kept_parts`) | geometry, mesh, places of interfaces, outlined patches |
 | modes, invariants, prestress | the mesh; material, theory, reference condition, attached masses, `[modes]` |
-| damping ratios, modal stresses, name | the modes; `[damping]`, `[stress]`, `name` |
+| damping ratios, modal stresses, name, what was measured | the modes; `[damping]`, `[stress]`, `name`, `[measured]` |
 
 NumPy only: no finite element library is needed where the modes stay.
 """
@@ -14,31 +14,33 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from ..mesh.kept_parts import geometry_content
-from .link_records import BeamLink, Link, SolidLink
+from .link_records import FAMILIES, BeamLink, Link, SolidLink, read_measured
 from .modal_body import ModalBody, StressPoint
 from .modal_body.damping import damping_ratio
 from .modal_body.lumped_masses import lumps
+from .modal_body.measured import as_computed, with_measured
 from .modal_body_file import FORMAT_VERSION
 
 # To be raised whenever the same link file gives other numbers than before, or further ones.
-ALGORITHM_VERSION = {"beam": 4, "solid": 3}
+ALGORITHM_VERSION = {"beam": 5, "solid": 4}
 
 # Likewise, of what files of links with stresses hold of these: 1 without static ones of unit loads.
 STRESS_VERSION = 2
 
-_AFTER_THE_MODES = ("name", "damping", "stress")
+_AFTER_THE_MODES = ("name", "damping", "stress", "measured")
 
 
 def input_hash(link: Link) -> str:
     """SHA-256 of what a modal body depends on: the link as checked, defaults filled in, and the program's algorithm.
 
-    A part's file counts by its content. Comments, the order of keys, 1 for 1.0, dates of files change nothing.
+    A part's file and a table of measured modes count by their content. Comments, the order of keys, 1 for 1.0, dates
+    of files change nothing.
     """
     content = _content(link)
     if link.stress.points or link.stress.surface:
@@ -55,6 +57,9 @@ def _content(link: Link) -> dict[str, Any]:
     record = link.model_dump(mode="json")
     if isinstance(link, SolidLink):
         record["geometry"] = geometry_content(link.geometry)
+    del record["measured"]  # links without it keep the hash that they had before it was a key
+    if link.measured is not None:
+        record["measured"] = [asdict(row) for row in read_measured(link.measured.table, FAMILIES)]
     return record
 
 
@@ -66,11 +71,12 @@ def _digest(record: Mapping[str, Any]) -> str:
 
 def restated(body: ModalBody, link: Link) -> ModalBody | None:
     """The modal body of `link` from one with the same modes; None where that has not all that `link` asks for."""
+    body = as_computed(body)
     stress = _stresses(body, link)
     if stress is None or (link.stress.surface and body.surface_static is None):
         return None
     points, loads = stress
-    return replace(
+    same = replace(
         body,
         name=link.name,
         damping_ratio=damping_ratio(link, np.sqrt(np.diag(body.stiffness))),
@@ -81,6 +87,7 @@ def restated(body: ModalBody, link: Link) -> ModalBody | None:
         surface_static=body.surface_static if link.stress.surface else None,
         input_hash=input_hash(link),
     )
+    return with_measured(same, link)
 
 
 def _stresses(body: ModalBody, link: Link) -> tuple[dict[str, StressPoint], tuple[str, ...]] | None:

@@ -19,7 +19,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .api import load_scene, make_link, plot_results, read_modal_body, solve, view_file, write_report
+    from .api import (
+        fit_measured,
+        load_scene,
+        make_link,
+        plot_results,
+        read_modal_body,
+        solve,
+        view_file,
+        write_movie,
+        write_report,
+    )
     from .common.errors import FfrobotError, FfrobotWarning, InputError, SolveError
     from .fe_models.modal_body import ModalBody
     from .results.file import Results
@@ -31,12 +41,14 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
+    "fit_measured": ".api",
     "load_scene": ".api",
     "make_link": ".api",
     "plot_results": ".api",
     "read_modal_body": ".api",
     "solve": ".api",
     "view_file": ".api",
+    "write_movie": ".api",
     "write_report": ".api",
     "FfrobotError": ".common.errors",
     "FfrobotWarning": ".common.errors",
@@ -60,6 +72,7 @@ __all__ = [
     "SolveError",
     "SpatialScene",
     "Watcher",
+    "fit_measured",
     "load_scene",
     "make_link",
     "make_scene",
@@ -67,6 +80,7 @@ __all__ = [
     "read_modal_body",
     "solve",
     "view_file",
+    "write_movie",
     "write_report",
 ]
 

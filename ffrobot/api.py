@@ -7,11 +7,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
+    from .fit import Fit
     from .results.file import Results
     from .run.solution import Solution
     from .run.spatial import SpatialSolution
@@ -135,6 +136,22 @@ def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, 
     return make_link(source, None if output is None else Path(output), force)
 
 
+def fit_measured(
+    file: AnyPath,
+    measured: AnyPath,
+    vary: Sequence[str],
+    output: AnyPath | None = None,
+    *,
+    motors: Literal["free", "held"] | None = None,
+    force: bool = False,
+) -> Fit:
+    """Fit keys of a link or a scene file to measured natural frequencies: `ffrobot fit`. See `fit.fitting`."""
+    from .fit import fit_measured
+
+    where = None if output is None else Path(output)
+    return fit_measured(Path(file), Path(measured), vary, where, motors=motors, force=force)
+
+
 def read_modal_body(path: AnyPath) -> ModalBody:
     """Read and check a modal body file. Raises `InputError` naming what is wrong with it."""
     from .fe_models.modal_body_file import read_modal_body
@@ -188,6 +205,32 @@ def view_file(
 
     with _files(file) as (path,):
         return view_file(path, Path(folder), Options(analysis, frames or FRAMES, time, scale, pictures)).paths
+
+
+def write_movie(
+    results: AnyPath | Results,
+    path: AnyPath,
+    *,
+    analysis: str | None = None,
+    seconds: float | None = None,
+    scale: float | None = None,
+    in_space: bool = False,
+) -> None:
+    """Write a movie of the motion, .gif or .mp4: `ffrobot plot --movie`, `in_space` `ffrobot view --movie`.
+
+    Of one `analysis`, the first that goes through time if None; it plays for 8 s or so many `seconds`, with deflections
+    `scale` times as large, by default as large as can be seen.
+    """
+    from .common.extras import extras
+
+    with extras(), _files(results) as (file,):
+        from .pictures.figures.movie import write_motion
+        from .pictures.movie_file import SECONDS, MovieOptions
+        from .pictures.view import view_movie
+
+        (view_movie if in_space else write_motion)(
+            file, Path(path), MovieOptions(analysis, SECONDS if seconds is None else seconds, scale)
+        )
 
 
 @contextmanager

@@ -6,9 +6,9 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -16,6 +16,7 @@ from .bench.command import bench
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first, on_first
+from .exchange.command import export, import_
 from .present.failures import describe, ready_streams, without_output
 from .present.logs import FILE, LOGGER, logging_options, python_option
 
@@ -24,6 +25,19 @@ MOST = 100_000  # runs of a sweep, frames of a view
 if TYPE_CHECKING:
     from .run.solution import Solution
     from .run.spatial import SpatialSolution
+
+
+def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Which movie, of what, and how."""
+    seconds = click.FloatRange(0.1, 600.0)
+    for option in (
+        click.option("--movie", metavar="FILE.gif|.mp4", type=FILE, help="Write a movie of the motion, no other file."),
+        click.option("--seconds", metavar="S", type=seconds, default=8.0, help="That the movie plays [8]."),
+        click.option("--analysis", metavar="NAME", help="Movie, or grid, of this analysis only."),
+        click.option("--scale", metavar="S", type=float, help="Of deflections as drawn [as large as can be seen]."),
+    ):
+        command = option(command)
+    return command
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -149,6 +163,7 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
     from .present.progress import Display
     from .present.spatial import print_spatial_summary
     from .present.summary import summary_console
+    from .results.file import Results
     from .results.spatial import write_spatial_results
     from .run.spatial import solve_spatial
 
@@ -164,7 +179,9 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
 
     with Display() as display:
         solution = solve_spatial(scene_file, display, keep)
-    print_spatial_summary(solution, path, {**solution.seconds, "writing": writing}, summary_console())
+    with Results(path) as results:
+        verdict = results.verdict
+    print_spatial_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
     try:
         for result in solution.analyses.values():
             result.run.check_completed()
@@ -173,7 +190,7 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
     if display.signal:
         raise StoppedError(f"{scene_file}: stopped on request; what was computed is in {path}", display.signal)
     for name, result in solution.analyses.items() if strict else ():
-        for text in result.run.warnings:
+        for text in result.warnings:
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
@@ -197,7 +214,6 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
     from .present.feasibility import print_feasibility
     from .present.summary import summary_console
 
-    _planar(results_file)
     with reading(results_file):
         print_feasibility(results_file, analysis, summary_console())
 
@@ -207,43 +223,70 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
 @click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several [png,pdf].")
 @click.option("--only", metavar="NAME", multiple=True, help='Figures of this name, or like "moment_*"; repeatable.')
-def plot(file: Path, output: Path | None, formats: str, only: tuple[str, ...]) -> None:
+@movie_options
+def plot(
+    file: Path,
+    output: Path | None,
+    formats: str,
+    only: tuple[str, ...],
+    movie: Path | None,
+    **options: Any,  # noqa: ANN401 (the fields of MovieOptions)
+) -> None:
     """Draw the figures of a results file, or mesh and modes of a modal body file.
 
-    Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn.
+    Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn. With
+    --movie, the motion in the plane instead.
     """
     from .common.hdf5 import reading
+    from .pictures.figures.movie import write_motion
     from .pictures.figures.plot import plot_file
+    from .pictures.movie_file import MovieOptions
 
-    _planar(file)
     with reading(file):
+        if movie is not None:
+            _tell([movie], write_motion(file, movie, MovieOptions(**options)))
+            return
         paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","), only)
-    for path in paths:
-        click.echo(path)
+    _tell(paths)
 
 
 @cli.command()
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the files; FILE.view if absent.")
-@click.option("--analysis", metavar="NAME", help="Of this analysis only.")
 @click.option("--frames", metavar="N", type=click.IntRange(1, MOST), default=201, help="Time steps at most [201].")
 @click.option("--time", metavar="SECONDS", type=float, help="Of the picture [where deflections are largest].")
-@click.option("--scale", metavar="S", type=float, help="Of deflections in the picture [as large as can be seen].")
 @click.option("--pictures/--no-pictures", default=None, help="PNG pictures too [where PyVista can draw].")
-def view(file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN401 (the fields of Options)
+@movie_options
+def view(
+    file: Path,
+    output: Path | None,
+    movie: Path | None,
+    seconds: float,
+    **options: Any,  # noqa: ANN401 (the fields of Options)
+) -> None:
     """Write links and motions in space: VTKHDF and XDMF files for ParaView, pictures by PyVista.
 
-    Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies.
+    Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies. With
+    --movie, a movie by PyVista instead.
     """
     from .common.hdf5 import reading
-    from .pictures.view import Options, view_file
+    from .pictures.movie_file import MovieOptions
+    from .pictures.view import Options, view_file, view_movie
 
-    _planar(file)
     with reading(file):
+        if movie is not None:
+            wanted = MovieOptions(options["analysis"], seconds, options["scale"])
+            _tell([movie], view_movie(file, movie, wanted))
+            return
         viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
-    for path in viewed.paths:
+    _tell(viewed.paths, viewed.notes)
+
+
+def _tell(paths: Iterable[Path], notes: Iterable[str] = ()) -> None:
+    """What was written, and what was not as it should be."""
+    for path in paths:
         click.echo(path)
-    for note in viewed.notes:
+    for note in notes:
         click.echo(f"ffrobot: {note}", err=True)
 
 
@@ -259,7 +302,6 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     from .pictures.report import write_report
 
     path = output or results_files[0].with_suffix(".html")
-    _planar(*results_files)
     with reading(*results_files):
         write_report(results_files, path)
     click.echo(path)
@@ -341,6 +383,43 @@ def sweep(
 
 
 @cli.command()
+@click.argument("file", metavar="LINK.toml|SCENE.toml", type=FILE)
+@click.option("--measured", metavar="MODES.csv", type=FILE, required=True, help="Table: mode, frequency (Hz), …")
+@click.option("--vary", metavar="KEY,KEY …", multiple=True, required=True, help="Keys to fit; repeatable.")
+@click.option("--motors", type=click.Choice(["free", "held"]), help="Of a robot, as it was measured [free].")
+@click.option("-o", "--output", metavar="FILE.toml", type=FILE, help="Where to write [FILE.fitted.toml].")
+@click.option("--force", is_flag=True, help="Replace files of an earlier fit.")
+@python_option
+@logging_options
+def fit(
+    file: Path,
+    measured: Path,
+    vary: tuple[str, ...],
+    motors: Literal["free", "held"] | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Fit keys of a link or a scene to measured natural frequencies; new files have what was found.
+
+    \b
+    ffrobot fit arm.toml --measured modes.csv --vary material.youngs_modulus
+    ffrobot fit scene.toml --measured robot.csv --vary joint.elbow.stiffness,links.arm.material.youngs_modulus
+
+    A link vibrates under its reference condition, a robot at the start of its scene. KEY=KEY: changed by one factor.
+    Says how sure the values are; keys that the frequencies cannot tell apart are refused.
+    """  # noqa: D301 (click wants the backspace itself)
+    from .fit.fitting import fit_measured
+    from .fit.table import print_fit
+    from .present.summary import summary_console
+    from .run.inputs import files_of
+
+    _protect([*files_of(file), measured])
+    keys = [key for text in vary for key in text.split(",")]
+    found = fit_measured(file, measured, keys, output, motors=motors, force=force)
+    print_fit(found, summary_console())
+
+
+@cli.command()
 @click.argument("kind", type=click.Choice(["link", "scene", "spatial", "figures"]))
 def schema(kind: str) -> None:
     """Print the JSON schema of link, scene or figures files, or of scenes in space, for editors.
@@ -357,6 +436,8 @@ def schema(kind: str) -> None:
 
 
 cli.add_command(bench)
+cli.add_command(import_)
+cli.add_command(export)
 
 
 def _protect(paths: Iterable[Path]) -> None:

@@ -38,6 +38,7 @@ class SectionQuadrature:
         weights: (q,) in m²; their sum over all processes is the area of the section.
         points: (q, 3) in m.
         y_range: smallest and largest y of the section, in m; (inf, −inf) where no cell is cut.
+        z_range: likewise.
     """
 
     cells: Integers
@@ -45,6 +46,7 @@ class SectionQuadrature:
     weights: Array
     points: Array
     y_range: tuple[float, float]
+    z_range: tuple[float, float]
 
 
 def section_quadrature(mesh: Mesh, x: float, degree: int) -> SectionQuadrature:
@@ -67,7 +69,8 @@ def section_quadrature(mesh: Mesh, x: float, degree: int) -> SectionQuadrature:
     above = _above(f, at_end, tolerance)
     cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
     if not cut.size:
-        return SectionQuadrature(cut, np.empty((0, 3)), np.empty(0), np.empty((0, 3)), (np.inf, -np.inf))
+        none = (np.inf, -np.inf)
+        return SectionQuadrature(cut, np.empty((0, 3)), np.empty(0), np.empty((0, 3)), none, none)
     cells = _Cells(mesh, cut, coordinates[nodes[cut]], f[cut])
     return _integrate(cells, _march(cells, at_end, tolerance), degree)
 
@@ -198,8 +201,8 @@ def _integrate(cells: _Cells, triangles: _Triangles, degree: int) -> SectionQuad
     first, second = (np.einsum("qid,qd->qi", J, tangent.reshape(-1, 3)) for tangent in tangents)
     weights = np.tile(rule, len(triangles.cell)) * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     kept = weights > 1e-14 * weights.max(initial=0.0)
-    y_range = _y_range(cells, triangles.cell, nodes)
-    return SectionQuadrature(cells.index[cell[kept]], flat[kept], weights[kept], points[kept], y_range)
+    ranges = [_range(cells, triangles.cell, nodes, axis) for axis in (1, 2)]
+    return SectionQuadrature(cells.index[cell[kept]], flat[kept], weights[kept], points[kept], *ranges)
 
 
 def _with_mid_sides(cells: _Cells, triangles: _Triangles) -> Array:
@@ -226,9 +229,9 @@ def _triangle_rule(nodes_degree: int, degree: int) -> tuple[Array, Array, Array]
     return table[0], table[1:], weights
 
 
-def _y_range(cells: _Cells, cell: Integers, nodes: Array) -> tuple[float, float]:
+def _range(cells: _Cells, cell: Integers, nodes: Array, axis: int) -> tuple[float, float]:
     if not cell.size:
         return np.inf, -np.inf
     table = cells.basis(nodes.reshape(-1, 3), 0)[0]
-    y = np.einsum("qv,qv->q", table, cells.nodes[np.repeat(cell, nodes.shape[1]), :, 1])
-    return float(y.min()), float(y.max())
+    values = np.einsum("qv,qv->q", table, cells.nodes[np.repeat(cell, nodes.shape[1]), :, axis])
+    return float(values.min()), float(values.max())

@@ -111,6 +111,16 @@ def slider_crank(solved):
     return solved("slider_crank")
 
 
+@pytest.fixture(scope="session")
+def arm_3r(solved):
+    return solved("arm_3r")
+
+
+@pytest.fixture(scope="session")
+def slider_crank_3d(solved):
+    return solved("slider_crank_3d")
+
+
 @pytest.fixture
 def case_copy(tmp_path):
     """Copy a case by its name; returns the scene file of the copy."""

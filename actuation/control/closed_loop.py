@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Self
 
@@ -10,6 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...common.arrays import Array, as_list
+from ...common.errors import SolveError
 from ...common.numbers import MOST_OUTPUTS
 from ...mbs._core import TimeFunction
 from ...mbs.analysis.drive import Progress, SampledControl, drive, initial_state
@@ -23,17 +25,21 @@ from ...mbs.model.raised_mass import coordinate_factors, factors_of, integrated,
 from ...mbs.model.system import MechanismSystem
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
 from ...mbs.scene.loads import Load
+from ...mbs.solve.linearisation import Linearisation
 from ...mbs.solve.state import State
 from ..context import ActuatedContext, WholeLinks, place_of
 from ..patches.patches import PatchArray, with_factors
 from ..patches.voltages import allocation
 from .choice import make_controller, needed_sensors
 from .controllers import Controller, Setup
+from .linear_model import LinearModel, linear_model
 from .loop import Loop
+from .margins import Margins, joint_gains, margins
 from .metrics import Metrics, measure
-from .records import ComputedTorque, Lqr, Sensor
+from .records import ComputedTorque, JointPid, Lqr, Sensor
 from .records import Controller as ControllerKeys
 from .signals import Signal, input_names, merged, sensing, signals
+from .suggestion import advice
 
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
 
@@ -137,6 +143,8 @@ class LoopRecord(Details):
         commands: (K, inputs) within limits; wanted: before.
         metrics: how well it went; `tip_error` (T,) m at the outputs of the run.
         warnings: one line each.
+        margins: by the linear model, of loops of joint PID controllers alone; else None.
+        advice: what to try, a text each, where the loop is not stable.
     """
 
     inputs: tuple[str, ...]
@@ -149,6 +157,8 @@ class LoopRecord(Details):
     tip_error: Array
     metrics: Metrics
     warnings: tuple[str, ...]
+    margins: Margins | None = None
+    advice: tuple[str, ...] = ()
 
 
 def run_closed_loop(
@@ -188,7 +198,33 @@ def run_closed_loop(
     voltages = [(driven.index[array.carriers[0]], array.Phi_V) for array in patches.values()]
     control = SampledControl(len(model.motors), voltages, loop.first, sensor, setup.times, analysis.delay, loop)
     outcome = drive(driven, analysis, start, progress, reported=assembly, times=outputs, control=control)
-    return _recorded(outcome, source, setup, loop, acting, place_of(whole, analysis.tip))
+    outcome = _recorded(outcome, source, setup, loop, acting, place_of(whole, analysis.tip))
+    return _judged(outcome, analysis, loop_models(built, moved))
+
+
+def loop_models(model: Model, reference: Outcome) -> tuple[LinearModel, ...]:
+    """The robot at rest on its reference at start, middle and end; none where it is singular."""
+    rows = sorted({0, len(reference.time) // 2, len(reference.time) - 1})
+    linearisation, rest = Linearisation(model, reference.q[0]), np.zeros_like(reference.v[0])
+    with suppress(SolveError):
+        return tuple(
+            linear_model(linearisation.at(float(reference.time[k]), reference.q[k], rest, rest), {}) for k in rows
+        )
+    return ()
+
+
+def _judged(outcome: Outcome, analysis: ClosedLoop, models: Sequence[LinearModel]) -> Outcome:
+    """The outcome with margins of its loop, and advice where it is not stable, by linear models on the reference."""
+    records = [record for record in analysis.controller if isinstance(record, JointPid)]
+    details = outcome.details
+    assert isinstance(details, LoopRecord)
+    if not models or not records or len(records) < len(analysis.controller):
+        return outcome
+    T, delay = analysis.sample_time, analysis.delay
+    found = margins(models, joint_gains(models[0], records), T, delay)
+    is_stable = details.metrics.verdict == "stable" and found.is_stable
+    texts = () if is_stable else tuple(advice(models, records, T, delay, found))
+    return replace(outcome, details=replace(details, margins=found, advice=texts))
 
 
 def _read(

@@ -16,6 +16,7 @@ from ..context import ActuatedContext, place_of
 from ..patches.patches import PatchArray
 from .linear_model import LinearModel, linear_model
 from .modes import Reach, RobotModes, controllability, observability, robot_modes
+from .suggestion import Suggestion, unhurried_gains
 from .zeros import Zeros, zeros
 
 
@@ -51,7 +52,8 @@ class LinearModels(Details):
 
     `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
     (inputs, outputs): from each motor to its own joint and to each coordinate of a point, from all motors to their
-    joints (the frequencies with held joints), and to a point where there are two.
+    joints (the frequencies with held joints), and to a point where there are two. `suggested`: gains of joint PD
+    controllers and the longest sample time (s) for them, of all models.
     """
 
     models: tuple[LinearModel, ...]
@@ -59,6 +61,15 @@ class LinearModels(Details):
     controllable: tuple[Reach, ...]
     observable: tuple[Reach, ...]
     zeros: Mapping[tuple[str, ...], tuple[Zeros, ...]]
+    suggested: tuple[Suggestion, float] | None = None
+
+    @property
+    def advice(self) -> str:
+        """Gains for the motors to start with, in words; empty where none are known."""
+        if self.suggested is None:
+            return ""
+        gains, sample_time = self.suggested
+        return f"joint PID to start with: {gains.in_words()}, sampled every {1e3 * sample_time:g} ms or faster"
 
 
 def linear_models(
@@ -85,6 +96,7 @@ def analyse(models: tuple[LinearModel, ...]) -> LinearModels:
         tuple(controllability(model, acting) for model in models),
         tuple(observability(model, seen) for model in models),
         {pair: tuple(zeros(model, *_split(pair)) for model in models) for pair in _pairs(first)},
+        unhurried_gains(models),
     )
 
 

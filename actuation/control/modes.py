@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, Indices
+from ...common.arrays import Array, ComplexArray, Indices, as_floats
 from .linear_model import LinearModel, Names
 
 ComplexArray = ComplexArray
@@ -70,6 +70,15 @@ def robot_modes(model: LinearModel) -> RobotModes:
     shape = np.linalg.solve(np.linalg.cholesky(model.mass).T, Z).T
     motion = shape @ model.transformation.T
     return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex))
+
+
+def held_frequencies(model: LinearModel) -> Array:
+    """Undamped frequencies, Hz, the lowest first, with the shafts of all motors held: of N_Bᵀ K̂ N_B, Bᵀ N_B = 0."""
+    K, _, B, _ = model.second_order
+    columns = B[:, [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]]
+    N = np.linalg.qr(columns, mode="complete")[0][:, columns.shape[1] :]
+    omega = np.sqrt(np.linalg.eigvalsh(N.T @ (K + K.T) @ N / 2).clip(min=0.0))
+    return as_floats(omega[omega > RIGID * omega.max(initial=0.0)] / (2 * np.pi))
 
 
 def _pairs(poles: ComplexArray) -> Indices:

@@ -24,7 +24,7 @@ from ...mbs.model.planar_body import PlanarBody
 from ...mbs.scene.analysis import Surroundings
 from ..context import ActuatedContext
 from ..patches.patches import PatchArray, patch_array
-from ..patches.records import PztLayout
+from ..patches.records import PatchKeys
 from .linear import linear_models
 from .linear_model import LinearModel
 from .records import Placement
@@ -178,7 +178,7 @@ def link_modes(planar: PlanarBody, count: int) -> ModalReach:
 def place(
     scene_path: Path,
     wanted: Placement,
-    layout: PztLayout,
+    layout: PatchKeys,
     body: ModalBody,
     planar: PlanarBody,
     model: LinearModel | None,
@@ -281,7 +281,7 @@ def _search(
 
 
 def _candidates(
-    scene_path: Path, wanted: Placement, layout: PztLayout, body: ModalBody, planar: PlanarBody, count: int
+    scene_path: Path, wanted: Placement, layout: PatchKeys, body: ModalBody, planar: PlanarBody, count: int
 ) -> Candidates:
     spacing = wanted.spacing or layout.length / STEPS
     steps = int((body.length - layout.length) / spacing * (1 + 1e-9))
@@ -301,13 +301,13 @@ def _candidates(
     return Candidates(centers, gap, columns)
 
 
-def _even(scene_path: Path, layout: PztLayout, body: ModalBody, planar: PlanarBody, count: int) -> PatchArray:
+def _even(scene_path: Path, layout: PatchKeys, body: ModalBody, planar: PlanarBody, count: int) -> PatchArray:
     return _patches(scene_path, layout, body, planar, count=count)
 
 
 def _patches(
     scene_path: Path,
-    layout: PztLayout,
+    layout: PatchKeys,
     body: ModalBody,
     planar: PlanarBody,
     count: int | None = None,

@@ -1,46 +1,57 @@
 """Patches as layers of their link: the composite section, with whatever modes the link has.
 
-Under the strains e = (φ', u') of the axis and a voltage V the layers at one place take the moment and the force
+Under the strains e = (φ_z', u', φ_x', −φ_y') of the axis and a voltage V the layers at one place take the loads
 
-    P = f V − C e,    C = E_p [[I, −S], [−S, A]],    f = (c, ∓E_p d31 w N)
+    P = f V − C e          (`layers`; in the plane e = (φ', u'), C = E_p [[I, −S], [−S, A]], f = (c, ∓E_p d31 w N))
 
 (Crawley and de Luis, AIAA J. 25, 1987, 1373–1385). The modes of the link have not the steps of curvature at the ends of
-patches. What they lack is static and known: of a link that is held isostatically, a moment or a force in one section
-strains that section alone, by 1/EI and 1/EA, of which the modes, with strains B p, have B K⁻¹ Bᵀ. At Gauss points of
-weights w, with C and f for the length w of each,
+patches. What they lack is static and known: of a link that is held isostatically, a load in one section strains that
+section alone, by 1/EI, 1/EA, 1/GJ, of which the modes, with strains B p, have B K⁻¹ Bᵀ. At Gauss points of weights w,
+with C and f for the length w of each,
 
-    e = B p + R P,    R = diag(1/(w EI), 1/(w EA)) − B K⁻¹ Bᵀ,    P = (1 + C R)⁻¹ (f V − C B p)
+    e = B p + R P,    R = diag(1/(w EI), 1/(w EA) …) − B K⁻¹ Bᵀ,    P = (1 + C R)⁻¹ (f V − C B p)
 
 so that the patches add the stiffness Bᵀ (1 + C R)⁻¹ C B to the link and have the modal forces Bᵀ (1 + C R)⁻¹ f V.
+Layouts of one link feel each other through its modes, and are taken together.
+
+Patches that bend (or twist) and name no face do that alone: on one face, where the section is free in all else, which
+shifts the neutral axis, but no other mode feels them. On both faces they bend alone by symmetry; on one named face they
+stretch the link, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
-from ...fe_models.modal_body import Interface, ModalBody
+from ...fe_models.modal_body import ModalBody
 from ...mbs.quantities.stress import SectionLoads
-from .layers import as_array, layer_section, moment_per_volt, pull_per_volt, side
-from .records import PztLayout
+from .layers import LayerLoads, bending_row, felt_rows, layer_loads, own_row, straight_loads
+from .records import PatchKeys
+from .sections import STRETCH, TWIST, LinkSections, link_sections, potentials
 
 SLIVER = 1e-6  # of a patch: what a station cuts off less of stays whole
 GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 
 
-class GaussPoint(NamedTuple):
-    """A place x (m) under patch number `patch`, its weight (m), the link's height (m), EA (N) and EI (N·m²) there."""
+class Placed(NamedTuple):
+    """A layout with its patches between `edges` (k, 2), m."""
 
-    patch: int
+    layout: PatchKeys
+    edges: Array
+
+
+class GaussPoint(NamedTuple):
+    """A place x (m) in interval number `interval`, its weight (m), and the station whose section holds there."""
+
+    interval: int
     x: float
     weight: float
-    height: float
-    EA: float
-    EI: float
+    station: int
 
 
 @dataclass(frozen=True)
@@ -56,31 +67,27 @@ class Composite:
     shortfall: Array
 
 
-def composite(layout: PztLayout, body: ModalBody, edges: Array) -> Composite:
-    """Of the patches between `edges` (k, 2), m; R is 0 where rigidities are not known.
-
-    On both faces patches bend only. On one named face they stretch the link too; without a named face they lie on one
-    and the axis stretches freely, which shifts the neutral axis, but no mode along the link feels them.
-    """
-    layers = _on_link(layout, body, edges)
+def composite(placed: Sequence[Placed], body: ModalBody) -> Composite:
+    """Of the patches of all layouts in their order; R is 0 where rigidities are not known."""
+    layers = _on_link(placed, body)
     stiffness, per_volt = layers.B.T @ layers.by_modes, layers.by_volts.T @ layers.B
     return Composite(0.5 * (stiffness + stiffness.T), layers.straight.T @ layers.B - per_volt)
 
 
-def section_loads(layout: PztLayout, body: ModalBody, edges: Array, p: Array, voltages: Array) -> SectionLoads:
-    """P over a motion, per length of the link: p (T, n) in the modes of the modal body, voltages (T, k)."""
-    layers = _on_link(layout, body, edges)
+def section_loads(placed: Placed, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
+    """P over a motion, per length of the link, of patches that bend in the plane: p (T, n), file's; voltages (T, k)."""
+    layers = _on_link([placed], body)
     P = voltages @ layers.by_volts.T - p @ layers.by_modes.T
     count = len(layers.points)
     density = P.reshape(len(p), count, -1) / np.array([at.weight for at in layers.points])[:, None]
     along = density[..., 1] if density.shape[2] == 2 else np.zeros((len(p), count))
-    patch = np.array([at.patch for at in layers.points])
+    patch = np.array([at.interval for at in layers.points])
     x = np.array([at.x for at in layers.points])
-    return SectionLoads(edges, patch, x, density[..., 0], along, P @ layers.B)
+    return SectionLoads(placed.edges, patch, x, density[..., 0], along, P @ layers.B)
 
 
 class _OnLink(NamedTuple):
-    """Layers on their link, rows (φ', and on one named face u') of each Gauss point.
+    """Layers on their link, of each Gauss point a row for each strain of e that is felt anywhere.
 
     B (rows, n); P of coordinates p and of voltages: `by_modes` (rows, n) taken off, `by_volts` (rows, k); `straight`
     (rows, k) of a volt on a link held straight.
@@ -93,72 +100,102 @@ class _OnLink(NamedTuple):
     straight: Array
 
 
-def _on_link(layout: PztLayout, body: ModalBody, edges: Array) -> _OnLink:
-    points = list(gauss_points(body, edges))
-    one_face = bool(side(layout))
-    loads = [_layers(layout, at) for at in points]
-    strains = np.array([np.stack(_slopes(body, at.x)) for at in points])  # (g, 2, n)
-    rows = 2 if one_face else 1
-    B: Array = strains[:, :rows].reshape(-1, body.mode_count)
-    C, f = np.zeros((len(B), len(B))), np.zeros((len(B), len(edges)))
+def _on_link(placed: Sequence[Placed], body: ModalBody) -> _OnLink:
+    sections = link_sections(body)
+    felt = np.unique(np.concatenate([felt_rows(layout) for layout, _ in placed]))
+    intervals, covering = _intervals(placed)
+    points = list(gauss_points(body, intervals))
+    B: Array = np.concatenate([_strains(body, at.x)[felt] for at in points])
+    patches = sum(len(edges) for _, edges in placed)
+    C, f = np.zeros((len(B), len(B))), np.zeros((len(B), patches))
     straight, exact = np.zeros_like(f), np.zeros(len(B))
-    for i, (at, (C_i, f_i)) in enumerate(zip(points, loads, strict=True)):
-        block = slice(rows * i, rows * (i + 1))
-        C[block, block], f[block, at.patch] = at.weight * C_i[:rows, :rows], at.weight * f_i[:rows]
-        straight[block, at.patch] = at.weight * _volt(layout, at)[:rows]
-        exact[block] = 1.0 / (at.weight * np.array([at.EI, at.EA]))[:rows]
+    for i, at in enumerate(points):
+        block = slice(len(felt) * i, len(felt) * (i + 1))
+        exact[block] = 1.0 / (at.weight * sections.rigidity[at.station, felt])
+        for layout, patch in covering[at.interval]:
+            loads = felt_loads(layout, sections, at.station)
+            C[block, block] += at.weight * loads.C[np.ix_(felt, felt)]
+            f[block, patch] = at.weight * loads.f[felt]
+            straight[block, patch] = at.weight * straight_loads(layout, *place_of(layout, sections, at.station))[felt]
     R = _residual(exact, B @ np.linalg.solve(body.stiffness, B.T))
     held = np.linalg.solve(np.eye(len(B)) + C @ R, np.concatenate([C @ B, f], axis=1))
     return _OnLink(points, B, held[:, : B.shape[1]], held[:, B.shape[1] :], straight)
 
 
-def stiffness_ratios(layout: PztLayout, body: ModalBody, edges: Array) -> tuple[Array, Array]:
+def stiffness_ratios(placed: Placed, body: ModalBody) -> tuple[Array, Array]:
     """Of each patch (k,): ψ, and its authority; nan where the link's rigidities are not known.
 
-    ψ = E_b A_b / (E_p w N t_p), E_b t_b / (E_p t_p) at equal widths. The authority is the curvature under a voltage, in
-    parts of c V/EI, that of a link which does not feel the layers' stiffness.
+    ψ = E_b A_b / (E_p w N t_p), E_b t_b / (E_p t_p) at equal widths. The authority is the curvature (or twist) under a
+    voltage, in parts of c V/EI (c V/GJ), that of a link which does not feel the layers' stiffness.
     """
-    found = np.zeros((len(edges), 3))
+    layout, edges = placed
+    found, sections = np.zeros((len(edges), 3)), link_sections(body)
+    own, felt = own_row(layout), felt_rows(layout)
     for at in gauss_points(body, edges):
-        C, f = _layers(layout, at)
-        strain = np.linalg.solve(np.diag([at.EI, at.EA]) + C, f)
-        ratio = at.EA / (layout.modulus * layout.width * layout.layers * layout.thickness)
-        found[at.patch] += at.weight * np.array([1.0, ratio, strain[0] * at.EI / _volt(layout, at)[0]])
+        rigidity = sections.rigidity[at.station]
+        C, f = felt_loads(layout, sections, at.station)
+        strain = np.zeros(4)
+        strain[felt] = np.linalg.solve(np.diag(rigidity[felt]) + C[np.ix_(felt, felt)], f[felt])
+        ratio = rigidity[STRETCH] / (layout.modulus * layout.width * layout.layers * layout.thickness)
+        straight = straight_loads(layout, *place_of(layout, sections, at.station))[own]
+        found[at.interval] += at.weight * np.array([1.0, ratio, strain[own] * rigidity[own] / straight])
     return found[:, 1] / found[:, 0], found[:, 2] / found[:, 0]
 
 
-def gauss_points(body: ModalBody, edges: Array) -> Iterator[GaussPoint]:
-    """Along all patches. No interval crosses a station: shapes have kinks there, sections steps."""
+def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
+    """Along `intervals` (m, 2). None is integrated across a station: shapes have kinks there, sections steps."""
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
     stations = body.stations.position[:, 0]
-    unknown = np.full((len(stations), 2), np.nan)
-    rigidity = unknown if body.stations.rigidity is None else body.stations.rigidity
-    for patch, (start, end) in enumerate(edges.clip(0.0, body.length)):
+    for number, (start, end) in enumerate(intervals.clip(0.0, body.length)):
         slack = SLIVER * (end - start)
         inside = stations[(stations > start + slack) & (stations < end - slack)]
         for a, b in np.lib.stride_tricks.sliding_window_view(np.concatenate([[start], inside, [end]]), 2):
-            station = np.searchsorted(stations, (a + b) / 2, side="right") - 1
-            height, (EA, EI) = float(body.stations.height[station]), rigidity[station]
+            station = int(np.searchsorted(stations, (a + b) / 2, side="right")) - 1
             for node, weight in zip(nodes, weights, strict=True):
-                x = (a + b) / 2 + node * (b - a) / 2
-                yield GaussPoint(patch, x, weight * (b - a) / 2, height, float(EA), float(EI))
+                yield GaussPoint(number, (a + b) / 2 + node * (b - a) / 2, weight * (b - a) / 2, station)
 
 
-def _layers(layout: PztLayout, at: GaussPoint) -> tuple[Array, Array]:
-    """C (2, 2) and f (2,) of the layers at one place, per length of the link, rows (φ', u')."""
-    A, S, I = layer_section(layout, at.height)  # noqa: E741
-    C, f = layout.modulus * np.array([[I, -S], [-S, A]]), _volt(layout, at)
-    if side(layout) or layout.face == "both":
-        return C, f
-    if np.isnan(at.EA):
-        return np.diag([C[0, 0], 0.0]), f
-    axial = at.EA + C[1, 1]  # free to stretch: u' from no force along the link
-    return np.diag([C[0, 0] - C[0, 1] ** 2 / axial, 0.0]), f * at.EA / axial
+def place_of(layout: PatchKeys, sections: LinkSections, station: int) -> tuple[float, float]:
+    """Extent along the patches' normal (m) and β at a station."""
+    shears = layout.lamina.C[0, 1] or layout.lamina.per_volt[1] or layout.lamina.C[1, 1]
+    lever = sections.shear_lever(station, layout.normal, layout.width) if shears else 0.0
+    return float(sections.extent(layout.normal)[station]), lever
 
 
-def _volt(layout: PztLayout, at: GaussPoint) -> Array:
-    """(2,) moment and force of a volt on a link held straight."""
-    return np.array([float(moment_per_volt(layout, as_array(at.height))[0]), pull_per_volt(layout)])
+def felt_loads(layout: PatchKeys, sections: LinkSections, station: int) -> LayerLoads:
+    """C (4, 4) and f (4,) of the layers, 0 but in the rows that feel them, the section free in those that do not.
+
+    Free means that link and layers together carry nothing there: e_d = (C_l + C)_dd⁻¹ (f_d V − C_df e_f), eliminated.
+    """
+    loads = layer_loads(layout, *place_of(layout, sections, station))
+    felt = felt_rows(layout)
+    free = np.setdiff1d([row for row in (bending_row(layout), STRETCH, TWIST) if loads.C[row].any()], felt)
+    C, f = np.zeros((4, 4)), np.zeros(4)
+    C[np.ix_(felt, felt)], f[felt] = loads.C[np.ix_(felt, felt)], loads.f[felt]
+    rigidity = sections.rigidity[station, free]
+    if free.size and not np.isnan(rigidity).any():
+        across = np.linalg.solve(np.diag(rigidity) + loads.C[np.ix_(free, free)], loads.C[np.ix_(free, felt)])
+        C[np.ix_(felt, felt)] -= loads.C[np.ix_(felt, free)] @ across
+        f[felt] -= across.T @ loads.f[free]
+    return LayerLoads(C, f)
+
+
+def _intervals(placed: Sequence[Placed]) -> tuple[Array, list[list[tuple[PatchKeys, int]]]]:
+    """Stretches (m, 2) of the link with the same patches on each, and which: layouts with numbers of their patches.
+
+    Patches are numbered through the layouts. Those of one layout lie beside each other and are the stretches.
+    """
+    edges = np.concatenate([edges for _, edges in placed])
+    owners = [layout for layout, of_layout in placed for _ in of_layout]
+    if len(placed) == 1:
+        return edges, [[(layout, k)] for k, layout in enumerate(owners)]
+    slack = SLIVER * np.diff(edges, axis=1).min()
+    cuts = np.unique(edges)
+    cuts = cuts[np.append(True, np.diff(cuts) > slack)]
+    pairs = np.stack([cuts[:-1], cuts[1:]], axis=1)
+    on = [np.flatnonzero((edges[:, 0] < b - slack) & (edges[:, 1] > a + slack)) for a, b in pairs]
+    kept = [k for k, patches in enumerate(on) if patches.size]
+    return pairs[kept], [[(owners[patch], int(patch)) for patch in on[k]] for k in kept]
 
 
 def _residual(exact: Array, of_modes: Array) -> Array:
@@ -170,14 +207,8 @@ def _residual(exact: Array, of_modes: Array) -> Array:
     return np.asarray((scale[:, None] * turn * values.clip(min=0.0)) @ (turn.T * scale))
 
 
-def _slopes(body: ModalBody, x: float) -> tuple[Array, Array]:
-    """φ' and u' (n,) of the modes at x: differences inside an element, exact for its quadratics."""
+def _strains(body: ModalBody, x: float) -> Array:
+    """B (4, n): e of the modes at x: differences inside an element, exact for its quadratics."""
     stations = body.stations.position[:, 0]
     h = min(1e-3 * body.length, 0.5 * float(np.abs(stations - x).min()))
-    return _differences(body.interpolate(x - h), body.interpolate(x + h), h)
-
-
-def _differences(behind: Interface, ahead: Interface, h: float) -> tuple[Array, Array]:
-    curvature: Array = (ahead.rotation[2] - behind.rotation[2]) / (2 * h)
-    stretch: Array = (ahead.translation[0] - behind.translation[0]) / (2 * h)
-    return curvature, stretch
+    return (potentials(body.interpolate(x + h)) - potentials(body.interpolate(x - h))) / (2 * h)

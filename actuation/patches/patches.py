@@ -14,54 +14,39 @@ from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.divided_link import DividedLink, Piece
 from ...mbs.model.planar_body import PlanarBody
-from .composite import SLIVER, composite, stiffness_ratios
-from .layers import moment_per_volt, pull_per_volt
-from .records import PztLayout
-
-STEP = 0.1  # of the height, from one station to the next; less is a taper
-SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
-MOST_CONDITION = 1e16  # what more is found of a condition number is rounding itself
-LEAST_WEIGHT = 1e-6  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
-OF_STATIC_SHAPES = 1e-3  # root of the weight of attachment modes beside modes: more patches than modes serve them last
-ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
+from .composite import SLIVER, Placed, stiffness_ratios
+from .effects import Effects, effects
+from .reach import Reach, check_all_served, weights
+from .records import PatchKeys
 
 
 @dataclass(frozen=True)
-class PatchArray:
-    """The patches of one body.
+class PatchArray(Reach):
+    """The patches of one layout.
 
     Attributes:
         layout: the keys of the scene.
         edges: (k, 2) where each patch begins and ends along the link, m.
-        height: (k,) t_b, of the link in the plane under each patch, its mean, m.
+        height: (k,) t_b, of the link along their normal under each patch, its mean, m.
         moment_per_volt: (k,) c in N·m/V.
-        turn: (n, k) φ'(x2) − φ'(x1) of the modes of the `PlanarBody`, rad per unit of modal coordinate.
-        Phi_V: (n, k) modal forces per volt, in the same coordinates: c times `turn`, and more on one named face.
-        limit: (k,) largest voltages, V; infinite where the scene gives none.
-        W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
-        frequency: (n,) of the modes, Hz.
-        served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
+        turn: (n, k) φ'(x2) − φ'(x1) of the n modes of the body, rad per unit of modal coordinate; of twist φ_x.
         stiffness_ratio: (k,) ψ of link to patch, and `authority`, the part of c V that bends the link: see
             `composite.stiffness_ratios`.
+        lever: (k,) strain of the surface by unit turn per length and distance: 1 of bending.
         of_all_modes: where the `PlanarBody` has not all modes, but the patches reach all: the same patches
             on all modes, and (n_all, n) the modal forces on these from those on the `PlanarBody`. Of a link in pieces:
             the patches on the link, and its modal forces from those on the pieces.
         pieces: names of the pieces of a link in pieces, whose modes, side by side, are the n modes; else empty.
     """
 
-    layout: PztLayout
+    layout: PatchKeys
     edges: Array
     height: Array
     moment_per_volt: Array
     turn: Array
-    Phi_V: Array
-    limit: Array
-    W_sqrt: Array
-    frequency: Array
-    served: int
     stiffness_ratio: Array
     authority: Array
-    of_all_modes: tuple[PatchArray, Array] | None = None
+    lever: Array
     pieces: tuple[str, ...] = ()
 
     @property
@@ -75,31 +60,15 @@ class PatchArray:
         return self.pieces or (self.body,)
 
     @property
-    def condition_number(self) -> float:
-        """Of Φ_V: how unequally the patches reach the modes; infinite where some mode is out of reach."""
-        return float(np.linalg.cond(self.Phi_V[: self.served]))
-
-    @property
-    def unreached_modes(self) -> Indices:
-        """Numbers (from 0) of the modes that take part in what no voltages can produce."""
-        left, sizes, _ = np.linalg.svd(self.Phi_V[: self.served])
-        rank = int(np.count_nonzero(sizes > sizes[0] / SINGULAR))
-        return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
-
-    @property
-    def in_order(self) -> Array:
-        """(rows, n) roots of weights: modes first, and attachment modes with what more patches than modes are left."""
-        n, k = self.Phi_V.shape
-        return served_first(self.served, n, k)
-
-    @property
     def stiffness_in_words(self) -> str:
         """ψ and the authority, and whether the link feels the stiffness of its patches."""
         if not np.isfinite(self.authority).all():
-            return f"{self.body}: stiffness ratio ψ not known: the modal body has no rigidities"
+            return f"{self.layout.label}: stiffness ratio ψ not known: the modal body has no rigidities"
         psi, authority = (_span(values) for values in (self.stiffness_ratio, self.authority))
         felt = "which counts" if self.layout.adds_stiffness else "left out: structural = false"
-        return f"{self.body}: stiffness ratio ψ {psi}: their own stiffness leaves {authority} of the curvature, {felt}"
+        what = "twist" if self.layout.acts_in == "twist" else "curvature"
+        left = f"their own stiffness leaves {authority} of the {what}, {felt}"
+        return f"{self.layout.label}: stiffness ratio ψ {psi}: {left}"
 
     @property
     def surface_distance(self) -> Array:
@@ -107,18 +76,12 @@ class PatchArray:
         return self.height / 2 + self.layout.layers * self.layout.thickness
 
 
-def served_first(served: int, n: int, patches: int) -> Array:
-    """(rows, n) roots of weights of the `served` first of n modes; more patches than these serve the others, too."""
-    rows = n if patches > served else served
-    return np.diag(np.where(np.arange(n) < served, 1.0, OF_STATIC_SHAPES))[:rows]
-
-
 def _span(values: Array) -> str:
     """One number, or from the smallest to the largest."""
     return " … ".join(dict.fromkeys(f"{value:.3g}" for value in (values.min(), values.max())))
 
 
-def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: PlanarBody) -> PatchArray:
+def patch_array(scene_path: Path, layout: PatchKeys, body: ModalBody, planar: PlanarBody) -> PatchArray:
     """Place the patches of `layout` on a link.
 
     A patch works on the difference of the section rotations at its ends, piecewise where t_b changes gradually; on one
@@ -129,37 +92,27 @@ def patch_array(scene_path: Path, layout: PztLayout, body: ModalBody, planar: Pl
     """
     key = f'{scene_path}: pzt "{layout.body}"'
     edges = patch_edges(layout, body.length)
-    _check_edges(key, edges, body.length)
+    check_edges(key, edges, body.length)
     if planar.reduction is not None:
         whole = patch_array(scene_path, layout, body, planar.reduction.whole)
         return _on_fewer_modes(whole, planar)
-    height, c, turn, Phi_V = _effects(key, layout, body, planar, edges)
-    limit = np.full(len(edges), np.inf if layout.limit is None else layout.limit)
-    weights, frequency = _weights(key, layout, planar), np.sqrt(planar.stiffness) / (2 * np.pi)
+    placed = Placed(layout, edges)
+    (found,) = effects(key, [placed], body)
+    points = {name: at.translation for name, at in planar.points.items()}
+    W_sqrt = weights(key, layout, planar.n_eigenmodes, planar.stiffness, points)
+    return assembled(placed, body, found, planar.modal_transform, planar.stiffness, W_sqrt, planar.n_eigenmodes)
+
+
+def assembled(
+    placed: Placed, body: ModalBody, of: Effects, T: Array, stiffness: Array, W_sqrt: Array, served: int
+) -> PatchArray:
+    """The patches in modal coordinates p, of which T (n_file, n) makes those of the modal body; `stiffness` (n,)."""
+    layout, edges = placed
     return PatchArray(
-        layout, edges, height, c, turn, Phi_V, limit, weights, frequency, planar.n_eigenmodes,
-        *stiffness_ratios(layout, body, edges),
+        layout, edges, of.extent, of.per_volt, (of.turn @ T).T, *stiffness_ratios(placed, body), of.lever,
+        Phi_V=(of.Phi_V @ T).T, limit=np.full(len(edges), np.inf if layout.limit is None else layout.limit),
+        W_sqrt=W_sqrt, frequency=np.sqrt(stiffness) / (2 * np.pi), served=served,
     )  # fmt: skip
-
-
-def _effects(
-    key: str, layout: PztLayout, body: ModalBody, planar: PlanarBody, edges: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Height (k,), moment per volt (k,), `turn` (n, k) and `Phi_V` (n, k) of the patches between `edges` (k, 2)."""
-    pieces = [_pieces(key, body, k, start, end) for k, (start, end) in enumerate(edges, 1)]
-    height = np.array([np.average(heights, weights=np.diff(x)) for x, heights in pieces])
-    moments = [moment_per_volt(layout, heights) for _, heights in pieces]
-    c = np.array([np.average(moment, weights=np.diff(x)) for (x, _), moment in zip(pieces, moments, strict=True)])
-    turns = [np.diff([body.interpolate(end).rotation[2] for end in x], axis=0) for x, _ in pieces]
-    if layout.coupling == "surface":
-        per_volt = (c / (layout.width * height / 2))[:, None] * _outlined(key, layout, body, edges)
-    else:
-        per_volt = np.array([moment @ turn for moment, turn in zip(moments, turns, strict=True)])
-        per_volt += _pull(layout, body, edges)
-    if layout.adds_stiffness:
-        per_volt -= composite(layout, body, edges).shortfall
-    T = planar.modal_transform
-    return height, c, (np.array([turn.sum(axis=0) for turn in turns]) @ T).T, (per_volt @ T).T
 
 
 def on_pieces(scene_path: Path, whole: PatchArray, link: DividedLink, pieces: Sequence[Piece]) -> PatchArray:
@@ -174,7 +127,8 @@ def on_pieces(scene_path: Path, whole: PatchArray, link: DividedLink, pieces: Se
         rows = slice(first, first + piece.planar.n_modes)
         which, edges = edges_on_piece(whole.layout, whole.edges, piece)
         if which.size:
-            _, _, turn[rows, which], Phi_V[rows, which] = _effects(key, whole.layout, piece.modal, piece.planar, edges)
+            (found,), T = effects(key, [Placed(whole.layout, edges)], piece.modal), piece.planar.modal_transform
+            turn[rows, which], Phi_V[rows, which] = (found.turn @ T).T, (found.Phi_V @ T).T
         first = rows.stop
     return replace(
         whole,
@@ -186,7 +140,7 @@ def on_pieces(scene_path: Path, whole: PatchArray, link: DividedLink, pieces: Se
     )
 
 
-def edges_on_piece(layout: PztLayout, edges: Array, piece: Piece) -> tuple[Indices, Array]:
+def edges_on_piece(layout: PatchKeys, edges: Array, piece: Piece) -> tuple[Indices, Array]:
     """Numbers (from 0) of the patches between `edges` (k, 2) that are on a piece, and where on it they are, m."""
     clipped = (edges - piece.start).clip(0.0, piece.modal.length)
     which = np.flatnonzero(np.diff(clipped, axis=1)[:, 0] > SLIVER * layout.length)
@@ -228,17 +182,7 @@ def _on_fewer_modes(whole: PatchArray, planar: PlanarBody) -> PatchArray:
     )
 
 
-def _pull(layout: PztLayout, body: ModalBody, edges: Array) -> Array:
-    """(k, n) modal forces per volt along the link, of patches on one named face."""
-    force = pull_per_volt(layout)
-    if not force:
-        return np.zeros((len(edges), body.mode_count))
-    ends = [[body.interpolate(x).translation[0] for x in pair] for pair in edges.clip(0.0, body.length)]
-    stretch: Array = np.diff(ends, axis=1)[:, 0]
-    return force * stretch
-
-
-def patch_edges(layout: PztLayout, length: float) -> Array:
+def patch_edges(layout: PatchKeys, length: float) -> Array:
     """(k, 2) where the patches of `layout` begin and end on a link of that length, m."""
     if layout.centers is not None:
         centers = np.array(layout.centers)
@@ -249,7 +193,7 @@ def patch_edges(layout: PztLayout, length: float) -> Array:
 
 
 def with_patch_count(
-    scene_path: Path, layout: PztLayout, body: ModalBody, planar: PlanarBody, count: int
+    scene_path: Path, layout: PatchKeys, body: ModalBody, planar: PlanarBody, count: int
 ) -> PatchArray | None:
     """As many of the same patches, evenly spread over the link, with one limit; None where they have no room."""
     if count * layout.length > body.length * (1 + 1e-9):
@@ -264,24 +208,12 @@ def with_patch_count(
 
 def check_reach(scene_path: Path, patches: PatchArray) -> None:
     """Raise `InputError` unless the patches reach every mode, or the scene is content with less."""
-    if patches.layout.allocation == "least-squares":
-        return
-    key = f'{scene_path}: pzt "{patches.body}"'
-    advice = 'or be content with the best they can do: allocation = "least-squares"'
-    n, k = patches.served, len(patches.edges)
-    if k < n:
-        raise InputError(f"{key}: expected as many patches as modes ({n}) or more, found {k}: add patches, {advice}")
-    unreached = patches.unreached_modes
-    if unreached.size:
-        modes = ", ".join(f"{j + 1} ({patches.frequency[j]:.4g} Hz)" for j in unreached)
-        raise InputError(
-            f"{key}: expected patches that reach every mode, found a singular Φ_V (condition number"
-            f" {min(patches.condition_number, MOST_CONDITION):.1g}): no voltages serve mode {modes};"
-            f" move patches, {advice}"
-        )
+    if patches.layout.allocation == "exact":
+        check_all_served(f'{scene_path}: pzt "{patches.body}"', patches)
 
 
-def _check_edges(key: str, edges: Array, length: float) -> None:
+def check_edges(key: str, edges: Array, length: float) -> None:
+    """Raise `InputError` for patches (k, 2) beyond a link of that length, m, or on each other."""
     slack = 1e-9 * length
     for k, (start, end) in enumerate(edges, 1):
         if start < -slack or end > length + slack:
@@ -297,82 +229,3 @@ def _check_edges(key: str, edges: Array, length: float) -> None:
                 f"{key}: expected patches beside each other, found patch {first} ({a:g} to {b:g} m) and patch {second}"
                 f" ({c:g} to {d:g} m) on the same place"
             )
-
-
-def _weights(key: str, layout: PztLayout, planar: PlanarBody) -> Array:
-    """W_sqrt: of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points."""
-    n = planar.n_eigenmodes
-    order = served_first(n, planar.n_modes, layout.patch_count)
-    if layout.mode_weights is not None:
-        if len(layout.mode_weights) != n:
-            raise InputError(
-                f"{key}: mode_weights: expected {n} weights, one for each mode that moves in the plane, found"
-                f" {len(layout.mode_weights)}"
-            )
-        weights = np.array(layout.mode_weights) / max(layout.mode_weights)
-        root = np.ones(len(order))
-        root[:n] = np.sqrt(weights.clip(min=LEAST_WEIGHT))
-        return root[:, None] * order
-    if layout.point_weights is None:
-        return order
-    unknown = layout.point_weights.keys() - planar.points.keys()
-    if unknown:
-        raise InputError(
-            f"{key}: point_weights: expected points of the link, {', '.join(planar.points)}, found"
-            f" {', '.join(sorted(unknown))}"
-        )
-    rows = np.vstack(
-        [
-            np.sqrt(weight) * planar.points[name].translation / planar.stiffness
-            for name, weight in layout.point_weights.items()
-        ]
-    )
-    size = np.linalg.norm(rows, 2)
-    if not size > 0.0:
-        raise InputError(f"{key}: point_weights: expected points that move with the modes, found none that do")
-    softest = np.sqrt(planar.stiffness.min() / planar.stiffness)
-    return np.vstack([rows / size, np.sqrt(ENERGY_WEIGHT) * np.diag(softest)])
-
-
-def _pieces(key: str, body: ModalBody, number: int, start: float, end: float) -> tuple[Array, Array]:
-    """The stretches (m + 1,) into which a change of the link's height along y cuts a patch, and the heights (m,)."""
-    x = body.stations.position[:, 0]
-    slack = min(1e-9 * body.length, 0.25 * (end - start))
-    covered = np.flatnonzero((x[1:] > start + slack) & (x[:-1] < end - slack))
-    if not len(covered):  # rounding: it begins where it ends
-        raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m, found less")
-    heights = body.stations.height[covered]
-    jump = np.abs(np.diff(heights)) / np.maximum(heights[1:], heights[:-1])
-    if jump.max(initial=0.0) > STEP:
-        k = int(jump.argmax())
-        raise InputError(
-            f"{key}: expected patches on one section each, found patch {number} ({start:g} to {end:g} m) across a step"
-            f" of the height from {heights[k]:g} to {heights[k + 1]:g} m at {x[covered[k + 1]]:g} m"
-        )
-    changes = np.flatnonzero(jump > 1e-9)
-    ends = np.concatenate([[max(start, 0.0)], x[covered[changes + 1]], [min(end, body.length)]])
-    return ends, heights[np.append(changes, len(heights) - 1)]
-
-
-def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Array:
-    """(k, n) modal forces of unit membrane force (N/m): pressing the upper face, pulling the lower, halved on both."""
-    patches = body.surface_patches
-    if patches is None:
-        raise InputError(
-            f'{key}: coupling: expected "rotation", or a link whose file outlines the patches ([surface_patch]), found'
-            ' "surface" and none outlined'
-        )
-    found = (*edges.ravel(), layout.width)
-    outlined = (*patches.edges.ravel(), patches.width)
-    if len(found) != len(outlined) or not np.allclose(found, outlined, rtol=0.0, atol=1e-6 * body.length):
-        raise InputError(
-            f"{key}: coupling: expected the {len(patches.edges)} patches that the link file outlines, from"
-            f" {_places(patches.edges)} m and {patches.width:g} m wide, found {len(edges)}, from {_places(edges)} m and"
-            f" {layout.width:g} m wide"
-        )
-    faces = [sign * face for sign, face in ((-1.0, patches.top), (1.0, patches.bottom)) if face is not None]
-    return np.asarray(sum(faces) / len(faces))
-
-
-def _places(edges: Array) -> str:
-    return ", ".join(f"{start:g} to {end:g}" for start, end in edges)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -12,24 +12,15 @@ from ...common.numbers import MOST_PATCHES, SMALLEST
 from ...common.validation import Record
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, one_of
 from ...mbs.fields.references import Reference
+from .lamina import Lamina, plain_lamina
 
 MOST_LAYERS = 1000
 
+Bends = Literal["in-plane", "out-of-plane", "twist"]
 
-class PztLayout(Record):
-    """Equal piezoelectric patches along one link. Lengths in m, modulus in Pa, d31 in m/V, density kg/m³, limit in V.
 
-    Centers are distances along the link from its root; `count` places them at (k − ½)·(length of link)/count.
-    `thickness` is that of one of `layers`, which lie on each other on one `face` or on both, driven against each other.
-    Without `face` they bend the link and do nothing else, as in the paper. `limit` is one for all or one for each.
-    `allocation = "least-squares"` is content with fewer patches than modes, or modes that no patch reaches.
-    Where voltages cannot produce all modal forces, `mode_weights` (of the squares of what is left) or `point_weights`
-    (of the squares of the deflections that this causes at points of the link) say what matters.
-    `structural`: what the patches add to their link. Without it their stiffness, so that they bend it as the composite
-    section bends; true: mass besides; a list names "mass", "stiffness" or both; false, as in the paper: nothing.
-    Only for the judgement: `depoling_field` (V/m) and `strain_limit` of the material.
-    `coupling`: patches work on the section rotations at their ends, or on the faces of a solid that outlines them.
-    """
+class PatchKeys(Record):
+    """What patches of planar scenes and of scenes in space have in common: see there."""
 
     body: str
     """Link that they sit on."""
@@ -53,7 +44,7 @@ class PztLayout(Record):
     """Largest voltage, V: of all, or of each."""
     layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
     """Layers on each other."""
-    face: Literal["+y", "-y", "both"] | None = None
+    face: Literal["+y", "-y", "+z", "-z", "both"] | None = None
     """Which face they sit on; without it they bend the link and do nothing else."""
     allocation: Literal["exact", "least-squares"] = "exact"
     """Voltages that produce all modal forces, or come nearest: then fewer patches than modes will do."""
@@ -71,10 +62,9 @@ class PztLayout(Record):
     """On what they work: section rotations at their ends, or faces outlined in the mesh of a solid."""
 
     @model_validator(mode="after")
-    def _consistent(self) -> PztLayout:
+    def _consistent(self) -> Self:
         one_of(self, ("count", "centers"))
-        if abs(self.d31) < SMALLEST:
-            raise ValueError(f"expected a d31 other than 0, found {self.d31:g}: such patches do nothing")
+        self.check_constants()
         if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
             raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
         if self.adds_mass and self.density is None:
@@ -85,6 +75,36 @@ class PztLayout(Record):
             if weights is not None and not any(weights):
                 raise ValueError("expected weights that are not all 0, found only zeros")
         return self
+
+    def check_constants(self) -> None:
+        """Raise `ValueError` for patches that do nothing."""
+        if abs(self.d31) < SMALLEST:
+            raise ValueError(f"expected a d31 other than 0, found {self.d31:g}: such patches do nothing")
+
+    @property
+    def label(self) -> str:
+        """What results and messages call the layout."""
+        return self.body
+
+    @property
+    def acts_in(self) -> Bends:
+        """What the patches do to their link."""
+        return "in-plane"
+
+    @property
+    def served_in_words(self) -> str:
+        """Which modes the patches are to serve."""
+        return "moves in the plane"
+
+    @property
+    def normal(self) -> Literal["y", "z"]:
+        """Of the faces that they sit on: an axis of the link."""
+        return "y"
+
+    @property
+    def lamina(self) -> Lamina:
+        """One layer by itself."""
+        return plain_lamina(self.modulus, self.d31, self.thickness)
 
     @property
     def adds_mass(self) -> bool:
@@ -107,6 +127,25 @@ class PztLayout(Record):
         yield Reference("body", self.body, "flexible body")
         for point in self.point_weights or ():
             yield Reference("point_weights", f"{self.body}.{point}")
+
+
+class PztLayout(PatchKeys):
+    """Equal piezoelectric patches along one link. Lengths in m, modulus in Pa, d31 in m/V, density kg/m³, limit in V.
+
+    Centers are distances along the link from its root; `count` places them at (k − ½)·(length of link)/count.
+    `thickness` is that of one of `layers`, which lie on each other on one `face` or on both, driven against each other.
+    Without `face` they bend the link and do nothing else, as in the paper. `limit` is one for all or one for each.
+    `allocation = "least-squares"` is content with fewer patches than modes, or modes that no patch reaches.
+    Where voltages cannot produce all modal forces, `mode_weights` (of the squares of what is left) or `point_weights`
+    (of the squares of the deflections that this causes at points of the link) say what matters.
+    `structural`: what the patches add to their link. Without it their stiffness, so that they bend it as the composite
+    section bends; true: mass besides; a list names "mass", "stiffness" or both; false, as in the paper: nothing.
+    Only for the judgement: `depoling_field` (V/m) and `strain_limit` of the material.
+    `coupling`: patches work on the section rotations at their ends, or on the faces of a solid that outlines them.
+    """
+
+    face: Literal["+y", "-y", "both"] | None = None
+    """Which face they sit on; without it they bend the link and do nothing else."""
 
 
 def _toml(value: bool | tuple[str, ...]) -> str:

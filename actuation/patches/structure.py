@@ -10,10 +10,11 @@ from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.masses import with_masses
 from ...mbs.model.planar_body import PlanarBody, PlanarPoint
-from .composite import composite, gauss_points
+from .composite import Placed, composite, gauss_points
 from .layers import layer_section
 from .patches import patch_edges
 from .records import PztLayout
+from .sections import link_sections
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,12 @@ def with_patches(planar: PlanarBody, body: ModalBody, layout: PztLayout, edges: 
     T = planar.modal_transform
     points: list[PlanarPoint] = []
     masses: list[float] = []
+    sections = link_sections(body)
     for place in gauss_points(body, edges) if layout.adds_mass else ():
         at = body.interpolate(place.x)
         points.append(PlanarPoint(at.position[:2], at.translation[:2] @ T, at.rotation[2] @ T))
-        masses.append(place.weight * layer_section(layout, place.height).A * (layout.density or 0.0))
-    stiffness = T.T @ composite(layout, body, edges).stiffness @ T if layout.adds_stiffness else None
+        masses.append(place.weight * layer_section(layout, sections.height[place.station]).A * (layout.density or 0.0))
+    stiffness = T.T @ composite([Placed(layout, edges)], body).stiffness @ T if layout.adds_stiffness else None
     if not points:
         points, masses = [PlanarPoint(np.zeros(2), np.zeros((2, planar.n_modes)), np.zeros(planar.n_modes))], [0.0]
     return with_masses(planar, points, np.array(masses), np.zeros(len(masses)), stiffness)

@@ -8,12 +8,12 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...mbs import _core
-from .patches import PatchArray
+from .reach import Reach
 
 
 @dataclass(frozen=True)
 class Voltages:
-    """Voltages of the patches of one body over time.
+    """Voltages of patches over time.
 
     Attributes:
         required: (T, k) V, with no limit; of least size or least residual where patches and modes differ in number.
@@ -39,13 +39,13 @@ class Voltages:
         return float(np.abs(self.required).max(initial=0.0))
 
 
-def voltage_scale(patches: PatchArray) -> Array:
+def voltage_scale(patches: Reach) -> Array:
     """Ordinary voltages (k,) of the patches: their limits, the largest of these where a patch has none, else 1 V."""
     known = np.isfinite(patches.limit)
     return np.where(known, patches.limit, patches.limit[known].max() if known.any() else 1.0)
 
 
-def voltage_gain(patches: PatchArray) -> Array:
+def voltage_gain(patches: Reach) -> Array:
     """Voltages (k, n) per modal force without limits: Φ_V⁻¹, or those of least weighted residual.
 
     Of many that do, the smallest relative to `voltage_scale`; where modes are left out, those that serve them too.
@@ -62,13 +62,13 @@ def voltage_gain(patches: PatchArray) -> Array:
     return gain
 
 
-def allocation(patches: PatchArray, *, limited: bool) -> _core.Allocation:
+def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
     """What turns modal forces into voltages, with the limits of the patches or without."""
     limit = patches.limit if limited else np.full_like(patches.limit, np.inf)
     return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), limit, voltage_scale(patches))
 
 
-def solve_voltages(patches: PatchArray, F_p: Array) -> Voltages:
+def solve_voltages(patches: Reach, F_p: Array) -> Voltages:
     """Voltages that produce the modal forces F_p (T, n), or as much of them as they can."""
     F_p = np.ascontiguousarray(F_p)
     required = F_p @ voltage_gain(patches).T

@@ -23,7 +23,7 @@ from ..modal_body.damping import damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
 from ..modal_body.signs import canonical_signs
 from .attachment_modes import attachment_modes
-from .beam import R_X, FamilyModel, family_model
+from .beam import R_X, FamilyModel, family_model, shear_modulus
 from .eigen import lowest_modes
 from .fixed_interfaces import fixed_interfaces, ritz_modes
 from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
@@ -76,14 +76,9 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
     omega: Array = np.sqrt([mode.omega2 for mode in modes])
     translation, rotation = np.moveaxis(fields[:R_X], 0, 1), np.moveaxis(fields[R_X:], 0, 1)
     position = _on_axis(stations.x)
-    segment = segments(link, stations.x)
-    heights = np.array([section.height for section in link.sections])[segment]
-    E = link.material.youngs_modulus
-    rigidity = np.array([[E * section.area, E * section.I_yy] for section in link.sections])[segment]
-    outlines = section_outlines(link.shapes)[segment]
     families = tuple(mode.family for mode in modes)
     residual = np.repeat([0, 1], [count, omega.size - count])
-    kept = Stations(position, translation, rotation, heights, stations.element, outlines, rigidity)
+    kept = _with_sections(link, stations, position, translation, rotation)
     return ModalBody(
         name=link.name,
         kind=link.geometry.kind,
@@ -105,6 +100,24 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         ffrobot_version=program_version(),
     )
+
+
+def _with_sections(
+    link: BeamLink, stations: StationSpace, position: Array, translation: Array, rotation: Array
+) -> Stations:
+    """The stations, with extents, outlines and rigidities of the sections from each on; GJ where there is a ν."""
+    segment = segments(link, stations.x)
+    sections, E = link.sections, link.material.youngs_modulus
+    height, width = (np.array([getattr(section, key) for section in sections]) for key in ("height", "width"))
+    rigidity = E * np.array([[section.area, section.I_yy, section.I_zz] for section in sections])[segment]
+    twist = None
+    if link.material.poissons_ratio is not None:
+        twist = (shear_modulus(link) * np.array([section.torsion for section in sections]))[segment]
+    outlines = section_outlines(link.shapes)[segment]
+    return Stations(
+        position, translation, rotation, height[segment], stations.element, outlines, rigidity[:, :2],
+        width[segment], rigidity[:, 2], twist,
+    )  # fmt: skip
 
 
 def _modes(

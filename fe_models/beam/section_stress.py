@@ -14,6 +14,7 @@ from ...common.arrays import Array
 from ...mesh.records import CircleSection, RectangleSection, SectionRecord, TubeSection
 from ..link_records.section import Section
 
+MEAN_POINTS = 40  # of a mean over a face: 1e-6 where the patch is as wide as the face, at whose edges shear falls to 0
 TERMS = 2000  # of the series for rectangles: 2e-4 of the largest stress at their corners, far less elsewhere
 
 
@@ -43,6 +44,17 @@ def section_stress(record: SectionRecord, section: Section, F: Array, M: Array, 
     stress[5] = F[1] * _transverse(record, y) / section.I_yy + M[0] / section.torsion * shear_y
     stress[4] = F[2] * _transverse(record, z, across=True) / section.I_zz + M[0] / section.torsion * shear_z
     return stress
+
+
+def surface_shear(extent: float, across: float, width: float) -> float:
+    """Mean shear strain along x on a face of a rectangle, over its middle `width` (m), of unit twist (rad/m); in m.
+
+    The face is `across` wide, its opposite `extent` away: γ = −∂Ψ/∂n of Prandtl's function over G φ', by Gauss.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(MEAN_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
+    record = RectangleSection(shape="rectangle", height=extent, width=across)
+    values = [_torsion(record, extent / 2, node * width / 2)[1] for node in nodes]
+    return float(np.dot(weights, values)) / 2
 
 
 def _transverse(record: SectionRecord, distance: float, across: bool = False) -> float:

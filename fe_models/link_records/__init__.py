@@ -2,6 +2,7 @@
 
 from .attached import Coupling, InterfaceRecord, SurfacePatches
 from .link import FAMILIES, HOLDING_ROOT, BeamLink, Family, Link, Material, OrthotropicMaterial, SolidLink
+from .measured import Measured, MeasuredMode, paired, read_measured
 
 __all__ = [
     "FAMILIES",
@@ -12,7 +13,11 @@ __all__ = [
     "InterfaceRecord",
     "Link",
     "Material",
+    "Measured",
+    "MeasuredMode",
     "OrthotropicMaterial",
     "SolidLink",
     "SurfacePatches",
+    "paired",
+    "read_measured",
 ]

@@ -21,6 +21,7 @@ from ...mesh.records import (
     TubeSection,
 )
 from .attached import Coupling, InterfaceRecord, SurfacePatches
+from .measured import Measured
 from .section import Section, rectangle, tube
 
 Family = Literal["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
@@ -158,10 +159,12 @@ class _Link(Record):
     """Of the link; in a scene that of its body where it is left out."""
     reference: Reference
     """What the link's frame is fixed to."""
-    modes: Modes
-    """Which modes the link may deform in."""
+    modes: Modes = Modes()
+    """Which modes the link may deform in; by default six of each bending family, one axial, one of torsion."""
     damping: Damping = Damping()
     """Of the modes."""
+    measured: Measured | None = None
+    """Measured natural frequencies and damping ratios in place of computed ones."""
     interface: tuple[InterfaceRecord, ...] = ()
     """Places for joints and loads beside `root` and `tip`, which always are."""
     stress: StressRecovery = StressRecovery()

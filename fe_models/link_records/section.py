@@ -16,6 +16,7 @@ class Section:
         I_zz: ∫z² dA in m⁴: out-of-plane bending works against E I_zz.
         torsion: J in m⁴, St Venant's torsion constant: twisting works against G J.
         height: extent along y, in m.
+        width: extent along z, in m.
         shear: Timoshenko's shear coefficient k, the same along y and z for all shapes here.
     """
 
@@ -24,6 +25,7 @@ class Section:
     I_zz: float
     torsion: float
     height: float
+    width: float
     shear: float
 
     @property
@@ -40,6 +42,7 @@ def rectangle(height: float, width: float, poissons_ratio: float) -> Section:
         I_zz=height * width**3 / 12,
         torsion=_rectangle_torsion(max(height, width), min(height, width)),
         height=height,
+        width=width,
         shear=10 * (1 + poissons_ratio) / (12 + 11 * poissons_ratio),
     )
 
@@ -56,6 +59,7 @@ def tube(outer: float, inner: float, poissons_ratio: float) -> Section:
         I_zz=moment,
         torsion=2 * moment,
         height=outer,
+        width=outer,
         shear=6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * hole),
     )
 

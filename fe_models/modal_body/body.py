@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
-from .parts import Interface, OutlinedPatches, PictureMesh, Stations, StressPoint, freeze
+from .parts import Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint, freeze
 from .unit_loads import unit_load_names
 
 # m_ff = I and the identities between invariants must hold to this.
@@ -55,6 +55,7 @@ class ModalBody:
         stress_loads: names of the l unit loads (`unit_loads`) whose static stresses are known; none in old files.
         surface_static: (p, 6, l) likewise, as `static` in `StressPoint`.
         surface_patches: modal forces of patches outlined in the mesh; None where there are none.
+        measured: which frequencies and damping ratios were measured; None where all are computed.
         input_hash: of the link file's content.
         modes_hash: of that part of it on which the modes depend; empty where not known.
         ffrobot_version: that made it.
@@ -92,6 +93,7 @@ class ModalBody:
     J_spin: float | None = None
     h_spin: Array | None = None
     S_spin: Array | None = None
+    measured: MeasuredValues | None = None
     input_hash: str = ""
     modes_hash: str = ""
     ffrobot_version: str = ""
@@ -315,8 +317,13 @@ def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str,
         shapes.append(("h_spin", body.h_spin, (n,)))
     if body.S_spin is not None:
         shapes.append(("S_spin", body.S_spin, (n, n)))
+    if body.measured is not None:
+        shapes += [(f"measured.{name}", value, (n,)) for name, value in vars(body.measured).items()]
     if body.stations.rigidity is not None:
         shapes.append(("stations.rigidity", body.stations.rigidity, (k, 2)))
+    for name in ("width", "out_of_plane_rigidity", "torsional_rigidity"):
+        if (values := getattr(body.stations, name)) is not None:
+            shapes.append((f"stations.{name}", values, (k,)))
     if body.mesh.edges is not None:
         shapes.append(("mesh.edges", body.mesh.edges, (len(body.mesh.edges), 2)))
     if (outline := body.stations.outline) is not None:

@@ -47,6 +47,9 @@ class Stations:
         outline: (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not
             known.
         rigidity: (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known.
+        width: (k,) extent along z in m, likewise.
+        out_of_plane_rigidity: (k,) EI in N·m² of bending along z, likewise.
+        torsional_rigidity: (k,) GJ in N·m², likewise.
     """
 
     position: Array
@@ -56,6 +59,9 @@ class Stations:
     element: Integers | None = None
     outline: Array | None = None
     rigidity: Array | None = None
+    width: Array | None = None
+    out_of_plane_rigidity: Array | None = None
+    torsional_rigidity: Array | None = None
 
     def __post_init__(self) -> None:
         freeze(self)
@@ -100,6 +106,31 @@ class StressPoint:
 
     def __post_init__(self) -> None:
         freeze(self)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredValues:
+    """Which values of the modes were measured, and what the finite element model says in the place of frequencies.
+
+    Attributes:
+        frequency: (n,) 1 of modes whose `ModalBody.frequency` was measured, else 0.
+        damping_ratio: (n,) likewise, of `ModalBody.damping_ratio`.
+        computed_frequency: (n,) in Hz, of the finite element model.
+    """
+
+    frequency: Integers
+    damping_ratio: Integers
+    computed_frequency: Array
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+    def in_words(self) -> str:
+        """Which modes they are, counted from 1."""
+        found = {"frequencies": self.frequency, "damping ratios": self.damping_ratio}
+        numbers = {what: np.flatnonzero(flags) + 1 for what, flags in found.items()}
+        parts = [f"{what} of modes {', '.join(map(str, of))}" for what, of in numbers.items() if len(of)]
+        return " and ".join(parts)
 
 
 @dataclass(frozen=True, eq=False)

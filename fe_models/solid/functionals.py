@@ -33,6 +33,7 @@ class Averages:
         centroid: (k, 3) in m.
         inertia: (k, 3, 3) J about the centroid in m⁴.
         height: (k,) extent along y in m.
+        width: (k,) extent along z in m.
         density: (k,) mean density in kg/m³.
     """
 
@@ -41,6 +42,7 @@ class Averages:
     centroid: Array
     inertia: Array
     height: Array
+    width: Array
     density: Array
 
     def of(self, model: SolidModel, modes: Array) -> tuple[Array, Array]:
@@ -70,7 +72,7 @@ def face_averages(model: SolidModel, facet_tags: object, tags: Sequence[int]) ->
     parts = [_face_weights(model, facet_tags, tag) for tag in tags]
     weights = sp.csr_matrix(np.concatenate([w for w, _ in parts]))
     nothing = np.full(len(tags), np.nan)
-    return _averages(model, weights, np.array([m for _, m in parts]), nothing, nothing)
+    return _averages(model, weights, np.array([m for _, m in parts]), np.array([nothing, nothing]), nothing)
 
 
 def section_averages(model: SolidModel, x: Array) -> Averages:
@@ -91,22 +93,23 @@ def section_averages(model: SolidModel, x: Array) -> Averages:
         row = np.broadcast_to(np.arange(4)[:, None], columns.shape)
         rows.append(sp.csr_matrix((entries.ravel(), (row.ravel(), columns.ravel())), shape=(4, size)))
         moments.append(monomials.T * w @ monomials)
-        ranges.append(section.y_range)
+        ranges.append((section.y_range, section.z_range))
         density = model.materials.density[model.materials.of_cell[section.cells]]
         masses.append(w @ density)
     low, high = _extremes(model, np.array(ranges))
-    averages = _averages(model, sp.vstack(rows, format="csr"), np.array(moments), high - low, np.array(masses))
+    extents = (high - low).T
+    averages = _averages(model, sp.vstack(rows, format="csr"), np.array(moments), extents, np.array(masses))
     return averages
 
 
-def _averages(model: SolidModel, weights: sp.csr_matrix, moments: Array, height: Array, mass: Array) -> Averages:
-    """`moments` (k, 4, 4): this rank's part of ∫ (1, x)ᵀ(1, x) ds; `mass` (k,) of ∫ρ ds."""
+def _averages(model: SolidModel, weights: sp.csr_matrix, moments: Array, extents: Array, mass: Array) -> Averages:
+    """`moments` (k, 4, 4): this rank's part of ∫ (1, x)ᵀ(1, x) ds; `mass` (k,) of ∫ρ ds; `extents` (2, k)."""
     moments = model.total(moments)
     area = moments[:, 0, 0]
     centroid = moments[:, 0, 1:] / area[:, None]
     second = moments[:, 1:, 1:] - area[:, None, None] * centroid[:, :, None] * centroid[:, None, :]
     inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
-    return Averages(weights, area, centroid, inertia, height, model.total(mass) / area)
+    return Averages(weights, area, centroid, inertia, extents[0], extents[1], model.total(mass) / area)
 
 
 def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Array, Array]:
@@ -134,6 +137,6 @@ def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Arra
 
 
 def _extremes(model: SolidModel, ranges: Array) -> tuple[Array, Array]:
-    """Over all ranks, of `ranges` (k, 2) each."""
+    """Over all ranks, of `ranges` (k, 2, 2) each, along y and along z; (k, 2)."""
     every = np.array(model.comm.allgather(ranges))
-    return every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)
+    return every[..., 0].min(axis=0), every[..., 1].max(axis=0)

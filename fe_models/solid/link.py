@@ -213,13 +213,15 @@ def _station_grid(link: SolidLink, solid: SolidMesh) -> tuple[Array, Integers]:
 
 
 def _stations(link: SolidLink, sections: Averages, x: Array, element: Integers, u: Array, turn: Array) -> Stations:
-    """Height and rigidity from each station on: those in the middle of the way to the next, by the stations' two."""
+    """Extents and rigidity from each station on: those in the middle of the way to the next, by the stations' two."""
     centroid = sections.centroid.copy()
     centroid[:, 0] = x
-    height, area, I = (_onward(values) for values in (sections.height, sections.area, sections.inertia[:, 2, 2]))  # noqa: E741
+    height, width, area = (_onward(values) for values in (sections.height, sections.width, sections.area))
+    I_zz, I_yy = (_onward(sections.inertia[:, axis, axis]) for axis in (1, 2))
     modulus = np.ravel(link.material.youngs_modulus)[0]  # of an orthotropic one E_x
-    rigidity = None if link.region else modulus * np.stack([area, I], axis=1)
-    return Stations(centroid, u, turn, height, element, rigidity=rigidity)
+    rigidity = None if link.region else modulus * np.stack([area, I_yy], axis=1)
+    lateral = None if link.region else modulus * I_zz
+    return Stations(centroid, u, turn, height, element, rigidity=rigidity, width=width, out_of_plane_rigidity=lateral)
 
 
 def _onward(values: Array) -> Array:

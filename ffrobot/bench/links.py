@@ -49,7 +49,7 @@ def elements_of(scene: Scene) -> str:
 
 def modes_of(scene: Scene) -> str:
     """Likewise for the numbers of modes."""
-    return _listed(scene, lambda keys: {"count": keys["modes"].get("count", "")})
+    return _listed(scene, lambda keys: {"count": keys.get("modes", {}).get("count", "")})
 
 
 def _listed(scene: Scene, table: Callable[[Keys], Keys]) -> str:
@@ -74,7 +74,7 @@ def _scale_mesh(keys: Keys, factor: float) -> bool:
 
 def _scale_modes(keys: Keys, factor: float) -> bool:
     """Whether there is a number of modes to scale, and damping that fits any number."""
-    modes = keys["modes"]
+    modes = keys.get("modes", {})
     if not isinstance(modes.get("count"), int) or isinstance(keys.get("damping", {}).get("ratio"), list):
         return False
     modes["count"] = ceil(factor * modes["count"])

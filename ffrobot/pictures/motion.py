@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..common.arrays import Array, Indices
 from ..common.plane import rotated
-from ..mbs.joints.joints import JOINT_TYPES
 from ..mbs.scene.topology import Edge, Topology, spanning_forest
 from ..results.file import Results
+from ..results.joints import joint_type
 
 VISIBLE_DEFORMATION = 0.05  # of the mechanism's size
 
@@ -74,12 +74,31 @@ def ordered_bodies(scene: Mapping[str, Any]) -> list[str]:
 
 def topology(scene: Mapping[str, Any]) -> Topology:
     """Which joint carries which body, of a scene as a results file has it."""
-    edges = [Edge(tuple(joint["between"]), JOINT_TYPES[joint["type"]].locates) for joint in scene.get("joint", [])]
+    edges = [Edge(tuple(joint["between"]), joint_type(scene, joint).locates) for joint in scene.get("joint", [])]
     return spanning_forest([body["name"] for body in scene["body"]], edges)
 
 
-def carried(bodies: Sequence[BodyMotion], scene: Mapping[str, Any]) -> dict[str, Array]:
-    """For each body (T, 2), m: how much a unit of s moves it as a whole, so that joints stay shut.
+class Moving(Protocol):
+    """What `carried` has to know of a body, in the plane (d = 2) or in space (d = 3)."""
+
+    @property
+    def name(self) -> str:
+        """In the scene."""
+
+    @property
+    def position(self) -> Array:
+        """(T, d) of its frame, m."""
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """Of its points, as in the results."""
+
+    def global_deflection(self, point: str) -> Array:
+        """A Φ p of a point (T, d), m."""
+
+
+def carried(bodies: Sequence[Moving], scene: Mapping[str, Any]) -> dict[str, Array]:
+    """For each body (T, d), m: how much a unit of s moves it as a whole, so that joints stay shut.
 
     `bodies` are all those of the scene, as `ordered_bodies` has them.
     """

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
+from .silhouette import silhouette
 
 CURVE_POINTS = 41
 
@@ -18,7 +19,7 @@ class Outline:
     """A line in the body frame that deforms with coordinates p.
 
     Attributes:
-        at: (m, 2) in m, undeformed.
+        at: (m, 2) in m, undeformed; rows of NaN part loops, of which openings go clockwise.
         modes: (m, 2, n) displacement in m per unit of coordinate.
         p: (T, n) the coordinates over the outputs.
         filled: whether the line goes around the body.
@@ -31,7 +32,24 @@ class Outline:
 
 
 def body_outline(body: ModalBody, p: Array) -> Outline:
-    """Upper and lower edge of a flexible link, from its stations; cross sections stay plane. `p` is (T, n) modal."""
+    """What a flexible link covers of the plane: of a solid its surface, of a beam its section along the axis.
+
+    `p` is (T, n) modal.
+    """
+    return _swept(body, p) if body.mesh.cells.shape[1] == 2 else _surface(body, p)
+
+
+def _surface(body: ModalBody, p: Array) -> Outline:
+    """Around the surface and its openings."""
+    loops = silhouette(body.mesh.points, body.mesh.cells)
+    gap = np.full((1, 2), np.nan)
+    at = [part for loop in loops for part in (body.mesh.points[np.append(loop, loop[0]), :2], gap)][:-1]
+    shapes = [body.mesh.mode_shapes[np.append(loop, [loop[0], loop[0]]), :2] for loop in loops]
+    return Outline(np.concatenate(at), np.concatenate(shapes)[:-1], p, filled=True)
+
+
+def _swept(body: ModalBody, p: Array) -> Outline:
+    """Upper and lower edge of a beam, from its stations; cross sections stay plane."""
     stations, n = body.stations, body.mode_count
     # The height of a stretch holds at both its ends: a step of the section shows as one.
     ends = np.arange(len(stations.position) - 1)[:, None] + np.array([0, 1])

@@ -1,9 +1,29 @@
-"""Where the viewer of a link stands: in all pictures of it in space the same."""
+"""Where the viewer stands: of a link in all pictures of it the same, and of a scene in space."""
+
+from typing import NamedTuple
 
 import numpy as np
+
+from ..common.arrays import Array
+
+
+class View(NamedTuple):
+    """Where a viewer stands: unit vectors (3,) that go right and up in the picture, and towards the viewer."""
+
+    right: Array
+    up: Array
+    viewer: Array
+
 
 # The link's x goes right, its y up, as in planar scenes; the viewer stands before z, towards the root and above.
 AZIMUTH, ELEVATION = np.radians(28.0), np.radians(24.0)
 RIGHT = np.array([np.cos(AZIMUTH), 0.0, np.sin(AZIMUTH)])
 UP = np.array([np.sin(ELEVATION) * np.sin(AZIMUTH), np.cos(ELEVATION), -np.sin(ELEVATION) * np.cos(AZIMUTH)])
 VIEWER = np.cross(RIGHT, UP)
+LINK = View(RIGHT, UP, VIEWER)
+
+# Scenes in space: z goes up, the viewer stands in front of −y, towards +x and above.
+_AZIMUTH, _ELEVATION = np.radians(-55.0), np.radians(25.0)
+_TOWARDS = np.array([np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)])
+_RIGHT = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
+SPACE = View(_RIGHT, np.cross(_TOWARDS, _RIGHT), _TOWARDS)

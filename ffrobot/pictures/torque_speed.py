@@ -2,38 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.joints.joints import JOINT_TYPES
 from ..mbs.joints.transmission import MotorLimits
 from ..results.file import Results
+from ..results.joints import joint_coordinates
 
 MARGIN = 1.15  # of the largest moment or speed, where no limit ends the curve of the power
 POINTS = 60  # of that curve
 
 
-def motor_limits(results: Results, joint: str) -> MotorLimits:
-    """Of a joint of the scene; infinite where it gives none."""
-    keys = joint_keys(results, joint)
-    return MotorLimits(*(float(keys.get(f"{what}_limit") or np.inf) for what in ("moment", "speed", "power")))
+def limits_of(results: Results, joint: str, datasets: Sequence[str]) -> MotorLimits:
+    """Of the motor of a joint of which `datasets` such as "…/moment" or "…/moment[1]" are drawn; infinite without any.
 
-
-def joint_keys(results: Results, joint: str) -> dict[str, Any]:
-    """What the scene says of a joint; nothing of one that it does not have."""
-    return next((keys for keys in results.scene.get("joint", []) if keys["name"] == joint), {})
-
-
-def force_unit(results: Results, joint: str) -> str:
-    """Of the force along a joint's coordinate: "N·m" or "N"."""
-    return JOINT_TYPES[str(joint_keys(results, joint)["type"])].force_unit
-
-
-def coordinate_unit(results: Results, joint: str) -> str:
-    """Of a joint's coordinate: "rad" or "m"."""
-    return "rad" if force_unit(results, joint) == "N·m" else "m"
+    Of several coordinates of a joint each has its limits: those of the one that the first dataset is of.
+    """
+    column = next((name.partition("[")[2].rstrip("]") for name in datasets), "")
+    coordinates, number = joint_coordinates(results.scene, joint), int(column or 0)
+    return coordinates[number].limits if number < len(coordinates) else MotorLimits()
 
 
 def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
@@ -42,8 +31,9 @@ def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
     In all four quadrants; the curve of the power goes as far as the data, `speed` and `moment` at most, ask for. Empty
     without limits.
     """
-    speed_end = min(limits.speed, MARGIN * max(speed, limits.power / limits.moment, 1e-300))
-    moment_end = min(limits.moment, MARGIN * max(moment, limits.power / speed_end, 1e-300))
+    power = limits.power if np.isfinite(limits.power) else 0.0  # without that limit nothing asks for more than the data
+    speed_end = min(limits.speed, MARGIN * max(speed, power / limits.moment, 1e-300))
+    moment_end = min(limits.moment, MARGIN * max(moment, power / speed_end, 1e-300))
     pieces = []
     if np.isfinite(limits.moment):
         pieces.append(np.array([[0.0, limits.moment], [min(speed_end, limits.power / limits.moment), limits.moment]]))

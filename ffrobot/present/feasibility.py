@@ -15,7 +15,6 @@ from ..actuation.motors import MotorFeasibility
 from ..common.errors import InputError
 from ..common.hdf5 import open_checked
 from ..common.validation import quoted
-from ..mbs.joints.joints import JOINT_TYPES
 
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:
@@ -41,11 +40,12 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
 
 def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
     from ..results.actuators import read_motors, read_unsupplied
+    from ..results.joints import labelled_coordinates
 
     yield f'analysis "{name}" ({group.attrs["kind"]})'
-    types = {joint["name"]: joint["type"] for joint in tomllib.loads(group.file.attrs["scene"])["joint"]}
-    if motors := read_motors(group["feasibility"], list(types)):
-        units = {name: JOINT_TYPES[types[name]].force_unit for name in motors}
+    coordinates = labelled_coordinates(tomllib.loads(group.file.attrs["scene"]))
+    units = {label: one.force_unit for label, (_, one) in coordinates.items()}
+    if motors := read_motors(group["feasibility"], list(units)):
         yield _motors(motors, units)
         spikes = ((name, motor.spike_in_words(units[name])) for name, motor in motors.items())
         yield from (f"motor of {name}: {text}" for name, text in spikes if text)

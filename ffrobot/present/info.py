@@ -52,14 +52,21 @@ def _modal_body(body: ModalBody) -> str:
         f"geometric stiffness: {', '.join(body.geometric_stiffness) or 'none'}",
         *_optional(body),
     ]
-    modes = Table("mode", "family", "frequency (Hz)", "ω (rad/s)", "damping ratio")
+    return "\n".join(lines) + "\n" + _rendered(_modes(body))
+
+
+def _modes(body: ModalBody) -> Table:
+    """A line for each mode, with what the model says where the frequency was measured."""
+    computed = None if body.measured is None else body.measured.computed_frequency
+    more = () if computed is None else ("of the model (Hz)",)
+    table = Table("mode", "family", "frequency (Hz)", *more, "ω (rad/s)", "damping ratio")
     for k, family in enumerate(body.family):
-        frequency = body.frequency[k]
         kind = f"{family}, attachment" if body.residual[k] else family
-        modes.add_row(
-            f"{k + 1}", kind, f"{frequency:.6f}", f"{6.283185307179586 * frequency:.5f}", f"{body.damping_ratio[k]:g}"
-        )
-    return "\n".join(lines) + "\n" + _rendered(modes)
+        row = [f"{body.frequency[k]:.6f}", f"{2 * np.pi * body.frequency[k]:.5f}", f"{body.damping_ratio[k]:g}"]
+        if computed is not None:
+            row.insert(1, f"{computed[k]:.6f}")
+        table.add_row(f"{k + 1}", kind, *row)
+    return table
 
 
 def _place(body: ModalBody, position: Array) -> str:
@@ -75,6 +82,8 @@ def _and_static(body: ModalBody) -> str:
 
 def _optional(body: ModalBody) -> Iterator[str]:
     """Lines on what only some modal bodies have."""
+    if body.measured is not None:
+        yield f"measured: {body.measured.in_words()}; shapes are those of the model"
     for name, point in body.stress.items():
         yield f"modal{_and_static(body)} stresses at {name}, {_place(body, point.position)}"
     if body.surface_stress is not None:

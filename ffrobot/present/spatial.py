@@ -9,14 +9,16 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from ..results.verdict import Verdict
 from ..run.spatial import SpatialSolution
 from .tables import plain_table
+from .voltages import voltage_table
 
 
 def print_spatial_summary(
-    solution: SpatialSolution, path: Path, seconds: Mapping[str, float], console: Console
+    solution: SpatialSolution, verdict: Verdict, path: Path, seconds: Mapping[str, float], console: Console
 ) -> None:
-    """A table of the analyses, one of the motors, warnings, wall time per stage, where the results are."""
+    """Tables of analyses, motors and patches, warnings, whether it can be done, wall time per stage, the file."""
     table = plain_table("analysis", "kind", "status", "integrator", "steps", "evaluations", "off the constraints")
     motors = plain_table("analysis", "motor", "largest", "unit")
     units = {joint.name: joint.units for joint in solution.scene.joint}
@@ -32,10 +34,23 @@ def print_spatial_summary(
     if motors.row_count:
         console.print()
         console.print(motors)
+    voltages = voltage_table(
+        (name, layout, array, result.actuation.voltages[layout])
+        for name, result in solution.analyses.items()
+        if result.actuation is not None
+        for of_link in solution.patches.values()
+        for layout, array in of_link.arrays.items()
+    )
+    if voltages.row_count:
+        console.print()
+        console.print(voltages)
     for name, result in solution.analyses.items():
-        for text in result.run.warnings:
+        for text in result.warnings:
             console.print(f"warning    {name}: {text}")
     notes = Table.grid(padding=(0, 2))
+    for one in verdict.analyses:
+        if one.answer:
+            notes.add_row("verdict", f"{one.name}: {one.answer}")
     for note in solution.notes:
         notes.add_row("links", note)
     notes.add_row("time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))

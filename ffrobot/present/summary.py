@@ -20,6 +20,7 @@ from ..run.solution import ModeChoice, Solution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
 from .tables import plain_table
+from .voltages import voltage_table
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
 
@@ -165,20 +166,11 @@ def _analyses(solution: Solution) -> Table:
 
 
 def _voltages(solution: Solution) -> Table:
-    table = plain_table("voltages of", "on", "largest (V)", "limit (V)", "times limit", "cond Φ_V")
-    for name, result in solution.analyses.items():
-        for body, values in result.voltages.items():
-            patches = solution.patches[body]
-            limit = patches.limit.min()
-            table.add_row(
-                name,
-                body,
-                f"{values.largest:.0f}" if values.largest >= 1e3 else f"{values.largest:.3g}",
-                "none" if limit == np.inf else f"{limit:g}",
-                "" if limit == np.inf else f"{np.abs(values.required / patches.limit).max():.3g}",
-                f"{patches.condition_number:.3g}",
-            )
-    return table
+    return voltage_table(
+        (name, body, solution.patches[body], values)
+        for name, result in solution.analyses.items()
+        for body, values in result.voltages.items()
+    )
 
 
 def _stresses(solution: Solution) -> Table:

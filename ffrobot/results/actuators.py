@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 
 import h5py
@@ -12,9 +12,12 @@ from ..actuation.control.placement import Placed
 from ..actuation.feasibility import Feasibility
 from ..actuation.motors import MotorFeasibility
 from ..actuation.patches.patches import PatchArray
+from ..actuation.patches.records import PatchKeys
 from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointForces, PointSet
 from ..actuation.prediction import Unsupplied
+from ..actuation.spatial_feasibility import UnsuppliedInSpace
+from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
 from ..run.solution import AnalysisResult, Solution
 
@@ -22,7 +25,7 @@ from ..run.solution import AnalysisResult, Solution
 def write_actuators(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
     """Of an analysis: pzt/, actuation_points/, patch_structure/, feasibility/, and what is left undone at points/."""
     for body, voltages in result.voltages.items():
-        _write_voltages(group.create_group(f"pzt/{body}"), solution.patches[body], voltages)
+        write_voltages(group.create_group(f"pzt/{body}"), solution.patches[body], voltages, voltages.unmet)
     for body, forces in result.point_forces.items():
         _write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)
     for body, effect in solution.structure.items():
@@ -34,7 +37,8 @@ def write_actuators(group: h5py.Group, solution: Solution, result: AnalysisResul
         _write_feasibility(group.create_group("feasibility"), solution, result.feasibility)
 
 
-def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) -> None:
+def write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages, unmet: Array) -> None:
+    """Of one layout, and the modal forces `unmet` (T, n) that it leaves."""
     group["voltage"] = voltages.within_limit
     group["required_voltage"] = voltages.required
     group["residual"] = voltages.residual
@@ -43,7 +47,7 @@ def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages) 
     group["stiffness_ratio"] = patches.stiffness_ratio
     group["authority"] = patches.authority
     group.attrs["condition_number"] = patches.condition_number
-    group["residual_force"] = voltages.unmet
+    group["residual_force"] = unmet
     group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
 
 
@@ -51,10 +55,15 @@ def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibilit
     group.attrs["feasible"] = judged.is_feasible
     if judged.unsupplied is not None:
         group.create_group("unsupplied").attrs.update(vars(judged.unsupplied))
+    write_judgement(group, judged, {name: array.layout for name, array in solution.patches.items()})
+
+
+def write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, PatchKeys]) -> None:
+    """What is required of each motor and each of the layouts, against what they can."""
     for joint, motor in judged.motors.items():
         group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
-    for body, patches in judged.patches.items():
-        entry, layout = group.create_group(f"pzt/{body}"), solution.patches[body].layout
+    for name, patches in judged.patches.items():
+        entry, layout = group.create_group(f"pzt/{name}"), layouts[name]
         arrays = {key: value for key, value in vars(patches).items() if isinstance(value, np.ndarray)}
         for key, values in (arrays | {"factor": patches.factor, "mode_factor": patches.mode_factor}).items():
             entry[key] = values
@@ -79,11 +88,14 @@ def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeas
     }
 
 
-def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
+def read_unsupplied(group: h5py.Group) -> Unsupplied | UnsuppliedInSpace | None:
     """Of the feasibility of an analysis: what nothing supplies; None where there is nothing of the kind."""
     if "unsupplied" not in group:
         return None
     about = dict(group["unsupplied"].attrs)
+    if "families" in about:
+        lists = {key: tuple(about[key]) for key in ("bodies", "families", "deflection", "rotation")}
+        return UnsuppliedInSpace(**lists, with_patches=bool(about["with_patches"]))
     return Unsupplied(**(about | {"bodies": tuple(about["bodies"])}))
 
 

@@ -22,6 +22,10 @@ def write_loop(group: h5py.Group, outcome: Outcome, record: LoopRecord) -> None:
     group.attrs["outputs"] = list(record.outputs)
     group.attrs["warnings"] = list(record.warnings)
     group.attrs.update(vars(record.metrics))
+    group.attrs["advice"] = list(record.advice)
+    if record.margins is not None:
+        found = record.margins
+        group.attrs.update(spectral_radius=found.radius, gain_margin=found.gain, delay_margin=found.delay)
 
 
 def read_metrics(attributes: Mapping[str, Any]) -> Metrics:

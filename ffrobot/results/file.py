@@ -179,6 +179,13 @@ class Results:
         return str(self.attributes("/")["name"])
 
     @property
+    def is_spatial(self) -> bool:
+        """Whether they are of a scene in space."""
+        from .joints import is_spatial
+
+        return is_spatial(self.scene)
+
+    @property
     def ffrobot_version(self) -> str:
         """Version of the program that wrote the file."""
         return str(self.attributes("/")["ffrobot_version"])
@@ -270,7 +277,7 @@ class Results:
         from .verdict import judge
 
         with blaming(self.path):
-            return judge(self._file, self.analyses, self.scene.get("joint", []))
+            return judge(self._file, self.analyses, self.scene)
 
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`.

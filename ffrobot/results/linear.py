@@ -39,6 +39,7 @@ def write_linear(group: h5py.Group, outcome: Outcome, linear: LinearModels) -> N
         group[f"modes/{body.name}/position"] = columns[:, :, :2]
         group[f"modes/{body.name}/angle"] = columns[:, :, 2]
         group[f"modes/{body.name}/modal"] = columns[:, :, 3:] @ body.modal_transform.T
+    group.attrs["advice"] = linear.advice
     for k, (pair, found) in enumerate(linear.zeros.items(), 1):
         _write_zeros(group, f"zeros/{k}", pair, found)
 

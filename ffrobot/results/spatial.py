@@ -10,6 +10,7 @@ import numpy as np
 from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..run.spatial import SpatialResult, SpatialSolution
+from .spatial_actuation import write_actuation
 from .write import write_head
 
 
@@ -26,6 +27,8 @@ def spatial_image(solution: SpatialSolution) -> bytes:
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
             _write_analysis(file.create_group(name), result)
+            if result.actuation is not None:
+                write_actuation(file[name], solution, result.actuation)
         file.flush()
         image: bytes = file.id.get_file_image()
     return image
@@ -39,7 +42,7 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
     for key in ("integrator", "steps", "evaluations", "wall_seconds", "status"):
         group.attrs[key] = getattr(run, key)
-    group.attrs.create("warnings", list(run.warnings), dtype=h5py.string_dtype())
+    group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
     group["time"] = run.time
     _write_bodies(group, result)
     _write_joints(group, result)
@@ -47,6 +50,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
         entry = group.create_group(f"trajectories/{trajectory.name}")
         entry["force"] = motion.path_force(trajectory.name)
         entry.attrs["components"] = list(trajectory.components)
+        if functions := list(trajectory.components.values()):
+            entry["target"] = np.stack([function.sample(run.time)[0] for function in functions], axis=1)
     for part in ("energies", "momentum"):
         for key, values in vars(getattr(result, part)).items():
             group[f"{'energy' if part == 'energies' else part}/{key}"] = values

@@ -10,9 +10,8 @@ import numpy as np
 
 from ..actuation.motors import MotorFeasibility, judge_motion
 from ..common.arrays import Array
-from ..mbs.joints.joints import JOINT_TYPES
-from ..mbs.joints.transmission import MotorLimits
 from .actuators import read_motors, read_unsupplied
+from .joints import Coordinates, Scene, labelled_coordinates
 
 Place = tuple[float, str, float]
 """A largest value, where it is, and when (s)."""
@@ -40,6 +39,7 @@ class AnalysisVerdict:
         patches: by body, of an inverse analysis.
         deflection: largest of a point, m, which, and when.
         stress: largest von Mises, Pa, the body, and when; None where none was asked for.
+        margins: of a closed loop by its linear model, in words; empty where not known.
         warnings: why results may be wrong, or not mean what they seem to.
         advice: what to try next, a text each.
     """
@@ -55,6 +55,7 @@ class AnalysisVerdict:
     patches: Mapping[str, PatchNeed]
     deflection: Place | None
     stress: Place | None
+    margins: str
     warnings: tuple[str, ...]
     advice: tuple[str, ...]
 
@@ -68,6 +69,8 @@ class AnalysisVerdict:
             yield f"  largest deflection {_place(1e3 * self.deflection[0], 'mm', *self.deflection[1:])}"
         if self.stress is not None:
             yield f"  largest stress {_place(self.stress[0] / 1e6, 'MPa', *self.stress[1:])} (von Mises)"
+        if self.margins:
+            yield f"  {self.margins}"
         yield from (f"  to try: {text}" for text in self.advice)
 
     @property
@@ -100,14 +103,15 @@ class Verdict:
             yield from one.lines()
 
 
-def judge(file: h5py.File, analyses: Sequence[str], joints: Sequence[Mapping[str, str | float]]) -> Verdict:
-    """The verdict of the `analyses` of a results file; `joints` as the scene has them."""
-    return Verdict(tuple(_judge(name, file[name], joints) for name in analyses))
+def judge(file: h5py.File, analyses: Sequence[str], scene: Scene) -> Verdict:
+    """The verdict of the `analyses` of a results file of a `scene`."""
+    coordinates = labelled_coordinates(scene)
+    return Verdict(tuple(_judge(name, file[name], coordinates) for name in analyses))
 
 
-def _judge(name: str, group: h5py.Group, joints: Sequence[Mapping[str, str | float]]) -> AnalysisVerdict:
-    motors = _motors(group, joints)
-    units = {str(joint["name"]): JOINT_TYPES[str(joint["type"])].force_unit for joint in joints}
+def _judge(name: str, group: h5py.Group, coordinates: Coordinates) -> AnalysisVerdict:
+    motors = _motors(group, coordinates)
+    units = {label: coordinate.force_unit for label, (_, coordinate) in coordinates.items()}
     patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
     answer, feasible = _answer(group, motors, patches)
     about = group.attrs
@@ -123,21 +127,22 @@ def _judge(name: str, group: h5py.Group, joints: Sequence[Mapping[str, str | flo
         patches=patches,
         deflection=None if _ended_early(group) else _deflection(group),
         stress=None if _ended_early(group) else _stress(group),
+        margins=_margins(group),
         warnings=tuple(map(str, about.get("warnings", ()))),
         advice=tuple(_advice(group, motors, units, patches)),
     )
 
 
-def _motors(group: h5py.Group, joints: Sequence[Mapping[str, str | float]]) -> dict[str, MotorFeasibility]:
+def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasibility]:
     """As the analysis judged them; of kinds that do not, such as closed loops, from what their motors did."""
     if "feasibility" in group:
-        return read_motors(group["feasibility"], [str(joint["name"]) for joint in joints])
+        return read_motors(group["feasibility"], list(coordinates))
     found, time = {}, group["time"][()]
-    for joint in joints:
-        entry = group.get(f"joints/{joint['name']}")
+    for label, (joint, coordinate) in coordinates.items():
+        entry = group.get(f"joints/{joint}")
         if entry is not None and "moment" in entry and "rate" in entry:
-            limits = MotorLimits(*(float(joint.get(f"{what}_limit", np.inf)) for what in ("moment", "speed", "power")))
-            found[str(joint["name"])] = judge_motion(time, entry["moment"][()], entry["rate"][()], limits)
+            moment, rate = (coordinate.of(entry[dataset][()]) for dataset in ("moment", "rate"))
+            found[label] = judge_motion(time, moment, rate, coordinate.limits)
     return found
 
 
@@ -242,8 +247,31 @@ def _advice(
             )
     if asked and read_unsupplied(group["feasibility"]) is not None:
         yield 'kind = "motors-only", or patches ([[pzt]]) on the links'
-    if "control" in group and group["control"].attrs["verdict"] != "stable":
-        yield "smaller gains, a shorter sample_time, or rotor_inertia in the joints"
+    if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
+        yield text
+    if "control" in group:
+        about = group["control"].attrs
+        general = ("smaller gains, a shorter sample_time, or rotor_inertia in the joints",)
+        yield from (
+            map(str, about.get("advice", ()))
+            if len(about.get("advice", ()))
+            else (general if about["verdict"] != "stable" else ())
+        )
+
+
+def _margins(group: h5py.Group) -> str:
+    """Of a closed loop of joint PID controllers."""
+    about = group["control"].attrs if "control" in group else {}
+    if "gain_margin" not in about:
+        return ""
+    if about["delay_margin"] == 0.0:
+        return f"margins (linear model): none, spectral radius of the sampled loop {about['spectral_radius']:.6g}"
+    gain, delay = float(about["gain_margin"]), float(about["delay_margin"])
+    texts = (
+        f"gains may grow {gain:.3g}-fold" if np.isfinite(gain) else "gains may grow as they like",
+        f"the delay by {1e3 * delay:.3g} ms" if np.isfinite(delay) else "the delay by 50 sample times or more",
+    )
+    return f"margins (linear model): {', '.join(texts)}"
 
 
 def _motor(motor: MotorFeasibility, unit: str) -> str:

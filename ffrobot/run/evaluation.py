@@ -9,9 +9,9 @@ from functools import partial
 
 import numpy as np
 
-from ..actuation.feasibility import Feasibility, judge_patches
+from ..actuation.feasibility import Feasibility, ModalMotion, judge_patches
 from ..actuation.motors import MotorFeasibility, judge_motors
-from ..actuation.patches.composite import section_loads
+from ..actuation.patches.composite import Placed, section_loads
 from ..actuation.patches.patches import with_patch_count
 from ..actuation.patches.voltages import voltage_gain
 from ..actuation.points import PointForces, solve_point_forces
@@ -50,7 +50,7 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
         mode_error=mode_error(outcome.computed) if outcome.analysis.is_integrated else None,
         start_jolt=start_jolt(outcome.computed) if outcome.analysis.is_integrated else 0.0,
     )
-    result = replace(result, warnings=tuple(warnings_of(result)))
+    result = replace(result, warnings=tuple(warnings_of(solution.scene, result)))
     return replace(result, seconds=result.seconds + time.perf_counter() - began)
 
 
@@ -105,7 +105,9 @@ def _feasibility(solution: Solution, result: AnalysisResult) -> Feasibility | No
         loaded = solution.bodies[body]
         assert loaded.modal is not None
         trial = partial(with_patch_count, solution.scene.path, array.layout, loaded.modal, loaded.planar)
-        patches[body] = judge_patches(array, result.voltages[body], outcome, trial)
+        p = outcome.q[:, outcome.coordinates(body)][:, 3:]
+        motion = ModalMotion(outcome.time, p, outcome.F_p[:, outcome.modal_columns(body)])
+        patches[body] = judge_patches(array, result.voltages[body], motion, trial)
     return Feasibility(_judge_motors(solution, outcome), patches)
 
 
@@ -137,4 +139,4 @@ def _sections(solution: Solution, body: str, p: Array, loads: LinkLoads) -> Sect
     if patches is None or not patches.layout.adds_stiffness or not np.isfinite(patches.authority).all():
         return None
     voltages = loads.modal_force @ voltage_gain(patches).T
-    return section_loads(patches.layout, solution.links[body], patches.edges, p, voltages)
+    return section_loads(Placed(patches.layout, patches.edges), solution.links[body], p, voltages)

@@ -73,7 +73,7 @@ def finer_scene(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Scene:
 
 
 def _twice_the_modes(keys: dict[str, Any], modal: ModalBody) -> dict[str, Any]:
-    modes = {key: value for key, value in keys["modes"].items() if key != "indices"}
+    modes = {key: value for key, value in keys.get("modes", {}).items() if key != "indices"}
     damping = dict(keys.get("damping", {}))
     if isinstance(damping.get("ratio"), list | tuple):  # one for each mode: the last is that of all above
         damping["ratio"] = [*damping["ratio"], *[damping["ratio"][-1]] * modal.eigenmode_count]

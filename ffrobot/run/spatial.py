@@ -8,7 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..actuation.patches.spatial_patches import LinkPatches
 from ..common.errors import of_file
+from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.spatial_kinds import IN_SPACE
 from ..mbs.analysis.spatial_run import SpatialContext, SpatialRun
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
@@ -18,6 +20,7 @@ from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
+from .spatial_actuation import SpatialActuation, actuated_in_space, patches_in_space
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
 from .watcher import Interruption, Watcher
 
@@ -26,13 +29,28 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class SpatialResult:
-    """What was computed of one analysis: the run, its motion, and forces in joints by name."""
+    """What was computed of one analysis.
+
+    Attributes:
+        run: how it went, and states.
+        motion: what is read off them.
+        reactions: forces in joints by name.
+        energies, momentum: of the robot.
+        actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
+    """
 
     run: SpatialRun
     motion: SpatialMotion
     reactions: Mapping[str, Wrench]
     energies: Energies
     momentum: Momentum
+    actuation: SpatialActuation | None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why results may be wrong, or not mean what they seem to, a text each."""
+        missed = None if self.actuation is None else self.actuation.unsupplied
+        return self.run.warnings if missed is None else (*self.run.warnings, missed.in_words)
 
 
 @dataclass(frozen=True)
@@ -42,6 +60,7 @@ class SpatialSolution:
     Attributes:
         scene, model: what was solved.
         bodies: by name.
+        patches: by body.
         analyses: by name, in the order of the scene.
         seconds: wall time by stage.
         failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
@@ -50,14 +69,21 @@ class SpatialSolution:
     scene: SpatialScene
     model: SpatialModel
     bodies: Mapping[str, LoadedSpatialBody]
+    patches: Mapping[str, LinkPatches]
     analyses: Mapping[str, SpatialResult]
     seconds: Mapping[str, float]
     failure: Exception | None = None
 
     @property
+    def links(self) -> dict[str, ModalBody]:
+        """The modal bodies of the flexible bodies, as their files have them."""
+        return {name: body.modal for name, body in self.bodies.items() if body.modal is not None}
+
+    @property
     def notes(self) -> tuple[str, ...]:
-        """What links cannot do, one line each."""
-        return tuple(
+        """What patches do to the stiffness of their links, and what links cannot do, one line each."""
+        stiffness = (array.stiffness_in_words for of in self.patches.values() for array in of.arrays.values())
+        return tuple(stiffness) + tuple(
             f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"
             for name, body in self.bodies.items()
             if body.rigid_in
@@ -81,7 +107,8 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     seconds = {"bodies": time.perf_counter() - began}
     model = build_spatial_model(scene, [body.spatial for body in loaded])
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
-    solution = SpatialSolution(scene, model, bodies, {}, seconds)
+    patches = patches_in_space(scene, bodies)
+    solution = SpatialSolution(scene, model, bodies, patches, {}, seconds)
     with Interruption(watcher.stopping) as interruption:
         solution = _run_all(solution, watcher, interruption)
         if keep is not None and solution.analyses:
@@ -103,7 +130,7 @@ def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interrup
         try:
             with of_file(solution.scene.path):
                 run = IN_SPACE[analysis.kind](_context(solution, analysis, results, watcher, interruption), analysis)
-                results[analysis.name] = _evaluated(run)
+                results[analysis.name] = _evaluated(solution, run)
         except Exception as error:  # raised once the analyses before it are kept
             if not results:
                 raise
@@ -130,12 +157,15 @@ def _context(
     return SpatialContext(solution.model, {name: result.run for name, result in results.items()}, progress)
 
 
-def _evaluated(run: SpatialRun) -> SpatialResult:
+def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     """What is read off a run."""
     motion = SpatialMotion(
         run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied
     )  # fmt: skip
-    return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion))
+    actuation = None
+    if motion.motor_forces is not None:  # else nothing is asked of motors and patches
+        actuation = actuated_in_space(solution.scene, motion, solution.bodies, solution.patches)
+    return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion), actuation)
 
 
 def _log(run: SpatialRun) -> None:

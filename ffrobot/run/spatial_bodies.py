@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..actuation.patches.spatial_patches import by_body, link_patches
+from ..actuation.patches.spatial_records import SpatialPztLayout
+from ..actuation.patches.spatial_structure import structure_effect_in_space, with_patches_in_space
+from ..actuation.patches.structure import StructureEffect
 from ..fe_models.link_records import FAMILIES
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.model.spatial_body import SpatialBody, from_modal_body, rigid_body
@@ -18,9 +22,10 @@ from .loaded_body import Loaded, payloads_on
 
 @dataclass(frozen=True, kw_only=True)
 class LoadedSpatialBody(Loaded):
-    """A body of the scene with its equations in space."""
+    """A body of the scene with its equations in space, and what patches that are part of it change."""
 
     spatial: SpatialBody
+    structure: StructureEffect | None = None
 
     @property
     def rigid_in(self) -> tuple[str, ...]:
@@ -31,8 +36,13 @@ class LoadedSpatialBody(Loaded):
 
 
 def load_spatial_bodies(scene: SpatialScene, stage: Callable[[str], None]) -> list[LoadedSpatialBody]:
-    """In the order of the scene, with their payloads; stage 1 runs where links are out of date, and tells `stage`."""
-    return [_with_payloads(scene, _loaded(body, stage)) for body in scene.body]
+    """In the order of the scene, with payloads and patches; stage 1 runs where links are out of date: `stage` is told.
+
+    Raises `InputError` for files that are none, and payloads and patches that do not fit.
+    """
+    patches = dict(by_body(scene.pzt))
+    bodies = [(body.name, _with_payloads(scene, _loaded(body, stage))) for body in scene.body]
+    return [_patched(scene, loaded, patches[name]) if name in patches else loaded for name, loaded in bodies]
 
 
 def _loaded(body: BodyInSpace, stage: Callable[[str], None]) -> LoadedSpatialBody:
@@ -59,3 +69,13 @@ def _with_payloads(scene: SpatialScene, body: LoadedSpatialBody) -> LoadedSpatia
     for point, payload in payloads_on(scene.payload, spatial.name, spatial.points, scene.path):
         spatial = with_payload(spatial, point, payload.mass, np.array(payload.center), tensor(payload.inertia))
     return replace(body, spatial=spatial)
+
+
+def _patched(scene: SpatialScene, body: LoadedSpatialBody, layouts: Sequence[SpatialPztLayout]) -> LoadedSpatialBody:
+    """With the mass and stiffness of its patches, as far as the scene asks for it."""
+    assert body.modal is not None
+    link_patches(scene.path, layouts, body.modal, body.spatial)  # refuses patches that do not fit
+    if not any(layout.adds_mass or layout.adds_stiffness for layout in layouts):
+        return body
+    patched = with_patches_in_space(body.spatial, body.modal, layouts)
+    return replace(body, spatial=patched, structure=structure_effect_in_space(body.spatial, patched))

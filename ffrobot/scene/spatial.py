@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ..actuation.patches.spatial_records import SpatialPztLayout
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
@@ -29,7 +30,7 @@ APPLICABLE = ("joints", "trajectory")  # values of `apply`
 
 # Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
 UNAVAILABLE = {
-    "": ("geometric_stiffening", "pzt", "actuation_points"),
+    "": ("geometric_stiffening", "actuation_points"),
     "body": ("modes", "pieces"),
     "trajectory": ("via", "profile", "shaper"),
     "load": ("pzt", "voltage", "force"),
@@ -39,12 +40,16 @@ UNAVAILABLE = {
 class SpatialSceneKeys(SpatialMechanismKeys):
     """Everything a scene file in space may contain."""
 
+    pzt: tuple[SpatialPztLayout, ...] = ()
+    """Layouts of piezoelectric patches; several on a body are told apart by their names."""
     analysis: Annotated[tuple[Analysis, ...], NotEmpty]
     """What is computed, in this order."""
 
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""
         yield from super().references()
+        for layout in self.pzt:
+            yield from under(f'pzt "{layout.label}"', layout.references())
         for analysis in self.analysis:
             yield from under(f'analysis "{analysis.name}"', analysis.references())
 
@@ -120,6 +125,9 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
         for name, count in Counter(record.name for record in getattr(scene, kind)).items():
             if count > 1:
                 yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
+    for label, count in Counter(layout.label for layout in scene.pzt).items():
+        if count > 1:
+            yield f'pzt "{label}": name: expected a name of its own for each layout on a body, found {count} of this'
     yield from _reference_problems(scene)
     for k, analysis in enumerate(scene.analysis):
         for problem in analysis.problems(Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS)):
@@ -132,6 +140,7 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
 
 def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     bodies, joints = [body.name for body in scene.body], {joint.name: joint for joint in scene.joint}
+    rigid = [body.name for body in scene.body if body.rigid is not None]
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
     for reference in scene.references():
@@ -147,7 +156,7 @@ def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f'{reference.key}: expected one of the bodies {quoted(bodies)}, found "{body}"' + did_you_mean(
                 body, bodies
             )
-        elif reference.kind == "flexible body" and scene.body[bodies.index(name)].rigid is not None:
+        elif reference.kind == "flexible body" and name in rigid:
             yield f'{reference.key}: expected a flexible body, found "{name}", which is rigid'
 
 
@@ -161,6 +170,9 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f'{joint.label}: stiffness: expected none in space = "spatial", found it: not available there yet'
         if not joint.units and getattr(joint, "motor", False):
             yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
+    for layout in scene.pzt:
+        if layout.coupling != "rotation":
+            yield f'pzt "{layout.label}": coupling: expected "rotation", found "surface": not available in space yet'
     for k, load in enumerate(scene.load, 1):
         loaded = next((joint for joint in scene.joint if joint.name == load.joint), None)
         if loaded is not None and len(loaded.units) != 1:

@@ -54,9 +54,9 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
     links: dict[str, Table] = {}
     for key, value in changes.items():
         if key[0] == LINKS:
-            _set(_link_of(scene_path, scene, key, links), key[2:], value, key)
+            set_key(_link_of(scene_path, scene, key, links), key[2:], value, key)
         else:
-            _set(scene, key, value, key)
+            set_key(scene, key, value, key)
     inputs = fingerprints(scene, scene_path.absolute())
     copies = {}
     for body, link in links.items():
@@ -109,8 +109,22 @@ def _resolve(data: Node, folder: Path) -> None:
             data[key] = str(folder / name) + colon + function  # type: ignore[call-overload]
 
 
-def _set(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ...]) -> None:
-    """data[key] = value; entries of a list go by their number (from 0), their `name` or their `body`."""
+def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = ()) -> Value:
+    """data[key], entries of a list as in `set_key`; None where there is none."""
+    if isinstance(data, dict) and key[0] not in data:
+        return None
+    value = data[_index(data, key[0], whole or key)]  # type: ignore[index]
+    if len(key) == 1 or value is None:
+        return value
+    return value_of(value, key[1:], whole or key) if isinstance(value, dict | list) else None
+
+
+def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ...] = ()) -> None:
+    """data[key] = value; entries of a list go by their number (from 0), their `name` or their `body`.
+
+    `whole` is what messages call the key, where that is not `key` itself.
+    """
+    whole = whole or key
     if len(key) == 1:
         data[_index(data, key[0], whole)] = value  # type: ignore[index]
         return
@@ -119,7 +133,7 @@ def _set(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ...])
     inner = data[_index(data, key[0], whole)]  # type: ignore[index]
     if not isinstance(inner, dict | list):
         raise InputError(f'--vary: expected a table or a list at "{key[0]}" of "{".".join(whole)}", found {inner!r}')
-    _set(inner, key[1:], value, whole)
+    set_key(inner, key[1:], value, whole)
 
 
 def _index(data: Node, part: str, whole: tuple[str, ...]) -> str | int:

@@ -9,12 +9,15 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
-from ..model.model import Constraint
+from ..fields.field_types import GROUND, split_point
+from ..model.model import Constraint, Model
 from ..model.system import MechanismSystem
+from ..scene.mechanism import MechanismKeys
 from .position import SINGULAR, rank_ratio, solve_positions
 from .state import State
 
 REACH_CHECKS = 200
+AXES = ("x", "y")
 GOLDEN_SECTIONS = 35  # between two of them: a kink is found to 1e-7 of their distance
 
 
@@ -87,17 +90,68 @@ def unreachable(assembly: MechanismSystem, t: float, q: Array) -> str:
         else "reach only in a singular configuration (stretched, folded, at a dead centre), from which no force on it"
         " says which way they go on: keep clear of it, or drive a joint instead"
     )
+    scene = assembly.model.scene
     only_joints = MechanismSystem(assembly.model, assembly.model.joints)
     if trajectories and solve_positions(only_joints, t, q) is not None:
+        more = "".join(f"; {text}" for text in (_distance(assembly, trajectories, t), *turned_guesses(scene)) if text)
         return (
             f"{assembly.model.scene.path}: {owners(trajectories)}: expected a target within reach, found one at"
-            f" t = {t:.6g} s that the undeformed links {how}"
+            f" t = {t:.6g} s that the undeformed links {how}{more}"
         )
     return (
         f"{assembly.model.scene.path}: expected joints that can be closed, found that"
         f" {owners([c for c in assembly.constraints if not c.is_trajectory])}"
         f" cannot be met at t = {t:g} s from the initial angles"
     )
+
+
+def _distance(assembly: MechanismSystem, trajectories: Sequence[Constraint], t: float) -> str:
+    """How far the target of the first point among trajectories is at t (s), and how far the links reach."""
+    model = assembly.model
+    points = {record.name: record.point for record in model.scene.trajectory if record.point is not None}
+    held = [c for c in trajectories if c.owner in points and c.component in AXES]
+    chain = _chain(model, points[held[0].owner]) if held else None
+    if chain is None:
+        return ""
+    of_point = [c for c in held if c.owner == held[0].owner]
+    away = [float(c.target.sample(np.array([t]))[0][0]) - chain.at[AXES.index(c.component)] for c in of_point]
+    distance, along = float(np.hypot.reduce(away)), "" if len(away) > 1 else f" along {of_point[0].component}"
+    unit = ': are these m? (mm are written "750*mm")' if distance > 10 * chain.reach else ""
+    return (
+        f'it is {distance:.4g} m{along} from joint "{chain.joint}" on the ground, from which the links reach'
+        f" {chain.reach:.4g} m{unit}"
+    )
+
+
+class _Chain(NamedTuple):
+    """The joint on the ground behind which a point is, its place (2,), m, and the most that links reach from there."""
+
+    joint: str
+    at: tuple[float, float]
+    reach: float
+
+
+def _chain(model: Model, point: str) -> _Chain | None:
+    """Of a point ("BODY.POINT"), by the undeformed links that carry it; None where a way between them is open."""
+    scene, reach = model.scene, 0.0
+    while point != GROUND:
+        name, own = split_point(point)
+        carrier = scene.topology.grounded[name]
+        joint, places = scene.joint[carrier.joint], model.body(name).points
+        if joint.type not in ("revolute", "weld"):
+            return None
+        reach += float(np.linalg.norm(places[own].position - places[split_point(carrier.own)[1]].position))
+        point = carrier.other
+    return _Chain(joint.name, joint.at, reach)
+
+
+def turned_guesses(scene: MechanismKeys) -> list[str]:
+    """Guesses of `initial.angles` beyond a whole turn, which are degrees as a rule; a text each."""
+    return [
+        f'initial.angles: {name} = {angle:g} rad is more than a turn (degrees are written "{angle:g}*deg")'
+        for name, angle in scene.initial.angles.items()
+        if abs(angle) > 2 * np.pi
+    ]
 
 
 def owners(constraints: Sequence[Constraint]) -> str:

@@ -7,8 +7,9 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from ffrobot.actuation.control.closed_loop import run_closed_loop
-from ffrobot.actuation.control.lqr import gains, sampled
+from ffrobot.actuation.control.lqr import gains
 from ffrobot.actuation.control.rigid_arm import RigidArm
+from ffrobot.actuation.control.sampling import sampled
 from ffrobot.actuation.control.signals import volts_per_modal_coordinate
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.python_files import python_allowed

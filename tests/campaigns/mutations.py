@@ -1,16 +1,17 @@
-"""Every key of every case with hostile values: what is solved, refused, stopped with a reason, and what falls over.
+"""Every key of every case, and of scenes in space, with hostile values: what is solved, refused, or falls over.
 
     python tests/campaigns/mutations.py [--count 100] [--seed 0] [--case NAME …] [--folder FOLDER] [--record]
 
-Run by hand, about half a second each. Every case is cut short, and its scene, link or figure file changed in one place:
-values of other types, huge, tiny, not finite, empty, nested, with markup and line breaks, keys removed, added, doubled,
-damage to the text. Keys take turns, values are drawn. The command runs in a process forked from this one, with limits
-of time and memory, and after `solve` the commands that read its results. Exit code 1 where anything fell over: a
+Run by hand, about half a second each. Every scene is cut short, and its scene, link or figure file changed in one
+place: values of other types, huge, tiny, not finite, empty, nested, with markup and line breaks, keys removed, added,
+doubled, damage to the text. Keys take turns, values are drawn. The command runs in a process forked from this one, with
+limits of time and memory, and after `solve` the commands that read its results. Exit code 1 where anything fell over: a
 traceback, a crash, no end within a minute of processor time, a message that names no file, other words on stderr.
 """
 
 import argparse
 import copy
+import json
 import os
 import random
 import re
@@ -33,8 +34,13 @@ from typing import Any
 import tomli_w
 from record import record
 
+sys.path.append(str(Path(__file__).parents[1] / "checkpoints" / "spatial"))
+from scene_of import scene
+
 ROOT = Path(__file__).parents[2]
 CASES = ROOT / "cases"
+CHECKPOINTS = ROOT / "tests" / "checkpoints" / "spatial"
+IN_SPACE = ("arm3_line_static", "stanford", "slider_crank_3d")
 CPU_TIME = 60  # s for one command
 PATIENCE = 600  # s of wall time: something waits for ever
 MEMORY = 8 << 30  # bytes of address space
@@ -111,6 +117,14 @@ def shortened(scene: dict[str, Any]) -> dict[str, Any]:
         if "times" in analysis and analysis.get("about") in ends:
             analysis["times"] = [0.0, ends[analysis["about"]]]
     return scene
+
+
+def write_scene_in_space(name: str, folder: Path) -> None:
+    text, links = scene(json.loads((CHECKPOINTS / f"{name}.json").read_text(encoding="utf-8")), 1e-5)
+    folder.mkdir()
+    (folder / "scene.toml").write_text(text, encoding="utf-8")
+    for link in links:
+        shutil.copy(CHECKPOINTS / link, folder)
 
 
 def places(data: Any, here: tuple[int | str, ...] = ()) -> Iterator[tuple[int | str, ...]]:
@@ -319,7 +333,9 @@ class Campaign:
         ready = folder / "ready"
         if not ready.exists():
             shutil.copytree(CASES, ready, ignore=shutil.ignore_patterns("*.h5", "figures", "README.md"))
-        names = sorted(path.parent.name for path in CASES.glob("*/scene.toml"))
+            for name in IN_SPACE:
+                write_scene_in_space(name, ready / name)
+        names = sorted(path.parent.name for path in ready.glob("*/scene.toml"))
         self.cases = [self.prepared(ready / name) for name in names if cases is None or name in cases]
         keys = {
             key for case in self.cases for file in case.files for key in known_keys(tomllib.loads(file.read_text()))
@@ -437,7 +453,8 @@ def main() -> None:
         for key, number in found.counts.items():
             kinds[key.partition(": ")[2]] += number
         tried = (
-            f"{asked.count} single changes of keys and text in scene, link and figure files of all cases, cut short;"
+            f"{asked.count} single changes of keys and text in scene, link and figure files of all cases, and of"
+            f" {len(IN_SPACE)} scenes in space, cut short;"
             f" {found.counts.total()} commands: solve, and those that read results"
         )
         record("mutations", tried=tried, found=", ".join(f"{kinds[kind]} × {kind}" for kind in (*GOOD, *BAD)))

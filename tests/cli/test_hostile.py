@@ -28,7 +28,7 @@ def solved(case_copy_of_module, ffrobot):
         text = text.replace(old, f'"{quoted}' if not old.endswith('"') else f'"{quoted}"')
     text = text.replace("link1 =", f"'{NAMES[0]}' =").replace("link2 =", f"'{NAMES[1]}' =")
     text = text.replace("LINK1", 'link = "link1.toml"').replace("LINK2", 'link = "link2.toml"')
-    (folder / "scene.toml").write_text(text, encoding="utf-8-sig")  # with a byte order mark
+    (folder / "scene.toml").write_text(text, encoding="utf-8")
     (folder / "figures.toml").unlink()
     done = ffrobot("solve", "scene.toml", cwd=folder)
     assert done.returncode == 0, done.stderr
@@ -51,6 +51,14 @@ def test_names_of_all_kinds(solved, ffrobot, command):
     if command[0] == "plot":
         drawn = [path.name for path in (solved / "scene.results.figures").iterdir()]
         assert sum(name.startswith("angle_") for name in drawn) == 2
+
+
+def test_byte_order_mark(case_copy, ffrobot):
+    scene = case_copy("two_link")
+    text = scene.read_text(encoding="utf-8").replace("end = 1.0", "end = 0.004")
+    scene.write_text(text, encoding="utf-8-sig")
+    done = ffrobot("solve", scene)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("command", ["info", "feasibility"])

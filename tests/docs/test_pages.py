@@ -13,7 +13,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [DOCS / "tutorial.md", *sorted((DOCS / "howto").glob("*.md"))]
 
 BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<content>.*?)^```$", re.DOTALL | re.MULTILINE)
-FILE = re.compile(r"`([\w.]+\.(?:toml|csv|py))`")  # the last one in the paragraph before a file
+FILE = re.compile(r"`([\w.]+\.(?:toml|csv|py|urdf))`")  # the last one in the paragraph before a file
 DOCTEST = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 

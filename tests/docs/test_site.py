@@ -1,6 +1,7 @@
 """The documentation as a site: builds without a warning, and leaves out no command, key or public name."""
 
 import html
+import json
 import re
 import shutil
 import subprocess
@@ -14,13 +15,16 @@ from ffrobot.cli import cli
 from ffrobot.schema import schema
 
 DOCS = Path(__file__).parents[2] / "docs"
+CASES = DOCS.parent / "cases"
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """The folder of the built site."""
-    source, folder = (tmp_path_factory.mktemp(name) for name in ("docs", "site"))
-    shutil.copytree(DOCS, source, dirs_exist_ok=True, ignore=shutil.ignore_patterns("_build"))
+    repository, folder = (tmp_path_factory.mktemp(name) for name in ("repository", "site"))
+    source = repository / "docs"
+    shutil.copytree(DOCS, source, ignore=shutil.ignore_patterns("_build"))
+    shutil.copytree(CASES, repository / "cases", ignore=shutil.ignore_patterns("*.h5"))
     build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", source, folder]
     done = subprocess.run(build, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -40,14 +44,50 @@ def test_every_command_and_option_is_documented(site):
             assert parameter.opts[-1] in text or parameter.param_type_name == "argument"
 
 
+def test_first_page_greets_with_a_picture_the_commands_and_all_cases(site):
+    """Cards link to the READMEs of the cases as pages of the site; their pictures are there."""
+    page = (site / "index.html").read_text(encoding="utf-8")
+    text = words(site / "index.html")
+    assert "./demo.sh" in text
+    assert "./test.sh" in text
+    greeting = page[: page.index('id="gallery"')]
+    assert 'class="hero"' in greeting
+    for readme in CASES.glob("*/README.md"):
+        name, lines = readme.parent.name, readme.read_text(encoding="utf-8").splitlines()
+        key = re.search(r"\*\*(.+?)\*\*", next(line for line in lines if line.startswith("> ")))[1]
+        assert key in text, name
+        assert f'href="cases/{name}.html"' in page
+        assert lines[0].removeprefix("# ") in words(site / "cases" / f"{name}.html")
+    pictures = re.findall(r'<img[^>]*src="([^"]+)"', page)
+    assert len(pictures) > len(list(CASES.glob("*/README.md")))
+    assert all((site / picture).is_file() for picture in pictures)
+
+
+def test_search_knows_keys_and_messages(site):
+    """The index that the site's search looks in: words of it, and which pages have them."""
+    index = (site / "searchindex.js").read_text(encoding="utf-8")
+    found = json.loads(index.removeprefix("Search.setIndex(").rstrip(")"))
+    pages = found["docnames"]
+    for word, page in {
+        "moment_limit": "reference/scene_keys",
+        "attachment_mod": "reference/link_keys",  # as the stemmer leaves it
+        "youngs_modulus": "reference/link_keys",
+        "expect": "reference/messages",
+    }.items():
+        places = found["terms"][word]
+        assert pages.index(page) in (places if isinstance(places, list) else [places]), word
+
+
 def test_pages_that_are_generated_are_those_in_the_repository(monkeypatch):
     """They can be read there without building anything. Where this fails: python docs/key_tables.py, or the other."""
     monkeypatch.syspath_prepend(str(DOCS))
     from benchmark_tables import benchmark_page
+    from gallery import gallery_page
     from key_tables import key_pages
 
     measured = DOCS / "reference" / "measured.md"
     pages = {**key_pages(), measured.name: benchmark_page(DOCS / "benchmarks", measured)}
+    assert (DOCS / "cases.md").read_text(encoding="utf-8") == gallery_page(), "python docs/gallery.py"
     for name, text in pages.items():
         assert (measured.parent / name).read_text(encoding="utf-8") == text, name
 

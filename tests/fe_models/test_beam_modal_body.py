@@ -225,6 +225,15 @@ def test_heights_follow_the_segments(modal_body):
     np.testing.assert_array_equal(body.stations.height, np.where(x < 0.4, 0.03, 0.015))
 
 
+def test_extents_and_rigidities_of_the_sections(modal_body):
+    """Of a rectangle of 15 by 25 mm: E b³h/12 across the plane; J = b h³ (1/3 − 0.21 h/b (1 − h⁴/12b⁴)) (Roark)."""
+    stations, E = modal_body(count=3).stations, 2.068427e11
+    np.testing.assert_array_equal(stations.width, 0.025)
+    np.testing.assert_allclose(stations.out_of_plane_rigidity, E * 0.015 * 0.025**3 / 12, rtol=1e-14)
+    J = 0.025 * 0.015**3 * (1 / 3 - 0.21 * 0.6 * (1 - 0.6**4 / 12))
+    np.testing.assert_allclose(stations.torsional_rigidity, E / 2.6 * J, rtol=4e-3)
+
+
 def test_static_deflection_under_a_tip_force(modal_body):
     """All modes of a cantilever under a unit tip force give FL³/(3EI), all of a rod FL/(EA): the modes are complete."""
     bending = modal_body(condition="cantilever", elements=4, count=8)

@@ -10,7 +10,7 @@ from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import PictureMesh
 from ffrobot.fe_models.modal_body_file import write_modal_body
-from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
+from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes, round_below
 from ffrobot.pictures.figures.plot import plot_file, plot_modal_body
 
 LINK = """
@@ -64,8 +64,18 @@ def test_modes_say_frequency_and_family(beam):
         assert title == f"{k + 1}: {beam.frequency[k]:.5g} Hz, {beam.family[k]}"
 
 
-def test_a_mode_that_does_not_move_the_axis_says_so(beam):
+def test_a_beam_is_drawn_at_all_its_stations(beam):
+    """Corners of its section on a ring at each, twisted ones too."""
     figure = draw_modes(beam)
+    for axes in figure.axes:
+        _, surface = axes.collections
+        assert len(surface.get_paths()) >= 4 * (len(beam.stations.position) - 1)
+        assert not axes.texts[0].get_text().startswith("the axis")
+
+
+def test_a_mode_that_does_not_move_the_axis_says_so(beam):
+    """Of a file that does not know the section."""
+    figure = draw_modes(replace(beam, stations=replace(beam.stations, outline=None)))
     texts = {axes.get_title(loc="left"): [text.get_text() for text in axes.texts] for axes in figure.axes}
     twisting = [title for title in texts if "torsion" in title]
     assert twisting
@@ -138,3 +148,9 @@ def test_what_is_refused(beam, tmp_path):
     path.write_bytes(path.read_bytes()[:4000])
     with pytest.raises(InputError, match=r"arm\.h5: expected a results file, found not a readable"):
         plot_file(path, tmp_path / "figures")
+
+
+def test_scale_bars_are_of_round_lengths():
+    assert [round_below(x) for x in (0.25, 0.2, 0.199, 1.0, 7.0, 4.9e-3)] == pytest.approx(
+        [0.2, 0.2, 0.1, 1.0, 5.0, 2e-3], rel=1e-12
+    )

@@ -140,6 +140,10 @@ def test_limits_of_a_motor_over_its_speed():
     power_alone = limit_curves(MotorLimits(power=40.0), 4.0, 18.0)
     drawn = power_alone[~np.isnan(power_alone).any(axis=1)]
     np.testing.assert_allclose(np.abs(drawn).prod(axis=1), 40.0, rtol=1e-12)
+    moment_alone = limit_curves(MotorLimits(moment=3.0), 4.0, 2.0)
+    drawn = moment_alone[~np.isnan(moment_alone).any(axis=1)]
+    np.testing.assert_array_equal(np.abs(drawn[:, 1]), 3.0)
+    assert 4.0 < np.abs(drawn[:, 0]).max() < 5.0  # no farther than the data ask for
 
 
 def test_magnitude_scale_and_x_of_a_curve(results):

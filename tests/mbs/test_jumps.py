@@ -1,4 +1,4 @@
-"""Loads and accelerations of paths that jump in time: steps end before a jump and begin behind it."""
+"""Loads and accelerations of paths that jump or come and go: steps end before a jump, and none goes over a pulse."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,6 @@ def angle_behind(jumps, time):
         [(0.5 - 2**-53, 1)],  # the last number before one
         [(0.5 - 2**-52, 1)],  # the one before
         [(1 / 3, 1), (0.75, -1)],
-        [(0.2, 1), (0.2000001, 1), (0.7, -3)],
     ],
 )
 def test_moments_that_jump(jumps, integrator):
@@ -51,6 +50,16 @@ def test_moments_that_jump(jumps, integrator):
     outcome = free_run(driven_rod(moment), tolerance=1e-3, integrator=integrator)
     angle = angle_behind(jumps, outcome.time)
     assert relative(outcome.q[:, 2], angle) < 1e-12
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_two_jumps_next_to_each_other(integrator):
+    """The first is located. A short step goes over the second, and misses at most its moment over the time between."""
+    jumps = [(0.2, 1), (0.2000001, 1), (0.7, -3)]
+    moment = "+".join(f"({size * MOMENT})*where(t > {t!r}, 1, 0)" for t, size in jumps)
+    outcome = free_run(driven_rod(moment), tolerance=1e-3, integrator=integrator)
+    missed = MOMENT / INERTIA * 1e-7 * 0.8  # rad at the end
+    assert np.abs(outcome.q[:, 2] - angle_behind(jumps, outcome.time)).max() < 1.5 * missed
 
 
 def test_a_jump_costs_a_search():
@@ -76,6 +85,39 @@ def test_acceleration_of_a_path_that_jumps():
     model = arm(trajectory=[path], initial={"angles": {"link1": -0.2, "link2": 1.4}})
     one, other = (run_pcid(model, pcid(tolerance=1e-7, integrator=name), False, always) for name in ("dop853", "radau"))
     assert relative(one.lambda_, other.lambda_) < 2e-7
+
+
+# Parts of the run; the shortest spans two of the thousand samples by which steps are limited.
+@pytest.mark.parametrize("width", [0.002, 0.02, 0.1])
+@pytest.mark.parametrize("integrator", [*METHODS, "generalized-alpha"])
+def test_pulse_while_nothing_moves(integrator, width):
+    """The error estimate of a step over it sees nothing: its stages stand beside it."""
+    chance = np.random.default_rng(8)
+    for begin in chance.uniform(0.2, 0.8, 4):
+        begin, end = float(begin), float(begin + width)
+        moment = f"where(t > {begin!r}, where(t <= {end!r}, {MOMENT}, 0), 0)"
+        outcome = free_run(driven_rod(moment), tolerance=1e-3, integrator=integrator)
+        exact = angle_behind([(begin, 1), (end, -1)], outcome.time)
+        assert relative(outcome.q[:, 2], exact) < (1e-3 if integrator == "generalized-alpha" else 1e-12)
+
+
+@pytest.mark.parametrize("width", [0.004, 0.02, 0.1])
+@pytest.mark.parametrize("integrator", [*METHODS, "generalized-alpha"])
+def test_hump_while_nothing_moves(integrator, width):
+    """As smooth as loads get, so that nothing jumps: M sin²; the speed behind it is M/I times half its width."""
+    chance = np.random.default_rng(9)
+    for begin in chance.uniform(0.2, 0.8, 4):
+        begin, end = float(begin), float(begin + width)
+        hump = f"where(t > {begin!r}, where(t < {end!r}, {MOMENT}*sin(pi*(t-{begin!r})/{width!r})**2, 0), 0)"
+        outcome = free_run(driven_rod(hump), tolerance=1e-3, integrator=integrator)
+        assert outcome.v[-1, 2] == pytest.approx(MOMENT / INERTIA * width / 2, rel=1e-3)
+
+
+def test_loads_that_do_not_bend_limit_no_step():
+    """A constant and a steady growth: as many steps as without samples, which is a few."""
+    for moment in (f"{MOMENT}", f"{MOMENT}*t", f"{MOMENT}*(1+1e-9*sin(1e4*t))"):
+        outcome = free_run(driven_rod(moment), tolerance=1e-6, integrator="dop853")
+        assert outcome.statistics.steps < 40
 
 
 def test_steep_load_is_no_jump():

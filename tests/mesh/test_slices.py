@@ -36,6 +36,7 @@ def test_sections_of_a_box_are_exact_also_in_planes_of_the_mesh(cell, x):
     np.testing.assert_allclose(moments(section), expected, rtol=1e-12, atol=1e-19)
     np.testing.assert_allclose(section.points[:, 0], x, atol=1e-9)
     np.testing.assert_allclose(section.y_range, [-h / 2, h / 2], atol=1e-15)
+    np.testing.assert_allclose(section.z_range, [-w / 2, w / 2], atol=1e-15)
 
 
 @pytest.mark.parametrize("cell", CELLS)
@@ -53,7 +54,7 @@ def test_no_section_beyond_the_part(cell):
     for x in (-0.1, 1.1):
         section = section_quadrature(mesh, x, 2)
         assert section.weights.size == 0
-        assert section.y_range == (np.inf, -np.inf)
+        assert section.y_range == section.z_range == (np.inf, -np.inf)
 
 
 def test_a_step_is_seen_from_the_larger_x():

@@ -168,3 +168,13 @@ def test_voltage_charts_mark_the_limit(paused):
     draw_all(paused)
     shapes = "document.querySelector('[data-chart=\"required_voltage_inverse_link1\"]').layout.shapes.map((s) => s.y0)"
     assert paused.value(shapes) == [-200, 200]  # V, `limit` in the scene file
+
+
+def test_on_paper_charts_stand_in_two_columns(paused):
+    """All of them drawn, none wider than half a page of A4; back on the screen as wide as there is room for."""
+    widths = "drawn().filter((c) => c.dataset.chart).map((c) => c._fullLayout.width)"
+    paused.run("window.dispatchEvent(new Event('beforeprint'))")
+    paused.wait(f"{widths}.length === places.length && {widths}.every((w) => w === 340)")
+    assert paused.value("[...document.querySelectorAll('details')].every((fold) => fold.open)")
+    paused.run("window.dispatchEvent(new Event('afterprint'))")
+    paused.wait(f"{widths}.every((w) => w > 340)")

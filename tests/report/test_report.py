@@ -16,10 +16,11 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import program_version
 from ffrobot.pictures.motion import topology
 from ffrobot.pictures.outline import body_outline, points_outline
+from ffrobot.pictures.path_targets import targets
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
 from ffrobot.pictures.report.histories import history_charts
-from ffrobot.pictures.report.runs import distinct_parts, runs, targets
+from ffrobot.pictures.report.runs import distinct_parts, runs
 from ffrobot.pictures.report.tables import peaks_table
 from ffrobot.results.file import Results
 
@@ -89,7 +90,7 @@ def test_files_of_the_same_scene_are_told_apart_by_their_paths(paths, labels):
 
 
 def test_forward_analyses_are_measured_against_the_path_they_should_follow(results):
-    by_name = {run.analysis: targets(run) for run in runs([results])}
+    by_name = {run.analysis: targets(run.results, run.analysis) for run in runs([results])}
     assert [target.point for target in by_name["joints_only"]] == ["link2.tip"]
     t = results.time("inverse")
     path = np.column_stack([1.5 * np.cos(np.pi * t / 4), np.sqrt(3) / 2 * np.cos(np.pi * t / 4)])  # scene.toml

@@ -199,7 +199,7 @@ def test_picture_shows_the_arm_exaggerated(solid_arm, tmp_path, capsys):
     arguments = ["view", solid_arm / "scene.results.h5", "-o", tmp_path, "--scale", 60, "--pictures"]
     cli([str(argument) for argument in arguments], standalone_mode=False)
     assert capsys.readouterr().out.split() == [
-        str(tmp_path / name) for name in ("inverse.vtkhdf", "inverse.xdmf", "inverse.png")
+        str(tmp_path / name) for name in ("inverse.vtkhdf", "inverse.xdmf", "inverse.png", "inverse.stress.png")
     ]
     image = np.asarray(Image.open(tmp_path / "inverse.png").convert("RGB"), dtype=int)[30:700, 200:]
     spread = np.ptp(image, axis=2)

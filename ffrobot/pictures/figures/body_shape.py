@@ -14,16 +14,18 @@ from matplotlib.figure import Figure
 
 from ...common.arrays import Array, Integers
 from ...fe_models.modal_body import ModalBody
-from ..body_surface import AMPLITUDE, drawn_mode
+from ..body_surface import AMPLITUDE, body_surface, drawn_mode
 from ..projection import RIGHT, UP, VIEWER
 from .palette import COLORS
 from .style import ORDERED
 
 WIDTH = 7.0  # inches: both columns of a page
+BEAM_HEIGHT, SOLID_HEIGHT = 2.3, 3.0  # inches, of a view of a mesh
 MODES = 6  # that are drawn at most
 COLUMNS = 2
 CLOSE_UP = 5.0  # heights of the section that the second view of a mesh shows
 FOLD = np.cos(np.radians(30.0))  # cells that meet at more than this show their edge
+BAR = 0.25  # of the width: about the length of the scale bar
 FACE, EDGE, GHOST = "#cfdce8", "#30465c", "#9a9a9a"
 LIGHT = (VIEWER + UP) / np.linalg.norm(VIEWER + UP)
 
@@ -36,7 +38,8 @@ def draw_mesh(body: ModalBody) -> Figure:
     near = cells[np.all(points[cells, 0] <= CLOSE_UP * body.stations.height.max(), axis=1)]
     if cells.shape[1] > 2 and 0 < len(near) < len(cells) and np.ptp(points[near, 0]) > 0.0:
         views.append((near, f"{body.name} at the root"))
-    figure = Figure(figsize=(WIDTH, 3.0 * len(views)), layout="constrained")
+    height = BEAM_HEIGHT if cells.shape[1] == 2 else SOLID_HEIGHT
+    figure = Figure(figsize=(WIDTH, height * len(views)), layout="constrained")
     for k, (shown, title) in enumerate(views):
         axes = _view(figure, (len(views), 1, k + 1), title)
         last = points[shown, 0].max()
@@ -46,14 +49,15 @@ def draw_mesh(body: ModalBody) -> Figure:
             if interface.position[0] <= last:
                 at = _projected(interface.position)
                 axes.plot(*at, "o", color=COLORS[(j + 1) % len(COLORS)], markersize=4.5, label=name)
-        axes.legend(loc="upper left", ncols=len(body.interfaces))
+        axes.legend(loc="lower right", ncols=len(body.interfaces), bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
         _directions(axes, 0.06 * np.ptp(points[shown, 0]))
     return figure
 
 
 def draw_modes(body: ModalBody) -> Figure:
     """The lowest modes, each scaled to the same largest displacement, whose size is the colour."""
-    points, cells = body.mesh.points, body.mesh.cells
+    mesh = body_surface(body)
+    points, cells = mesh.points, mesh.cells
     count = min(body.mode_count, MODES)
     rows = -(-count // COLUMNS)
     figure = Figure(figsize=(WIDTH, 1.9 * rows), layout="constrained")
@@ -63,7 +67,7 @@ def draw_modes(body: ModalBody) -> Figure:
     for k in range(count):
         axes = _view(figure, (rows, COLUMNS, k + 1), f"{k + 1}: {body.frequency[k]:.5g} Hz, {body.family[k]}")
         axes.add_collection(LineCollection(list(outline), colors=GHOST, linewidths=0.5, zorder=0))
-        displacement, size = drawn_mode(body.mesh.mode_shapes[:, :, k], body.length)
+        displacement, size = drawn_mode(mesh.mode_shapes[:, :, k], body.length)
         if np.any(size):
             colors = matplotlib.colormaps[ORDERED](size[cells].mean(axis=1))[:, :3]
             _draw_cells(axes, points + displacement, cells, colors)
@@ -120,16 +124,25 @@ def _edge_depth(cells: Integers, depth: Array, edges: Integers) -> tuple[Integer
 
 
 def _directions(axes: Axes, size: float) -> None:
-    """Arrows of `size` (m) along x, y and z below the picture, and what that size is."""
+    """Arrows of `size` (m) along x, y and z below the picture, and a bar of a round length along x."""
     (left, right), bottom = axes.get_xlim(), axes.get_ylim()[0]
-    x, y = left + 0.05 * (right - left), bottom - 1.2 * size
+    x, y = left + 0.05 * (right - left), bottom - 2.0 * size
     for axis, name in zip(np.eye(3), "xyz", strict=True):
         dx, dy = size * _projected(axis)
         axes.annotate("", (x + dx, y + dy), (x, y), arrowprops={"arrowstyle": "->", "linewidth": 0.6, "shrinkB": 0})
         axes.annotate(name, (x + 1.35 * dx, y + 1.35 * dy), ha="center", va="center", fontsize=7)
-    axes.annotate(f"arrows: {size:.2g} m", (x + 2.2 * size, y), va="center", fontsize=7)
-    axes.update_datalim([(x - 0.6 * size, y - 0.6 * size)])
+    length = round_below(BAR * (right - left))
+    bar = np.array([x + 3.0 * size, y]) + np.array([[0.0, 0.0], length * _projected(np.eye(3)[0])])
+    axes.plot(*bar.T, color=EDGE, linewidth=1.5, solid_capstyle="butt")
+    axes.annotate(f" {length:g} m", bar[1], va="center", fontsize=7)
+    axes.update_datalim([(x - 0.6 * size, y - 0.6 * size), *bar])
     axes.autoscale_view()
+
+
+def round_below(value: float) -> float:
+    """The next of …, 0.1, 0.2, 0.5, 1, … not above a positive value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))
 
 
 def _normals(points: Array, cells: Integers) -> Array:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import PathPatch
 
 from ...common.arrays import Array
 from ...results.file import Results
+from ..drawn_body import drawn_bodies
 from ..outline import points_outline
 from .figure_file import FigureRecord
+from .filled import closed_path
 from .path import draw_paths
 from .style import legend, shades
 
@@ -17,14 +20,18 @@ def draw_configurations(axes: Axes, figure: FigureRecord, results: Results) -> N
     """Draw the bodies of an analysis at the outputs nearest to `figure.times`, with the curves of `figure` as paths."""
     analysis = figure.analysis
     draw_paths(axes, figure, results)
+    assert analysis is not None
     outputs = results.time(f"{analysis}/time")
-    for time, color in zip(figure.times, shades(len(figure.times)), strict=True):
-        k = int(np.argmin(np.abs(outputs - time)))
-        label: str | None = f"t = {outputs[k]:g} s"
-        for body in results.names(f"{analysis}/bodies"):
-            shape, ends = body_shape(results, f"{analysis}/points", body, k)
-            axes.plot(*shape.T, color=color, linewidth=1.5, label=label)
-            axes.plot(*ends.T, "o", color=color, markersize=3)
+    frames = np.abs(outputs[:, None] - figure.times).argmin(axis=0)
+    bodies = drawn_bodies(results, analysis, frames, [])
+    for k, color in enumerate(shades(len(frames))):
+        label: str | None = f"t = {outputs[frames[k]]:g} s"
+        for body in bodies:
+            corners = body.corners(k)
+            if body.outline.filled:
+                axes.add_patch(PathPatch(closed_path(corners), facecolor=color, alpha=0.2, linewidth=0.0))
+            axes.plot(*corners.T, color=color, linewidth=0.8 if body.outline.filled else 1.5, label=label)
+            axes.plot(*body.joints(k).T, "o", color=color, markersize=3)
             label = None
     axes.set_aspect("equal", adjustable="datalim")
     legend(axes)

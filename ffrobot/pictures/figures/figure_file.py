@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from ...common.numbers import Positive
 from ...common.toml_files import load_toml
 from ...common.validation import InputFile, Record, validate
 
@@ -47,11 +48,11 @@ class Curve(Record):
 class FigureRecord(Record):
     """One figure. Axes without a range take that of the data; units stand in the labels of the axes.
 
-    Kinds: "time" draws its curves over time; "path" draws (x, y) datasets against each other; "configurations" draws
-    the bodies of `analysis` at `times` (s), and its curves as paths; "torque-speed" draws its curves over their `x`,
-    and the limits of the motor of `joint`. Of a linear `analysis`, at the first of `times`: "bode" draws the frequency
-    responses of `transfers` [input, output], "modes" the mode shapes of the robot; "placement" the patches that an
-    analysis of that kind found.
+    Kinds: "time" draws its curves over time; "path" draws (x, y) datasets against each other, (x, y, z) ones in space;
+    "configurations" draws the bodies of `analysis` at `times` (s), and its curves as paths (in space, the paths of
+    points with trajectories); "torque-speed" draws its curves over their `x`, and the limits of the motor of `joint`.
+    Of a linear `analysis`, at the first of `times`: "bode" draws the frequency responses of `transfers`
+    [input, output], "modes" the mode shapes of the robot; "placement" the patches that an analysis of that kind found.
     """
 
     name: FileName
@@ -70,6 +71,8 @@ class FigureRecord(Record):
     """Whose motor has the limits of kind = "torque-speed"."""
     times: tuple[float, ...] = ()
     """Instants of the configurations, s."""
+    exaggeration: Positive | None = None
+    """Of deflections in configurations in space; as large as can be seen well if absent."""
     x_label: str = "time (s)"
     """Of the horizontal axis, with its unit, in kind = "time" and "torque-speed"."""
     y_label: str = ""
@@ -95,6 +98,10 @@ class FigureRecord(Record):
             )
         if self.kind in ("time", "path", "torque-speed") and not self.curves:
             raise ValueError(f'expected the key "curves" in kind = "{self.kind}", found none')
+        if self.exaggeration is not None and self.kind != "configurations":
+            raise ValueError(
+                f'expected the key "exaggeration" only in kind = "configurations", found kind = "{self.kind}"'
+            )
         if self.kind == "torque-speed" and (self.joint is None or any(curve.x is None for curve in self.curves)):
             raise ValueError('expected the key "joint", and "x" in every curve, in kind = "torque-speed"')
         return self

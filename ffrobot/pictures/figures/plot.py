@@ -23,6 +23,7 @@ from .figure_file import FigureRecord, load_figures
 from .linear import draw_bode, draw_robot_modes
 from .path import draw_path
 from .placement import draw_placement
+from .spatial_configurations import draw_spatial_configurations, draw_spatial_path
 from .standard import standard_figures
 from .style import literal, new_axes, style
 from .time_history import draw_time_history
@@ -37,6 +38,7 @@ DRAW = {
 }
 
 DRAW_WHOLE = {"bode": draw_bode, "modes": draw_robot_modes}  # with axes of their own
+DRAW_IN_SPACE = {"configurations": draw_spatial_configurations, "path": draw_spatial_path}
 
 # No dates and no versions: the same results give the same files.
 METADATA = {
@@ -136,8 +138,14 @@ def _formulas(label: str) -> Iterator[None]:
 
 def draw(record: FigureRecord, results: Results) -> Figure:
     """Draw one figure."""
-    if record.kind in DRAW_WHOLE:
-        return DRAW_WHOLE[record.kind](record, results)
+    if record.exaggeration is not None and not results.is_spatial:
+        raise InputError(
+            f'{results.path}: figure "{record.name}": exaggeration: expected it only of scenes in space, found a planar'
+            " one, whose configurations are to scale"
+        )
+    whole = DRAW_WHOLE | DRAW_IN_SPACE if results.is_spatial else DRAW_WHOLE
+    if record.kind in whole:
+        return whole[record.kind](record, results)
     picture, axes = new_axes(record.title)
     DRAW[record.kind](axes, record, results)
     if record.x_range is not None:

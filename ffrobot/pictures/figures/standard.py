@@ -2,49 +2,35 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 
 import numpy as np
 
 from ...results.file import Results
-from ..torque_speed import coordinate_unit, force_unit, motor_limits
+from ...results.joints import joint_coordinates
 from .figure_file import Curve, FigureRecord
-
-SNAPSHOTS = 5
+from .shared import curves_of, file_name, joint_figures, members, moving_configurations, voltage_figures
+from .spatial_standard import spatial_figures
 
 
 def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
     """Configurations, paths, angles, deflections, forces, moments and voltages; analyses are laid over each other."""
+    if results.is_spatial:
+        return spatial_figures(results)
     return tuple(
         [
-            *_configurations(results),
+            *moving_configurations(results),
             *_paths(results),
             *_angles(results),
             *_deflections(results),
             *_trajectory_forces(results),
-            *_joints(results),
+            *joint_figures(results),
             *_stresses(results),
-            *_voltages(results),
+            *voltage_figures(results),
             *_tip_errors(results),
             *_linear(results),
         ]
     )
-
-
-def _configurations(results: Results) -> Iterator[FigureRecord]:
-    """Of the first analysis that goes through time, else the first: in others the robot is hardly elsewhere."""
-    moving = [analysis for analysis in results.analyses if len(results.time(analysis)) > 1]
-    for analysis in [*moving, *results.analyses][:1]:
-        times = results.time(f"{analysis}/time")
-        snapshots = np.linspace(times[0], times[-1], SNAPSHOTS if len(times) > 1 else 1)
-        yield FigureRecord(
-            name=file_name("configurations", analysis),
-            title=f"configurations, {analysis}",
-            kind="configurations",
-            analysis=analysis,
-            times=tuple(float(t) for t in snapshots),
-        )
 
 
 def _paths(results: Results) -> Iterator[FigureRecord]:
@@ -70,7 +56,7 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
 
 
 def _angles(results: Results) -> Iterator[FigureRecord]:
-    for body in _members(results, "bodies"):
+    for body in members(results, "bodies"):
         datasets = [f"{a}/bodies/{body}/angle" for a in results.analyses if results.has(f"{a}/bodies/{body}/angle")]
         if any(np.ptp(results.data(name)) for name in datasets):
             curves = tuple(Curve(data=name, label=name.split("/")[0]) for name in datasets)
@@ -80,7 +66,7 @@ def _angles(results: Results) -> Iterator[FigureRecord]:
 
 
 def _deflections(results: Results) -> Iterator[FigureRecord]:
-    for point in _members(results, "points"):
+    for point in members(results, "points"):
         datasets = [f"{a}/points/{point}/deflection[1]" for a in results.analyses if results.has(f"{a}/points/{point}")]
         if any(results.data(name).any() for name in datasets):
             curves = tuple(Curve(data=name, label=name.split("/")[0]) for name in datasets)
@@ -106,62 +92,21 @@ def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
                 for k, component in enumerate(components)
             ]
         if curves:
-            is_force = "point" in trajectory or (joint is not None and force_unit(results, joint) == "N")
+            is_force = "point" in trajectory or _slides(results, str(joint))
             y_label, title = "force (N)" if is_force else "moment (N·m)", f"force along trajectory {name}"
             yield FigureRecord(name=file_name("force", name), title=title, curves=tuple(curves), y_label=y_label)
 
 
-def _joints(results: Results) -> Iterator[FigureRecord]:
-    """Coordinate, moment, moment over speed, and size of the reaction, of every joint."""
-    for joint in _members(results, "joints"):
-        unit, coordinate = force_unit(results, joint), coordinate_unit(results, joint)
-        force = "moment" if unit == "N·m" else "force"
-        moved = _curves(results, f"joints/{joint}/coordinate")
-        if any(np.ptp(results.data(curve.data)) for curve in moved):
-            title, y_label = f"joint {joint}", f"{'angle' if coordinate == 'rad' else 'way'} ({coordinate})"
-            yield FigureRecord(name=file_name("coordinate", joint), title=title, curves=moved, y_label=y_label)
-        if driven := _curves(results, f"joints/{joint}/moment"):
-            limit = motor_limits(results, joint).moment
-            title, lines = f"motor of joint {joint}", _both_ways(limit) if np.isfinite(limit) else ()
-            yield FigureRecord(
-                name=file_name("moment", joint), title=title, curves=driven, y_label=f"{force} ({unit})", limits=lines
-            )
-            yield from _torque_speed(results, joint, f"{force} ({unit})", f"speed ({coordinate}/s)")
-        if held := _curves(results, f"joints/{joint}/reaction", magnitude=True):
-            title = f"size of the reaction of joint {joint}"
-            yield FigureRecord(name=file_name("reaction", joint), title=title, curves=held, y_label="reaction (N)")
-
-
-def _torque_speed(results: Results, joint: str, y_label: str, x_label: str) -> Iterator[FigureRecord]:
-    curves = []
-    for analysis in results.analyses:
-        moment, rate = (f"{analysis}/joints/{joint}/{dataset}" for dataset in ("moment", "rate"))
-        if results.has(moment) and results.has(rate) and len(results.time(analysis)) > 1:
-            curves.append(Curve(data=moment, x=rate, label=analysis))
-    if curves:
-        yield FigureRecord(
-            name=file_name("torque_speed", joint),
-            title=f"motor of joint {joint} over its speed",
-            kind="torque-speed",
-            joint=joint,
-            curves=tuple(curves),
-            x_label=x_label,
-            y_label=y_label,
-        )
-
-
-def _curves(results: Results, dataset: str, *, magnitude: bool = False) -> tuple[Curve, ...]:
-    """That dataset of every analysis that has it."""
-    names = ((analysis, f"{analysis}/{dataset}") for analysis in results.analyses)
-    return tuple(Curve(data=name, label=a, magnitude=magnitude) for a, name in names if results.has(name))
+def _slides(results: Results, joint: str) -> bool:
+    return any(coordinate.unit == "m" for coordinate in joint_coordinates(results.scene, joint))
 
 
 def _stresses(results: Results) -> Iterator[FigureRecord]:
     """Von Mises stress at stress points, and the largest on surfaces."""
-    for body in _members(results, "stress"):
+    for body in members(results, "stress"):
         places = [(f"points/{point}/von_mises", point) for point in _stress_points(results, body)]
         for dataset, where in (*places, ("surface/von_mises_max", "surface")):
-            if curves := _curves(results, f"stress/{body}/{dataset}"):
+            if curves := curves_of(results, f"stress/{body}/{dataset}"):
                 title = f"stress in {body}, {'largest on its surface' if where == 'surface' else where} (von Mises)"
                 yield FigureRecord(
                     name=file_name("stress", body, where),
@@ -174,21 +119,6 @@ def _stresses(results: Results) -> Iterator[FigureRecord]:
 
 def _stress_points(results: Results, body: str) -> list[str]:
     return list(dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/stress/{body}/points")))
-
-
-def _voltages(results: Results) -> Iterator[FigureRecord]:
-    limits = {layout["body"]: layout.get("limit") for layout in results.scene.get("pzt", [])}
-    for analysis in results.analyses:
-        for body in results.names(f"{analysis}/pzt"):
-            limit = limits.get(body)
-            for dataset, title in (("required_voltage", "voltages required"), ("voltage", "voltages within the limit")):
-                yield FigureRecord(
-                    name=file_name(dataset, analysis, body),
-                    title=f"{title}, patches of {body}, {analysis}",
-                    curves=(Curve(data=f"{analysis}/pzt/{body}/{dataset}", label="patch"),),
-                    y_label="voltage (V)",
-                    limits=() if limit is None else _both_ways(limit),
-                )
 
 
 def _tip_errors(results: Results) -> Iterator[FigureRecord]:
@@ -225,26 +155,3 @@ def _linear(results: Results) -> Iterator[FigureRecord]:
                     transfers=tuple((source, name) for name in seen),
                     y_label="magnitude (m, rad per N·m, V)",
                 )
-
-
-def _members(results: Results, group: str) -> list[str]:
-    """Names in a group of any analysis, each once, in the order of the scene."""
-    order = [keys["name"] for table in ("body", "joint") for keys in results.scene.get(table, [])]
-    names = dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/{group}"))
-    return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
-
-
-def _both_ways(limit: float | list[float]) -> tuple[float, ...]:
-    """The limits of patches, one for all or one each, in both directions, each once."""
-    return tuple(sorted({sign * float(one) for one in np.atleast_1d(limit) for sign in (-1.0, 1.0)}))
-
-
-def file_name(*parts: str) -> str:
-    """A file name: everything but letters, digits, `.` and `-` becomes `_`.
-
-    Letters other than a to z and signs take a few digits of their own besides: names of other scripts stay apart.
-    """
-    joined = "_".join(parts)
-    plain = "".join(c if c.isascii() and (c.isalnum() or c in ".-") else "_" for c in joined)
-    lost = any(c != p and c not in " /_" for c, p in zip(joined, plain, strict=True))
-    return f"{plain}-{hashlib.sha256(joined.encode()).hexdigest()[:6]}" if lost else plain

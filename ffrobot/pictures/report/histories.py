@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,19 +10,20 @@ from ...common.arrays import Array
 from ...results.file import Results
 from ..figures.figure_file import Curve, FigureRecord
 from ..figures.reading import curve_points
-from ..figures.standard import file_name, standard_figures
-from ..torque_speed import limit_curves, motor_limits
+from ..figures.shared import energy_figures, file_name
+from ..figures.standard import standard_figures
+from ..path_targets import Target, targets
+from ..torque_speed import limit_curves, limits_of
 from .charts import DASHES, Chart, limit_style, shades, style
-from .runs import Run, Target, runs, sources, targets
-
-ENERGIES = ("kinetic", "strain", "gravitational")
+from .runs import Run, runs, sources
 
 
 def history_charts(files: Sequence[Results]) -> list[Chart]:
     """Path errors, paths, angles, deflections, forces, moments, voltages and energies."""
     charts = {chart.name: chart for chart in _path_errors(files)}
     for number, (results, source) in enumerate(zip(files, sources(files), strict=True)):
-        for record in (*standard_figures(results), *_energy_figures(results)):
+        records = {record.name: record for record in (*standard_figures(results), *energy_figures(results))}
+        for record in records.values():
             if record.kind == "configurations" or not record.curves:  # the mechanism moves instead; no histories
                 continue
             chart = charts.setdefault(record.name, _empty(record))
@@ -79,21 +80,9 @@ def _add_limits(chart: Chart, results: Results, record: FigureRecord, source: st
     assert record.joint is not None
     points = [curve_points(results, curve, record.scale) for curve in record.curves]
     speed, moment = (max(float(abs(pair[i]).max()) for pair in points) for i in (0, 1))
-    limits = limit_curves(motor_limits(results, record.joint), speed, moment)
+    limits = limit_curves(limits_of(results, record.joint, [curve.data for curve in record.curves]), speed, moment)
     if len(limits):
         chart.add(f"{source}: limits" if source else "limits", *limits.T, line=limit_style())
-
-
-def _energy_figures(results: Results) -> Iterator[FigureRecord]:
-    for analysis in results.analyses:
-        curves = tuple(
-            Curve(data=f"{analysis}/energy/{kind}", label=kind)
-            for kind in ENERGIES
-            if results.has(f"{analysis}/energy/{kind}")
-        )
-        if curves:
-            name = file_name("energy", analysis)
-            yield FigureRecord(name=name, title=f"energies, {analysis}", curves=curves, y_label="energy (J)")
 
 
 def _path_errors(files: Sequence[Results]) -> list[Chart]:
@@ -101,7 +90,7 @@ def _path_errors(files: Sequence[Results]) -> list[Chart]:
     charts: dict[str, Chart] = {}
     for run in runs(files):
         time = run.results.time(run.analysis)
-        for target in targets(run):
+        for target in targets(run.results, run.analysis):
             name, title = target.trajectory, f"distance of {target.point} from its path"
             chart = charts.setdefault(name, Chart(file_name("error", name), title, "distance (mm)"))
             error = path_error(run, target)

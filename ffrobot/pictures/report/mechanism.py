@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Indices
-from ...common.errors import InputError
-from ...mbs.fields.field_types import GROUND
+from ..drawn_body import ground_points, outline
 from ..figures.palette import COLORS
 from ..motion import BodyMotion, body_motion, ordered_bodies, topology, visible_exaggeration
-from ..outline import Outline, body_outline, points_outline
+from ..outline import Outline
+from ..path_targets import Target, targets
 from .charts import encoded, plain
-from .runs import Run, Target, targets
+from .runs import Run
 
 MAX_FRAMES = 2000
 PLAYING_SECONDS = 8.0
@@ -44,8 +44,8 @@ def mechanism(runs: Sequence[Run]) -> Mechanism:
                 "color": COLORS[k % len(COLORS)],
                 "visible": run.analysis == run.results.analyses[0],
                 "time": encoded(time[frames]),
-                "bodies": [_body_data(run, body, bodies, _outline(run, body, notes)) for body in bodies],
-                "paths": [_path_data(target, bodies, frames) for target in targets(run)],
+                "bodies": [_body_data(run, body, bodies, outline(run.results, body, notes)) for body in bodies],
+                "paths": [_path_data(target, bodies, frames) for target in targets(run.results, run.analysis)],
             }
         )
         if run.analysis != run.results.analyses[0]:
@@ -61,32 +61,20 @@ def mechanism(runs: Sequence[Run]) -> Mechanism:
         "exaggeration": visible_exaggeration(size, max(deflections)),
         "speed": max(end / PLAYING_SECONDS, SLOWEST),
         "range": [[box[0, i] - margin, box[1, i] + margin] for i in range(2)],
-        "ground": _ground_points(runs),
+        "ground": ground_points([run.results.scene for run in runs]),
     }
     return Mechanism(data, list(dict.fromkeys(notes)))
 
 
-def _outline(run: Run, body: BodyMotion, notes: list[str]) -> Outline:
-    """From the body's modal body, or from its points where that is not found."""
-    if body.modal is not None:
-        try:
-            return body_outline(run.results.modal_body(body.name), body.modal)
-        except InputError as error:
-            notes.append(f"{body.name} is drawn through its points only: {error}")
-    return points_outline(
-        [label.removeprefix(f"{body.name}.") for label in body.point_names], body.points, body.deflection
-    )
-
-
-def _body_data(run: Run, body: BodyMotion, bodies: Sequence[BodyMotion], outline: Outline) -> dict[str, Any]:
+def _body_data(run: Run, body: BodyMotion, bodies: Sequence[BodyMotion], shape: Outline) -> dict[str, Any]:
     data: dict[str, Any] = {
         "name": body.name,
         "position": encoded(body.position),
         "angle": encoded(body.angle),
-        "outline": encoded(outline.at),
-        "modes": encoded(outline.modes),
-        "p": encoded(outline.p),
-        "filled": outline.filled,
+        "outline": encoded(shape.at),
+        "modes": encoded(shape.modes),
+        "p": encoded(shape.p),
+        "filled": shape.filled,
         "points": encoded(body.points),
         "names": body.point_names,
         "deflection": encoded(body.deflection),
@@ -108,9 +96,3 @@ def _path_data(target: Target, bodies: Sequence[BodyMotion], frames: Indices) ->
 def _index(point: str, bodies: Sequence[BodyMotion]) -> list[int] | None:
     """Numbers of the body and of its point; None for the ground."""
     return next(([i, b.point_names.index(point)] for i, b in enumerate(bodies) if point in b.point_names), None)
-
-
-def _ground_points(runs: Sequence[Run]) -> list[tuple[float, float]]:
-    """Where joints sit on the ground, in m."""
-    joints = [joint for run in runs for joint in run.results.scene.get("joint", []) if GROUND in joint["between"]]
-    return list(dict.fromkeys(tuple(joint.get("at", (0.0, 0.0))) for joint in joints))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
-from ..figures.standard import file_name
+from ..figures.shared import file_name
 from .charts import Chart, shades
 from .runs import Run
 

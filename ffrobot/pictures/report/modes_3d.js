@@ -15,8 +15,6 @@ for (const link of MODES_3D.links) {
   link.count = link.points.length / 3;
 }
 
-const every = (values, step, offset) => Array.from(values).filter((_, i) => i % step === offset);
-
 // Coordinates of the deformed surface; the size of the displacement, which the amplitude does not change.
 function modeShape() {
   const link = MODES_3D.links[modeState.link], start = 3 * link.count * modeState.mode;

@@ -24,7 +24,7 @@ def modes_3d(links: Sequence[LinkModes]) -> dict[str, Any]:
     """What the script of the page draws; links whose surface is not known are left out."""
     surfaces = [(link, body_surface(link.body)) for link in links]
     entries = [
-        _entry(link, mesh.points, _triangles(mesh.cells), mesh.mode_shapes)
+        _entry(link, mesh.points, triangles_of(mesh.cells), mesh.mode_shapes)
         for link, mesh in surfaces
         if mesh.cells.shape[1] > 2
     ]
@@ -51,7 +51,7 @@ def _name(body: ModalBody, k: int) -> str:
     return f"{k + 1}: {body.frequency[k]:.5g} Hz, {body.family[k]}"
 
 
-def _triangles(cells: Integers) -> Integers:
+def triangles_of(cells: Integers) -> Integers:
     """(t, 3) of triangles or quadrilaterals."""
     return cells if cells.shape[1] == 3 else np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
 

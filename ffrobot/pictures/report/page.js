@@ -42,6 +42,9 @@ function repaint(element) {
   return Plotly.relayout(element, { "font.color": colors.font.color, ...Object.fromEntries(Object.entries(colors).filter(([key]) => key !== "font")) });
 }
 
+// Every `step`-th of values, from `offset` on.
+const every = (values, step, offset) => Array.from(values).filter((_, i) => i % step === offset);
+
 // Charts are drawn when they come near the window: a page of many opens at once.
 const CHARTS = JSON.parse(document.getElementById("chart-data").textContent);
 
@@ -62,8 +65,18 @@ places.forEach((place) => watcher.observe(place));
 const drawn = () => [...document.querySelectorAll(".js-plotly-plot")];
 SCREEN.addEventListener("change", () => drawn().forEach(repaint));
 
-// On paper: every chart and everything that is folded.
+// On paper: every chart, two side by side on A4 or letter, and everything that is folded. A chart keeps the size that it
+// is drawn with, and the width of the paper is not known before the page is laid out.
+const SIZES = {
+  paper: { mechanism: { width: 690, height: 400, "legend.y": -0.2 }, chart: { width: 340, height: 265, "legend.y": -0.4 } },
+  screen: { mechanism: { width: null, height: null, "legend.y": -0.13 }, chart: { width: null, height: null, "legend.y": -0.27 } },
+};
+function resize(place) {
+  for (const chart of drawn()) if (chart.id !== "modes-3d") Plotly.relayout(chart, SIZES[place][chart.id] ?? SIZES[place].chart);
+}
 window.addEventListener("beforeprint", () => {
   document.querySelectorAll("details").forEach((fold) => (fold.open = true));
   places.forEach(drawChart);
+  resize("paper");
 });
+window.addEventListener("afterprint", () => resize("screen"));

@@ -15,6 +15,7 @@ from ...common.version import program_version
 from ...results.file import Results
 from .histories import folded, history_charts
 from .mechanism import mechanism
+from .mechanism_3d import spatial_mechanism
 from .modes import link_modes
 from .modes_3d import modes_3d
 from .runs import runs, sources
@@ -56,7 +57,8 @@ def report(files: Sequence[Results]) -> str:
         plotly_version=get_plotlyjs_version(),
         page_js=(HERE / "page.js").read_text(encoding="utf-8"),
         modes_3d_js=(HERE / "modes_3d.js").read_text(encoding="utf-8"),
-        mechanism_js=(HERE / "mechanism.js").read_text(encoding="utf-8"),
+        player_js=(HERE / "player.js").read_text(encoding="utf-8"),
+        mechanism_js=(HERE / f"mechanism{'_3d' if _all_spatial(files) else ''}.js").read_text(encoding="utf-8"),
         page_css=(HERE / "page.css").read_text(encoding="utf-8"),
         ffrobot_version=program_version(),
     )
@@ -65,12 +67,15 @@ def report(files: Sequence[Results]) -> str:
 def _content(files: Sequence[Results]) -> dict[str, Any]:
     """What the template fills in."""
     all_runs = runs(files)
-    moving, modes, histories = mechanism(all_runs), link_modes(all_runs), history_charts(files)
+    spatial = _all_spatial(files)
+    moving = spatial_mechanism(all_runs) if spatial else mechanism(all_runs)
+    modes, histories = link_modes(all_runs), history_charts(files)
     shapes = modes_3d(modes)
     charts = [*histories, *(chart for link in modes for chart in link.charts)]
     return {
         "title": ", ".join(dict.fromkeys(results.name for results in files)),
         "mechanism": _script_data(moving.data),
+        "spatial": spatial,
         "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
         "shapes": shapes["links"],
         "modes_3d": _script_data(shapes),
@@ -89,6 +94,17 @@ def _content(files: Sequence[Results]) -> dict[str, Any]:
         "skipped": [(source, line) for r, source in zip(files, sources(files), strict=True) for line in r.skipped],
         "scenes": [(source or r.name, r.scene_text) for r, source in zip(files, sources(files), strict=True)],
     }
+
+
+def _all_spatial(files: Sequence[Results]) -> bool:
+    """Whether the files are of scenes in space; `InputError` where some are and some are not."""
+    kinds = {results.is_spatial: results.path for results in files}
+    if len(kinds) == 2:
+        raise InputError(
+            f"report: expected results all of the plane or all of space, found {kinds[True]} of space and"
+            f" {kinds[False]} of the plane: write a report of each"
+        )
+    return True in kinds
 
 
 def _script_data(value: object) -> str:

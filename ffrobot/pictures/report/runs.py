@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from os.path import abspath
 from pathlib import Path
 
-import numpy as np
-
-from ...common.arrays import Array
 from ...results.file import Results
 
 
@@ -61,33 +58,3 @@ def runs(files: Sequence[Results]) -> list[Run]:
         for results, source in zip(files, sources(files), strict=True)
         for analysis in results.analyses
     ]
-
-
-@dataclass(frozen=True)
-class Target:
-    """Where a point of a run should be: the `columns` (0 for x, 1 for y) of its position, (T, m) in m."""
-
-    trajectory: str
-    point: str
-    columns: tuple[int, ...]
-    wanted: Array
-
-
-def targets(run: Run) -> list[Target]:
-    """The target of every trajectory of a point, over the first outputs of the run.
-
-    A forward analysis does not hold trajectories: its targets are those of the analysis its actuation comes from.
-    """
-    results, found = run.results, []
-    time = results.time(run.analysis)
-    holders = (run.analysis, str(results.attributes(run.analysis).get("actuation", "")))
-    for trajectory in results.scene.get("trajectory", []):
-        groups = {holder: f"{holder}/trajectories/{trajectory['name']}" for holder in holders}
-        holder = next((h for h, group in groups.items() if results.has(f"{group}/target")), None)
-        if holder is None or "point" not in trajectory:
-            continue
-        wanted, common = results.data(f"{groups[holder]}/target"), min(len(results.time(holder)), len(time))
-        if np.allclose(time[:common], results.time(holder)[:common], rtol=0, atol=1e-12):
-            columns = tuple("xy".index(c) for c in results.attributes(groups[holder])["components"])
-            found.append(Target(trajectory["name"], trajectory["point"], columns, wanted[:common]))
-    return found

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array
-from ...mbs.joints.joints import JOINT_TYPES
 from ...results.file import Results, status_in_words
+from ...results.joints import joint_coordinates
+from ..path_targets import targets
 from .histories import path_error
-from .runs import Run, sources, targets
+from .runs import Run, sources
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ def analyses_table(runs: Sequence[Run]) -> Table:
     for run in runs:
         about, time = run.results.attributes(run.analysis), run.results.time(run.analysis)
         integrated = about["integrator"] != "none"
-        counts = tuple(f"{about[key]}" if integrated else "" for key in ("steps", "rejected", "evaluations"))
+        counts = tuple(f"{about.get(key, '')}" if integrated else "" for key in ("steps", "rejected", "evaluations"))
         violation = run.results[f"{run.analysis}/constraint_violation"].max(initial=0.0)
         rows.append(
             (run.label, about["kind"], status_in_words(about), f"{time[-1]:g}", f"{len(time)}", *counts,
@@ -74,13 +75,13 @@ def peaks_table(runs: Sequence[Run]) -> Table:
 def _peaks(run: Run) -> Iterator[tuple[str, str, Array]]:
     """(quantity, unit, its values (T, …)) of a run."""
     results, analysis = run.results, run.analysis
-    for target in targets(run):
+    for target in targets(run.results, run.analysis):
         yield f"distance of {target.point} from its path", "mm", 1e3 * path_error(run, target)
-    types = {joint["name"]: joint["type"] for joint in results.scene.get("joint", [])}
-    for joint in types:
-        if results.has(f"{analysis}/joints/{joint}/moment"):
-            unit = JOINT_TYPES[types[joint]].force_unit
-            yield f"motor of joint {joint}", unit, results[f"{analysis}/joints/{joint}/moment"]
+    for joint in (keys["name"] for keys in results.scene.get("joint", [])):
+        for coordinate in joint_coordinates(results.scene, joint):
+            if results.has(moment := f"{analysis}/joints/{joint}/moment"):
+                name = f"motor of joint {joint}{coordinate.label}"
+                yield name, coordinate.force_unit, results.data(moment + coordinate.column)
     for point in results.names(f"{analysis}/points"):
         deflection = np.linalg.norm(results[f"{analysis}/points/{point}/deflection"], axis=1)
         if deflection.any():

@@ -76,6 +76,20 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
     )
 
 
+def joint_places(results: Results, analysis: str, frames: Indices) -> tuple[Array, Array]:
+    """Where revolute joints are at the outputs `frames` (T, j, 3) in m, and their exaggeration as of grids."""
+    motions = [body_motion(results, analysis, name, frames) for name in ordered_bodies(results.scene)]
+    shift = carried(motions, results.scene)
+    ends = {joint["between"][1] for joint in results.scene.get("joint", []) if joint["type"] == "revolute"}
+    at, exaggeration = [np.zeros((len(frames), 0, 3))], [np.zeros((len(frames), 0, 3))]
+    for motion in motions:
+        here = [k for k, name in enumerate(motion.point_names) if name in ends]
+        moved = rotated(motion.angle[:, None], motion.deflection[:, here])
+        at.append(_in_space(motion.global_points[:, here]))
+        exaggeration.append(_in_space(moved + shift[motion.name][:, None]))
+    return np.concatenate(at, axis=1), np.concatenate(exaggeration, axis=1)
+
+
 def _placed(piece: Piece, shift: Array) -> tuple[Array, Array, Array]:
     """Where the points of a body are, their deflection and exaggeration (T, p, 3), in m and global axes."""
     moved = np.einsum("pin,tn->tpi", piece.shapes, piece.modal, optimize=True)

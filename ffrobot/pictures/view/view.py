@@ -15,10 +15,12 @@ from ...common.files import check_folder, write_atomically
 from ...common.validation import did_you_mean
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
-from ..figures.standard import file_name
+from ..drawn_body import ground_points
+from ..figures.shared import file_name
 from ..motion import visible_exaggeration
-from .grids import modes_grid, results_grid
+from .grids import joint_places, modes_grid, results_grid
 from .pictures import Picture, draw_pictures
+from .spatial_grids import spatial_results_grid
 from .vtkhdf import Grid, vtkhdf_image
 from .xdmf import xdmf_text
 
@@ -58,19 +60,20 @@ def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewe
     Grids are .vtkhdf files, each with an .xdmf for programs that cannot read those.
 
     Raises `InputError` where the file cannot be read or has no such analysis, `SolveError` where a file cannot be
-    written, or pictures that are asked for cannot be drawn: grids are written all the same.
+    written, or pictures that are asked for cannot be drawn: grids are written all the same. Where stresses of a surface
+    are known there is a second picture, `.stress.png`.
     """
     options = options or Options()
     check_folder(folder)
     notes: list[str] = []
     views = _modal_body(path) if is_modal_body_file(path) else _results(path, options, notes)
     paths, pictures = [], []
-    for name, grid, picture in views:
+    for name, grid, shown in views:
         paths.append(folder / f"{name}.vtkhdf")
         write_atomically(paths[-1], vtkhdf_image(grid), "grid", make_folder=True)
         paths.append(folder / f"{name}.xdmf")
         write_atomically(paths[-1], xdmf_text(grid, paths[-2].name), "index of the grid")
-        pictures.append(replace(picture, grid=str(paths[-2]), path=f"{name}.png"))
+        pictures += [replace(picture, grid=str(paths[-2])) for picture in shown]
     if options.pictures is not False:
         try:
             paths += _draw(pictures, folder)
@@ -81,19 +84,24 @@ def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewe
     return Viewed(paths, list(dict.fromkeys(notes)))
 
 
-View = tuple[str, Grid, Picture]  # name of its files, grid, picture without paths
+View = tuple[str, Grid, list[Picture]]  # name of its files, grid, pictures without the grid's path
 
 
 def _modal_body(path: Path) -> Iterator[View]:
     body = read_modal_body(path)
-    yield file_name(body.name), modes_grid(body), Picture(body.name, length=body.length)
+    name = file_name(body.name)
+    yield name, modes_grid(body), [Picture(body.name, path=f"{name}.png", length=body.length)]
 
 
 def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
     with Results(path) as results:
         for analysis in _analyses(results, options.analysis):
-            grid = results_grid(results, analysis, _frames(results, analysis, options.frames), notes)
-            yield file_name(analysis), grid, _snapshot(f"{results.name}: {analysis}", grid, options)
+            frames = _frames(results, analysis, options.frames)
+            grid_of = spatial_results_grid if results.is_spatial else results_grid
+            grid, name = grid_of(results, analysis, frames, notes), file_name(analysis)
+            pictures = [_snapshot(results, analysis, frames, grid, options, color) for color in _colors(grid)]
+            pictures[0] = replace(pictures[0], path=f"{name}.png")
+            yield name, grid, [pictures[0], *(replace(other, path=f"{name}.stress.png") for other in pictures[1:])]
 
 
 def _analyses(results: Results, wanted: str | None) -> Sequence[str]:
@@ -112,15 +120,53 @@ def _frames(results: Results, analysis: str, count: int) -> Indices:
     return np.unique(np.linspace(0, outputs - 1, min(outputs, count)).round().astype(np.intp))
 
 
-def _snapshot(title: str, grid: Grid, options: Options) -> Picture:
-    """At the step nearest to the time asked for, or where deflections are largest."""
+def _colors(grid: Grid) -> list[str]:
+    """What bodies are coloured by: a picture each."""
+    return ["deflection", *(["von_mises"] if "von_mises" in grid.point_data else [])]
+
+
+def _snapshot(
+    results: Results, analysis: str, frames: Indices, grid: Grid, options: Options, color: str = "deflection"
+) -> Picture:
+    """At the step nearest to the time asked for, or where what it is coloured by is largest."""
     assert grid.time is not None
-    deflection = np.linalg.norm(grid.point_data["deflection"], axis=2).max(axis=1)
-    step = int(np.argmax(deflection) if options.time is None else np.argmin(np.abs(grid.time - options.time)))
-    scale = options.scale
-    if scale is None:
-        scale = visible_exaggeration(float(np.ptp(grid.points[step], axis=0).max()), float(deflection[step]))
-    return Picture(f"{title}, t = {grid.time[step]:.4g} s, deformation x {scale:g}", step=step, scale=scale)
+    values = grid.point_data[color]
+    largest = np.nanmax(np.linalg.norm(values, axis=2) if values.ndim == 3 else values, axis=1)
+    step = int(np.argmax(largest) if options.time is None else np.argmin(np.abs(grid.time - options.time)))
+    scale = visible_scale(grid, [step]) if options.scale is None else options.scale
+    return motion_picture(results, analysis, frames, grid, (step,), scale, color)
+
+
+def visible_scale(grid: Grid, steps: Sequence[int]) -> float:
+    """How much larger deflections are drawn so that they can be seen at these steps."""
+    size = max(float(np.ptp(grid.points[step], axis=0).max()) for step in steps)
+    deflection = np.linalg.norm(grid.point_data["deflection"][list(steps)], axis=2)
+    return visible_exaggeration(size, float(deflection.max()))
+
+
+def motion_picture(
+    results: Results, analysis: str, frames: Indices, grid: Grid, steps: tuple[int, ...], scale: float, color: str
+) -> Picture:
+    """Of the steps of a grid, which shows the outputs `frames` of an analysis."""
+    assert grid.time is not None
+    name, exaggerated = f"{results.name}: {analysis}", "" if scale == 1.0 else f", deformation x {scale:g}"
+    braces = name.replace("{", "{{").replace("}", "}}")
+    picture = Picture(
+        f"{braces}, t = {{time}} s{exaggerated}",
+        steps=steps,
+        times=tuple(float(t) for t in grid.time[list(steps)]),
+        scale=scale,
+        color=color,
+    )
+    if results.is_spatial:
+        return replace(picture, in_space=True, joints=((),) * len(steps))
+    at, exaggeration = joint_places(results, analysis, frames[list(steps)])
+    joints = at + (scale - 1.0) * exaggeration
+    return replace(
+        picture,
+        joints=tuple(tuple(map(tuple, places)) for places in joints.tolist()),
+        ground=tuple((float(x), float(y), 0.0) for x, y in ground_points([results.scene])),
+    )
 
 
 def _draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:

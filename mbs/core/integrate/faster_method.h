@@ -46,6 +46,7 @@ public:
   void go_on(const MethodHistory &history); // of a run with the same candidates
 
 private:
+  unsigned long steps_measured() const;
   const Candidate &now() const { return candidates_[history_.second ? 1 : 0]; }
   const Candidate &other() const { return candidates_[history_.second ? 0 : 1]; }
 

@@ -2,6 +2,7 @@
 
 #include "core/integrate/jump.h"
 #include "core/integrate/step_control.h"
+#include "core/integrate/step_limit.h"
 
 #include <algorithm>
 #include <chrono>
@@ -59,6 +60,7 @@ double next_step(double h, double left, bool lands) {
 // A step to be tried. `target` is where steps have to end next, if `lands`, or the end of the run.
 struct Attempt {
   double target, step, end;
+  bool is_limited; // shorter than asked for, by what is prescribed
 };
 
 // How large its error may be: as parts of the tolerance, and in the unit of errors.
@@ -73,10 +75,10 @@ public:
               const IntegrationControls &controls, const StateFunctionOfTime &output,
               const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks)
       : system_(system), times_(times), controls_(controls), output_(output), carry_on_(carry_on),
-        recording_(recording), breaks_(breaks), methods_(controls.methods, times.front(), times.back()),
-        method_(make_method(methods_.at_work(), system)), control_(method_->error_order()), t_(times.front()),
-        t_asked_(t_), end_(times.back()), duration_(times.back() - times.front()), z_(system.size()),
-        error_(system.size()), z_output_(system.size()) {
+        recording_(recording), breaks_(breaks), limit_(system, times.front(), times.back(), controls.tolerance),
+        methods_(controls.methods, times.front(), times.back()), method_(make_method(methods_.at_work(), system)),
+        control_(method_->error_order()), t_(times.front()), t_asked_(t_), end_(times.back()),
+        duration_(times.back() - times.front()), z_(system.size()), error_(system.size()), z_output_(system.size()) {
     system_.local().set_centre(y.data());
     system_.local().from_state(y.data(), z_.data());
   }
@@ -205,8 +207,9 @@ private:
       end_at(breaks_->times[next_break_]);
     if (jump_)
       end_at(jump_->before);
-    const double step = next_step(steps_.next_step, target - t_, lands);
-    return {target, step, step == target - t_ ? target : t_ + step};
+    const double wanted = next_step(steps_.next_step, target - t_, lands);
+    const double step = limit_.of(t_, wanted);
+    return {target, step, step == target - t_ ? target : t_ + step, step < wanted};
   }
 
   Allowance allowance_of(double step) const {
@@ -253,10 +256,11 @@ private:
       return;
     }
     // A step that was shortened to land on an output tells what the step asked for would have cost. One that was
-    // shortened much, to end at a break or a jump, tells nothing: the next step stays as long as the control had asked
-    // for.
+    // shortened much, to end at a break or a jump or by what is prescribed, tells nothing: the next step stays as long
+    // as the control had asked for.
     const double asked = std::clamp(steps_.next_step, attempt.step, 2 * attempt.step);
-    if (!(t_ == attempt.target && (breaks_ || jump_) && 2 * attempt.step < steps_.next_step))
+    const bool ends_early = attempt.is_limited || (t_ == attempt.target && (breaks_ || jump_));
+    if (!(ends_early && 2 * attempt.step < steps_.next_step))
       steps_.next_step = control_.after_accepted(asked, size * std::pow(asked / attempt.step, method_->error_order()));
     if (pass_breaks()) {
       system_.slope(t_, z_.data(), method_->first_slope());
@@ -356,6 +360,7 @@ private:
   const std::function<bool(double)> &carry_on_;
   Recording *recording_;
   const Breaks *breaks_;
+  StepLimit limit_;
   FasterMethod methods_;
   std::unique_ptr<Method> method_;
   StepControl control_;

@@ -42,6 +42,10 @@ public:
   // Whether z is still something that the equations describe; where it is not, the run ends as diverged.
   virtual bool is_sensible(const double *z) const = 0;
 
+  // Functions of time alone that slopes follow, as many as prescribed(): loads, accelerations of paths.
+  virtual Eigen::Index prescribed() const { return 0; }
+  virtual void prescribe([[maybe_unused]] double t, [[maybe_unused]] double *f) {}
+
   // First step size to try.
   virtual double initial_step() const = 0;
 

@@ -35,6 +35,19 @@ void ConstrainedMotion::slope(double t, const double *z, double *z_dot) {
   evaluated_at_ = t;
 }
 
+Index ConstrainedMotion::prescribed() const {
+  return static_cast<Index>(system_.drives.size() + system_.modal_drives.size() + system_.constraints.size());
+}
+
+void ConstrainedMotion::prescribe(double t, double *f) {
+  for (const Drive &drive : system_.drives)
+    *f++ = drive.magnitude(t).value;
+  for (const ModalDrive &drive : system_.modal_drives)
+    *f++ = drive.magnitude(t).value;
+  for (const Constraint &constraint : system_.constraints)
+    *f++ = constraint.target(t).acceleration;
+}
+
 bool ConstrainedMotion::correct(double t, double *z) {
   if (system_.space.is_flat())
     return project(system_, t, z, z + n_v(), workspace_) < 1e-11;

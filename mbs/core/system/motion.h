@@ -30,6 +30,8 @@ public:
   double error_size(double t, const double *z, const double *e) override;
   void accepted(double t, const double *z, const double *z_dot) override;
   bool is_sensible(const double *z) const override;
+  Eigen::Index prescribed() const override; // of the system's own loads and of its constraints
+  void prescribe(double t, double *f) override;
   double initial_step() const override { return 0.1 / norm_.fastest(); }
   unsigned long evaluations() const override { return workspace_.evaluations; }
 

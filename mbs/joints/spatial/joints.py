@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, get_args
 
 from pydantic import Field
 
 from .cylindrical import SpatialCylindrical
 from .free import SpatialFree
+from .joint import SpatialJoint
 from .planar_joint import SpatialPlanar
 from .prismatic import SpatialPrismatic
 from .revolute import SpatialRevolute
@@ -29,3 +30,8 @@ AnySpatialJoint = Annotated[
     Field(discriminator="type"),
 ]
 """The list of all types, told apart by the key `type`: a new one is a file beside this one and an entry here."""
+
+SPATIAL_JOINT_TYPES: dict[str, type[SpatialJoint]] = {
+    record.type_name(): record for record in get_args(get_args(AnySpatialJoint)[0])
+}
+"""The records by what the key `type` says."""

@@ -1,0 +1,126 @@
+"""Stability of sampled joint PID loops by the linear model.
+
+The loop is judged as it acts: moments are held between samples and begin `delay` after their reading. Of the model
+sampled exactly (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3) the loop x(k+1) = F x(k) is stable where
+the spectral radius of F is below 1. Margins are by how much all gains, or the delay, may grow until it is 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array
+from .linear_model import LinearModel
+from .records import JointPid
+from .sampling import sampled
+
+STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to rounding
+LARGEST_GAIN, LEAST_GAIN, LONGEST_DELAY = 1e4, 1e-2, 50.0  # that margins are sought to: factors, and sample times
+GRID = 60  # points of the search for the first crossing, before bisection
+RELATIVE = 1e-3  # to which margins are found
+
+
+@dataclass(frozen=True)
+class JointGains:
+    """u = −(P y + D ẏ + D' (y − y₋)/T + I Σ T y) with matrices (motors, outputs); y are the joints' errors."""
+
+    P: Array
+    D: Array
+    difference: Array
+    integral: Array
+
+    def times(self, factor: float) -> JointGains:
+        """All gains times a factor."""
+        return JointGains(*(factor * matrix for matrix in (self.P, self.D, self.difference, self.integral)))
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How far a loop is from its stability bound, the worst of several configurations.
+
+    Attributes:
+        radius: the spectral radius; below 1 the loop is stable.
+        gain: factor by which all gains may grow; below 1 the factor that would make it stable, 0 where none does.
+        delay: s, by which the delay may grow; 0 where the loop is not stable.
+    """
+
+    radius: float
+    gain: float
+    delay: float
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether the linear model says so."""
+        return self.radius <= STABLE
+
+
+def joint_gains(model: LinearModel, records: Sequence[JointPid]) -> JointGains:
+    """The gains of joint PID controllers, which add up."""
+    shape = (len(motor_inputs(model)), len(model.output_names))
+    P, D, difference, integral = (np.zeros(shape) for _ in range(4))
+    motors = [model.input_names[k] for k in motor_inputs(model)]
+    for record in records:
+        for joint in record.joints:
+            at = motors.index(f"joint/{joint}"), model.outputs(f"{record.side}/{joint}")[0]
+            P[at] += record.proportional.get(joint, 0.0)
+            (D if record.rate == "measured" else difference)[at] += record.derivative.get(joint, 0.0)
+            integral[at] += record.integral.get(joint, 0.0)
+    return JointGains(P, D, difference, integral)
+
+
+def motor_inputs(model: LinearModel) -> list[int]:
+    """Columns of B that are motors'."""
+    return [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]
+
+
+def spectral_radius(model: LinearModel, gains: JointGains, T: float, delay: float) -> float:
+    """The largest |eigenvalue| of the sampled loop."""
+    f, m, o = model.freedom, len(gains.P), len(model.output_names)
+    plant = sampled(model.A, model.B[:, motor_inputs(model)], T, delay)
+    n = len(plant.A)
+    value, rate = np.zeros((o, n)), np.zeros((o, n))
+    value[:, :f] = rate[:, f : 2 * f] = model.C[:, :f]
+    # states: those of the plant with commands on their way, the last readings, and their sums
+    feedback = np.zeros((m, n + 2 * o))
+    feedback[:, :n] = (gains.P + gains.difference / T + T * gains.integral) @ value + gains.D @ rate
+    feedback[:, n : n + o] = -gains.difference / T
+    feedback[:, n + o :] = gains.integral
+    used = np.append(np.ones(n + o, dtype=bool), gains.integral.any(axis=0))  # sums without a gain would stay at 1
+    F = np.zeros((n + 2 * o, n + 2 * o))
+    F[:n, :n] = plant.A
+    F[:n] -= plant.B @ feedback
+    F[n : n + o, :n] = value
+    F[n + o :, :n], F[n + o :, n + o :] = T * value, np.eye(o)
+    return float(np.abs(np.linalg.eigvals(F[np.ix_(used, used)])).max())
+
+
+def margins(models: Sequence[LinearModel], gains: JointGains, T: float, delay: float) -> Margins:
+    """Of a loop about each of the `models`, the worst."""
+
+    def radius(factor: float, more: float) -> float:
+        return max(spectral_radius(model, gains.times(factor), T, delay + more) for model in models)
+
+    now = radius(1.0, 0.0)
+    if now > STABLE:
+        factors = np.geomspace(1.0, LEAST_GAIN, GRID)
+        return Margins(now, _last_before(lambda c: radius(c, 0.0) <= STABLE, factors, missing=0.0), 0.0)
+    gain = _last_before(lambda c: radius(c, 0.0) > STABLE, np.geomspace(1.0, LARGEST_GAIN, GRID), missing=np.inf)
+    waits = np.append(0.0, T * np.geomspace(0.01, LONGEST_DELAY, GRID))
+    return Margins(now, gain, _last_before(lambda d: radius(1.0, d) > STABLE, waits, missing=np.inf))
+
+
+def _last_before(changed: Callable[[float], bool], values: Array, missing: float) -> float:
+    """Where on the way along `values` a condition first changes, by bisection; `missing` where it never does."""
+    before = float(values[0])
+    for value in map(float, values[1:]):
+        if changed(value):
+            after = value
+            while abs(after - before) > RELATIVE * max(abs(before), abs(after)):
+                middle = 0.5 * (before + after)
+                before, after = (before, middle) if changed(middle) else (middle, after)
+            return 0.5 * (before + after)
+        before = value
+    return missing

@@ -1,0 +1,113 @@
+"""Which modal forces patches reach, which they are to serve, and what counts of those that they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array, Indices
+from ...common.errors import InputError
+from .records import PatchKeys
+
+SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
+MOST_CONDITION = 1e16  # what more is found of a condition number is rounding itself
+LEAST_WEIGHT = 1e-6  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
+OF_STATIC_SHAPES = 1e-3  # root of the weight of attachment modes beside modes: more patches than modes serve them last
+ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reach:
+    """What k patches do to n modes, and what is wanted of them.
+
+    Attributes:
+        Phi_V: (n, k) modal forces per volt.
+        limit: (k,) largest voltages, V; infinite where the scene gives none.
+        W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
+        frequency: (n,) of the modes, Hz.
+        served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
+        of_all_modes: where these are not all modes, but the patches reach all: the same patches on all modes, and
+            (n_all, n) the modal forces on these from those on the n.
+    """
+
+    Phi_V: Array
+    limit: Array
+    W_sqrt: Array
+    frequency: Array
+    served: int
+    of_all_modes: tuple[Reach, Array] | None = None
+
+    @property
+    def condition_number(self) -> float:
+        """Of Φ_V: how unequally the patches reach the modes; infinite where some mode is out of reach."""
+        return float(np.linalg.cond(self.Phi_V[: self.served]))
+
+    @property
+    def unreached_modes(self) -> Indices:
+        """Numbers (from 0) of the modes that take part in what no voltages can produce."""
+        left, sizes, _ = np.linalg.svd(self.Phi_V[: self.served])
+        rank = int(np.count_nonzero(sizes > sizes[0] / SINGULAR))
+        return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
+
+    @property
+    def in_order(self) -> Array:
+        """(rows, n) roots of weights: modes first, and attachment modes with what more patches than modes are left."""
+        n, k = self.Phi_V.shape
+        return served_first(self.served, n, k)
+
+
+def served_first(served: int, n: int, patches: int) -> Array:
+    """(rows, n) roots of weights of the `served` first of n modes; more patches than these serve the others, too."""
+    rows = n if patches > served else served
+    return np.diag(np.where(np.arange(n) < served, 1.0, OF_STATIC_SHAPES))[:rows]
+
+
+def weights(key: str, layout: PatchKeys, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
+    """W_sqrt (rows, n): of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points.
+
+    `stiffness` (n,) of the modes, `points` their Φ (components, n) by name. Raises `InputError` for weights that do not
+    fit.
+    """
+    order = served_first(served, len(stiffness), layout.patch_count)
+    if layout.mode_weights is not None:
+        if len(layout.mode_weights) != served:
+            raise InputError(
+                f"{key}: mode_weights: expected {served} weights, one for each mode that {layout.served_in_words},"
+                f" found {len(layout.mode_weights)}"
+            )
+        shares = np.array(layout.mode_weights) / max(layout.mode_weights)
+        root = np.ones(len(order))
+        root[:served] = np.sqrt(shares.clip(min=LEAST_WEIGHT))
+        return root[:, None] * order
+    if layout.point_weights is None:
+        return order
+    unknown = layout.point_weights.keys() - points.keys()
+    if unknown:
+        raise InputError(
+            f"{key}: point_weights: expected points of the link, {', '.join(points)}, found"
+            f" {', '.join(sorted(unknown))}"
+        )
+    rows = np.vstack([np.sqrt(weight) * points[name] / stiffness for name, weight in layout.point_weights.items()])
+    size = np.linalg.norm(rows, 2)
+    if not size > 0.0:
+        raise InputError(f"{key}: point_weights: expected points that move with the modes, found none that do")
+    softest = np.sqrt(stiffness.min() / stiffness)
+    return np.vstack([rows / size, np.sqrt(ENERGY_WEIGHT) * np.diag(softest)])
+
+
+def check_all_served(key: str, reach: Reach) -> None:
+    """Raise `InputError` unless the patches reach every mode that they are to serve."""
+    advice = 'or be content with the best they can do: allocation = "least-squares"'
+    n, k = reach.served, reach.Phi_V.shape[1]
+    if k < n:
+        raise InputError(f"{key}: expected as many patches as modes ({n}) or more, found {k}: add patches, {advice}")
+    unreached = reach.unreached_modes
+    if unreached.size:
+        modes = ", ".join(f"{j + 1} ({reach.frequency[j]:.4g} Hz)" for j in unreached)
+        raise InputError(
+            f"{key}: expected patches that reach every mode, found a singular Φ_V (condition number"
+            f" {min(reach.condition_number, MOST_CONDITION):.1g}): no voltages serve mode {modes};"
+            f" move patches, {advice}"
+        )

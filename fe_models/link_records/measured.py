@@ -1,0 +1,124 @@
+"""A table of measured modes: natural frequencies and damping ratios, as link files and `ffrobot fit` take them."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+from ...common.errors import InputError
+from ...common.tables import LARGEST, shown
+from ...common.toml_files import read_text
+from ...common.validation import InputFile, Record, did_you_mean, quoted
+
+COLUMNS = ("mode", "family", "frequency", "damping_ratio", "uncertainty")
+
+
+class Measured(Record):
+    """Natural frequencies and damping ratios that were measured, in place of the computed ones; shapes stay."""
+
+    table: InputFile
+    """CSV table with the columns `mode` and `frequency` (Hz) or `damping_ratio`; `family` beside `mode` where modes are
+    counted by family."""
+
+
+@dataclass(frozen=True)
+class MeasuredMode:
+    """One row of the table.
+
+    Attributes:
+        line: of the file.
+        number: of the mode, from 1, the lowest first: among those of `family`, or among all where that is empty.
+        frequency: Hz; None where not measured.
+        damping_ratio: ζ; None where not measured.
+        uncertainty: standard deviation of the frequency, Hz; None where not known.
+    """
+
+    line: int
+    number: int
+    family: str
+    frequency: float | None
+    damping_ratio: float | None
+    uncertainty: float | None
+
+    @property
+    def label(self) -> str:
+        """What messages and tables call the mode."""
+        return f"{self.family} {self.number}" if self.family else f"mode {self.number}"
+
+
+def read_measured(path: Path, families: tuple[str, ...] = ()) -> list[MeasuredMode]:
+    """The rows of the CSV table at `path`; `families` are the names that its column `family` may have.
+
+    Raises `InputError` naming file and line.
+    """
+    reader = csv.DictReader(read_text(path, "table of measured modes").splitlines(), skipinitialspace=True)
+    try:
+        header = [name.strip() for name in reader.fieldnames or ()]
+        _check_header(path, header)
+        reader.fieldnames = header
+        rows = [_row(path, reader.line_num, values, families) for values in reader if any(values.values())]
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot read the table of measured modes: {error}") from None
+    if not rows:
+        raise InputError(f"{path}: expected at least one measured mode below the header, found none")
+    seen = set[tuple[str, int]]()
+    for row in rows:
+        if (row.family, row.number) in seen:
+            raise InputError(f"{path}: line {row.line}: expected each mode once, found {row.label} again")
+        seen.add((row.family, row.number))
+    return rows
+
+
+def _check_header(path: Path, header: list[str]) -> None:
+    """Raise `InputError` unless the columns are known ones, `mode` and something measured among them."""
+    for name in header:
+        if name not in COLUMNS:
+            known = f"columns among {quoted(COLUMNS)}"
+            raise InputError(f'{path}: line 1: expected {known}, found "{shown(name)}"{did_you_mean(name, COLUMNS)}')
+    if len(set(header)) < len(header) or "mode" not in header or not {"frequency", "damping_ratio"} & set(header):
+        found = shown(",".join(header))
+        raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio, found {found!r}")
+
+
+def _row(path: Path, line: int, values: Mapping[str | None, str | None], families: tuple[str, ...]) -> MeasuredMode:
+    where = f"{path}: line {line}"
+    if None in values or None in values.values():
+        raise InputError(f"{where}: expected as many entries as the header has, found more or fewer")
+    texts = {str(name): (text or "").strip() for name, text in values.items()}
+    number = texts["mode"]
+    if not (number.isascii() and number.isdecimal() and int(number[:9]) > 0):
+        raise InputError(f'{where}: mode: expected a whole number from 1 on, found "{shown(number)}"')
+    family = texts.get("family", "")
+    if family and family not in families:
+        known = f"expected {quoted(families)}" if families else "expected none of a robot, whose modes have no family"
+        raise InputError(f'{where}: family: {known}, found "{shown(family)}"{did_you_mean(family, families)}')
+    frequency, damping, spread = (_number(where, name, texts.get(name, "")) for name in COLUMNS[2:])
+    if frequency is None and damping is None:
+        raise InputError(f"{where}: expected a frequency or a damping_ratio, found neither")
+    return MeasuredMode(line, int(number[:9]), family, frequency, damping, spread)
+
+
+def _number(where: str, name: str, text: str) -> float | None:
+    """The entry as a number above 0, for damping not below it; None where it is empty."""
+    if not text:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    least = value >= 0.0 if name == "damping_ratio" else value > 0.0
+    if not (isfinite(value) and least and value < LARGEST):
+        bound = "not below 0" if name == "damping_ratio" else "above 0, in Hz"
+        raise InputError(f'{where}: {name}: expected a number {bound}, or nothing, found "{shown(text)}"')
+    return value
+
+
+def paired(rows: list[MeasuredMode], family: tuple[str, ...]) -> Iterator[tuple[int, MeasuredMode]]:
+    """The rows whose modes are among those of `family` (their families, the lowest first), with their number there."""
+    for row in rows:
+        candidates = [k for k, name in enumerate(family) if not row.family or name == row.family]
+        if row.number <= len(candidates):
+            yield candidates[row.number - 1], row

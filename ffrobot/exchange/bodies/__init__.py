@@ -1,0 +1,1 @@
+"""Flexible bodies in the formats of other programs."""

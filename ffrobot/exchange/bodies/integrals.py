@@ -1,0 +1,182 @@
+"""The integrals that the equations of a flexible body consist of, as other programs keep them, and back.
+
+Symbols of Wallrapp's standard input data (O. Wallrapp, Standardization of flexible body modeling in multibody system
+codes, Mech. Struct. Mach. 22, 1994, 283–304), to first order in the modal coordinates q:
+
+    mdCM = m c + C_tᵀ q       J = J_0 + Σ J_l q_l        C_r = C_r0 + Σ C_rl q_l      of x + Φ q
+    G_r l = 2 ∫ρ[(x·Φ_l) E − Φ_l xᵀ] dV     G_e = 2 ∫ρ Φᵀ e~ Φ dV     O_e = ∫ρ Φᵀ ω~ω~ (x + Φ q) dV
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...fe_models.modal_body import Interface, ModalBody
+from ...fe_models.modal_body.tensors import LEVI_CIVITA
+from ...mbs.model.spatial_body import from_modal_body
+
+POSITIVE = 1e-9  # of the largest entry: less is rounding
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+"""ω_a ω_b of the columns of O_e."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeIntegrals:
+    """Of a body with n modes; SI units, axes of the body.
+
+    Attributes:
+        mass: m in kg.
+        first_moment: (3,) m c in kg·m.
+        S_bar: (3, n) ∫ρ Φ dV = C_tᵀ.
+        inertia: (3, 3) J_0 about the origin, kg·m².
+        inertia_slope: (3, 3, n) J_l.
+        spin: (3, n) ∫ρ x × Φ_l dV = C_r0ᵀ.
+        spin_slope: (3, n, n) ∫ρ Φ_k × Φ_l dV at [l, k].
+        modal_mass: (n, n) M_e.
+        centrifugal_slope: (6, n, n) ∫ρ Φ_lᵀ ω~ω~ Φ_k dV at [l, k], for ω_a ω_b of `PAIRS`; both orders where a ≠ b.
+        stiffness, damping: (n, n).
+    """
+
+    mass: float
+    first_moment: Array
+    S_bar: Array
+    inertia: Array
+    inertia_slope: Array
+    spin: Array
+    spin_slope: Array
+    modal_mass: Array
+    centrifugal_slope: Array
+    stiffness: Array
+    damping: Array
+
+    @property
+    def n_modes(self) -> int:
+        """Number n of modes."""
+        return len(self.stiffness)
+
+    @property
+    def I_bar(self) -> Array:
+        """(3, 3, n) ∫ρ x_k Φ_l dV at [k, l]: its symmetric part is in J_l, the other one in C_r0."""
+        trace = np.einsum("aan->n", self.inertia_slope) / 4
+        symmetric = trace * np.eye(3)[:, :, None] - self.inertia_slope / 2
+        found: Array = symmetric + 0.5 * np.einsum("abc,an->bcn", LEVI_CIVITA, self.spin)
+        return found
+
+    @property
+    def gyroscopic(self) -> Array:
+        """G_r (3, 3, n)."""
+        I_bar = self.I_bar
+        return np.asarray(2 * (np.einsum("ccn,ab->abn", I_bar, np.eye(3)) - I_bar.transpose(1, 0, 2)))
+
+    @property
+    def centrifugal(self) -> Array:
+        """O_e of the undeformed body, (n, 6): ∫ρ Φ_lᵀ ω~ω~ x dV = −½ J_l of squares, −J_l of products."""
+        return np.stack([-(0.5 if a == b else 1.0) * self.inertia_slope[a, b] for a, b in PAIRS], axis=1)
+
+    @property
+    def translational_mass(self) -> Array:
+        """(n, n) ∫ρ Φᵀ Φ dV: M_e less what sections have by turning."""
+        return np.asarray(-0.5 * self.centrifugal_slope[:3].sum(axis=0))
+
+    @property
+    def S_bar_kl(self) -> Array:
+        """(3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l]: symmetric parts are in O_e, the others in C_r."""
+        n = self.n_modes
+        found, total = np.zeros((3, 3, n, n)), self.translational_mass
+        for k, (a, b) in enumerate(PAIRS):
+            if a == b:
+                found[a, a] = self.centrifugal_slope[k] + total
+                continue
+            c = 3 - a - b
+            sign = LEVI_CIVITA[a, b, c]
+            found[a, b] = 0.5 * (self.centrifugal_slope[k] - sign * self.spin_slope[c])
+            found[b, a] = found[a, b].T
+        return found
+
+
+def integrals_of(body: ModalBody) -> ShapeIntegrals:
+    """Of a modal body, its inertia of sections about their axis included."""
+    spatial = from_modal_body(body.name, body)
+    spin_slope, centrifugal_slope = slopes(spatial.S_bar_kl)
+    return ShapeIntegrals(
+        spatial.mass, spatial.first_moment, spatial.S_bar, spatial.inertia, spatial.inertia_slope, spatial.spin,
+        spin_slope, body.modal_mass, centrifugal_slope, body.stiffness, spatial.damping,
+    )  # fmt: skip
+
+
+def slopes(S: Array) -> tuple[Array, Array]:
+    """`spin_slope` and `centrifugal_slope` from S (3, 3, n, n) = ∫ρ Φ_kᵀ Φ_l dV at [k, l]."""
+    total = S[0, 0] + S[1, 1] + S[2, 2]
+    centrifugal = [S[a, a] - total if a == b else S[a, b] + S[b, a] for a, b in PAIRS]
+    return np.einsum("abc,bckl->alk", LEVI_CIVITA, S), np.array(centrifugal)
+
+
+def section_inertia(found: ShapeIntegrals) -> dict[str, Array | float]:
+    """J_spin, h_spin, S_spin and second_moment of `ModalBody`, which only together make J_0, C_r0 and M_e.
+
+    Formats have the sums alone, which these reproduce. Where sections turn (M_e is more than ∫ρΦᵀΦ) all of the inertia
+    about x that no mass beside the axis needs is booked as theirs: J_s = 1/(J⁻¹)_xx about the center of mass, and h_s =
+    C_r0 about x, both exact of a line of mass. Where that is more than S_s allows, of a line with masses that turn as
+    well, C_r0 stays in I_bar.
+    """
+    turning = found.modal_mass - found.translational_mass
+    n, J_spin, h_spin = found.n_modes, 0.0, np.zeros(found.n_modes)
+    center = found.first_moment / found.mass
+    about_center = found.inertia - found.mass * (center @ center * np.eye(3) - np.outer(center, center))
+    if np.abs(turning).max(initial=0.0) > 1e-12 * np.abs(found.modal_mass).max(initial=1.0):
+        J_spin = float(1 / np.linalg.inv(about_center)[0, 0])
+        rest = np.linalg.eigvalsh(turning - np.outer(found.spin[0], found.spin[0]) / J_spin)
+        if rest[0] >= -POSITIVE * np.abs(turning).max():
+            h_spin = found.spin[0].copy()
+    else:
+        turning = np.zeros((n, n))
+    J = found.inertia - J_spin * np.diag([1.0, 0.0, 0.0])
+    second = 0.5 * np.trace(J) * np.eye(3) - J
+    return {"second_moment": second, "J_spin": J_spin, "h_spin": h_spin, "S_spin": turning}
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A point that a format knows the motion of, with its number there."""
+
+    number: int
+    at: Interface
+
+
+def nodes_of(body: ModalBody) -> tuple[list[Node], dict[str, int]]:
+    """Stations, then interfaces that are at none of them; and the number of each interface."""
+    stations = body.stations
+    nodes = [
+        Node(k + 1, Interface(*parts))
+        for k, parts in enumerate(zip(stations.position, stations.translation, stations.rotation, strict=True))
+    ]
+    numbers = dict[str, int]()
+    for name, at in body.interfaces.items():
+        same = next((node.number for node in nodes if _is_same(node.at, at)), None)
+        if same is None:
+            nodes.append(Node(same := len(nodes) + 1, at))
+        numbers[name] = same
+    return nodes, numbers
+
+
+def _is_same(first: Interface, second: Interface) -> bool:
+    return all(np.array_equal(vars(first)[key], vars(second)[key]) for key in ("position", "translation", "rotation"))
+
+
+def interfaces_of(nodes: list[Node], numbers: Mapping[str, int]) -> dict[str, Interface]:
+    """By name: those of `numbers`, `root` (nearest to the origin), `tip` (farthest from it), else "node_NUMBER"."""
+    names = {number: name for name, number in numbers.items()}
+    by_distance = sorted(nodes, key=lambda node: float(np.linalg.norm(node.at.position)))
+    for name, node in (("root", by_distance[0]), ("tip", by_distance[-1])):
+        if name not in numbers and node.number not in names:
+            names[node.number] = name
+    named = {names.get(node.number, f"node_{node.number}"): node.at for node in nodes}
+    return (
+        named
+        if not numbers
+        else {name: named[name] for name in (*numbers, *(k for k in ("root", "tip") if k not in numbers))}
+    )

@@ -1,0 +1,166 @@
+"""Standard input data of flexible bodies, SID_FEM files (Wallrapp 1994), which SIMPACK, EMBSlib and pymbs read.
+
+Written as PY_SID writes them: J as six rows xx yy zz xy xz yz, M1 as (row, mode, column), G_r by mode, G_e by axis
+Read in other dialects too: J as (3, 3), M1 as (row, column, mode).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ...fe_models.modal_body import Interface, ModalBody
+from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of
+from .make import NOT_IN_THE_FILE, modal_body
+from .sid_text import Layout, Section, Taylor, fortran, layout_of, lines_of, parse, taylor
+
+ROWS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Entries of a symmetric matrix in the six rows of J."""
+NOTE = re.compile(r"ffrobot: (?P<condition>[\w-]+); (?P<numbers>.*)")
+LARGEST_ASYMMETRY = 1e-6  # of C_r's M1: a symmetric part is geometric stiffness
+
+
+def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
+    """The SID_FEM file of a body, and what it does not carry."""
+    found, (nodes, numbers) = integrals_of(body), nodes_of(body)
+    lines = [f"{len(nodes):5d}{found.n_modes:5d}    : nodes, modes : {body.name} : {_note(body, numbers)}", " part"]
+    lines += ["      new modal                        =", "           refmod"]
+    lines += [f"                mass                   = {fortran(found.mass)}",
+              f"                nelastq                = {found.n_modes:5d}"]  # fmt: skip
+    lines += [
+        f"                ielastq ({k + 1:4d})         = Eigen Mode {k + 1:4d} : {value:12.6g} Hz"
+        for k, value in enumerate(body.frequency)
+    ]
+    lines += ["           end refmod", "           frame"]
+    for node in nodes:
+        lines += _node_lines(node)
+    lines += ["           end frame", *_integral_lines(found), "      end modal", " end part"]
+    left = ["geometric stiffness, stresses, the surface, sections and families of modes"]
+    return "\n".join(lines) + "\n", (f"not carried by SID as written here: {left[0]}",)
+
+
+def _note(body: ModalBody, numbers: dict[str, int]) -> str:
+    """What the format has no place for: names of interfaces; read back by `read_sid`."""
+    names = ", ".join(f"{name}={number}" for name, number in numbers.items())
+    return f"ffrobot: {body.reference_condition}; {names}"
+
+
+def _node_lines(node: Node) -> Iterator[str]:
+    at, n = node.at, node.at.translation.shape[1]
+    yield f"                new node               = {node.number:5d}"
+    yield "                     rframe            = body ref"
+    yield from lines_of("origin", at.position[:, None], at.translation[:, :, None], 21)
+    yield from lines_of("phi", at.translation, None, 21)
+    yield from lines_of("psi", at.rotation, None, 21)
+    x, y, z = at.rotation
+    zero = np.zeros(n)
+    tilde = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(0, 2, 1)  # (row, mode, column)
+    yield from lines_of("AP", np.eye(3), tilde, 21)
+    yield "                end node"
+
+
+def _integral_lines(found: ShapeIntegrals) -> Iterator[str]:
+    n = found.n_modes
+    J, slope = found.inertia, found.inertia_slope
+    by_axis = 2 * np.concatenate(list(found.spin_slope), axis=1)  # G_e = 2∫ρΦᵀe~Φ = twice the slope of C_r
+    yield from lines_of("mdCM", found.first_moment[:, None], found.S_bar[:, :, None])
+    yield from lines_of("J", np.array([[J[k]] for k in ROWS]), np.array([slope[k] for k in ROWS])[:, :, None])
+    yield from lines_of("Ct", found.S_bar.T)
+    yield from lines_of("Cr", found.spin.T, found.spin_slope.transpose(1, 2, 0))
+    yield from lines_of("Me", found.modal_mass, structure=_structure(found.modal_mass))
+    yield from lines_of("Gr", found.gyroscopic.transpose(0, 2, 1).reshape(3, 3 * n))
+    yield from lines_of("Ge", by_axis)
+    yield from lines_of("Oe", found.centrifugal, found.centrifugal_slope.transpose(1, 2, 0))
+    yield from lines_of("ksigma", np.zeros((n, 1)))
+    yield from lines_of("Ke", found.stiffness)
+    yield from lines_of("De", found.damping)
+
+
+def _structure(M: Array) -> int | None:
+    return 4 if np.array_equal(M, np.eye(len(M))) else None
+
+
+def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
+    """The body in the text of a SID_FEM file, and remarks on it.
+
+    Raises:
+        InputError: it is no such file, or what it holds cannot be a body.
+    """
+    head, top = parse(text)
+    modal = _modal(top)
+    modes = int(modal["refmod"].number("nelastq"))
+    if modes < 1:
+        raise InputError(f"refmod: nelastq: expected at least one mode, found {modes}")
+    layout = layout_of(modal, modes)
+    found = _integrals(modal, layout)
+    nodes = [_node(section, layout) for section in modal["frame"].inside if section.name == "node"]
+    if not nodes:
+        raise InputError("frame: expected at least one node, found none")
+    match = NOTE.search(head)
+    numbers, condition = dict[str, int](), None
+    if match is not None:
+        pairs = (pair.rpartition("=") for pair in match["numbers"].split(", "))
+        numbers, condition = {key: int(number) for key, _, number in pairs}, match["condition"]
+    return modal_body(name, found, nodes, numbers, condition), (NOT_IN_THE_FILE, *_checks(modal, found, layout))
+
+
+def _modal(top: Section) -> Section:
+    part = top["part"]
+    return next((section for section in part.inside if section.name == "modal"), None) or part["modal"]
+
+
+def _node(section: Section, layout: Layout) -> Node:
+    number = int(section.number("number"))
+    phi, psi = (taylor(section[key], layout).m0 for key in ("phi", "psi"))
+    return Node(number, Interface(taylor(section["origin"], layout).m0[:, 0], phi, psi))
+
+
+def _integrals(modal: Section, layout: Layout) -> ShapeIntegrals:
+    mdCM, J, Cr, Oe = (taylor(modal[key], layout) for key in ("mdCM", "J", "Cr", "Oe"))
+    Me, Ke, De = (taylor(modal[key], layout).m0 for key in ("Me", "Ke", "De"))
+    J0, J1 = _inertia(J)
+    slope = Cr.m1.transpose(2, 0, 1)
+    symmetric = np.abs(slope + slope.transpose(0, 2, 1)).max(initial=0.0)
+    if symmetric > LARGEST_ASYMMETRY * max(np.abs(slope).max(initial=0.0), np.abs(Me).max()):
+        raise InputError(
+            "Cr: expected m1 without a symmetric part, found one: the file has geometric stiffness among its integrals,"
+            " which cannot be told apart from them in Oe; write it without"
+        )
+    return ShapeIntegrals(
+        modal["refmod"].number("mass"), mdCM.m0[:, 0], mdCM.m1[:, :, 0], J0, J1, Cr.m0.T,
+        0.5 * (slope - slope.transpose(0, 2, 1)), Me, Oe.m1.transpose(2, 0, 1), Ke, De,
+    )  # fmt: skip
+
+
+def _inertia(J: Taylor) -> tuple[Array, Array]:
+    """(3, 3) and (3, 3, n), from six rows or from (3, 3)."""
+    if J.nrow == 3:
+        return J.m0, J.m1.transpose(0, 2, 1)
+    J0, J1 = np.zeros((3, 3)), np.zeros((3, 3, J.m1.shape[1]))
+    for row, (a, b) in enumerate(ROWS):
+        J0[a, b] = J0[b, a] = J.m0[row, 0]
+        J1[a, b] = J1[b, a] = J.m1[row, :, 0]
+    return J0, J1
+
+
+def _checks(modal: Section, found: ShapeIntegrals, layout: Layout) -> Iterator[str]:
+    """What the file says twice, held against itself: a line each where it differs."""
+    Gr = taylor(modal["Gr"], layout).m0
+    wanted = found.inertia_slope
+    layouts = (Gr.reshape(3, layout.modes, 3).transpose(0, 2, 1), Gr.reshape(3, 3, layout.modes))
+    scale = max(float(np.abs(wanted).max(initial=0.0)), 1e-300)
+    errors = [float(np.abs((each + each.transpose(1, 0, 2)) / 2 - wanted).max(initial=0.0)) for each in layouts]
+    if min(errors) > 1e-6 * scale:
+        yield f"Gr: its symmetric part is off the slope of J by {min(errors) / scale:.2g} of its largest entry"
+    identities = (
+        ("Ct", taylor(modal["Ct"], layout).m0, found.S_bar.T, "the slope of mdCM"),
+        ("Oe", taylor(modal["Oe"], layout).m0, found.centrifugal, "−½ and −1 times the slope of J"),
+    )
+    for name, given, expected, what in identities:
+        error = float(np.abs(given - expected).max(initial=0.0))
+        if error > 1e-6 * max(float(np.abs(expected).max(initial=0.0)), 1e-300):
+            yield f"{name}: off {what} by {error:.2g}, of {np.abs(expected).max():.2g} at most"

@@ -1,0 +1,96 @@
+"""The commands `import` and `export`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import click
+
+from ..common.errors import InputError
+from ..common.outputs import protected
+from ..present.logs import FILE, logging_options
+
+
+@click.command(name="import")
+@click.argument("file", metavar="ROBOT.urdf|BODY.SID_FEM|BODY.fem", type=FILE)
+@click.option(
+    "-o", "--output", metavar="DIR|BODY.h5", type=FILE, required=True, help="Folder of the scene; of a body, its file."
+)
+@click.option(
+    "--flexible",
+    metavar="LINK=FILE.toml",
+    multiple=True,
+    help="A link, and the link file that says what it is; repeatable.",
+)
+@click.option("--force", is_flag=True, help="Replace files that are there.")
+@logging_options
+def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool) -> None:
+    """Make a scene in space of a robot description (URDF), or a modal body of one of other programs.
+
+    DIR/scene.toml gets bodies and joints: every link rigid, as its <inertial> says, unless --flexible names a link
+    file for it; links that fixed joints hold together are one body, what the root carries that way stands still.
+    What is to be computed is for you to append.
+
+    BODY.SID_FEM (standard input data, Wallrapp) and BODY.fem (MBDyn) become modal body files, which scenes take as
+    `modal = "BODY.h5"`.
+    """
+    from ..present.summary import summary_console
+    from .export import READERS, import_body
+    from .present import print_export, print_import
+    from .urdf.import_urdf import import_urdf
+
+    links = _links(flexible)
+    if file.suffix.lower() in READERS:
+        if links or force:
+            raise InputError(f"{file}: expected --flexible and --force with a URDF only, found a body")
+        with protected([file]):
+            print_export(import_body(file, output), summary_console())
+        return
+    click.get_current_context().with_resource(protected([file, *links.values()]))
+    print_import(import_urdf(file, output, links, force=force), summary_console())
+
+
+def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
+    """`LINK=FILE.toml` by link."""
+    found = dict[str, Path]()
+    for pair in pairs:
+        name, sign, path = pair.partition("=")
+        if not (name and sign and path):
+            raise InputError(f'--flexible: expected LINK=FILE.toml, found "{pair}"')
+        if name in found:
+            raise InputError(f'--flexible: expected one file for link "{name}", found two')
+        found[name] = Path(path)
+    return found
+
+
+@click.command()
+@click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
+@click.option(
+    "--format",
+    "file_format",
+    metavar="FORMAT",
+    required=True,
+    help="Of results csv, joint-trajectory; of bodies sid, mbdyn, craig-bampton, exudyn.",
+)
+@click.option("--analysis", metavar="NAME", help="Of this analysis; the first with moving joints if absent.")
+@click.option("-o", "--output", metavar="FILE", type=FILE, help="Where to write [beside the input].")
+@logging_options
+def export(file: Path, file_format: str, analysis: str | None, output: Path | None) -> None:
+    """Write results or a modal body in a format of other programs.
+
+    \b
+    csv               time, and coordinate, rate and moment of every joint, with all digits
+    joint-trajectory  JSON in the layout of ROS 2's trajectory_msgs/JointTrajectory, with effort
+    sid               SID_FEM, standard input data of flexible bodies (Wallrapp)
+    mbdyn             .fem of MBDyn's modal joint
+    craig-bampton     .npz with M, K, C in interface coordinates and fixed-interface modes
+    exudyn            .npz of EXUDYN's ObjectFFRFreducedOrderInterface
+    """  # noqa: D301 (click wants the backspace itself)
+    from ..common.hdf5 import reading
+    from ..present.summary import summary_console
+    from .export import export_file
+    from .present import print_export
+
+    with reading(file):
+        print_export(export_file(file, file_format, analysis, output), summary_console())

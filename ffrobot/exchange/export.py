@@ -1,0 +1,113 @@
+"""`ffrobot export`, and `ffrobot import` of bodies: which format takes which file, and how it is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..common.errors import InputError, of_file
+from ..common.files import check_output, write_atomically
+from ..common.outputs import check_not_an_input
+from ..common.toml_files import read_text
+from ..common.validation import quoted
+from ..fe_models.modal_body import ModalBody
+from ..fe_models.modal_body_file import FORMAT, is_modal_body_file, read_modal_body, write_modal_body
+from .bodies.craig_bampton import craig_bampton_file
+from .bodies.exudyn import exudyn_file
+from .bodies.mbdyn import fem_text, read_fem
+from .bodies.sid import read_sid, sid_text
+from .motion.joint_trajectory import joint_trajectory_text
+from .motion.joints import csv_text, robot_motion
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written where, in a few words, and what to know of it."""
+
+    path: Path
+    what: str
+    remarks: tuple[str, ...]
+
+
+def _csv(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...]]:
+    motion = robot_motion(path, analysis)
+    return csv_text(motion), f"{len(motion.joints)} joints of {motion.analysis}", motion.remarks
+
+
+def _joint_trajectory(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...]]:
+    motion = robot_motion(path, analysis)
+    text, remarks = joint_trajectory_text(motion)
+    return text, f"{len(motion.time)} points of {motion.analysis}", remarks
+
+
+OF_RESULTS: Mapping[str, tuple[str, Callable[[Path, str | None], tuple[str, str, tuple[str, ...]]]]] = {
+    "csv": (".csv", _csv),
+    "joint-trajectory": (".joint-trajectory.json", _joint_trajectory),
+}
+"""Formats of results: end of the file's name, and what makes the text, a few words on it, remarks."""
+
+
+OF_BODIES: Mapping[str, tuple[str, Callable[[ModalBody], tuple[str | bytes, tuple[str, ...]]]]] = {
+    "sid": (".SID_FEM", sid_text),
+    "mbdyn": (".fem", fem_text),
+    "craig-bampton": (".craig-bampton.npz", craig_bampton_file),
+    "exudyn": (".exudyn.npz", exudyn_file),
+}
+"""Formats of bodies: end of the file's name, and what makes the content and remarks on what it does not carry."""
+
+
+def export_file(path: Path, file_format: str, analysis: str | None, output: Path | None) -> Exported:
+    """Write a modal body or a results file in another format.
+
+    Raises:
+        InputError: the file is of another kind, or has nothing to export.
+        SolveError: it cannot be written.
+    """
+    is_body = is_modal_body_file(path)
+    known: Collection[str] = OF_BODIES if is_body else OF_RESULTS
+    if file_format not in known:
+        kind = "a modal body" if is_body else "results"
+        raise InputError(f'{path}: --format: expected one of {quoted(known)} of {kind}, found "{file_format}"')
+    if is_body:
+        if analysis is not None:
+            raise InputError(f"{path}: --analysis: expected it with results only, found a modal body")
+        return _export_body(path, file_format, output)
+    suffix, make = OF_RESULTS[file_format]
+    target = output or path.with_suffix(suffix)
+    check_not_an_input(target)
+    text, what, remarks = make(path, analysis)
+    write_atomically(target, text.encode(), "exported file")
+    return Exported(target, what, remarks)
+
+
+def _export_body(path: Path, file_format: str, output: Path | None) -> Exported:
+    suffix, write = OF_BODIES[file_format]
+    target = output or path.with_suffix(suffix)
+    check_not_an_input(target)
+    body = read_modal_body(path)
+    content, remarks = write(body)
+    write_atomically(target, content.encode() if isinstance(content, str) else content, "exported file")
+    return Exported(target, f"{body.name}, {body.modes_in_words}", remarks)
+
+
+READERS: Mapping[str, Callable[[str, str], tuple[ModalBody, tuple[str, ...]]]] = {
+    ".sid_fem": read_sid,
+    ".fem": read_fem,
+}
+"""What reads bodies of other programs, by the end of the file's name."""
+
+
+def import_body(path: Path, output: Path) -> Exported:
+    """Write the modal body file of a body in a format of `READERS`.
+
+    Raises:
+        InputError: it cannot be read, or cannot be a body; names the file.
+        SolveError: the modal body file cannot be written.
+    """
+    text = read_text(path, "file of a flexible body")
+    with of_file(path):
+        body, remarks = READERS[path.suffix.lower()](text, path.stem)
+    check_output(output, FORMAT)
+    write_modal_body(output, body)
+    return Exported(output, f"{body.name}, {body.modes_in_words}, interfaces {', '.join(body.interfaces)}", remarks)

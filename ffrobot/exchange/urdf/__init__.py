@@ -1,0 +1,1 @@
+"""URDF robot descriptions: read, checked, and written as scenes in space."""

@@ -1,0 +1,153 @@
+"""From links and joints of a URDF to bodies: links that fixed joints hold together are one, the root stands still."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ...common.errors import InputError
+from ...common.numbers import SMALLEST
+from ...common.tables import shown
+from ...common.validation import quoted
+from ...mbs.scene.spatial.bodies import check_inertia
+from .robot import HERE, MASSLESS, Inertial, Origin, Place, Robot, UrdfJoint
+
+
+@dataclass(eq=False)
+class Body:
+    """Links that move as one: `top` carries the others, and its axes are those of the body, unless it is flexible.
+
+    Attributes:
+        top: name of the link.
+        stands_still: whether it is the ground.
+        flexible: whether a link file says what it is; then it has no other member.
+        members: links, and where they stand in the body's axes.
+        inertial: of all of them.
+    """
+
+    top: str
+    stands_still: bool = False
+    flexible: bool = False
+    members: dict[str, Place] = field(default_factory=dict)
+    inertial: Inertial = MASSLESS
+
+    def add(self, robot: Robot, link: str, place: Place) -> None:
+        """Take in a link."""
+        self.members[link] = place
+        if (inertial := robot.links[link].inertial) is not None:
+            self.inertial = self.inertial + inertial.seen_from(place)
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        fixed = [name for name in self.members if name != self.top]
+        return f'link "{shown(self.top)}"' + (f" with {quoted(fixed)} fixed to it" if fixed else "")
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Bodies in the order in which joints carry them, and these joints, each from one body to the next.
+
+    `body_of` has the body of each link; `remarks` say what was left out.
+    """
+
+    bodies: tuple[Body, ...]
+    joints: tuple[UrdfJoint, ...]
+    body_of: Mapping[str, Body]
+    remarks: tuple[str, ...]
+
+
+def mechanism(robot: Robot, flexible: Mapping[str, Place]) -> Mechanism:
+    """The bodies of a robot.
+
+    Args:
+        robot: as read.
+        flexible: links that shall be flexible, and where their URDF frame stands in the axes of the link file.
+
+    Raises:
+        InputError: a body that moves has no mass but carries others, or an inertia that no body has.
+    """
+    ground = Body(robot.root, stands_still=True)
+    bodies, joints, body_of = [ground], list[UrdfJoint](), dict[str, Body]()
+    if robot.root in flexible:
+        joints.append(_weld_to_ground(robot))
+        bodies.append(_start(robot, robot.root, flexible, body_of))
+    else:
+        ground.add(robot, robot.root, HERE)
+        body_of[robot.root] = ground
+    for joint in _outward(robot):
+        parent = body_of[joint.parent]
+        if joint.type == "fixed" and not parent.flexible and joint.child not in flexible:
+            parent.add(robot, joint.child, parent.members[joint.parent] @ joint.origin.place)
+            body_of[joint.child] = parent
+        else:
+            joints.append(joint)
+            bodies.append(_start(robot, joint.child, flexible, body_of))
+    kept, carried, remarks = _with_mass(bodies, joints, body_of)
+    if not kept:
+        raise InputError(f'expected a link with mass that moves on "{shown(robot.root)}", found none')
+    _check_inertias(kept)
+    return Mechanism(tuple(kept), tuple(carried), body_of, tuple(remarks))
+
+
+def _weld_to_ground(robot: Robot) -> UrdfJoint:
+    """What holds a flexible root: a fixed joint whose parent is not a link."""
+    return UrdfJoint(f"{robot.root}_fixed", "fixed", "", robot.root, Origin(), (1.0, 0.0, 0.0), {}, {}, None)
+
+
+def _start(robot: Robot, link: str, flexible: Mapping[str, Place], body_of: dict[str, Body]) -> Body:
+    body = Body(link, flexible=link in flexible)
+    body.add(robot, link, flexible.get(link, HERE))
+    body_of[link] = body
+    return body
+
+
+def _outward(robot: Robot) -> list[UrdfJoint]:
+    """All joints, those nearer the root first, else in the order of the file."""
+    order, todo = list[UrdfJoint](), [robot.root]
+    while todo:
+        found = robot.joints_of(todo.pop(0))
+        order += found
+        todo += [joint.child for joint in found]
+    return order
+
+
+def _with_mass(
+    bodies: list[Body], joints: list[UrdfJoint], body_of: Mapping[str, Body]
+) -> tuple[list[Body], list[UrdfJoint], list[str]]:
+    """Without bodies beyond which nothing has mass: frames of tools and sensors on joints of their own."""
+    weighs = {id(body): body.flexible or body.inertial.mass > 0 for body in bodies}
+    below = dict(weighs)
+    for joint in reversed(joints):
+        if joint.parent in body_of and below[id(body_of[joint.child])]:
+            below[id(body_of[joint.parent])] = True
+    kept = [body for body in bodies if not body.stands_still and below[id(body)]]
+    bare = [body for body in kept if not weighs[id(body)]]
+    if bare:
+        raise InputError(
+            "\n".join(
+                f"{body.label}: expected a mass of a body that moves and carries others, found none: give it an"
+                " <inertial>, or make the joint that carries it fixed"
+                for body in bare
+            )
+        )
+    remarks = [
+        f'joint "{shown(joint.name)}" and link "{shown(joint.child)}" left out: nothing there has mass'
+        for joint in joints
+        if not below[id(body_of[joint.child])]
+    ]
+    return kept, [joint for joint in joints if below[id(body_of[joint.child])]], remarks
+
+
+def _check_inertias(bodies: list[Body]) -> None:
+    found = []
+    for body in bodies:
+        if body.flexible:
+            continue
+        try:
+            xx, yy, zz = (tuple(row) for row in body.inertial.inertia.tolist())
+            check_inertia((xx, yy, zz), SMALLEST)
+        except ValueError as error:
+            found.append(f"{body.label}: <inertia>: {error}")
+    if found:
+        raise InputError("\n".join(found))

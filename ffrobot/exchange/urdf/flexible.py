@@ -1,0 +1,161 @@
+"""Link files of flexible links of a robot: where their axes stand, how long they are, where their joints are.
+
+The x axis of the link goes from the joint that carries it to the one beyond (the farthest, if there are several); z is
+along the axis of the carrying joint as far as that is square to x, so that "in-plane" is the plane in which it swings.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ...common.tables import shown
+from ...common.toml_files import load_toml
+from ...common.validation import did_you_mean
+from ...fe_models.link_file import LinkTable, read_link
+from .names import Names
+from .robot import Place, Robot, UrdfJoint
+
+ON_AXIS = 1e-6  # of the length: how far a joint may be off the axis of a beam
+SAME_LENGTH = 1e-6  # relative
+SQUARE = 1e-3  # least sine between x and the axis of the joint for a plane of swing
+
+
+@dataclass(frozen=True, eq=False)
+class FlexibleLink:
+    """A link of the URDF that a link file describes.
+
+    Attributes:
+        name: of the link.
+        file_name: of the link file beside the scene.
+        place: of the URDF's link frame in the axes of the link file.
+        keys: of that file.
+        root: its interface at the carrying joint.
+        point_of: by the name of each joint beyond, the interface that it is on.
+        remarks: on what was taken from where.
+    """
+
+    name: str
+    file_name: str
+    place: Place
+    keys: Mapping[str, Any]
+    root: str
+    point_of: Mapping[str, str]
+    remarks: tuple[str, ...]
+
+
+def flexible_link(robot: Robot, name: str, source: Path, folder: Path) -> FlexibleLink:
+    """The link `name` from the link file at `source`, for a scene in `folder`.
+
+    Raises:
+        InputError: there is no such link or file, a joint is off the axis of a beam, the file has another length.
+    """
+    if name not in robot.links:
+        known = did_you_mean(name, robot.links)
+        raise InputError(f"--flexible {shown(name)}: expected a link of the URDF, found none of this name{known}")
+    keys = load_toml(source, "link file")
+    geometry = keys.get("geometry")
+    if not isinstance(geometry, dict):
+        raise InputError(f"{source}: expected a link file, found no [geometry]")
+    beyond = robot.joints_of(name)
+    tip = max(beyond, key=lambda joint: float(np.linalg.norm(joint.origin.xyz)), default=None)
+    axes = _axes(robot, name, tip)
+    place = Place(np.zeros(3), axes.T)
+    remarks = list[str]()
+    length = _set_length(geometry, tip, name, source, remarks)
+    keys["name"] = str(keys.get("name", name))
+    _rebase_file(geometry, axes, source, folder, remarks)
+    point_of = _interfaces(keys, beyond, tip, place, length, f"{source}: link {shown(name)}")
+    file_name = f"{Names()[name]}.toml"
+    read_link(LinkTable(keys, folder / file_name))
+    return FlexibleLink(name, file_name, place, keys, "root", point_of, tuple(remarks))
+
+
+def _axes(robot: Robot, name: str, tip: UrdfJoint | None) -> Array:
+    """(3, 3) axes of the link file, columns, in those of the URDF's link; these themselves where no joint is beyond."""
+    if tip is None or not any(tip.origin.xyz):
+        return np.eye(3)
+    x = np.array(tip.origin.xyz) / np.linalg.norm(tip.origin.xyz)
+    carrying = next((joint.axis for joint in robot.joints.values() if joint.child == name), (0.0, 0.0, 1.0))
+    for candidate in (carrying, tip.origin.place.C @ np.array(tip.axis), np.eye(3)[np.abs(x).argmin()]):
+        unit = np.array(candidate) / np.linalg.norm(candidate)
+        across = unit - (unit @ x) * x
+        if np.linalg.norm(across) > SQUARE:
+            z = across / np.linalg.norm(across)
+            return np.stack([x, np.cross(z, x), z], axis=1)
+    raise AssertionError("a coordinate axis is always square enough")
+
+
+def _set_length(geometry: dict[str, Any], tip: UrdfJoint | None, name: str, source: Path, remarks: list[str]) -> float:
+    """That of the file, which has to be the distance of the joints; or that distance, where the file has none."""
+    given = geometry.get("length")
+    if tip is None:
+        if not isinstance(given, int | float):
+            raise InputError(
+                f'{source}: geometry.length: expected it of "{shown(name)}", which carries no further joint'
+            )
+        return float(given)
+    wanted = float(np.linalg.norm(tip.origin.xyz))
+    if given is None:
+        geometry["length"] = wanted
+        remarks.append(f'length {wanted:.9g} m, the distance to joint "{shown(tip.name)}"')
+    elif not isinstance(given, int | float) or abs(given - wanted) > SAME_LENGTH * wanted:
+        raise InputError(
+            f'{source}: geometry.length: expected {wanted:.9g} m, the distance to joint "{shown(tip.name)}", or no such'
+            f" key, found {given!r}"
+        )
+    return wanted
+
+
+def _rebase_file(geometry: dict[str, Any], axes: Array, source: Path, folder: Path, remarks: list[str]) -> None:
+    """The file of a solid, told from the scene's folder; its axes are the URDF link's unless the link file says."""
+    if not isinstance(file := geometry.get("file"), str):
+        return
+    geometry["file"] = os.path.relpath(source.parent / file, folder)
+    if not {"origin", "x_axis", "y_axis"} & set(geometry):
+        geometry["x_axis"], geometry["y_axis"] = axes[:, 0].tolist(), axes[:, 1].tolist()
+        remarks.append(f"{file} is taken to be drawn in the axes of the URDF's link")
+
+
+def _interfaces(
+    keys: dict[str, Any], beyond: list[UrdfJoint], tip: UrdfJoint | None, place: Place, length: float, label: str
+) -> dict[str, str]:
+    """Write an interface for each joint beyond that is at neither end; those that the file has stay as they are."""
+    tables = list(keys.get("interface", ()))
+    taken = [str(table.get("name")) for table in tables if isinstance(table, dict)]
+    names, point_of = Names(("root", "tip")), dict[str, str]()
+    for joint in beyond:
+        x = place.C @ np.array(joint.origin.xyz)
+        if joint is tip or np.linalg.norm(x - [length, 0.0, 0.0]) <= ON_AXIS * length:
+            point_of[joint.name] = "tip"
+        elif np.linalg.norm(x) <= ON_AXIS * length:
+            point_of[joint.name] = "root"
+        else:
+            point_of[joint.name] = names[joint.name]
+            if point_of[joint.name] not in taken:
+                tables.append(
+                    {"name": point_of[joint.name]} | _position(keys, x, length, f'{label}: joint "{joint.name}"')
+                )
+    if tables:
+        keys["interface"] = tables
+    return point_of
+
+
+def _position(keys: Mapping[str, Any], x: Array, length: float, label: str) -> dict[str, Any]:
+    """Of a beam the distance from the root, of a solid the point, whose nearest face is taken."""
+    if keys["geometry"].get("kind", "beam") == "solid":
+        return {"position": x.tolist()}
+    off = float(np.linalg.norm(x[1:]))
+    if off > ON_AXIS * length or not 0 < x[0] < length:
+        raise InputError(
+            f"{label}: expected a joint on the line between the ends of the beam, found it {off:.4g} m beside it, at"
+            f" {x[0]:.4g} m of {length:.4g} m: take a solid, or split the link in the URDF"
+        )
+    return {"position": float(x[0])}

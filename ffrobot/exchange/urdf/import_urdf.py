@@ -1,0 +1,116 @@
+"""`ffrobot import ROBOT.urdf -o DIR`: from a URDF to a scene in space, with link files of flexible links."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from ...common.errors import InputError
+from ...common.files import check_folder, write_atomically
+from .bodies import mechanism
+from .flexible import FlexibleLink, flexible_link
+from .meshes import MeshMass, mesh_masses
+from .read import read_urdf
+from .robot import Robot
+from .scale import remarks_on_scale
+from .scene import SceneOfRobot
+from .toml import toml_text
+
+SCENE = "scene.toml"
+TO_BE_APPENDED = """\
+# What is to be computed: a trajectory for each joint with a motor, or for a point, and an analysis, such as
+#
+# [[trajectory]]
+# name = "{joint}"
+# joint = "{joint}"
+# value = "0.3*sin(t)"
+#
+# [[analysis]]
+# name = "inverse"
+# kind = "pcid"
+# end = 1.0
+# output_step = 0.01
+# tolerance = 1e-6
+"""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What an import made.
+
+    Attributes:
+        robot: as read.
+        scene: keys of the scene file.
+        flexible: links from link files.
+        remarks: on what is left out, renamed or odd, a line each.
+        masses: what meshes say.
+        files: all that were written.
+    """
+
+    robot: Robot
+    scene: Mapping[str, Any]
+    flexible: tuple[FlexibleLink, ...]
+    remarks: tuple[str, ...]
+    masses: tuple[MeshMass, ...]
+    files: tuple[Path, ...]
+
+
+def import_urdf(urdf: Path, folder: Path, flexible: Mapping[str, Path], *, force: bool = False) -> Imported:
+    """Write DIR/scene.toml, and a link file for each link of `flexible`.
+
+    Raises:
+        InputError: wrong input, or files that would be replaced without `force`.
+        SolveError: a file cannot be written.
+    """
+    robot = read_urdf(urdf)
+    links = {name: flexible_link(robot, name, source, folder) for name, source in flexible.items()}
+    try:
+        scene = SceneOfRobot(robot, mechanism(robot, {name: link.place for name, link in links.items()}), links)
+    except InputError as error:
+        raise InputError("\n".join(f"{urdf}: {line}" for line in str(error).splitlines())) from None
+    masses, about_meshes = mesh_masses(robot, urdf)
+    remarks = [*scene.remarks, *_remarks_on_links(links), *about_meshes, *remarks_on_scale(robot)]
+    files = {SCENE: _scene_text(urdf, scene.keys, remarks)}
+    files |= {link.file_name: _link_text(urdf, link) for link in links.values()}
+    written = _write(folder, files, force=force)
+    return Imported(robot, scene.keys, tuple(links.values()), tuple(remarks), tuple(masses), written)
+
+
+def _remarks_on_links(links: Mapping[str, FlexibleLink]) -> Iterator[str]:
+    for link in links.values():
+        yield f'link "{link.name}" is flexible: {link.file_name} says what it weighs, not its <inertial>'
+        yield from (f"{link.file_name}: {remark}" for remark in link.remarks)
+
+
+def _scene_text(urdf: Path, keys: Mapping[str, Any], remarks: list[str]) -> str:
+    head = [
+        f"# From {urdf.name} by `ffrobot import`. Each link is rigid, as its <inertial> says, unless it names a file."
+    ]
+    head += [f"# * {remark}" for remark in remarks]
+    joint = next((entry["name"] for entry in keys["joint"] if entry["type"] in ("revolute", "prismatic")), "JOINT")
+    tail = TO_BE_APPENDED.format(joint=joint)
+    return "\n".join(head) + "\n\n" + toml_text(keys) + "\n" + tail
+
+
+def _link_text(urdf: Path, link: FlexibleLink) -> str:
+    head = (
+        f'# Link "{link.name}" of {urdf.name}: x from the joint that carries it to the next, y in its plane of swing.'
+    )
+    return f"{head}\n\n{tomli_w.dumps(dict(link.keys))}"
+
+
+def _write(folder: Path, files: Mapping[str, str], *, force: bool) -> tuple[Path, ...]:
+    check_folder(folder)
+    paths = {folder / name: text for name, text in files.items()}
+    if there := [path for path in paths if path.exists() and not force]:
+        raise InputError(
+            f"{there[0]}: output: expected a new name, found a file, which may have been edited since: take another"
+            " folder, or --force"
+        )
+    for path, text in paths.items():
+        write_atomically(path, text.encode(), "file", make_folder=True)
+    return tuple(paths)

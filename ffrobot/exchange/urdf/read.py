@@ -1,0 +1,201 @@
+"""Reading URDF files: elements and numbers, with messages that name file, element, what was expected and found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ...common.errors import InputError
+from ...common.rotations import of_rpy
+from ...common.tables import shown
+from ...common.toml_files import read_text
+from ...common.validation import quoted
+from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Robot, UrdfJoint, UrdfLink
+from .topology import check_mimics, root_of
+
+Element = ElementTree.Element
+
+ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+def read_urdf(path: Path) -> Robot:
+    """The robot in the URDF file at `path`.
+
+    Raises:
+        InputError: it cannot be read, is no URDF, an element or number is missing or wrong, links do not form one tree.
+    """
+    try:
+        return robot_of(_root_element(read_text(path, "URDF file")))
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(f"{path}:") else _in_file(path, text)) from None
+
+
+def _in_file(path: Path, text: str) -> str:
+    return "\n".join(f"{path}: {line}" for line in text.splitlines())
+
+
+def _root_element(text: str) -> Element:
+    try:
+        root = ElementTree.fromstring(text.encode())
+    except ElementTree.ParseError as error:
+        raise InputError(f"expected a URDF file, found XML that is not well-formed: {error}") from None
+    if root.tag != "robot":
+        raise InputError(f"expected a URDF file, whose root is <robot>, found <{shown(root.tag)}>")
+    if xacro := next((each.tag for each in root.iter() if "ros.org/wiki/xacro" in str(each.tag)), None):
+        name = xacro.partition("}")[2]
+        raise InputError(f"expected a URDF file, found <xacro:{name}>: run xacro first, which writes the URDF")
+    return root
+
+
+def robot_of(root: Element) -> Robot:
+    """The robot of a <robot> element."""
+    links = [_link(each) for each in root.findall("link")]
+    joints = [_joint(each) for each in root.findall("joint")]
+    _check_once("link", (link.name for link in links))
+    _check_once("joint", (joint.name for joint in joints))
+    by_name = {joint.name: joint for joint in joints}
+    check_mimics(by_name)
+    base = root_of([link.name for link in links], joints)
+    name = root.get("name", "").strip() or base
+    return Robot(name, {link.name: link for link in links}, by_name, base)
+
+
+def _check_once(kind: str, names: Iterable[str]) -> None:
+    seen = set[str]()
+    for name in names:
+        if name in seen:
+            raise InputError(f'expected one <{kind}> of each name, found several of the name "{shown(name)}"')
+        seen.add(name)
+
+
+def _name(element: Element) -> str:
+    if not (name := element.get("name", "")):
+        raise InputError(f"<{element.tag}>: expected the attribute name, found none")
+    return name
+
+
+def _link(element: Element) -> UrdfLink:
+    name = _name(element)
+    label = f'link "{shown(name)}"'
+    inertial = element.find("inertial")
+    return UrdfLink(
+        name,
+        None if inertial is None else _inertial(inertial, f"{label}: <inertial>"),
+        tuple(_meshes(element, "visual", label)),
+        tuple(_meshes(element, "collision", label)),
+    )
+
+
+def _inertial(element: Element, label: str) -> Inertial:
+    mass = _attribute(element, "mass", "value", label)
+    inertia = element.find("inertia")
+    if inertia is None:
+        raise InputError(f"{label}: expected <inertia>, found none")
+    values = dict(zip(ENTRIES, (_number(inertia, key, f"{label}: <inertia>") for key in ENTRIES), strict=True))
+    J = np.array([[values["i" + "".join(sorted(a + b))] for b in "xyz"] for a in "xyz"])
+    if mass < 0:
+        raise InputError(f"{label}: <mass>: expected a mass not below 0, found {mass:g}")
+    origin = _origin(element, label)
+    C = of_rpy(*origin.rpy)
+    return Inertial(mass, np.array(origin.xyz), C @ J @ C.T if any(origin.rpy) else J)
+
+
+def _meshes(link: Element, kind: str, label: str) -> Iterable[MeshFile]:
+    for element in link.findall(kind):
+        mesh = element.find("geometry/mesh")
+        if mesh is not None and (filename := mesh.get("filename")):
+            where = f"{label}: <{kind}>"
+            scale = _triple(mesh, "scale", (1.0, 1.0, 1.0), f"{where}: <mesh>")
+            yield MeshFile(filename, scale, _origin(element, where))
+
+
+def _joint(element: Element) -> UrdfJoint:
+    name = _name(element)
+    label = f'joint "{shown(name)}"'
+    kind = element.get("type", "")
+    if kind not in TYPES:
+        raise InputError(f'{label}: type: expected one of {quoted(TYPES)}, found "{shown(kind)}"')
+    axis = element.find("axis")
+    along = (1.0, 0.0, 0.0) if axis is None else _triple(axis, "xyz", (1.0, 0.0, 0.0), f"{label}: <axis>")
+    if not any(along) and kind in ("revolute", "continuous", "prismatic", "planar"):
+        raise InputError(f"{label}: <axis>: expected a direction, found 0 0 0")
+    return UrdfJoint(
+        name, kind, _end(element, "parent", label), _end(element, "child", label), _origin(element, label), along,
+        _attributes(element, "limit", ("lower", "upper", "effort", "velocity"), label),
+        _attributes(element, "dynamics", ("damping", "friction"), label),
+        _mimic(element, label),
+    )  # fmt: skip
+
+
+def _end(joint: Element, kind: str, label: str) -> str:
+    end = joint.find(kind)
+    if end is None or not (name := end.get("link", "")):
+        raise InputError(f'{label}: expected <{kind} link="…"/>, found none')
+    return name
+
+
+def _mimic(joint: Element, label: str) -> Mimic | None:
+    element = joint.find("mimic")
+    if element is None:
+        return None
+    if not (name := element.get("joint", "")):
+        raise InputError(f"{label}: <mimic>: expected the attribute joint, found none")
+    where = f"{label}: <mimic>"
+    return Mimic(name, _number(element, "multiplier", where, 1.0), _number(element, "offset", where, 0.0))
+
+
+def _attributes(joint: Element, tag: str, keys: Iterable[str], label: str) -> dict[str, float]:
+    element = joint.find(tag)
+    if element is None:
+        return {}
+    return {key: _number(element, key, f"{label}: <{tag}>") for key in keys if element.get(key) is not None}
+
+
+def _origin(element: Element, label: str) -> Origin:
+    origin = element.find("origin")
+    if origin is None:
+        return Origin()
+    where = f"{label}: <origin>"
+    return Origin(_triple(origin, "xyz", (0.0, 0.0, 0.0), where), _triple(origin, "rpy", (0.0, 0.0, 0.0), where))
+
+
+def _attribute(element: Element, tag: str, key: str, label: str) -> float:
+    child = element.find(tag)
+    if child is None:
+        raise InputError(f'{label}: expected <{tag} {key}="…"/>, found none')
+    return _number(child, key, f"{label}: <{tag}>")
+
+
+def _number(element: Element, key: str, label: str, default: float | None = None) -> float:
+    text = element.get(key)
+    if text is None:
+        if default is None:
+            raise InputError(f"{label}: expected the attribute {key}, found none")
+        return default
+    return _finite(text, f"{label}: {key}")
+
+
+def _triple(element: Element, key: str, default: Numbers3, label: str) -> Numbers3:
+    text = element.get(key)
+    if text is None:
+        return default
+    parts = text.split()
+    if len(parts) != 3:
+        raise InputError(f'{label}: {key}: expected three numbers, found "{shown(text)}"')
+    x, y, z = (_finite(part, f"{label}: {key}") for part in parts)
+    return x, y, z
+
+
+def _finite(text: str, label: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f'{label}: expected a finite number, found "{shown(text)}"')
+    return value

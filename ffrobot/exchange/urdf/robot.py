@@ -1,0 +1,139 @@
+"""What a URDF says of a robot (wiki.ros.org/urdf/XML), as read: nothing merged, nothing left out. SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import of_rpy
+
+Numbers3 = tuple[float, float, float]
+
+MOVING = ("revolute", "continuous", "prismatic", "planar", "floating")
+TYPES = (*MOVING, "fixed")
+"""Types of joints that URDF has."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a frame stands in another: `xyz` (m), and `rpy` (rad) about the fixed axes x, y, z in this order."""
+
+    xyz: Numbers3 = (0.0, 0.0, 0.0)
+    rpy: Numbers3 = (0.0, 0.0, 0.0)
+
+    @property
+    def place(self) -> Place:
+        """The same with its rotation matrix."""
+        return Place(np.array(self.xyz), of_rpy(*self.rpy))
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A frame in another: its origin d (3,) in m and its axes C (3, 3), columns, both in axes of the other."""
+
+    d: Array
+    C: Array
+
+    def __matmul__(self, inner: Place) -> Place:
+        """A frame in this one, told in the other."""
+        return Place(self.d + self.C @ inner.d, self.C @ inner.C)
+
+    @property
+    def inverse(self) -> Place:
+        """The other in this one."""
+        return Place(-self.C.T @ self.d, self.C.T)
+
+
+HERE = Place(np.zeros(3), np.eye(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass (kg), center (3,) in m and inertia about it (3, 3) in kg·m², in axes of the link."""
+
+    mass: float
+    center: Array
+    inertia: Array
+
+    def seen_from(self, place: Place) -> Inertial:
+        """The same in the frame in which that of the link has this place."""
+        return Inertial(self.mass, place.d + place.C @ self.center, place.C @ self.inertia @ place.C.T)
+
+    def __add__(self, other: Inertial) -> Inertial:
+        """Both together (parallel axes)."""
+        mass = self.mass + other.mass
+        if mass == 0.0:
+            return Inertial(0.0, self.center, self.inertia + other.inertia)
+        center = (self.mass * self.center + other.mass * other.center) / mass
+        inertia = self.inertia + other.inertia
+        for part in (self, other):
+            r = part.center - center
+            inertia = inertia + part.mass * (r @ r * np.eye(3) - np.outer(r, r))
+        return Inertial(mass, center, inertia)
+
+
+MASSLESS = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """A mesh that a link shows: its file as the URDF names it, factors along its axes, place in the link."""
+
+    filename: str
+    scale: Numbers3
+    origin: Origin
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfLink:
+    """A link: what it weighs (None: the URDF does not say), and its meshes, visual ones and collision ones."""
+
+    name: str
+    inertial: Inertial | None
+    visual: tuple[MeshFile, ...] = ()
+    collision: tuple[MeshFile, ...] = ()
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """The coordinate is `multiplier` times that of the joint, plus `offset`."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """A joint: the child's frame stands at `origin` in the parent's where the coordinate is zero.
+
+    `axis` is in axes of the child. `limits` are those attributes of <limit> that are there (lower, upper, effort,
+    velocity), `dynamics` those of <dynamics> (damping, friction).
+    """
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    origin: Origin
+    axis: Numbers3
+    limits: Mapping[str, float]
+    dynamics: Mapping[str, float]
+    mimic: Mimic | None
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Links and joints by name, in the order of the file; `root` is the link that no joint carries."""
+
+    name: str
+    links: Mapping[str, UrdfLink]
+    joints: Mapping[str, UrdfJoint]
+    root: str
+
+    def joints_of(self, link: str) -> list[UrdfJoint]:
+        """Those whose parent is this link."""
+        return [joint for joint in self.joints.values() if joint.parent == link]

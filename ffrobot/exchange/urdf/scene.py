@@ -1,0 +1,180 @@
+"""The keys of a scene in space for a robot read from a URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import about
+from ...common.tables import shown
+from ...mbs.fields.field_types import GROUND
+from .bodies import Body, Mechanism
+from .flexible import FlexibleLink
+from .names import Names
+from .robot import HERE, Place, Robot, UrdfJoint
+
+GRAVITY = [0.0, 0.0, -9.81]
+SCENE_TYPE = {
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "prismatic": "prismatic",
+    "planar": "planar",
+    "floating": "free",
+    "fixed": "weld",
+}
+WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
+SINGLE = ("revolute", "continuous", "prismatic")  # types with one coordinate
+ORIGIN = "origin"  # point of a rigid body where the joint that carries it is
+
+
+class SceneOfRobot:
+    """A scene made from a robot: `keys` of the file, and `remarks` on what it does not keep of the URDF."""
+
+    def __init__(self, robot: Robot, found: Mechanism, flexible: Mapping[str, FlexibleLink]) -> None:
+        self.robot, self.found, self.flexible = robot, found, flexible
+        self.remarks = list(found.remarks)
+        self.bodies, self.joints = Names((GROUND,)), Names()
+        self.points = {body.top: Names((ORIGIN,)) for body in found.bodies}
+        joints = [self._joint(joint) for joint in found.joints]  # first: they name points
+        self.keys: dict[str, Any] = {
+            "name": self._title(),
+            "space": "spatial",
+            "gravity": GRAVITY,
+            "body": [self._body(body) for body in found.bodies],
+            "joint": joints,
+        }
+        self._remark_on_ground()
+        changed = self.bodies.changed | self.joints.changed
+        self.remarks += [f'"{shown(old)}" is called "{new}" in the scene' for old, new in changed.items()]
+
+    def _title(self) -> str:
+        return " ".join("".join(c if c.isprintable() else " " for c in self.robot.name).split())[:100] or "robot"
+
+    def _remark_on_ground(self) -> None:
+        still = [name for name, body in self.found.body_of.items() if body.stands_still]
+        mass = sum(inertial.mass for name in still if (inertial := self.robot.links[name].inertial) is not None)
+        if still:
+            names = ", ".join(f'"{shown(name)}"' for name in still)
+            self.remarks.append(f"{names} (mass {mass:g} kg) stand still on the ground and are no body of the scene")
+
+    # Bodies
+
+    def _body(self, body: Body) -> dict[str, Any]:
+        name = self.bodies[body.top]
+        if body.flexible:
+            return {"name": name, "link": self.flexible[body.top].file_name}
+        points = {ORIGIN: [0.0, 0.0, 0.0]}
+        of_body = self.points[body.top]
+        for joint in self.found.joints:
+            if self.found.body_of.get(joint.parent) is body:
+                points[of_body[joint.name]] = _numbers((body.members[joint.parent] @ joint.origin.place).d)
+        for link, place in body.members.items():  # frames of tools and sensors keep their names
+            if link != body.top:
+                points[of_body[f"link {link}" if link in self.robot.joints else link]] = _numbers(place.d)
+        inertial = body.inertial
+        rigid = {
+            "mass": inertial.mass,
+            "center": _numbers(inertial.center),
+            "inertia": _tensor(inertial.inertia),
+            "points": points,
+        }
+        return {"name": name, "rigid": rigid}
+
+    # Joints
+
+    def _joint(self, joint: UrdfJoint) -> dict[str, Any]:
+        parent, child = self.found.body_of.get(joint.parent), self.found.body_of[joint.child]
+        place = joint.origin.place if parent is None else parent.members[joint.parent] @ joint.origin.place
+        keys: dict[str, Any] = {"name": self.joints[joint.name], "type": SCENE_TYPE[joint.type]}
+        on_ground = parent is None or parent.stands_still
+        first = GROUND if parent is None or on_ground else f"{self.bodies[parent.top]}.{self._point(parent, joint)}"
+        second = self.flexible[child.top].root if child.flexible else ORIGIN
+        keys["between"] = [first, f"{self.bodies[child.top]}.{second}"]
+        if on_ground and np.any(place.d):
+            keys["at"] = _numbers(place.d)
+        if joint.type in WITH_AXIS:
+            keys["axis"] = _numbers(place.C @ np.array(joint.axis))
+        turned = Place(place.d, place.C @ child.members[joint.child].C.T)
+        keys |= self._orientation(joint, turned, kept=parent is None or _is_plain(parent, joint, child))
+        self._remark_on_mimic(joint)
+        return keys | self._limits(joint) | self._friction(joint)
+
+    def _point(self, body: Body, joint: UrdfJoint) -> str:
+        if body.flexible:
+            return self.flexible[body.top].point_of[joint.name]
+        return self.points[body.top][joint.name]
+
+    def _orientation(self, joint: UrdfJoint, place: Place, *, kept: bool) -> dict[str, Any]:
+        """`rpy`: the URDF's own numbers where nothing is merged in between."""
+        rpy = list(joint.origin.rpy) if kept else rpy_of(place.C)
+        return {"rpy": rpy} if any(rpy) else {}
+
+    def _limits(self, joint: UrdfJoint) -> dict[str, Any]:
+        keys: dict[str, Any] = {}
+        label, limits = f'joint "{shown(joint.name)}"', dict(joint.limits)
+        if joint.type == "continuous":
+            limits = {key: value for key, value in limits.items() if key in ("effort", "velocity")}
+        if joint.type not in SINGLE:
+            if limits:
+                self.remarks.append(f"{label}: limits of a {joint.type} joint left out")
+            return {}
+        lower, upper = limits.get("lower", 0.0), limits.get("upper", 0.0)
+        if lower < upper:
+            keys["position_limit"] = [lower, upper]
+        elif joint.type != "continuous":
+            self.remarks.append(f"{label}: range {lower:g} … {upper:g} left out: nothing lies between")
+        for key, ours in (("effort", "moment_limit"), ("velocity", "speed_limit")):
+            if limits.get(key, 0.0) > 0:
+                keys[ours] = limits[key]
+            elif key in limits:
+                self.remarks.append(f"{label}: {key} limit {limits[key]:g} left out: expected it greater than 0")
+        return keys
+
+    def _remark_on_mimic(self, joint: UrdfJoint) -> None:
+        if (mimic := joint.mimic) is not None:
+            self.remarks.append(
+                f'joint "{shown(joint.name)}" follows "{shown(mimic.joint)}": give it a trajectory of its own,'
+                f" {mimic.multiplier:g} times that one plus {mimic.offset:g}; the motor of that one then has to supply"
+                f" {mimic.multiplier:g} times this one's moment beside its own"
+            )
+
+    def _friction(self, joint: UrdfJoint) -> dict[str, Any]:
+        keys: dict[str, Any] = {}
+        for key, ours in (("damping", "viscous_friction"), ("friction", "coulomb_friction")):
+            value = joint.dynamics.get(key, 0.0)
+            label = f'joint "{shown(joint.name)}": {key} {value:g} left out'
+            if value < 0:
+                self.remarks.append(f"{label}: expected it not below 0")
+            elif value and joint.type not in SINGLE:
+                self.remarks.append(f"{label}, of a {joint.type} joint")
+            elif value:
+                keys[ours] = value
+        return keys
+
+
+def _is_plain(parent: Body, joint: UrdfJoint, child: Body) -> bool:
+    """Whether the joint's origin is between the axes of the two bodies themselves."""
+    return parent.members[joint.parent] is HERE and child.members[joint.child] is HERE
+
+
+def rpy_of(C: Array) -> list[float]:
+    """Roll, pitch, yaw about fixed axes of a rotation (3, 3), `of_rpy` back: pitch within ±π/2."""
+    across = float(np.hypot(C[0, 0], C[1, 0]))
+    yaw = float(np.arctan2(C[1, 0], C[0, 0])) if across > 1e-9 else 0.0  # else about the same axis as roll
+    B = about(2, yaw).T @ C
+    return [float(np.arctan2(-B[1, 2], B[1, 1])), float(np.arctan2(-B[2, 0], B[0, 0])), yaw]
+
+
+def _numbers(vector: Array) -> list[float]:
+    return [float(value) + 0.0 for value in vector]  # no −0.0
+
+
+def _tensor(inertia: Array) -> list[Any]:
+    """[xx, yy, zz] where the axes are principal, else three rows; symmetric to the last digit."""
+    J = (inertia + inertia.T) / 2
+    if not np.any(J - np.diag(np.diag(J))):
+        return _numbers(np.diag(J))
+    return [_numbers(row) for row in J]

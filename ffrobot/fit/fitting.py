@@ -1,0 +1,125 @@
+"""`ffrobot fit`: measured frequencies of a link or a robot, the keys to vary, and the new files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+
+from ..common.arrays import Array, as_floats
+from ..common.errors import FfrobotError, InputError
+from ..common.files import check_new_file, write_atomically
+from ..common.toml_files import load_toml
+from ..fe_models.link_records import MeasuredMode, paired, read_measured
+from .least_squares import Fit, fit_frequencies
+from .link_target import LinkTarget
+from .robot_target import RobotTarget
+from .toml_edit import Key
+
+DIGITS = 8  # of fitted values in files: more than measured ones have
+
+Motors = Literal["free", "held"]
+
+
+class Target(Protocol):
+    """A link or a robot, as its files describe it; `families` that a table of its modes may name."""
+
+    families: tuple[str, ...]
+
+    def start(self, key: Key) -> object:
+        """What the files say at `key`; None where it is not given."""
+
+    def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
+        """Families and frequencies (Hz) of its modes, the lowest first, with some values changed."""
+
+    def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
+        """The text of new files with these values, by where they go."""
+
+
+def fit_measured(
+    path: Path,
+    measured: Path,
+    vary: Sequence[str],
+    output: Path | None = None,
+    *,
+    motors: Motors | None = None,
+    force: bool = False,
+) -> Fit:
+    """Fit keys of the link or scene file at `path` to the table `measured`, and write what was found to new files.
+
+    `vary` are keys with dots; "KEY=KEY" are changed by one factor. `motors` of a robot: "free" (the default) or "held".
+    New files are beside the old ones, with names that end in `.fitted.toml`, or at `output`; they replace
+    others only where `force` says so.
+
+    Raises:
+        InputError: anything wrong with files or keys, parameters that frequencies cannot tell apart, a file in the way.
+        SolveError: no convergence, or a model without frequencies.
+    """
+    target = _target(path, motors)
+    groups = [tuple(tuple(name.strip().split(".")) for name in text.split("=")) for text in vary]
+    starts = {key: _start(path, target, key) for group in groups for key in group}
+    rows = [row for row in read_measured(measured, target.families) if row.frequency is not None]
+
+    def changes(values: Array) -> dict[Key, float]:
+        factors = values / np.array([starts[group[0]] for group in groups])
+        return {key: float(starts[key] * c) for group, c in zip(groups, factors, strict=True) for key in group}
+
+    def frequencies(values: Array) -> Array:
+        try:
+            family, found = target.modes(changes(values))
+        except FfrobotError as error:
+            at = ", ".join(f"{'.'.join(key)} = {value:.6g}" for key, value in changes(values).items())
+            raise type(error)(f"with {at}:\n{error}") from None
+        return _of_rows(measured, rows, family, found)
+
+    for new in target.files(starts, output):  # before any work is done
+        check_new_file(new, replace=force)
+    keys = ["=".join(".".join(key) for key in group) for group in groups]
+    start = np.array([starts[group[0]] for group in groups])
+    measured_at = np.array([row.frequency for row in rows], dtype=np.float64)
+    found = fit_frequencies(
+        frequencies, keys, start, [row.label for row in rows], measured_at, _uncertainty(measured, rows)
+    )
+    texts = target.files({key: float(f"{value:.{DIGITS}g}") for key, value in changes(found.value).items()}, output)
+    for new, text in texts.items():
+        write_atomically(new, text.encode(), "fitted file")
+    return replace(found, files=tuple(map(str, texts)))
+
+
+def _target(path: Path, motors: Motors | None) -> LinkTarget | RobotTarget:
+    tables = load_toml(path, "link or scene file")
+    if "geometry" not in tables:
+        return RobotTarget(path, motors or "free")
+    if motors is not None:
+        raise InputError(f"{path}: --motors: expected a scene file beside it, found a link file")
+    return LinkTarget(path)
+
+
+def _start(path: Path, target: Target, key: Key) -> float:
+    value = target.start(key)
+    if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0:
+        found = "none" if value is None else repr(value)
+        raise InputError(f"{path}: --vary: expected a number above 0 at {'.'.join(key)}, found {found}")
+    return float(value)
+
+
+def _of_rows(path: Path, rows: Sequence[MeasuredMode], family: tuple[str, ...], frequency: Array) -> Array:
+    """The frequencies (m,) that belong to the rows."""
+    places = {row: k for k, row in paired(list(rows), family)}
+    for row in rows:
+        if row not in places:
+            raise InputError(
+                f"{path}: line {row.line}: expected modes that the model has ({len(family)} of them), found {row.label}"
+            )
+    return as_floats(frequency[[places[row] for row in rows]])
+
+
+def _uncertainty(path: Path, rows: Sequence[MeasuredMode]) -> Array | None:
+    """(m,) Hz, where the table has them."""
+    given = [row.uncertainty for row in rows if row.uncertainty is not None]
+    if given and len(given) < len(rows):
+        raise InputError(f"{path}: uncertainty: expected it of all frequencies or of none, found {len(given)}")
+    return np.array(given) if given else None

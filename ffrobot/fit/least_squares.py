@@ -1,0 +1,146 @@
+"""Parameters by least squares from measured natural frequencies, with their uncertainty (NumPy and SciPy alone).
+
+Parameters are positive, and fitted by their logarithms: x = ln(θ/θ₀). Residuals are r_i = (f_i(θ)/f_i − 1)/s_i with the
+relative uncertainty s_i of the measured f_i, or 1 where none is known. With J = ∂r/∂x at the end, the covariance of x
+is σ² (JᵀJ)⁻¹, where σ² is 1 with known uncertainties and else |r|²/(m − n) (Seber and Wild, Nonlinear Regression, 2.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..common.arrays import Array, as_floats
+from ..common.errors import InputError, SolveError
+
+STEP = 1e-3  # of ln θ, on both sides: frequencies of finite elements are known to about 1e-9
+NO_EFFECT = 1e-4  # of a parameter, or a combination, against the largest: differences have errors of 1e-6
+SHARE = 0.1  # of the largest: entries of a combination that are named
+MOST_EVALUATIONS = 100
+
+Frequencies = Callable[[Array], Array]
+"""Frequencies (m,), Hz, of parameters (n,)."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fitted parameters, n, and frequencies before and after, m.
+
+    Attributes:
+        keys: names of the parameters.
+        start, value: (n,) before and after.
+        relative_deviation: (n,) standard deviations of the parameters, relative to them; NaN where not known.
+        correlation: (n, n) of the parameters' errors; NaN where not known.
+        labels: (m) names of the modes.
+        measured, before, after: (m,) Hz.
+        uncertainty: (m,) standard deviations of `measured`, Hz; None where not known.
+        files: that were written.
+    """
+
+    keys: tuple[str, ...]
+    start: Array
+    value: Array
+    relative_deviation: Array
+    correlation: Array
+    labels: tuple[str, ...]
+    measured: Array
+    before: Array
+    after: Array
+    uncertainty: Array | None
+    files: tuple[str, ...] = ()
+
+    @property
+    def deviation(self) -> Array:
+        """(n,) standard deviations of the parameters, in their units."""
+        return self.relative_deviation * self.value
+
+    @property
+    def error(self) -> Array:
+        """(m,) of the fitted frequencies, relative to the measured ones."""
+        return self.after / self.measured - 1.0
+
+    @property
+    def misfit(self) -> float:
+        """√(χ²/(m − n)): remaining errors in terms of the uncertainties, about 1 of a right model; NaN without them."""
+        spare = len(self.measured) - len(self.keys)
+        if self.uncertainty is None or spare == 0:
+            return float("nan")
+        return float(np.linalg.norm((self.after - self.measured) / self.uncertainty) / np.sqrt(spare))
+
+
+def fit_frequencies(
+    frequencies: Frequencies,
+    keys: Sequence[str],
+    start: Array,
+    labels: Sequence[str],
+    measured: Array,
+    uncertainty: Array | None = None,
+) -> Fit:
+    """The parameters (n,), from `start` on, whose frequencies come nearest to the `measured` ones (m,), Hz.
+
+    `uncertainty` (m,): standard deviations of these, Hz. `keys` and `labels` name parameters and modes.
+
+    Raises:
+        InputError: fewer frequencies than parameters, or parameters that they cannot tell apart.
+        SolveError: the iteration does not converge.
+    """
+    from scipy.optimize import least_squares
+
+    if len(measured) < len(keys):
+        raise InputError(
+            f"fit: expected at least as many measured frequencies as keys to vary, found {len(measured)} of"
+            f" {', '.join(labels)} for {len(keys)}: {', '.join(keys)}"
+        )
+    weight = 1.0 if uncertainty is None else measured / uncertainty
+
+    def residuals(x: Array) -> Array:
+        return as_floats((frequencies(start * np.exp(x)) / measured - 1.0) * weight)
+
+    def jacobian(x: Array) -> Array:
+        steps = STEP * np.eye(len(keys))
+        return np.column_stack([(residuals(x + step) - residuals(x - step)) / (2 * STEP) for step in steps])
+
+    origin = np.zeros(len(keys))
+    check_told_apart(jacobian(origin), keys)
+    found = least_squares(residuals, origin, jac=jacobian, max_nfev=MOST_EVALUATIONS, xtol=1e-10, ftol=1e-14)
+    if not found.success:
+        raise SolveError(f"fit: no convergence within {MOST_EVALUATIONS} steps: start nearer to the measured values")
+    J, r = jacobian(found.x), found.fun
+    check_told_apart(J, keys)
+    deviation, correlation = _uncertainty(J, r, known=uncertainty is not None)
+    before, after = (measured * (1.0 + residuals(x) / weight) for x in (origin, found.x))
+    return Fit(
+        tuple(keys), as_floats(start), as_floats(start * np.exp(found.x)), deviation, correlation,
+        tuple(labels), as_floats(measured), as_floats(before), as_floats(after), uncertainty,
+    )  # fmt: skip
+
+
+def check_told_apart(J: Array, keys: Sequence[str]) -> None:
+    """Raise `InputError` for parameters, or combinations of them, without effect: null vectors of J (m, n)."""
+    _, values, V = np.linalg.svd(J)
+    sizes = np.linalg.norm(J, axis=0)
+    for key, size in zip(keys, sizes, strict=True):
+        if size <= NO_EFFECT * sizes.max():
+            raise InputError(f"fit: expected keys on which the measured frequencies depend, found {key}: leave it out")
+    if values[-1] > NO_EFFECT * values[0]:
+        return
+    vector = V[-1] / V[-1][np.abs(V[-1]).argmax()]
+    named = [(key, part) for key, part in zip(keys, vector, strict=True) if abs(part) > SHARE]
+    change = ", ".join(f"{key} times c" + ("" if part > 1 - 1e-3 else f"^{part:.3g}") for key, part in named)
+    raise InputError(
+        f"fit: expected keys that the measured frequencies tell apart, found that they stay the same with {change}, for"
+        f" any c: vary only {len(named) - 1} of these {len(named)}, or measure with a known mass or spring attached"
+    )
+
+
+def _uncertainty(J: Array, r: Array, *, known: bool) -> tuple[Array, Array]:
+    """Standard deviations (n,) of ln θ, and correlations (n, n); NaN where as many residuals tell none."""
+    m, n = J.shape
+    if not known and m == n:
+        return np.full(n, np.nan), np.full((n, n), np.nan)
+    variance = 1.0 if known else float(r @ r) / (m - n)
+    inverse = np.linalg.inv(J.T @ J)
+    deviation = np.sqrt(np.diag(inverse))
+    return as_floats(np.sqrt(variance) * deviation), as_floats(inverse / np.outer(deviation, deviation))

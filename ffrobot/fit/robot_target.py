@@ -1,0 +1,91 @@
+"""A scene file whose robot's natural frequencies are fitted, by its linear model about the static equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..actuation.control.linear import LinearModels
+from ..actuation.control.linear_model import LinearModel
+from ..actuation.control.modes import held_frequencies, robot_modes
+from ..common.arrays import Array, as_floats
+from ..common.errors import InputError
+from ..common.toml_files import load_toml, read_text
+from ..run.solve import solve
+from ..scene.load import load_scene, make_scene
+from ..sweep.files import LINKS, run_files, value_of
+from .link_target import fitted_name
+from .toml_edit import Key, with_values
+
+ANALYSIS = {"name": "fit", "kind": "linear"}
+
+
+class RobotTarget:
+    """The scene at `path`: vibrations about the equilibrium at t = 0, with `motors` "free" or "held"."""
+
+    families: tuple[str, ...] = ()
+
+    def __init__(self, path: Path, motors: str) -> None:
+        self._path, self._motors = path, motors
+        self._scene = load_toml(path, "scene file")
+        load_scene(path)
+        bodies = {body["name"]: body.get("link") for body in self._scene["body"]}
+        self._links = {name: path.parent / link for name, link in bodies.items() if isinstance(link, str)}
+        self._tables: dict[str, Any] = {name: load_toml(link, "link file") for name, link in self._links.items()}
+        self._tables |= {name: link for name, link in bodies.items() if isinstance(link, dict)}
+
+    def start(self, key: Key) -> object:
+        """What scene or link file say at `key`, `links.BODY.…` in the latter; None where it is not given."""
+        if key[0] != LINKS:
+            return value_of(self._scene, key)
+        return value_of(self._tables, key[1:]) if len(key) > 2 else None
+
+    def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
+        """Frequencies (Hz) of the robot's vibrations, the lowest first, with some values changed; no families."""
+        files = run_files(self._path, changes, self._path.parent)
+        scene = files.scene | {"analysis": [ANALYSIS]}
+        tables = {str(path): link for path, link in files.links.items()}
+        for body in scene["body"]:
+            body["link"] = tables.get(body.get("link"), body.get("link")) if "link" in body else None
+            if body.get("modes") == "auto":  # the linear model needs no choice: all of them
+                del body["modes"]
+        solution = solve(make_scene(folder=self._path.parent, **scene))
+        details = solution.outcomes["fit"].details
+        assert isinstance(details, LinearModels)
+        frequency = held_frequencies(details.models[0]) if self._motors == "held" else _free(details.models[0])
+        return ("",) * len(frequency), frequency
+
+    def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
+        """The text of the new scene file and of the link files that change, by where they go."""
+        path = output or fitted_name(self._path)
+        if path.parent.resolve() != self._path.parent.resolve():
+            raise InputError(
+                f"{path}: output: expected a file beside {self._path}, to which its file names are relative"
+            )
+        of_scene: dict[Key, float | str] = {}
+        of_links: dict[str, dict[Key, float | str]] = {}
+        for key, value in changes.items():
+            if key[0] != LINKS:
+                of_scene[key] = value
+            elif key[1] in self._links:
+                of_links.setdefault(key[1], {})[key[2:]] = value
+            else:
+                of_scene["body", key[1], "link", *key[2:]] = value
+        found = {}
+        for body, values in of_links.items():
+            old = self._links[body]
+            new = fitted_name(old, f".{body}")
+            found[new] = with_values(read_text(old, "link file"), values)
+            of_scene["body", body, "link"] = Path(_link_of(self._scene, body)).with_name(new.name).as_posix()
+        return found | {path: with_values(read_text(self._path, "scene file"), of_scene)}
+
+
+def _link_of(scene: Mapping[str, Any], body: str) -> str:
+    """What the scene calls the link file of a body."""
+    return str(next(entry["link"] for entry in scene["body"] if entry["name"] == body))
+
+
+def _free(model: LinearModel) -> Array:
+    found = robot_modes(model).frequency
+    return as_floats(found[found > 0.0])

@@ -1,0 +1,138 @@
+"""Movies from pictures: GIF through Pillow, MP4 (H.264) through ffmpeg, which is given the pictures as they come."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.arrays import Indices
+from ..common.errors import InputError, SolveError
+from ..common.files import write_atomically
+from ..common.outputs import check_not_an_input
+from ..common.validation import did_you_mean
+from ..results.file import Results
+
+Frame = NDArray[np.uint8]  # (height, width, 3) red, green, blue
+FRAMES_A_SECOND = 25
+SECONDS = 8.0  # of a movie, unless asked for otherwise
+COLORS = 256  # of a frame of a GIF
+
+
+@dataclass(frozen=True)
+class MovieOptions:
+    """What a movie shows.
+
+    Attributes:
+        analysis: the first that goes through time if None.
+        seconds: how long it plays; the whole of the analysis is shown, faster or slower than in truth.
+        scale: of deflections; as large as can be seen well if None.
+    """
+
+    analysis: str | None = None
+    seconds: float = SECONDS
+    scale: float | None = None
+
+
+def moving_analysis(results: Results, wanted: str | None) -> str:
+    """The analysis asked for, or the first that goes through time. Raises `InputError` where there is none."""
+    moving = [name for name in results.analyses if len(results.time(name)) > 1]
+    if wanted is None and moving:
+        return moving[0]
+    if wanted not in moving:
+        found = "none" if wanted is None else f'"{wanted}"{did_you_mean(wanted, moving)}'
+        names = f" ({', '.join(moving)})" if moving else ""
+        raise InputError(f"{results.path}: movie: expected an analysis that goes through time{names}, found {found}")
+    return wanted
+
+
+def check_movie(path: Path) -> None:
+    """Refuse, before frames are drawn, what cannot become a movie. Raises `InputError`, `SolveError`."""
+    check_not_an_input(path)
+    if path.is_dir():
+        raise InputError(f"{path}: movie: expected a file name, found a folder")
+    if path.suffix.lower() not in (".gif", ".mp4"):
+        raise InputError(f'{path}: movie: expected a name that ends in ".gif" or ".mp4", found "{path.name}"')
+    if path.suffix.lower() == ".mp4":
+        ffmpeg()
+
+
+def movie_outputs(time: NDArray[np.float64], seconds: float) -> Indices:
+    """The outputs (m,) that the frames of a movie of so many seconds show: equally far apart in `time` (T,), all of it.
+
+    A movie shows the latest output not after its own time, as often as need be.
+    """
+    count = max(2, round(FRAMES_A_SECOND * seconds)) if len(time) > 1 else 1
+    wanted = np.linspace(time[0], time[-1], count)
+    reach = 1e-9 * (time[-1] - time[0])
+    return np.asarray(np.searchsorted(time, wanted + reach, side="right") - 1, dtype=np.intp)
+
+
+def write_movie(path: Path, frames: Iterable[Frame]) -> None:
+    """Write frames, all of the same size, as a movie: the suffix of `path` says of which kind."""
+    image = gif_image(frames) if path.suffix.lower() == ".gif" else mp4_image(frames)
+    write_atomically(path, image, "movie", make_folder=True)
+
+
+def gif_image(frames: Iterable[Frame]) -> bytes:
+    """An endless GIF of frames, each with a palette of its own."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    first, *rest = [Image.fromarray(frame).quantize(COLORS, Image.Quantize.FASTOCTREE) for frame in frames]
+    stream = BytesIO()
+    hundredths = 100 // FRAMES_A_SECOND  # the unit of the format
+    first.save(stream, "GIF", save_all=True, append_images=rest, duration=10 * hundredths, loop=0)
+    return stream.getvalue()
+
+
+def mp4_image(frames: Iterable[Frame]) -> bytes:
+    """H.264 in MP4 as every browser and slide program shows it: even sizes, 4:2:0, its index at the front."""
+    remaining: Iterator[Frame] = iter(frames)
+    first = next(remaining)
+    height, width = first.shape[:2]
+    with tempfile.TemporaryDirectory() as place:
+        path = Path(place) / "movie.mp4"
+        # fmt: off
+        command = [
+            ffmpeg(), "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+            "-r", str(FRAMES_A_SECOND), "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264",
+            "-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart", "-bitexact", str(path),
+        ]
+        # fmt: on
+        with (Path(place) / "errors").open("w+b") as errors:
+            with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=errors, stderr=errors) as process:
+                assert process.stdin is not None
+                try:
+                    for frame in (first, *remaining):
+                        process.stdin.write(np.ascontiguousarray(frame).tobytes())
+                    process.stdin.close()
+                except BrokenPipeError:
+                    pass  # it has ended early, and said why
+            errors.seek(0)
+            said = errors.read().decode(errors="replace").strip().splitlines()
+        if process.returncode or not path.is_file():
+            raise SolveError(f"ffmpeg failed: {said[-1] if said else 'no reason given'}")
+        return path.read_bytes()
+
+
+def ffmpeg() -> str:
+    """The program that makes MP4: the one on the PATH, or that of imageio-ffmpeg. Raises `SolveError`."""
+    if found := shutil.which("ffmpeg"):
+        return found
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return str(get_ffmpeg_exe())
+    except (ModuleNotFoundError, RuntimeError):
+        raise SolveError(
+            "a movie in MP4 needs ffmpeg, which is not installed: apt install ffmpeg, or pip install 'ffrobot[movie]';"
+            " a .gif needs neither"
+        ) from None

@@ -1,0 +1,64 @@
+"""Joints and tool frames of scenes in space as pictures have them: where they are, along which directions they move."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...mbs.fields.field_types import GROUND
+from .motion import SpatialBodyMotion, section_axes
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A place that moves, with directions.
+
+    Attributes:
+        name: of the joint, or of the point.
+        position: (T, 3) m, global axes.
+        exaggeration: (T, 3) m, by which it moves when deflections are made larger by one.
+        directions: (T, k, 3) unit vectors in global axes.
+    """
+
+    name: str
+    position: Array
+    exaggeration: Array
+    directions: Array
+
+
+def joint_markers(
+    scene: Mapping[str, Any], bodies: Sequence[SpatialBodyMotion], shift: Sequence[Array]
+) -> list[Marker]:
+    """Every joint at its second side, with the axes that it has: one, two of universal joints, none of others."""
+    return [_joint(keys, bodies, shift) for keys in scene.get("joint", [])]
+
+
+def tool_marker(point: str, bodies: Sequence[SpatialBodyMotion], shift: Sequence[Array]) -> Marker:
+    """The section "BODY.POINT" with its axes x, y, z."""
+    position, exaggeration = _place(point, bodies, shift)
+    return Marker(point, position, exaggeration, section_axes(bodies, point, len(position)).swapaxes(1, 2))
+
+
+def _joint(keys: Mapping[str, Any], bodies: Sequence[SpatialBodyMotion], shift: Sequence[Array]) -> Marker:
+    first, second = keys["between"]
+    side = second if second != GROUND else first
+    position, exaggeration = _place(side, bodies, shift)
+    T = len(position)
+    directions = [
+        section_axes(bodies, of, T) @ (np.array(keys[key]) / np.linalg.norm(keys[key]))
+        for key, of in (("axis", first), ("second_axis", second))
+        if key in keys
+    ]
+    return Marker(keys["name"], position, exaggeration, np.stack(directions, 1) if directions else np.zeros((T, 0, 3)))
+
+
+def _place(side: str, bodies: Sequence[SpatialBodyMotion], shift: Sequence[Array]) -> tuple[Array, Array]:
+    for body, carried in zip(bodies, shift, strict=True):
+        if side in body.point_names:
+            k = body.point_names.index(side)
+            return body.global_points[:, k], body.global_deflection(side) + carried
+    raise KeyError(side)

@@ -1,0 +1,129 @@
+"""What a body looks like in space, in its frame: its surface, the line of its stations, or lines between its points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...common.arrays import Array, Integers
+from ...common.errors import InputError
+from ...common.rotations import smallest_turn
+from ...fe_models.modal_body import ModalBody
+from ...results.file import Results
+from ..body_surface import body_surface
+from .motion import SpatialBodyMotion, placed, turned
+
+SIDES = 8  # of bars that stand for lines
+OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Points of a body that coordinates move: x + s Φ p.
+
+    Attributes:
+        points: (p, 3) x, in the frame, in m.
+        shapes: (p, 3, n) Φ, displacement in m per unit of coordinate.
+        coordinates: (T, n) over the outputs.
+        cells: (c, v) points that make a line (v = 2) or a facet.
+    """
+
+    points: Array
+    shapes: Array
+    coordinates: Array
+    cells: Integers
+
+    def deflection(self, body: SpatialBodyMotion) -> Array:
+        """A Φ p (T, p, 3), m, global axes."""
+        return turned(body, np.einsum("pin,tn->tpi", self.shapes, self.coordinates, optimize=True))
+
+    def placed(self, body: SpatialBodyMotion, shift: Array, s: float) -> Array:
+        """Where its points are (T, p, 3), m, with deflections s times as large; joints stay shut by `shift` (T, 3)."""
+        rest = placed(body, np.broadcast_to(self.points, (len(body.position), *self.points.shape)))
+        found: Array = rest + s * self.deflection(body) + (s - 1.0) * shift[:, None]
+        return found
+
+
+def surface_shape(results: Results, body: SpatialBodyMotion, notes: list[str]) -> Shape:
+    """The surface of a flexible body; lines of a rigid one, or where its file is not found, as `notes` then say."""
+    found = _modal_body(results, body, notes)
+    if found is None:
+        return point_shape(body)
+    mesh = body_surface(found)
+    assert body.modal is not None
+    return Shape(mesh.points, mesh.mode_shapes, body.modal, mesh.cells)
+
+
+def line_shape(results: Results, body: SpatialBodyMotion, notes: list[str]) -> Shape:
+    """The line through the stations of a flexible body; otherwise as `surface_shape`."""
+    found = _modal_body(results, body, notes)
+    if found is None:
+        return point_shape(body)
+    stations, k = found.stations, len(found.stations.position)
+    assert body.modal is not None
+    return Shape(stations.position, stations.translation, body.modal, np.stack([np.arange(k - 1), np.arange(1, k)], 1))
+
+
+def point_shape(body: SpatialBodyMotion) -> Shape:
+    """Lines between the points of a body, as short as they all connect; a single point is itself."""
+    k = len(body.points)
+    shapes = np.eye(3 * k).reshape(k, 3, 3 * k)
+    cells = shortest_tree(body.points) if k > 1 else np.zeros((k, 1), dtype=np.int64)
+    return Shape(body.points, shapes, body.deflection.reshape(len(body.position), 3 * k), cells)
+
+
+def thickened(shape: Shape, radius: float) -> Shape:
+    """Lines as bars of `radius` (m) with `SIDES` sides, in triangles; single points as octahedra."""
+    if shape.cells.shape[1] > 2:
+        return shape
+    if shape.cells.shape[1] == 1:
+        offsets = 2 * radius * np.concatenate([np.eye(3), -np.eye(3)])
+        return Shape(shape.points + offsets, np.repeat(shape.shapes, 6, axis=0), shape.coordinates, OCTAHEDRON)
+    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    points, ends, triangles, count = [], [], [], 0
+    for first, last in shape.cells:
+        across = smallest_turn(shape.points[last] - shape.points[first])[:, :2]
+        ring = radius * (np.outer(np.cos(angle), across[:, 0]) + np.outer(np.sin(angle), across[:, 1]))
+        points += [shape.points[first] + ring, shape.points[last] + ring]
+        ends += [np.full(SIDES, first), np.full(SIDES, last)]
+        triangles.append(_bar() + count)
+        count += 2 * SIDES
+    at = np.concatenate(ends)
+    return Shape(np.concatenate(points), shape.shapes[at], shape.coordinates, np.concatenate(triangles))
+
+
+def _bar() -> Integers:
+    """(t, 3) between a ring of `SIDES` points and the next, with caps."""
+    k = np.arange(SIDES)
+    after = (k + 1) % SIDES
+    sides = np.concatenate([np.stack([k, after, SIDES + after], 1), np.stack([k, SIDES + after, SIDES + k], 1)])
+    fan = np.stack([np.zeros(SIDES - 2, dtype=np.int64), k[1:-1], k[2:]], axis=1)
+    found: Integers = np.concatenate([sides, fan[:, ::-1], SIDES + fan]).astype(np.int64)
+    return found
+
+
+def shortest_tree(points: Array) -> Integers:
+    """(p − 1, 2) which of points (p, 3) to join so that all hang together by the shortest lines (Prim 1957)."""
+    distance = np.linalg.norm(points[:, None] - points, axis=2)
+    nearest, way = np.zeros(len(points), dtype=np.int64), distance[0].copy()
+    way[0] = np.inf
+    edges = []
+    for _ in range(len(points) - 1):
+        k = int(np.argmin(way))
+        edges.append((int(nearest[k]), k))
+        joined = np.isinf(way) | (np.arange(len(points)) == k)
+        closer = ~joined & (distance[k] < way)
+        nearest[closer], way[closer] = k, distance[k][closer]
+        way[k] = np.inf
+    return np.array(edges, dtype=np.int64).reshape(-1, 2)
+
+
+def _modal_body(results: Results, body: SpatialBodyMotion, notes: list[str]) -> ModalBody | None:
+    if body.modal is None:
+        return None
+    try:
+        return results.modal_body(body.name)
+    except InputError as error:
+        notes.append(f"{body.name} is drawn through its points only: {error}")
+        return None

@@ -1,0 +1,175 @@
+"""What PyVista draws of grids: `main` is a process of its own (`pictures.draw_pictures`)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...common.arrays import Array
+from ..body_surface import drawn_mode
+from ..projection import LINK, SPACE, View
+
+SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels
+PANEL = (700, 360)  # pixels, of a mode
+COLUMNS = 2
+MODES = 6  # that are drawn at most
+MARGIN = 1.25  # how much larger than the link or robot the picture is
+COLORS = "viridis"
+GHOST, METAL, BARE = "#9a9a9a", "#4a5563", "#c9ced6"
+FOLD = 30.0  # degrees: an edge at which a surface bends by more is shown
+ROD, PIN, STAND = 0.006, 0.009, 0.06  # of the size of the robot: radius of lines and of pins, height of the ground
+ROUND = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])  # ends of colour bars, times a power of ten
+SHOWN = {"deflection": ("deflection (mm)", 1e3), "von_mises": ("von Mises stress (MPa)", 1e-6)}
+BAR = {
+    "vertical": False, "height": 0.05, "width": 0.4, "position_x": 0.3, "position_y": 0.02, "fmt": "%.4g",
+    "color": "black", "title_font_size": 16, "label_font_size": 14, "n_labels": 5,
+}  # fmt: skip
+BAR_ROOM = 0.12  # of the height, at the bottom
+LINE, VERTEX = 3, 1  # VTK's numbers of cells
+
+
+def main() -> None:
+    """Draw the pictures (`pictures.Picture`) of the JSON list on the standard input."""
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # it tells of every way to OpenGL that it tries
+    for job in json.loads(sys.stdin.buffer.read()):
+        _draw_modes(job) if job["scale"] is None else _draw_motion(job)
+
+
+def _draw_motion(job: dict[str, Any]) -> None:
+    """Bodies where they were, pale, and as exaggerated, coloured; the same view and colours in all frames."""
+    import pyvista
+
+    grids = [_exaggerated(job, step) for step in job["steps"]]
+    everything = np.concatenate([shown.points for _, shown in grids])
+    name = SHOWN[job["color"]][0]
+    limit = round_above(max(float(np.nanmax(shown[name], initial=0.0)) for _, shown in grids))
+    size = float(np.ptp(everything, axis=0).max()) or 1.0
+    view = SPACE if job["in_space"] else LINK
+    for k, (grid, shown) in enumerate(grids):
+        plotter = pyvista.Plotter(off_screen=True, window_size=MOVIE_SIZE if job["movie"] else SIZE)
+        if job["scale"] != 1.0 and not job["movie"]:
+            _add_ghost(plotter, grid)
+        _add(plotter, shown, name, limit, ROD * size, BAR)
+        _add_joints(plotter, job["joints"][k], job["ground"], size, float(np.ptp(everything[:, 2])))
+        _finish(plotter, job["title"].format(time=f"{job['times'][k]:.4g}"), everything, view, BAR_ROOM)
+        plotter.screenshot(str(Path(job["path"]) / f"{k:05d}.png") if job["movie"] else job["path"])
+        plotter.close()
+
+
+def _exaggerated(job: dict[str, Any], step: int) -> tuple[Any, Any]:
+    """The grid at a time step as it was, and exaggerated with what it is coloured by."""
+    grid = _read(job["grid"], step)
+    shown = grid.copy()
+    shown.points = grid.points + (job["scale"] - 1.0) * grid["exaggeration"]
+    name, unit = SHOWN[job["color"]]
+    values = grid[job["color"]]
+    shown[name] = unit * (np.linalg.norm(values, axis=1) if values.ndim == 2 else values)
+    return grid, shown
+
+
+def _draw_modes(job: dict[str, Any]) -> None:
+    """The lowest modes, each as large as the others, over the undeformed link."""
+    import pyvista
+
+    grid = _read(job["grid"], 0)
+    names = sorted(name for name in grid.point_data if name.startswith("mode "))[:MODES]
+    columns, rows = min(COLUMNS, len(names)), -(-len(names) // COLUMNS)
+    plotter = pyvista.Plotter(off_screen=True, shape=(rows, columns), window_size=(PANEL[0] * columns, PANEL[1] * rows))
+    for k, name in enumerate(names):
+        plotter.subplot(k // columns, k % columns)
+        displacement, size = drawn_mode(grid[name], job["length"])
+        shown = grid.copy()
+        shown.points = grid.points + displacement
+        shown["size"] = size
+        _add_ghost(plotter, grid)
+        _add(plotter, shown, "size", 1.0, ROD * job["length"], None)
+        _finish(plotter, name, shown.points, LINK)
+    plotter.screenshot(job["path"])
+    plotter.close()
+
+
+def round_above(value: float) -> float:
+    """The next round number, of a few digits that quarters of it have too; 1 for zero."""
+    if not value > 0.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * ROUND[np.searchsorted(ROUND, value / power * (1.0 - 1e-9))])
+
+
+def _read(path: str, step: int) -> Any:  # noqa: ANN401 (PyVista's objects, here and below)
+    import pyvista
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    reader = vtkHDFReader()
+    reader.SetFileName(path)
+    reader.UpdateInformation()
+    reader.SetStep(step)
+    reader.Update()
+    return pyvista.wrap(reader.GetOutputDataObject(0))
+
+
+def _add(plotter: Any, grid: Any, scalars: str, limit: float, rod: float, bar: dict[str, Any] | None) -> None:  # noqa: ANN401
+    """Surfaces, smooth but at their folds; lines as rods, single points as balls."""
+    kinds = grid.celltypes
+    look = {
+        "scalars": scalars, "cmap": COLORS, "clim": [0.0, limit], "nan_color": BARE, "ambient": 0.45, "diffuse": 0.7,
+        "show_scalar_bar": bar is not None, "scalar_bar_args": bar,
+    }  # fmt: skip
+    for chosen in (kinds == LINE, kinds == VERTEX, (kinds != LINE) & (kinds != VERTEX)):
+        if not chosen.any():
+            continue
+        part = grid.extract_cells(np.flatnonzero(chosen)).extract_surface(algorithm="dataset_surface")
+        if kinds[chosen][0] == LINE:
+            plotter.add_mesh(part.tube(radius=rod), smooth_shading=True, **look)
+        elif kinds[chosen][0] == VERTEX:
+            plotter.add_mesh(part, render_points_as_spheres=True, point_size=40, **look)
+        else:
+            plotter.add_mesh(part, smooth_shading=True, split_sharp_edges=True, feature_angle=FOLD, **look)
+
+
+def _add_ghost(plotter: Any, grid: Any) -> None:  # noqa: ANN401
+    """The undeformed shape, to be seen through, with its edges; all of what is a line."""
+    edges = grid.extract_feature_edges(FOLD)
+    plotter.add_mesh(grid, color=GHOST, opacity=0.25, line_width=2)
+    plotter.add_mesh(edges if edges.n_points else grid, style="wireframe", color=GHOST, line_width=2)
+
+
+def _add_joints(plotter: Any, joints: list[list[float]], ground: list[list[float]], size: float, depth: float) -> None:  # noqa: ANN401
+    """Pins through the robot, which is `depth` thick, where it turns, and what stands on the ground below it."""
+    import pyvista
+
+    for at in joints:
+        pin = pyvista.Cylinder(at, (0.0, 0.0, 1.0), radius=PIN * size, height=1.2 * depth + 3.0 * PIN * size)
+        plotter.add_mesh(pin, color=METAL, smooth_shading=True, split_sharp_edges=True, ambient=0.3)
+    for at in ground:
+        foot = [at[0], at[1] - 0.5 * STAND * size, at[2]]
+        stand = pyvista.Cone(foot, (0.0, 1.0, 0.0), height=STAND * size, radius=0.5 * STAND * size, resolution=4)
+        plotter.add_mesh(stand, color=METAL, ambient=0.3)
+
+
+def _finish(plotter: Any, title: str, points: Array, view: View, room: float = 0.0) -> None:  # noqa: ANN401
+    """Title, directions, and the view of the other pictures.
+
+    `room` is the part of the height at the bottom that is for a colour bar.
+    """
+    plotter.set_background("white")
+    plotter.add_text(title, font_size=9, color="black", position="upper_left")
+    plotter.add_axes(color="black")
+    plotter.enable_parallel_projection()
+    plotter.view_vector(view.viewer, view.up)
+    corners = points @ np.stack(view, axis=1)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    width, height = plotter.renderer.GetSize()
+    half = 0.5 * MARGIN * max((high - low)[1] / (1.0 - room), (high - low)[0] * height / width)
+    middle = 0.5 * (low + high) - np.array([0.0, room * half, 0.0])
+    plotter.camera.focal_point = middle @ view
+    plotter.camera.position = (middle + np.array([0.0, 0.0, 10.0 * half])) @ view
+    plotter.camera.parallel_scale = half
+    plotter.reset_camera_clipping_range()
+    plotter.enable_anti_aliasing("ssaa")

@@ -1,0 +1,86 @@
+"""Joints as the scene text of a results file has them: coordinates, units, limits of motors, in plane and space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..common.arrays import Array
+from ..mbs.joints.joint import JointKeys
+from ..mbs.joints.joints import JOINT_TYPES
+from ..mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
+from ..mbs.joints.transmission import MotorLimits
+
+Scene = Mapping[str, Any]
+"""A scene file as TOML has it."""
+
+
+def is_spatial(scene: Scene) -> bool:
+    """Whether the scene is one in space."""
+    return bool(scene.get("space") == "spatial")
+
+
+class Coordinate(NamedTuple):
+    """One coordinate of a joint.
+
+    Attributes:
+        label: what tells it from the joint's others: "" of a single one, " 1", " 2" of several.
+        column: which column of `coordinate`, `rate` and `moment` it is: "", or "[0]", "[1]".
+        unit: "rad" or "m".
+        limits: of its motor; infinite where the scene gives none.
+    """
+
+    label: str
+    column: str
+    unit: str
+    limits: MotorLimits
+
+    def of(self, values: Array) -> Array:
+        """Its own (T,) of `values` of a dataset of its joint, (T,) or (T, coordinates)."""
+        return values.reshape(len(values), -1)[:, int(self.column[1:-1] or 0)]
+
+    @property
+    def force_unit(self) -> str:
+        """Of what acts along it: "N·m" or "N"."""
+        return "N·m" if self.unit == "rad" else "N"
+
+
+def joint_type(scene: Scene, keys: Mapping[str, Any]) -> type[JointKeys]:
+    """The record of a joint of the scene with these keys."""
+    types: Mapping[str, type[JointKeys]] = SPATIAL_JOINT_TYPES if is_spatial(scene) else JOINT_TYPES
+    return types[str(keys["type"])]
+
+
+def joint_keys(scene: Scene, name: str) -> Mapping[str, Any]:
+    """What the scene says of a joint; nothing of one that it does not have."""
+    return next((keys for keys in scene.get("joint", []) if keys["name"] == name), {})
+
+
+def joint_coordinates(scene: Scene, name: str) -> tuple[Coordinate, ...]:
+    """The coordinates of a joint in the order of its datasets; none of one that does not move, or is not there."""
+    keys = joint_keys(scene, name)
+    units = _units(scene, keys) if keys else ()
+    limits = [np.broadcast_to(keys.get(f"{what}_limit") or np.inf, len(units)) for what in ("moment", "speed", "power")]
+    several = len(units) > 1
+    return tuple(
+        Coordinate(f" {k + 1}" if several else "", f"[{k}]" if several else "", unit, MotorLimits(*map(float, of_one)))
+        for k, (unit, *of_one) in enumerate(zip(units, *limits, strict=True))
+    )
+
+
+Coordinates = Mapping[str, tuple[str, Coordinate]]
+"""Joint and coordinate by label: the joint's name, with a number where it has several coordinates."""
+
+
+def labelled_coordinates(scene: Scene) -> Coordinates:
+    """Those of all joints, in the order of the scene."""
+    names = [str(joint["name"]) for joint in scene.get("joint", [])]
+    return {f"{name}{one.label}": (name, one) for name in names for one in joint_coordinates(scene, name)}
+
+
+def _units(scene: Scene, keys: Mapping[str, Any]) -> tuple[str, ...]:
+    if is_spatial(scene):
+        return SPATIAL_JOINT_TYPES[str(keys["type"])].units
+    return ("rad" if JOINT_TYPES[str(keys["type"])].force_unit == "N·m" else "m",)

@@ -1,0 +1,39 @@
+"""What patches and motors of a robot in space have to do in results files, and whether they can."""
+
+from __future__ import annotations
+
+import h5py
+
+from ..run.spatial import SpatialSolution
+from ..run.spatial_actuation import SpatialActuation
+from .actuators import write_judgement, write_voltages
+
+
+def write_actuation(group: h5py.Group, solution: SpatialSolution, actuation: SpatialActuation) -> None:
+    """Of an analysis: pzt/, by layout, patch_structure/, by body, and feasibility/.
+
+    `pzt/LAYOUT/residual_force` (T, n) is what all patches of the link leave, on the modes of its file.
+    """
+    layouts = {}
+    for body, of_link in solution.patches.items():
+        families = [str(name) for name in solution.links[body].family]
+        for name, array in of_link.arrays.items():
+            entry = group.create_group(f"pzt/{name}")
+            write_voltages(entry, array, actuation.voltages[name], actuation.unmet[body])
+            entry["residual_force"].attrs.create("columns", families, dtype=h5py.string_dtype())
+            entry.attrs.update({"body": body, "bends": array.layout.acts_in})
+            layouts[name] = array.layout
+    for body, loaded in solution.bodies.items():
+        for key, pair in vars(loaded.structure).items() if loaded.structure is not None else ():
+            group[f"patch_structure/{body}/{key}"] = pair
+    entry = group.create_group("feasibility")
+    entry.attrs["feasible"] = actuation.is_feasible
+    if actuation.unsupplied is not None:
+        about = entry.create_group("unsupplied").attrs
+        for key, value in vars(actuation.unsupplied).items():
+            about[key] = list(value) if isinstance(value, tuple) else value
+    write_judgement(entry, actuation.feasibility, layouts)
+    for joint in solution.scene.motor_joints:
+        for k, unit in enumerate(joint.units):
+            name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
+            entry[f"joints/{name}"].attrs["unit"] = "N·m" if unit == "rad" else "N"

@@ -1,0 +1,66 @@
+"""From the modal forces of a motion in space to voltages of patches, and to whether motors and patches can do it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..actuation.feasibility import Feasibility
+from ..actuation.patches.spatial_patches import LinkPatches, by_body, link_patches
+from ..actuation.patches.voltages import Voltages
+from ..actuation.spatial_feasibility import UnsuppliedInSpace, judge_in_space, links_in_motion
+from ..common.arrays import Array
+from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..scene.spatial import SpatialScene
+from .spatial_bodies import LoadedSpatialBody
+
+Bodies = Mapping[str, LoadedSpatialBody]
+
+
+@dataclass(frozen=True)
+class SpatialActuation:
+    """What an analysis asks of motors and patches.
+
+    Attributes:
+        voltages: by layout.
+        unmet: by body with patches, (T, n) modal forces that voltages within their limits leave, modes of its file.
+        feasibility: whether motors and patches can do it, within their limits.
+        unsupplied: what no patch supplies; None where that bends no link.
+    """
+
+    voltages: Mapping[str, Voltages]
+    unmet: Mapping[str, Array]
+    feasibility: Feasibility
+    unsupplied: UnsuppliedInSpace | None
+
+    @property
+    def is_feasible(self) -> bool:
+        """Whether there are actuators for all that is needed, within their limits."""
+        return self.unsupplied is None and self.feasibility.is_feasible
+
+
+def patches_in_space(scene: SpatialScene, bodies: Bodies) -> dict[str, LinkPatches]:
+    """By body. Raises `InputError` for layouts that do not fit their link or do not serve what they are to."""
+    found = {}
+    for name, layouts in by_body(scene.pzt):
+        body = bodies[name]
+        assert body.modal is not None
+        found[name] = link_patches(scene.path, layouts, body.modal, body.spatial)
+    return found
+
+
+def actuated_in_space(
+    scene: SpatialScene, motion: SpatialMotion, bodies: Bodies, patches: Mapping[str, LinkPatches]
+) -> SpatialActuation:
+    """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it."""
+    links = links_in_motion(motion, {name: body.modal for name, body in bodies.items() if body.modal is not None})
+    voltages: dict[str, Voltages] = {}
+    unmet = {}
+    for name, of_link in patches.items():
+        found = of_link.voltages(links[name].F_p)
+        within = np.concatenate([of_layout.within_limit for of_layout in found.values()], axis=1)
+        unmet[name] = of_link.unmet(links[name].F_p, within)
+        voltages |= found
+    return SpatialActuation(voltages, unmet, *judge_in_space(scene.path, motion, links, patches, voltages))

@@ -1,0 +1,217 @@
+"""Margins of sampled joint loops against closed forms and simulated boundaries; suggested gains on random arms."""
+
+import numpy as np
+import pytest
+
+from ffrobot.actuation.control.linear import linear_models
+from ffrobot.actuation.control.margins import joint_gains, margins, spectral_radius
+from ffrobot.actuation.control.modes import held_frequencies
+from ffrobot.actuation.control.records import JointPid
+from ffrobot.actuation.control.suggestion import FRACTION, joint_inertia, light_roots, suggested_gains
+from ffrobot.results.file import Results
+from ffrobot.results.write import results_image
+from ffrobot.run.solve import solve
+from ffrobot.scene.load import make_scene
+
+INERTIA, T = 0.5, 0.01
+LINK = {
+    "material": {"youngs_modulus": 70e9, "density": 2700.0},
+    "mesh": {"elements": 10},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 3, "family": "in-plane-bending"},
+    "damping": {"ratio": 0.01},
+}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def cache(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+def models(scene):
+    """The linear models of the scene's only analysis."""
+    return solve(scene).outcomes["linear"].details.models
+
+
+def wheel():
+    """I γ̈ = u."""
+    body = {"mass": 1.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
+    joint = {"name": "O", "type": "revolute", "between": ["ground", "w.root"]}
+    linear = {"name": "linear", "kind": "linear"}
+    return make_scene(
+        name="wheel", gravity=[0.0, 0.0], body=[{"name": "w", "rigid": body}], joint=[joint], analysis=[linear]
+    )
+
+
+def pid(P=0.0, D=0.0, integral=0.0, joint="O", rate="measured"):
+    gains = {"proportional": {joint: P}, "derivative": {joint: D}, "integral": {joint: integral}}
+    return JointPid(kind="joint-pid", rate=rate, **gains)
+
+
+def links(rng, count, payload, rotors, analysis, **keys):
+    """An arm of `count` tubes of random sizes and directions, geared motors with `rotors` (kg·m², at the joint)."""
+    bodies, joints, before = [], [], "ground"
+    for k in range(count):
+        outer, length = rng.uniform(0.015, 0.04), rng.uniform(0.3, 0.8)
+        section = {"shape": "tube", "outer": outer, "inner": 0.85 * outer}
+        link = LINK | {"name": f"a{k}", "geometry": {"kind": "beam", "length": length, "section": section}}
+        bodies.append({"name": f"a{k}", "link": link})
+        rotor = {"rotor_inertia": rotors[k]} if rotors[k] else {}
+        joints.append({"name": f"J{k}", "type": "revolute", "between": [before, f"a{k}.root"]} | rotor)
+        before = f"a{k}.tip"
+    angles = {f"a{k}": float(rng.uniform(-2.0, 2.0)) for k in range(count)}
+    return make_scene(
+        name="arm", gravity=[0.0, 0.0], body=bodies, joint=joints, initial={"angles": angles},
+        payload=[{"point": before, "mass": payload}], analysis=analysis, **keys,
+    )  # fmt: skip
+
+
+def test_margins_of_an_inertia_are_those_of_the_closed_form():
+    """det(z I − F) of the sampled double integrator: stable for D > P T/2 and D < 2 I/T (Jury)."""
+    plants = models(wheel())
+    for P, D in ((20.0, 4.0), (300.0, 10.0)):
+        found = margins(plants, joint_gains(plants[0], [pid(P, D)]), T, 0.0)
+        assert found.is_stable
+        assert found.gain == pytest.approx(2 * INERTIA / (D * T), rel=2e-3)
+    slack = margins(plants, joint_gains(plants[0], [pid(400.0, 1.9)]), T, 0.0)
+    assert not slack.is_stable
+    assert (slack.gain, slack.delay) == (0.0, 0.0)  # no factor helps: D < P T/2
+
+
+def test_delay_margin_of_a_fast_sampled_loop_is_that_of_the_continuous_one():
+    """L = (P + D s) e^{−s d}/(I s²): the delay that takes the phase margin, less half a sample that holding costs."""
+    plants, fast, P, D = models(wheel()), 0.004, 20.0, 4.0
+    omega = np.sqrt((D**2 + np.sqrt(D**4 + 4 * P**2 * INERTIA**2)) / (2 * INERTIA**2))  # |L| = 1
+    phase = np.arctan2(D * omega, P)
+    found = margins(plants, joint_gains(plants[0], [pid(P, D)]), fast, 0.0)
+    assert found.delay == pytest.approx(phase / omega - fast / 2, rel=5e-3)  # holding is T/2 to (ωT)²/12 = 1e-4
+
+
+def test_integral_and_differences_are_in_the_loop():
+    """Roots of the sampled loops' polynomials, written out: PID with ẏ as the difference of two readings."""
+    plants = models(wheel())
+    P, D, integral = 15.0, 3.0, 30.0
+    b = T**2 / (2 * INERTIA)
+    # y/u = b (z + 1)/(z − 1)²; u/y = −(P + D (1 − 1/z)/T + I T z/(z − 1))
+    plant = np.polymul([1, -1], [1, -1])
+    control = np.polyadd(
+        np.polymul([P + D / T, -D / T], [1, -1]), np.polymul([integral * T, 0.0], [1, 0])
+    )  # over z (z − 1)
+    loop = np.polyadd(np.polymul(np.polymul(plant, [1, 0]), [1, -1]), b * np.polymul([1, 1], control))
+    found = spectral_radius(plants[0], joint_gains(plants[0], [pid(P, D, integral, rate="difference")]), T, 0.0)
+    assert found == pytest.approx(np.abs(np.roots(loop)).max(), rel=1e-9)
+
+
+def simulated(rng_seed, gains, sample_time, delay, kick=1e-4):
+    """Verdict of the nonlinear loop about rest, from a small blow on the tip."""
+    loop = {
+        "name": "loop", "kind": "closed-loop", "actuation": "rest", "sample_time": sample_time, "delay": delay,
+        "controller": [{"kind": "joint-pid"} | gains],
+        "disturbance": [{"point": "a0.tip", "y": f"where(t <= 0.01, {kick}, 0)"}],
+    }  # fmt: skip
+    rest = {"name": "rest", "kind": "pcid", "end": 3.0, "output_step": 0.01}
+    arm = links(
+        np.random.default_rng(rng_seed), 1, 0.2, [0.01], [rest, loop],
+        trajectory=[{"name": "still", "joint": "J0", "value": "0.3"}],
+    )  # fmt: skip
+    return solve(arm)
+
+
+def shaking(record):
+    """Second differences of the joint's rate: slow motion, which the blow leaves, is small in them."""
+    return np.abs(np.diff(record.readings[:, record.outputs.index("joint/J0/rate")], 2))
+
+
+def grows(record, calm):
+    """Whether the joint's vibration grows from the second quarter of the run to its last, or has long ago.
+
+    Until the motion is so large that the robot is linear no more: above a hundred times what it is in a `calm` run.
+    """
+    _, second, _, last = np.array_split(shaking(record), 4)
+    return last.max() > min(second.max(), 100 * shaking(calm).max())
+
+
+@pytest.mark.parametrize(("sample_time", "delay"), [(0.002, 0.0), (0.002, 0.003)])
+def test_margin_is_where_the_simulated_loop_begins_to_grow(sample_time, delay):
+    gains = {"proportional": {"J0": 2.0}, "derivative": {"J0": 0.2}}
+    record = simulated(3, gains, sample_time, delay).outcomes["loop"].details
+    assert (record.metrics.verdict, record.advice) == ("stable", ())
+    factor, later = record.margins.gain, record.margins.delay
+    assert 1.0 < factor < 1e3
+    assert 0.0 < later < 50 * sample_time
+    for part in (0.93, 1.07):
+        scaled = {what: {"J0": part * factor * of["J0"]} for what, of in gains.items()}
+        for run in (simulated(3, scaled, sample_time, delay), simulated(3, gains, sample_time, delay + part * later)):
+            assert grows(run.outcomes["loop"].details, record) == (part > 1.0)
+
+
+def test_suggested_gains_are_stable_on_random_arms():
+    """Twenty-four arms of one to three links, with and without rotors: by the linear model, twice the gains too."""
+    rng, found = np.random.default_rng(), 0
+    for _ in range(24):
+        count, sample_time = int(rng.integers(1, 4)), float(rng.choice([5e-4, 1e-3, 2e-3]))
+        delay = float(rng.choice([0.0, 0.5, 1.0]) * sample_time)
+        rotors = [float(rng.choice([0.0, 0.01, 0.1])) for _ in range(count)]
+        plants = models(links(rng, count, float(rng.uniform(0.1, 2.0)), rotors, [{"name": "linear", "kind": "linear"}]))
+        suggestion = suggested_gains(plants, sample_time, delay)
+        if suggestion is None:
+            assert 0.0 in rotors  # roots without inertia leave no gain that is stable
+            continue
+        found += 1
+        names = suggestion.proportional
+        record = JointPid(kind="joint-pid", proportional=names, derivative=suggestion.derivative)
+        for factor in (1.0, 2.0):
+            gains = joint_gains(plants[0], [record]).times(factor)
+            assert max(spectral_radius(plant, gains, sample_time, delay) for plant in plants) < 1.0
+    assert found >= 12
+
+
+def test_suggested_gains_hold_the_simulated_arm():
+    """Those of the linear analysis, at the sample time that it names; its bandwidth is the third that it says."""
+    rng = np.random.default_rng(5)
+    (plant,) = models(links(rng, 1, 0.2, [0.05], [{"name": "linear", "kind": "linear"}]))
+    solution = solve(links(np.random.default_rng(5), 1, 0.2, [0.05], [{"name": "linear", "kind": "linear"}]))
+    details = solution.outcomes["linear"].details
+    suggestion, sample_time = details.suggested
+    J = joint_inertia(plant)[0, 0]
+    omega = 2 * np.pi * suggestion.bandwidth
+    assert suggestion.proportional["J0"] == pytest.approx(J * omega**2, rel=0.05)  # two digits
+    assert suggestion.derivative["J0"] == pytest.approx(2 * J * omega, rel=0.05)
+    text = Results.from_image(results_image(solution), solution.scene.path).verdict["linear"].advice[0]
+    assert f"sampled every {1e3 * sample_time:g} ms or faster" in text
+    assert f"proportional = {{ J0 = {suggestion.proportional['J0']:.2g} }}" in text
+    (lowest, *_) = held_frequencies(plant)
+    assert suggestion.bandwidth == pytest.approx(FRACTION * lowest, rel=1e-9)
+
+
+def test_a_loop_that_diverges_says_why_and_what_to_start_with():
+    """No rotor, gains for the rigid arm: the root of the link turns at once. With the gains it names it is stable."""
+    loop = {
+        "name": "loop", "kind": "closed-loop", "actuation": "rest", "sample_time": 0.001,
+        "controller": [{"kind": "joint-pid", "proportional": {"J0": 500.0}, "derivative": {"J0": 50.0}}],
+        "disturbance": [{"point": "a0.tip", "y": "where(t <= 0.01, 0.01, 0)"}],
+    }  # fmt: skip
+    rest = {"name": "rest", "kind": "pcid", "end": 1.0, "output_step": 0.01}
+    path = [{"name": "still", "joint": "J0", "value": "0.3"}]
+
+    def arm(loop):
+        return solve(links(np.random.default_rng(3), 1, 0.2, [0.0], [rest, loop], trajectory=path))
+
+    solution = arm(loop)
+    record = solution.outcomes["loop"].details
+    assert record.metrics.verdict == "diverges"
+    assert record.margins.radius > 1.0 > record.margins.gain
+    advice = Results.from_image(results_image(solution), solution.scene.path).verdict["loop"].advice
+    assert any("J0: no rotor_inertia to speak of" in text for text in advice)
+    assert light_roots([linear_models_of(solution)]) == ["J0"]
+    (start,) = [text for text in advice if text.startswith("start with ")]
+    P, D = (float(start.split(f"{what} = {{ J0 = ")[1].split(" }")[0]) for what in ("proportional", "derivative"))
+    calm = {"kind": "joint-pid", "proportional": {"J0": P}, "derivative": {"J0": D}}
+    assert arm(loop | {"controller": [calm]}).outcomes["loop"].details.metrics.verdict == "stable"
+
+
+def linear_models_of(solution):
+    """About the first configuration of the inverse analysis, at rest."""
+    return linear_models(solution.outcomes["rest"], {})[0]

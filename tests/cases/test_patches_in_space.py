@@ -1,0 +1,310 @@
+"""Patches of scenes in space through `ffrobot solve`: against the plane, turned links, and what no patch reaches."""
+
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+import pytest
+
+from ffrobot import Results
+
+LINK = """
+name = "{name}"
+[material]
+youngs_modulus = 70e9
+poissons_ratio = 0.33
+density = 2700.0
+[geometry]
+kind = "beam"
+length = {length}
+section = {{ shape = "rectangle", height = {height}, width = {width} }}
+[mesh]
+elements = 4
+[reference]
+condition = "cantilever"
+[modes]
+{modes}
+attachment_modes = false
+[damping]
+ratio = 0.01
+"""
+PZT = """
+[[pzt]]
+body = "{body}"
+{keys}
+count = 4
+length = 0.06
+width = 0.01
+thickness = 0.5e-3
+modulus = 63e9
+d31 = 110e-12
+density = 7600.0
+limit = {limit}
+"""
+
+
+@dataclass
+class Arm:
+    """Two links, shoulder and elbow about z, the tip on a path in the plane; in the plane and in space.
+
+    Without attachment modes, whose mass the planar program raises and that in space does not.
+    """
+
+    keys: str = 'structural = true\nface = "both"'
+    limit: float = 200.0
+    payload: str = "mass = 0.2"
+
+    def write(self, folder, space):
+        modes = 'count = 4\nfamily = "in-plane-bending"'
+        for name, length in (("upper", 0.4), ("fore", 0.3)):
+            size = {"height": 0.006, "width": 0.02}
+            (folder / f"{name}.toml").write_text(LINK.format(name=name, length=length, modes=modes, **size))
+        vector = ("0.0, -9.81, 0.0", "0.0, 0.0, 0.0", "axis = [0.0, 0.0, 1.0]")
+        guess = "angles = { upper = -0.3, fore = 0.9 }"
+        if space == "spatial":
+            guess = "joints = { shoulder = -0.3, elbow = 1.2 }"
+        gravity, at, axis = ("0.0, -9.81", "0.0, 0.0", "") if space == "planar" else vector
+        text = f"""
+name = "arm"
+space = "{space}"
+gravity = [{gravity}]
+[[body]]
+name = "upper"
+link = "upper.toml"
+[[body]]
+name = "fore"
+link = "fore.toml"
+[[joint]]
+name = "shoulder"
+type = "revolute"
+between = ["ground", "upper.root"]
+at = [{at}]
+{axis}
+[[joint]]
+name = "elbow"
+type = "revolute"
+between = ["upper.tip", "fore.root"]
+{axis}
+[[payload]]
+point = "fore.tip"
+{self.payload}
+[initial]
+{guess}
+[[trajectory]]
+name = "tip"
+point = "fore.tip"
+x = "0.45 + 0.05*sin(4*t)**3"
+y = "0.2 - 0.06*sin(3*t)**3"
+{PZT.format(body="upper", keys=self.keys, limit=self.limit)}
+{PZT.format(body="fore", keys=self.keys, limit=self.limit)}
+[[analysis]]
+name = "inverse"
+kind = "pcid"
+end = 0.1
+output_step = 0.01
+tolerance = 1e-10
+"""
+        path = folder / f"{space}.toml"
+        path.write_text(text)
+        return path
+
+
+@pytest.mark.parametrize(
+    "arm",
+    [
+        Arm(),
+        Arm(limit=20.0),
+        Arm('structural = false\ncoupling = "rotation"'),
+        Arm('allocation = "least-squares"\npoint_weights = { tip = 1.0 }\nstructural = ["stiffness"]', limit=30.0),
+    ],
+    ids=["structural", "limited", "paper", "weights"],
+)
+def test_planar_scene_put_into_space_has_the_planar_voltages(arm, tmp_path, ffrobot):
+    """To 1e-8 of each peak, with mass and stiffness of patches, limits that bind, and weights."""
+    for space in ("planar", "spatial"):
+        done = ffrobot("solve", arm.write(tmp_path, space))
+        assert done.returncode == 0, done.stderr
+    with Results(tmp_path / "planar.results.h5") as plane, Results(tmp_path / "spatial.results.h5") as found:
+        for body in ("upper", "fore"):
+            for key in ("required_voltage", "voltage", "residual"):
+                expected = plane[f"inverse/pzt/{body}/{key}"]
+                size = np.abs(plane[f"inverse/pzt/{body}/required_voltage"]).max() if "volt" in key else expected.max()
+                np.testing.assert_allclose(found[f"inverse/pzt/{body}/{key}"], expected, atol=1e-8 * max(size, 1e-6))
+            for key in ("edges", "moment_per_volt", "stiffness_ratio", "authority"):
+                np.testing.assert_allclose(found[f"inverse/pzt/{body}/{key}"], plane[f"inverse/pzt/{body}/{key}"],
+                                           rtol=1e-12)  # fmt: skip
+            judged = f"inverse/feasibility/pzt/{body}"
+            for key in ("factor", "field", "strain", "mode_required"):
+                np.testing.assert_allclose(found[f"{judged}/{key}"], plane[f"{judged}/{key}"], rtol=1e-6)
+        assert found.verdict["inverse"].feasible == plane.verdict["inverse"].feasible
+        assert found.verdict["inverse"].answer == plane.verdict["inverse"].answer
+
+
+SEVEN = 'indices = [1, 2, 3, 4, 5, 6, 7]\nfamily = "all"'
+
+ONE_LINK = """
+name = "turned"
+space = "spatial"
+gravity = [0.3, 0.5, -9.81]
+[[body]]
+name = "link"
+link = "link.toml"
+[[joint]]
+name = "yaw"
+type = "universal"
+between = ["ground", "link.root"]
+axis = [0.0, 0.0, 1.0]
+second_axis = {second_axis}
+rpy = {rpy}
+[[payload]]
+point = "link.tip"
+mass = 0.1
+[[trajectory]]
+name = "tip"
+point = "link.tip"
+y = "0.02*sin(6*t)**3"
+z = "0.03*sin(5*t)**3"
+{layouts}
+[[analysis]]
+name = "inverse"
+kind = "pcid"
+end = 0.2
+output_step = 0.02
+tolerance = 1e-8
+"""
+
+
+def layouts(first, second):
+    text = "".join(PZT.format(body="link", keys=f'name = "{name}"\nbends = "{bends}"', limit=200.0)
+                   for name, bends in (("one", first), ("other", second)))  # fmt: skip
+    return text
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory, ffrobot):
+    return solve_turned(tmp_path_factory.mktemp("straight"), ffrobot, turned=False)
+
+
+def solve_turned(folder, ffrobot, *, turned):
+    """A link, or the same turned by 90° about its axis, height and width exchanged: y becomes z and z becomes −y."""
+    size = {"height": 0.012, "width": 0.006} if turned else {"height": 0.006, "width": 0.012}
+    (folder / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=SEVEN, **size))
+    names = ("out-of-plane", "in-plane") if turned else ("in-plane", "out-of-plane")
+    keys = {
+        "second_axis": [0.0, 0.0, 1.0] if turned else [0.0, 1.0, 0.0],
+        "rpy": [-np.pi / 2, 0.0, 0.0] if turned else [0.0, 0.0, 0.0],
+    }
+    (folder / "scene.toml").write_text(ONE_LINK.format(layouts=layouts(*names), **keys))
+    done = ffrobot("solve", folder / "scene.toml")
+    assert done.returncode == 0, done.stderr
+    assert "voltages of" in done.stdout
+    return folder / "scene.results.h5"
+
+
+def test_turning_a_link_about_its_axis_exchanges_its_planes(straight, tmp_path, ffrobot):
+    """Patches towards the old y, now z, have the same voltages; those towards the old z, now −y, the opposite ones."""
+    with h5py.File(straight) as one, h5py.File(solve_turned(tmp_path, ffrobot, turned=True)) as other:
+        for name, sign in (("one", 1.0), ("other", -1.0)):
+            for key in ("required_voltage", "voltage"):
+                expected = one[f"inverse/pzt/{name}/{key}"][()]
+                assert np.abs(expected).max() > 1.0
+                found = sign * other[f"inverse/pzt/{name}/{key}"][()]
+                np.testing.assert_allclose(found, expected, atol=2e-6 * np.abs(expected).max())
+        moments = [file["inverse/joints/yaw/moment"][()] for file in (one, other)]
+        np.testing.assert_allclose(moments[1], moments[0], atol=2e-6 * np.abs(moments[0]).max())
+
+
+def test_feasibility_of_a_scene_in_space(straight, ffrobot):
+    done = ffrobot("feasibility", straight)
+    assert done.returncode == 0, done.stderr
+    assert "yaw 1" in done.stdout  # motors of a universal joint, one for each axis
+    for name in ("one", "other"):
+        assert f"\n{name} " in done.stdout
+    with Results(straight) as results:
+        verdict = results.verdict["inverse"]
+        assert set(verdict.patches) == {"one", "other"}
+        assert verdict.feasible == all(need.factor <= 1.0 for need in verdict.patches.values())
+
+
+WRIST = """
+name = "wrist"
+space = "spatial"
+gravity = [0.0, 0.0, 0.0]
+[[body]]
+name = "link"
+link = "link.toml"
+[[body]]
+name = "hand"
+[body.rigid]
+mass = 0.2
+center = [0.0, 0.05, 0.0]
+inertia = [1e-4, 1e-4, 1e-4]
+points = {{ root = [0.0, 0.0, 0.0], tool = [0.0, 0.1, 0.0] }}
+[[joint]]
+name = "yaw"
+type = "revolute"
+between = ["ground", "link.root"]
+axis = [0.0, 0.0, 1.0]
+[[joint]]
+name = "roll"
+type = "revolute"
+between = ["link.tip", "hand.root"]
+axis = [1.0, 0.0, 0.0]
+[[trajectory]]
+name = "tool"
+point = "hand.tool"
+y = "0.1 - 0.02*sin(8*t)**3"
+z = "0.05*sin(10*t)**3"
+{layouts}
+[[analysis]]
+name = "inverse"
+kind = "pcid"
+end = 0.2
+output_step = 0.02
+tolerance = 1e-6
+"""
+
+
+def test_what_no_patch_reaches_is_told_mode_by_mode(tmp_path, ffrobot):
+    """The moment of a wrist about the link's axis twists it: the modal force τ φ_x of torsion is left, whole."""
+    link = LINK.format(name="link", length=0.4, modes=SEVEN.replace("7]", "7, 8]"), height=0.006, width=0.012)
+    (tmp_path / "link.toml").write_text(link)
+    (tmp_path / "scene.toml").write_text(WRIST.format(layouts=layouts("in-plane", "out-of-plane")))
+    done = ffrobot("solve", tmp_path / "scene.toml")
+    assert done.returncode == 0, done.stderr
+    with Results(tmp_path / "scene.results.h5") as results, h5py.File(results.path) as file:
+        force, left = results["inverse/bodies/link/modal_force"], results["inverse/pzt/one/residual_force"]
+        torsion = list(file["inverse/pzt/one/residual_force"].attrs["columns"]).index("torsion")
+        moment = results["inverse/joints/roll/moment"]
+        expected = moment * results.modal_body("link").interfaces["tip"].rotation[0, torsion]
+        np.testing.assert_allclose(force[:, torsion], expected, atol=1e-2 * np.abs(expected).max())  # small rotations
+        np.testing.assert_allclose(left[:, torsion], force[:, torsion], rtol=1e-9)
+        np.testing.assert_array_equal(left, results["inverse/pzt/other/residual_force"])
+        assert results.verdict["inverse"].feasible is False
+        (told,) = (text for text in results.warnings["inverse"] if "nothing supplies" in text)
+        assert "modal forces of link (torsion), off by" in told
+    assert "nothing supplies modal forces" in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name = "other"', 'name = "one"', 'pzt "one": name: expected a name of its own for each layout on a body'),
+        ('body = "link"', 'body = "lnk"', 'expected one of the bodies "link", found "lnk"'),
+        ('bends = "out-of-plane"', 'bends = "twist"', "plain piezoceramic strains alike in all directions"),
+        ("count = 4", "count = 1", "expected as many patches as modes"),
+        ("limit = 200.0", 'coupling = "surface"', 'coupling: expected "rotation", found "surface"'),
+    ],
+)
+def test_mistakes(old, new, message, tmp_path, ffrobot):
+    modes = 'count = 6\nfamily = "all"'
+    link = LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012)
+    (tmp_path / "link.toml").write_text(link)
+    keys = {"second_axis": [0.0, 1.0, 0.0], "rpy": [0.0] * 3}
+    text = ONE_LINK.format(layouts=layouts("in-plane", "out-of-plane"), **keys)
+    assert old in text
+    (tmp_path / "scene.toml").write_text(text.replace(old, new))
+    done = ffrobot("solve", tmp_path / "scene.toml")
+    assert done.returncode == 2
+    assert message in " ".join(done.stderr.split())
+    assert not (tmp_path / "scene.results.h5").exists()

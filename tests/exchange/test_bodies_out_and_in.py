@@ -1,0 +1,276 @@
+"""Bodies in the formats of other programs: there and back, identities inside the files, what is refused."""
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+from material_points import random_cloud
+
+from ffrobot import InputError, make_link
+from ffrobot.exchange.bodies.craig_bampton import craig_bampton_file
+from ffrobot.exchange.bodies.exudyn import exudyn_file
+from ffrobot.exchange.bodies.integrals import integrals_of
+from ffrobot.exchange.bodies.mbdyn import fem_text, read_fem
+from ffrobot.exchange.bodies.sid import read_sid, sid_text
+from ffrobot.fe_models.modal_body_file import read_modal_body
+
+LINK = {
+    "name": "arm",
+    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
+    "mesh": {"elements": 8},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 6},
+    "damping": {"ratio": 0.01},
+}
+"""A line of mass: torsion has inertia of its own."""
+LOADED = LINK | {"interface": [{"name": "middle", "position": 0.3, "mass": 0.2, "inertia": [1e-4, 2e-4, 3e-4]}]}
+"""With a mass on it that turns about all axes."""
+HELD = LINK | {"reference": {"condition": "craig-bampton"}}
+
+EXACT = 1e-12  # what a file carries that this program wrote: the rounding of 17 digits
+FORMATS = {"sid": (sid_text, read_sid), "mbdyn": (fem_text, read_fem)}
+KEPT = ("mass", "first_moment", "S_bar", "stiffness", "damping_ratio", "S_bar_kl", "modal_mass", "frequency")
+OF_LINES = (*KEPT, "second_moment", "I_bar", "J_spin", "h_spin", "S_spin")
+
+
+def cloud():
+    """Mass points with modes in all directions: every integral is dense."""
+    body = random_cloud(np.random.default_rng(5), "cloud").modal_body()
+    n = body.mode_count
+    return dataclasses.replace(body, damping_ratio=np.full(n, 0.02), family=("torsion",) * n)
+
+
+@pytest.fixture(scope="module")
+def bodies():
+    return {name: make_link(link).body for name, link in (("line", LINK), ("loaded", LOADED), ("held", HELD))} | {
+        "cloud": cloud()
+    }
+
+
+def differences(first, second, keys):
+    """Of each field, over its largest entry."""
+    found = {}
+    for key in keys:
+        a, b = (np.asarray(getattr(body, key) if getattr(body, key) is not None else 0.0) for body in (first, second))
+        found[key] = float(np.abs(a - b).max() / max(np.abs(a).max(), 1e-12))
+    return found
+
+
+@pytest.mark.parametrize("file_format", FORMATS)
+@pytest.mark.parametrize("name", ["line", "loaded", "held", "cloud"])
+def test_there_and_back(file_format, name, bodies):
+    write, read = FORMATS[file_format]
+    body = bodies[name]
+    text, left_out = write(body)
+    back, remarks = read(text, body.name)
+    assert max(differences(body, back, KEPT).values()) < EXACT
+    integrals = vars(integrals_of(body))
+    assert max(differences(integrals_of(body), integrals_of(back), integrals).values()) < EXACT
+    if name != "loaded":  # there the sum of what sections and what the mass have by turning is kept
+        assert max(differences(body, back, OF_LINES).values()) < EXACT
+    assert list(back.interfaces) == list(body.interfaces)
+    for label, at in body.interfaces.items():
+        for key, value in vars(at).items():
+            np.testing.assert_array_equal(vars(back.interfaces[label])[key], value)
+    assert back.reference_condition == body.reference_condition
+    assert any("geometric stiffness" in line for line in left_out)
+    assert any("not in the file" in line for line in remarks)
+    assert not any(" off " in line for line in remarks)  # what SID says twice
+
+
+def test_modes_of_any_normalisation_become_orthonormal(bodies):
+    """A .fem file with modes mixed and scaled: the same body."""
+    body = bodies["cloud"]
+    T = np.random.default_rng(1).standard_normal((body.mode_count, body.mode_count))
+    text, _ = fem_text(mixed(body, T))
+    back, _ = read_fem(text, body.name)
+    np.testing.assert_allclose(back.frequency, body.frequency, rtol=1e-10)
+    signs = np.sign(np.einsum("an,an->n", back.interfaces["tip"].translation, body.interfaces["tip"].translation))
+    np.testing.assert_allclose(back.S_bar * signs, body.S_bar, atol=1e-10)
+    np.testing.assert_allclose(back.I_bar * signs, body.I_bar, atol=1e-10)
+
+
+class Mixed:
+    """A body in coordinates q, p = T q, which `ModalBody` does not take; what `fem_text` asks for."""
+
+    def __init__(self, body, T):
+        self.__dict__.update({item.name: getattr(body, item.name) for item in dataclasses.fields(body)})
+        self.mode_count = body.mode_count
+        self.interpolate = body.interpolate
+        self.T = T
+
+
+def mixed(body, T):
+    """The text's own numbers changed: M, K, D, shapes and invariants by the congruence with T."""
+    from ffrobot.fe_models.modal_body import Interface, Stations
+
+    changed = Mixed(body, T)
+    changed.modal_mass, changed.stiffness = T.T @ T, T.T @ body.stiffness @ T
+    changed.S_bar, changed.I_bar = body.S_bar @ T, body.I_bar @ T
+    changed.S_bar_kl = np.einsum("abkl,km,ln->abmn", body.S_bar_kl, T, T)
+    changed.interfaces = {
+        name: Interface(at.position, at.translation @ T, at.rotation @ T) for name, at in body.interfaces.items()
+    }
+    at = body.stations
+    changed.stations = Stations(at.position, at.translation @ T, at.rotation @ T, at.height)
+    return changed
+
+
+def test_lumped_masses_of_a_fem_file(bodies):
+    """Record 11 in place of 12 and 14 to 18: sums over nodes, exact for a body that is mass points."""
+    points = random_cloud(np.random.default_rng(5), "cloud")
+    body = bodies["cloud"]
+    text, _ = fem_text(with_all_points(body, points))
+    text = re.sub(r"\*\* RECORD GROUP 1[2-8],.*?(?=\*\* RECORD|\Z)", "", text, flags=re.DOTALL)
+    rows = "\n".join(" ".join(map(repr, [m, m, m, 0.0, 0.0, 0.0])) for m in masses_in_order(text, points))
+    back, remarks = read_fem(f"{text}** RECORD GROUP 11, LUMPED MASS\n{rows}\n", "cloud")
+    keys = [key for key in vars(integrals_of(body)) if key != "damping"]
+    assert max(differences(integrals_of(body), integrals_of(back), keys).values()) < 1e-10
+    assert any("lumped masses" in line for line in remarks)
+
+
+def with_all_points(body, points):
+    from ffrobot.fe_models.modal_body import Interface
+
+    zero = np.zeros((3, body.mode_count))
+    more = {f"p{k}": Interface(points.x[k], points.Phi[k], zero) for k in range(2, len(points.x))}
+    root, tip = (Interface(points.x[k], points.Phi[k], zero) for k in (0, 1))
+    stations = dataclasses.replace(
+        body.stations, translation=points.Phi[:2], rotation=np.zeros_like(body.stations.rotation)
+    )
+    return dataclasses.replace(body, interfaces={"root": root, "tip": tip} | more, stations=stations)
+
+
+def masses_in_order(text, points):
+    """Mass of each node, found by its x coordinate in record 5."""
+    x = np.array(re.search(r"RECORD GROUP 5,.*?\n(.*?)\*\*", text, re.DOTALL)[1].split(), dtype=float)
+    return [float(points.mass[np.abs(points.x[:, 0] - value).argmin()]) for value in x]
+
+
+def test_the_other_dialect_of_sid(bodies):
+    """J as (3, 3) and M1 as (row, column, mode)."""
+    body = bodies["cloud"]
+    text, _ = sid_text(body)
+    turned = re.sub(r"m1\(\s*(\d+),\s*(\d+),\s*(\d+)\s*\)", r"m1(\1,\3,\2)", text)
+    head, J, tail = re.split(r"(?s)(\n\s+J\n.*?end J\n)", turned, maxsplit=1)
+    places = {1: (1, 1), 2: (2, 2), 3: (3, 3), 4: (1, 2), 5: (1, 3), 6: (2, 3)}
+    J = re.sub(r"(nrow +)= +6", r"\1= 3", J)
+    lines = []
+    for line in re.sub(r"(ncol +)= +1", r"\1= 3", J).splitlines():
+        entry = re.match(r"\s+m([01])\(\s*(\d+),\s*1\s*(?:,(\s*\d+))?\) += (.*)", line)
+        if entry is None:
+            lines.append(line)
+            continue
+        a, b = places[int(entry[2])]
+        mode = f",{entry[3]}" if entry[3] else ""
+        lines += [f"m{entry[1]}({row},{column}{mode}) = {entry[4]}" for row, column in {(a, b), (b, a)}]
+    back, _ = read_sid(head + "\n".join(lines) + "\n" + tail, body.name)
+    assert max(differences(integrals_of(body), integrals_of(back), vars(integrals_of(body))).values()) < EXACT
+
+
+def test_craig_bampton_matrices(bodies, tmp_path):
+    """K of rigid motions is zero, their kinetic energy is the body's, recovery moves stations rigidly."""
+    content, _ = craig_bampton_file(bodies["held"])
+    (tmp_path / "held.npz").write_bytes(content)
+    file = np.load(tmp_path / "held.npz")
+    origins, body = file["origins"], bodies["held"]
+    fixed = len(file["M"]) - 6 * len(origins)
+    assert fixed == body.eigenmode_count
+    rigid = np.zeros((len(file["M"]), 6))
+    for k, x in enumerate(origins):
+        rigid[6 * k : 6 * k + 6] = np.eye(6)
+        rigid[6 * k : 6 * k + 3, 3:] = -np.cross(np.eye(3), x).T @ -np.eye(3)
+    assert np.abs(file["K"] @ rigid).max() < 1e-9 * np.abs(file["K"]).max()
+    assert np.sum(np.linalg.eigvalsh(file["K"]) > 1e-7 * np.abs(file["K"]).max() * 1e-3) == len(file["K"]) - 6
+    inertia = rigid.T @ file["M"] @ rigid
+    np.testing.assert_allclose(inertia[:3, :3], body.mass * np.eye(3), atol=1e-12)
+    J = np.trace(body.second_moment) * np.eye(3) - body.second_moment
+    np.testing.assert_allclose(inertia[3:, 3:], J, atol=1e-12)
+    moved = (file["recovery"] @ rigid).reshape(-1, 3, 6)
+    np.testing.assert_allclose(moved[:, :, :3], np.broadcast_to(np.eye(3), moved[:, :, :3].shape), atol=1e-9)
+    np.testing.assert_allclose(moved[:, :, 5], np.cross([0, 0, 1.0], file["points"]), atol=1e-9)
+
+
+def test_exudyn_matrices_are_those_of_its_own_assembly(bodies, tmp_path):
+    """Of mass points: PsiTildeᵀ M Psi and its like, as EXUDYN computes them from nodes."""
+    points = random_cloud(np.random.default_rng(5), "cloud")
+    (tmp_path / "cloud.npz").write_bytes(exudyn_file(bodies["cloud"])[0])
+    file = np.load(tmp_path / "cloud.npz", allow_pickle=True)
+    n = len(points.stiffness)
+    tilde = lambda a: np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])  # noqa: E731
+    Psi = points.Phi.reshape(-1, n)
+    PsiTilde = np.vstack([np.hstack([tilde(phi[:, mode]) for mode in range(n)]) for phi in points.Phi])
+    xTilde, one = np.vstack([tilde(x) for x in points.x]), np.tile(np.eye(3), (len(points.x), 1))
+    M = np.repeat(points.mass, 3)[:, None]
+    expected = {
+        "inertiaLocal": xTilde.T @ (M * xTilde), "mPsiTildePsi": PsiTilde.T @ (M * Psi),
+        "mPsiTildePsiTilde": PsiTilde.T @ (M * PsiTilde), "mPhitTPsi": one.T @ (M * Psi),
+        "mPhitTPsiTilde": one.T @ (M * PsiTilde), "mXRefTildePsi": xTilde.T @ (M * Psi),
+        "mXRefTildePsiTilde": xTilde.T @ (M * PsiTilde), "massMatrixReduced": Psi.T @ (M * Psi),
+        "chiU": points.mass @ points.x / points.mass.sum(),
+    }  # fmt: skip
+    for key, value in expected.items():
+        np.testing.assert_allclose(file[key], value, atol=1e-12, err_msg=key)
+
+
+def replaced(pattern, text, count=0):
+    """An edit of a file's text."""
+    return lambda whole: re.sub(pattern, text, whole, count=count, flags=re.DOTALL)
+
+
+WRONG = {
+    "an object that does not end": (read_sid, replaced(" end part", ""), "expected `end part`"),
+    "no modes": (read_sid, replaced(r"nelastq +=[^\n]*", "nelastq = 0"), "expected at least one mode, found 0"),
+    "an object missing": (read_sid, replaced(r"\n +Oe\n.*?end Oe", ""), "expected the object Oe in modal, found none"),
+    "an entry outside": (read_sid, replaced(r"(mdCM.*?)m0\( 1", r"\1m0(9", 1), "expected m0 within (3, 1)"),
+    "not a number": (read_sid, replaced("nelastq", "mass = x\nnelastq", 1), 'expected a finite number, found "x"'),
+    "no stiffness": (
+        read_sid,
+        replaced(r"Ke\n(.*?)m0\(.*?end Ke", r"Ke\n\1end Ke"),
+        "a positive stiffness",
+    ),
+    "not a .fem file": (read_fem, lambda _: "hello", "expected a .fem file of MBDyn"),
+    "records cut off": (read_fem, replaced(r"\*\* RECORD GROUP 14.*", ""), "which couple modes with rigid motion"),
+    "too few numbers": (read_fem, replaced(r"\*\* RECORD GROUP 10", "1\n** RECORD GROUP 10"), "record 9: expected 16"),
+    "words": (read_fem, replaced(r"MODAL MASS MATRIX\n", "\nx "), 'record 9: expected numbers, found "x"'),
+}
+
+
+@pytest.mark.parametrize(("read", "edit", "expected"), WRONG.values(), ids=WRONG)
+def test_damaged_files(read, edit, expected, bodies):
+    write = sid_text if read is read_sid else fem_text
+    text = edit(write(bodies["cloud"])[0])
+    with pytest.raises(InputError, match=re.escape(expected)):
+        read(text, "cloud")
+
+
+def test_geometric_stiffness_among_the_integrals_is_refused(bodies):
+    """A symmetric part of C_r's M1 cannot come from ∫ρ Φ_k × Φ_l."""
+    text = sid_text(bodies["cloud"])[0]
+    text = re.sub(r"(?s)( Cr\n.*?)( +end Cr)", r"\1 m1(1,1,1) = 3.0D+00\n\2", text)
+    with pytest.raises(InputError, match="the file has geometric stiffness among its integrals"):
+        read_sid(text, "cloud")
+
+
+def test_commands(tmp_path, ffrobot, bodies):
+    """Out and in again on the command line; what a format does not take is told."""
+    import tomli_w
+
+    (tmp_path / "arm.toml").write_text(tomli_w.dumps(LINK))
+    assert ffrobot("link", "arm.toml", cwd=tmp_path).returncode == 0
+    for file_format, name in (("sid", "arm.SID_FEM"), ("mbdyn", "arm.fem")):
+        done = ffrobot("export", "arm.h5", "--format", file_format, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert "not carried by" in done.stdout
+        done = ffrobot("import", name, "-o", f"{file_format}.h5", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        back = read_modal_body(tmp_path / f"{file_format}.h5")
+        assert max(differences(bodies["line"], back, OF_LINES).values()) < EXACT
+    done = ffrobot("export", "arm.h5", "--format", "craig-bampton", cwd=tmp_path)
+    assert done.returncode == 2
+    assert 'expected one with [reference] condition = "craig-bampton" in its link file' in done.stderr
+    done = ffrobot("export", "arm.h5", "--format", "csv", cwd=tmp_path)
+    assert done.returncode == 2
+    assert 'expected one of "sid", "mbdyn", "craig-bampton", "exudyn" of a modal body, found "csv"' in done.stderr

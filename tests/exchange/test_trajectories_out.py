@@ -1,0 +1,91 @@
+"""`ffrobot export` of motions: CSV, and JSON in the layout of trajectory_msgs/JointTrajectory."""
+
+import csv
+import json
+
+import h5py
+import numpy as np
+import pytest
+from rigid_robots import ROBOTS, with_motion
+
+# Fields in the order of the message definitions of ROS 2 (common_interfaces: trajectory_msgs/msg).
+TRAJECTORY = ["header", "joint_names", "points"]
+POINT = ["positions", "velocities", "accelerations", "effort", "time_from_start"]
+
+
+@pytest.fixture(scope="module")
+def ur5(tmp_path_factory, ffrobot):
+    """Results of a spatial scene: six joints, each with a motor."""
+    folder = tmp_path_factory.mktemp("ur5")
+    assert ffrobot("import", ROBOTS / "ur5.urdf", "-o", folder).returncode == 0
+    scene = folder / "scene.toml"
+    names = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint"]
+    motion = [dict.fromkeys([*names, "wrist_3_joint"], value) for value in (0.1, 0.2, 0.3)]
+    text = (
+        with_motion(scene.read_text(), *motion).replace("end = 1e-3", "end = 2.1").replace("step = 1e-3", "step = 0.7")
+    )
+    scene.write_text(text)
+    done = ffrobot("solve", scene)
+    assert done.returncode == 0, done.stderr
+    return scene.with_suffix(".results.h5")
+
+
+@pytest.fixture(scope="module")
+def crank(solved):
+    """Results of a planar closed loop whose slider is driven along its path: no joint has a motor."""
+    case = solved("slider_crank")
+    return case.folder / "scene.results.h5"
+
+
+def table(path):
+    head, *rows = csv.reader(path.read_text().splitlines())
+    return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
+
+
+@pytest.mark.parametrize("kind", ["ur5", "crank"])
+def test_csv_has_every_digit(kind, request, ffrobot, tmp_path):
+    results = request.getfixturevalue(kind)
+    done = ffrobot("export", results, "--format", "csv", "-o", tmp_path / "out.csv")
+    assert done.returncode == 0, done.stderr
+    found = table(tmp_path / "out.csv")
+    with h5py.File(results) as file:
+        analysis = "inverse"
+        np.testing.assert_array_equal(found.pop("time"), file[analysis]["time"])
+        for name, joint in file[analysis]["joints"].items():
+            for key in ("coordinate", "rate", "moment"):
+                if key in joint:
+                    np.testing.assert_array_equal(found.pop(f"{name}.{key}"), joint[key])
+    assert found == {}
+
+
+@pytest.mark.parametrize("kind", ["ur5", "crank"])
+def test_joint_trajectory_is_the_message(kind, request, ffrobot, tmp_path):
+    results = request.getfixturevalue(kind)
+    done = ffrobot("export", results, "--format", "joint-trajectory", "-o", tmp_path / "out.json")
+    assert done.returncode == 0, done.stderr
+    message = json.loads((tmp_path / "out.json").read_text())
+    assert list(message) == TRAJECTORY
+    points, names = message["points"], message["joint_names"]
+    assert all(list(point) == POINT for point in points)
+    with h5py.File(results) as file:
+        group = file["inverse"]
+        driven = {name for name, joint in group["joints"].items() if "moment" in joint}
+        assert set(names) == (driven or {name for name, joint in group["joints"].items() if "coordinate" in joint})
+        for key, ours in (("positions", "coordinate"), ("velocities", "rate"), ("effort", "moment")):
+            rows = [group[f"joints/{name}/{ours}"][()] for name in names if ours in group[f"joints/{name}"]]
+            expected = np.stack(rows, axis=1) if rows else np.zeros((len(points), 0))
+            np.testing.assert_array_equal(np.array([point[key] for point in points]), expected)
+        stamps = [point["time_from_start"] for point in points]
+        seconds = [stamp["sec"] + 1e-9 * stamp["nanosec"] for stamp in stamps]
+        np.testing.assert_allclose(seconds, group["time"], atol=0.6e-9)
+        assert all(0 <= stamp["nanosec"] < 1_000_000_000 for stamp in stamps)
+    assert ("no joint has a motor: effort is left empty" in done.stdout) == (not driven)
+
+
+def test_what_is_refused(ur5, ffrobot, tmp_path):
+    done = ffrobot("export", ur5, "--format", "csv", "--analysis", "invers")
+    assert done.returncode == 2
+    assert 'expected one of "inverse", found "invers" (did you mean "inverse"?)' in done.stderr
+    done = ffrobot("export", ur5, "--format", "xls")
+    assert done.returncode == 2
+    assert '--format: expected one of "csv", "joint-trajectory"' in done.stderr

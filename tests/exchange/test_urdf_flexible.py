@@ -1,0 +1,119 @@
+"""Links of a URDF that a link file makes flexible: where they stand, where joints are on them, what is refused."""
+
+import re
+import tomllib
+
+import h5py
+import numpy as np
+import pytest
+from rigid_robots import moments, with_motion
+
+DENSITY, SIDE = 7850.0, 0.03  # a square bar, so stiff that it is rigid
+LENGTH = 0.5
+MASS, J_X = DENSITY * SIDE**2 * LENGTH, DENSITY * SIDE**4 / 6 * LENGTH
+BAR = f"""
+[material]
+youngs_modulus = 2e14
+poissons_ratio = 0.3
+density = {DENSITY}
+
+[geometry]
+kind = "beam"
+section = {{ shape = "rectangle", height = {SIDE}, width = {SIDE} }}
+
+[mesh]
+elements = 10
+
+[reference]
+condition = "cantilever"
+
+[modes]
+count = 6
+"""
+# The bar lies along (0, 0.6, 0.8) of its link: its inertia in the axes of the link, its center half way.
+ALONG = np.array([0.0, 0.6, 0.8])
+J_BAR = J_X * np.outer(ALONG, ALONG) + MASS * LENGTH**2 / 12 * (np.eye(3) - np.outer(ALONG, ALONG))
+ENTRIES = " ".join(f'i{"xyz"[k]}{"xyz"[j]}="{J_BAR[k, j]!r}"' for k in range(3) for j in range(k, 3))
+SMALL = """<inertial><origin xyz="0.02 0.1 0.03"/><mass value="1.5"/>
+<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.012" iyz="0" izz="0.008"/></inertial>"""
+
+
+def joint(name, kind, parent, child, origin, axis="1 0 0"):
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}<origin {origin}/><axis xyz="{axis}"/></joint>\n'
+
+
+ARM = f"""<robot name="arm">
+<link name="base"/>
+<link name="waist">{SMALL}</link>
+<link name="upper"><inertial><origin xyz="{" ".join(map(repr, (LENGTH / 2 * ALONG).tolist()))}"/>
+<mass value="{MASS!r}"/><inertia {ENTRIES}/></inertial></link>
+<link name="fore">{SMALL}</link>
+<link name="gripper">{SMALL}</link>
+<link name="box">{SMALL}</link>
+{joint("turn", "revolute", "base", "waist", 'xyz="0 0 0.2"', "0 0 1")}
+{joint("shoulder", "revolute", "waist", "upper", 'xyz="0.1 0 0.1" rpy="0.3 0.2 -0.4"')}
+{joint("elbow", "revolute", "upper", "fore", 'xyz="0 0.3 0.4" rpy="-0.5 0.1 0.2"', "0 1 0")}
+{joint("middle", "fixed", "upper", "box", 'xyz="0 0.12 0.16" rpy="0.1 0.2 0.3"')}
+{joint("flange", "fixed", "fore", "gripper", 'xyz="0.3 0 0" rpy="0 0.4 0"')}
+</robot>"""
+
+
+def import_with(ffrobot, folder, link=BAR, text=ARM, name="upper"):
+    (folder / "arm.urdf").write_text(text)
+    (folder / "bar.toml").write_text(link)
+    return ffrobot("import", "arm.urdf", "-o", "out", "--flexible", f"{name}=bar.toml", cwd=folder)
+
+
+def test_a_stiff_link_carries_what_the_rigid_one_does(tmp_path, ffrobot):
+    """Weights in three postures: frames, interfaces and welds are where the URDF has them."""
+    done = import_with(ffrobot, tmp_path)
+    assert done.returncode == 0, done.stderr
+    scene = tmp_path / "out" / "scene.toml"
+    text, names = scene.read_text(), ("turn", "shoulder", "elbow")
+    rest = dict.fromkeys(names, 0.0)
+    for posture in ((0.0, 0.0, 0.0), (0.4, -1.0, 0.7), (-2.0, 0.5, 1.9)):
+        q = dict(zip(names, posture, strict=True))
+        moved = with_motion(text, q, rest, rest).replace(
+            "[initial.joints]", '[initial]\nstate = "static"\n[initial.joints]'
+        )
+        scene.write_text(moved)
+        solved = ffrobot("solve", scene)
+        assert solved.returncode == 0, solved.stderr
+        expected = moments(ARM, q, rest, rest)
+        with h5py.File(scene.with_suffix(".results.h5")) as file:
+            found = [file[f"inverse/joints/{name}/moment"][0] for name in names]
+        # 30 N at the tip bend it by F L³/3EI = 9e-8 m, which moves moments by 3e-6 N·m.
+        np.testing.assert_allclose(found, [expected[name] for name in names], atol=9e-6)
+
+
+def test_the_link_file_gets_length_and_interfaces(tmp_path, ffrobot):
+    done = import_with(ffrobot, tmp_path)
+    link = tomllib.loads((tmp_path / "out" / "upper.toml").read_text())
+    assert link["geometry"]["length"] == pytest.approx(0.5, rel=1e-15)
+    assert link["interface"] == [{"name": "middle", "position": pytest.approx(0.2, rel=1e-15)}]
+    joints = {entry["name"]: entry for entry in tomllib.loads((tmp_path / "out" / "scene.toml").read_text())["joint"]}
+    assert joints["shoulder"]["between"][1] == "upper.root"
+    assert joints["elbow"]["between"] == ["upper.tip", "fore.origin"]
+    assert joints["middle"]["type"] == "weld"
+    assert joints["middle"]["between"] == ["upper.middle", "box.origin"]
+    assert 'link "upper" is flexible: upper.toml says what it weighs, not its <inertial>' in done.stdout
+    assert 'length 0.5 m, the distance to joint "elbow"' in done.stdout
+
+
+WRONG = {
+    "another length": ({"link": BAR.replace('kind = "beam"', 'kind = "beam"\nlength = 0.4')},
+                       'geometry.length: expected 0.5 m, the distance to joint "elbow", or no such key, found 0.4'),
+    "unknown link": ({"name": "uper"}, 'expected a link of the URDF, found none of this name (did you mean "upper"?)'),
+    "joint off the axis": ({"text": ARM.replace("0 0.12 0.16", "0.1 0.12 0.16")},
+                           'joint "middle": expected a joint on the line between the ends of the beam, found it 0.1 m'),
+    "wrong link file": ({"link": BAR.replace("density", "dennsity")}, "density"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "expected"), WRONG.values(), ids=WRONG)
+def test_what_is_refused(changes, expected, tmp_path, ffrobot):
+    done = import_with(ffrobot, tmp_path, **changes)
+    assert done.returncode == 2
+    assert expected in re.sub(r"\s+", " ", done.stderr)
+    assert not (tmp_path / "out").exists()

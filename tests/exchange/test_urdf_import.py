@@ -1,0 +1,267 @@
+"""`ffrobot import` of URDFs: what is kept, merged, left out, and what wrong files are told."""
+
+import re
+import tomllib
+
+import numpy as np
+import pytest
+from rigid_robots import of_rpy
+
+from ffrobot import InputError
+from ffrobot.common.rotations import of_rpy as of_rpy_here
+from ffrobot.common.validation import validate
+from ffrobot.exchange.urdf.import_urdf import import_urdf
+from ffrobot.exchange.urdf.names import Names
+from ffrobot.exchange.urdf.scene import rpy_of
+from ffrobot.mbs.scene.spatial.mechanism import SpatialMechanismKeys
+
+INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial>'
+
+
+def link(name, inside=INERTIAL):
+    return f'<link name="{name}">{inside}</link>'
+
+
+def joint(name, parent, child, inside="", kind="revolute", at="0 0 0.3"):
+    limit = '<limit lower="-1" upper="2" effort="30" velocity="4"/>' if kind in ("revolute", "prismatic") else ""
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{at}"/><axis xyz="0 1 0"/>{limit}{inside}</joint>'
+    )
+
+
+def robot(*parts):
+    return f'<?xml version="1.0"?>\n<robot name="r">{"".join(parts)}</robot>\n'
+
+
+@pytest.fixture
+def imported(tmp_path, ffrobot):
+    """Import a text: keys of the scene, checked as `solve` checks them, and what was printed."""
+
+    def run(text, *arguments):
+        urdf = tmp_path / "robot.urdf"
+        urdf.write_text(text)
+        done = ffrobot("import", urdf, "-o", tmp_path / "scene", *arguments)
+        assert done.returncode == 0, done.stderr
+        scene = tmp_path / "scene" / "scene.toml"
+        keys = tomllib.loads(scene.read_text())
+        validate(SpatialMechanismKeys, keys, scene)
+        return keys, done.stdout
+
+    return run
+
+
+def test_keys_of_a_joint(imported):
+    dynamics = '<dynamics damping="0" friction="0"/>'
+    keys, _ = imported(robot(link("base"), link("arm"), joint("shoulder", "base", "arm", dynamics)))
+    assert keys["joint"] == [
+        {
+            "name": "shoulder", "type": "revolute", "between": ["ground", "arm.origin"], "at": [0.0, 0.0, 0.3],
+            "axis": [0.0, 1.0, 0.0], "position_limit": [-1.0, 2.0], "moment_limit": 30.0, "speed_limit": 4.0,
+        }
+    ]  # fmt: skip
+    assert keys["gravity"] == [0.0, 0.0, -9.81]
+    assert "trajectory" not in keys
+    assert "analysis" not in keys
+
+
+def test_welds_are_merged_and_their_frames_stay_as_points(imported):
+    """Two masses of 2 kg, 0.4 m apart along z: parallel axes."""
+    keys, out = imported(
+        robot(
+            link("base"), link("arm"), link("tool"), link("tip", ""),
+            joint("shoulder", "base", "arm"),
+            joint("flange", "arm", "tool", kind="fixed", at="0 0 0.4"),
+            joint("end", "tool", "tip", kind="fixed", at="0.1 0 0"),
+        )
+    )  # fmt: skip
+    (body,) = keys["body"]
+    assert body["rigid"]["mass"] == 4.0
+    np.testing.assert_allclose(body["rigid"]["center"], [0, 0, 0.2])
+    np.testing.assert_allclose(body["rigid"]["inertia"], [0.04 + 4 * 0.2**2, 0.04 + 4 * 0.2**2, 0.02])
+    np.testing.assert_allclose(body["rigid"]["points"]["tip"], [0.1, 0, 0.4])
+    assert '"base" (mass 2 kg) stand still on the ground' in out
+
+
+def test_mimic_limits_of_zero_and_masses_of_zero_are_told(imported):
+    keys, out = imported(
+        robot(
+            link("base"), link("a"), link("b"), link("camera", ""),
+            joint("j", "base", "a"),
+            joint("k", "a", "b", '<mimic joint="j" multiplier="-2" offset="0.1"/>'),
+            joint("pan", "b", "camera", kind="continuous"),
+        ).replace('effort="30"', 'effort="0"', 1)
+    )  # fmt: skip
+    assert [entry["name"] for entry in keys["joint"]] == ["j", "k"]
+    assert 'joint "pan" and link "camera" left out: nothing there has mass' in out
+    assert 'joint "k" follows "j": give it a trajectory of its own, -2 times that one plus 0.1' in out
+    assert 'joint "j": effort limit 0 left out' in out
+    assert "moment_limit" not in keys["joint"][0]
+
+
+def test_names_follow_the_rules_of_scenes(imported):
+    text = robot(link("ns/base"), link("ns/arm.v2"), link("ground"), joint("a/b", "ns/base", "ns/arm.v2"),
+                 joint("a.b", "ns/arm.v2", "ground"))  # fmt: skip
+    keys, out = imported(text)
+    assert [body["name"] for body in keys["body"]] == ["ns_arm_v2", "ground_2"]
+    assert [entry["name"] for entry in keys["joint"]] == ["a_b", "a_b_2"]
+    assert '"ns/arm.v2" is called "ns_arm_v2" in the scene' in out
+
+
+def test_all_types_of_joints(imported):
+    kinds = ("revolute", "continuous", "prismatic", "planar", "floating")
+    names = [f"l{k}" for k in range(len(kinds))]
+    joints = [joint(f"j{k}", "base", name, kind=kind) for k, (kind, name) in enumerate(zip(kinds, names, strict=True))]
+    keys, _ = imported(robot(link("base"), *map(link, names), *joints))
+    assert [entry["type"] for entry in keys["joint"]] == ["revolute", "revolute", "prismatic", "planar", "free"]
+
+
+@pytest.mark.parametrize("pitch", [0.3, np.pi / 2, -np.pi / 2, 1.5708, np.pi / 2 - 1e-8])
+def test_orientations_of_merged_joints(pitch):
+    C = of_rpy([0.4, pitch, -2.5])
+    np.testing.assert_allclose(of_rpy_here(*rpy_of(C)), C, atol=1e-15 * 8)
+
+
+def test_names_are_used_once():
+    names = Names(("taken",))
+    assert [names[name] for name in ("a.b", "a/b", "taken", "a.b", " x ")] == ["a_b", "a_b_2", "taken_2", "a_b", "x"]
+
+
+BASE, ARM = link("base"), link("arm")
+WRONG = {
+    "not well-formed": (robot(BASE)[:-8], "found XML that is not well-formed"),
+    "another root": ("<sdf/>", "whose root is <robot>, found <sdf>"),
+    "xacro": (
+        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="a"/></robot>',
+        "found <xacro:include>: run xacro first",
+    ),
+    "no links": (robot(), "expected at least one <link>, found none"),
+    "two roots": (robot(BASE, ARM), 'expected one link that no joint carries, found 2: "base", "arm"'),
+    "circle": (
+        robot(BASE, ARM, joint("j", "base", "arm"), joint("k", "arm", "base")),
+        "found none: the joints form a circle",
+    ),
+    "circle beside a tree": (
+        robot(BASE, link("a"), link("b"), joint("j", "a", "b"), joint("k", "b", "a")),
+        'found a circle of "a", "b"',
+    ),
+    "two parents": (
+        robot(BASE, ARM, link("c"), joint("j", "base", "arm"), joint("k", "base", "c"), joint("m", "c", "arm")),
+        'joint "m": expected one joint that carries link "arm", found a second one',
+    ),
+    "circle of mimics": (
+        robot(BASE, ARM, link("c"), joint("j", "base", "arm", '<mimic joint="k"/>'),
+              joint("k", "arm", "c", '<mimic joint="j"/>')),
+        "found a circle: j → k → j",
+    ),
+    "mimic of nothing": (
+        robot(BASE, ARM, joint("shoulder", "base", "arm", '<mimic joint="sholder"/>')),
+        'expected a joint of the file, found "sholder" (did you mean "shoulder"?)',
+    ),
+    "unknown link": (
+        robot(BASE, ARM, joint("j", "base", "amr")),
+        'joint "j": <child>: expected a link of the file, found "amr" (did you mean "arm"?)',
+    ),
+    "no child": (
+        robot(BASE, '<joint name="j" type="fixed"><parent link="base"/></joint>'),
+        'joint "j": expected <child link="…"/>',
+    ),
+    "unknown type": (robot(BASE, ARM, joint("j", "base", "arm", kind="hinge")), 'found "hinge"'),
+    "zero inertia": (
+        robot(BASE, link("arm", INERTIAL.replace("0.02", "0").replace("0.01", "0")), joint("j", "base", "arm")),
+        'link "arm": <inertia>: expected principal moments of inertia greater than 0, found 0',
+    ),
+    "impossible inertia": (
+        robot(BASE, link("arm", INERTIAL.replace("0.01", "0.5")), joint("j", "base", "arm")),
+        'link "arm": <inertia>: expected no principal moment of inertia larger than the sum of the others',
+    ),
+    "no mass in between": (
+        robot(BASE, link("arm", ""), link("c"), joint("j", "base", "arm"), joint("k", "arm", "c")),
+        'link "arm": expected a mass of a body that moves and carries others, found none',
+    ),
+    "negative mass": (
+        robot(BASE, link("arm", INERTIAL.replace('mass value="2"', 'mass value="-2"')), joint("j", "base", "arm")),
+        'link "arm": <inertial>: <mass>: expected a mass not below 0, found -2',
+    ),
+    "not a number": (robot(BASE, ARM, joint("j", "base", "arm", at="0 0 z")), 'expected a finite number, found "z"'),
+    "two numbers": (robot(BASE, ARM, joint("j", "base", "arm", at="0 0")), 'expected three numbers, found "0 0"'),
+    "axis without direction": (
+        robot(BASE, ARM, joint("j", "base", "arm").replace("0 1 0", "0 0 0")),
+        "<axis>: expected a direction, found 0 0 0",
+    ),
+    "nothing moves": (robot(BASE), 'expected a link with mass that moves on "base", found none'),
+    "the same name twice": (robot(BASE, BASE), 'found several of the name "base"'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "expected"), WRONG.values(), ids=WRONG)
+def test_wrong_files(text, expected, tmp_path):
+    (tmp_path / "robot.urdf").write_text(text)
+    with pytest.raises(InputError) as error:
+        import_urdf(tmp_path / "robot.urdf", tmp_path / "scene", {})
+    assert expected in str(error.value)
+    assert all("robot.urdf: " in line for line in str(error.value).splitlines())
+    assert not (tmp_path / "scene").exists()
+
+
+def test_a_wrong_file_ends_the_command(tmp_path, ffrobot):
+    (tmp_path / "robot.urdf").write_text(WRONG["two roots"][0])
+    done = ffrobot("import", "robot.urdf", "-o", "scene", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("ffrobot: robot.urdf: expected one link that no joint carries, found 2")
+    assert not (tmp_path / "scene").exists()
+
+
+def test_units_in_a_wrong_scale_are_told(imported):
+    """Millimetres in place of metres, kg·mm² in place of kg·m²."""
+    _, out = imported(robot(BASE, ARM, joint("j", "base", "arm", at="0 0 425")))
+    assert 'joint "j" is 425 m from that of its parent: URDF is in metres; is this file in millimetres?' in out
+    heavy = INERTIAL.replace("0.02", "20000").replace("0.01", "10000")
+    _, out = imported(robot(BASE, link("arm", heavy), joint("j", "base", "arm")), "--force")
+    assert 'link "arm": radius of gyration 100 m, in a robot whose joints span 0.3 m' in out
+
+
+CUBE = """solid cube
+{}endsolid cube
+"""
+
+
+def stl_of_cube(a):
+    """A closed cube of edge a, m, a corner at the origin."""
+    corners = np.array([[x, y, z] for x in (0, a) for y in (0, a) for z in (0, a)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    facets = ""
+    for p, q, r, s in quads:
+        for triangle in ((p, q, r), (p, r, s)):
+            vertices = "".join("vertex {} {} {}\n".format(*corners[k]) for k in triangle)
+            facets += f"facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n"
+    return CUBE.format(facets)
+
+
+def test_masses_of_meshes(tmp_path, imported):
+    """A cube of 0.1 m as a mesh in mm: 1e-3 m³, so 2000 kg/m³; its inertia of 2 kg is m a²/6 about each axis."""
+    pytest.importorskip("trimesh")
+    (tmp_path / "cube.stl").write_text(stl_of_cube(100.0))
+    visual = '<visual><geometry><mesh filename="package://{}/cube.stl" scale="1e-3 1e-3 1e-3"/></geometry></visual>'
+    arm = link("arm", INERTIAL + visual.format(tmp_path.name))
+    _, out = imported(robot(BASE, arm, joint("j", "base", "arm")))
+    (row,) = re.findall(r"^arm +closed .*$", out, flags=re.MULTILINE)
+    _, _, mass, volume, density, ratio, apart = row.split()
+    assert (mass, volume, density) == ("2", "0.001", "2000")
+    assert float(ratio) == pytest.approx(3 * 2 * 0.01 / 6 / 0.05, rel=1e-3)
+    assert float(apart) == pytest.approx(0.05 * np.sqrt(3), abs=1e-3)
+    assert "meshes are skins" in out
+
+
+def test_missing_meshes_are_told(imported):
+    pytest.importorskip("trimesh")
+    visual = '<visual><geometry><mesh filename="package://nowhere/arm.dae"/></geometry></visual>'
+    _, out = imported(robot(BASE, link("arm", INERTIAL + visual), joint("j", "base", "arm")))
+    assert "mesh not found: package://nowhere/arm.dae" in out
+
+
+def test_an_edited_scene_is_not_replaced(imported, tmp_path, ffrobot):
+    imported(robot(BASE, ARM, joint("j", "base", "arm")))
+    done = ffrobot("import", tmp_path / "robot.urdf", "-o", tmp_path / "scene")
+    assert done.returncode == 2
+    assert "expected a new name, found a file, which may have been edited since" in done.stderr

@@ -1,0 +1,81 @@
+"""Rigid robots from their URDF through `ffrobot import` and `ffrobot solve`: motor moments against other codes."""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from rigid_robots import ROBOTS, moments, random_urdf, with_motion
+
+# Motor moments at q = 0.1(1 … n), q̇ = 0.2(n … 1), q̈ = 0.3 cos(0 … n − 1), gravity −9.81 along z, no friction: Pinocchio
+# 2.6.20 and MuJoCo 4.0.0, equal to all these digits.
+OTHERS = {
+    "ur5": [-2.19784031, -54.77458172, -12.468253, 0.17824312, 0.47975015, -0.05791279],
+    "z1": [0.140006549, 4.44682343, -7.27741968, -1.5586138, 0.553306243, 0.0226056378, 0.00447557451],
+}
+
+
+def solved_moments(ffrobot, urdf, folder, motion):
+    """{joint: moment} at t = 0."""
+    done = ffrobot("import", urdf, "-o", folder)
+    assert done.returncode == 0, done.stderr
+    scene = folder / "scene.toml"
+    text = re.sub(r"^(viscous|coulomb)_friction = .*\n", "", scene.read_text(), flags=re.MULTILINE)
+    scene.write_text(with_motion(text, *motion))
+    done = ffrobot("solve", scene)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(scene.with_suffix(".results.h5")) as file:
+        return {name: float(joint["moment"][0]) for name, joint in file["inverse/joints"].items() if "moment" in joint}
+
+
+def joint_names(urdf):
+    return re.findall(r'<joint name="(\w+)" type="(?!fixed)', urdf.read_text())
+
+
+@pytest.mark.parametrize("robot", OTHERS)
+def test_real_arms(robot, tmp_path, ffrobot):
+    urdf = ROBOTS / f"{robot}.urdf"
+    names = joint_names(urdf)
+    n = len(names)
+    values = 0.1 * np.arange(1, n + 1), 0.2 * np.arange(n, 0, -1), 0.3 * np.cos(np.arange(n))
+    motion = [dict(zip(names, row, strict=True)) for row in values]
+    found = solved_moments(ffrobot, urdf, tmp_path, motion)
+    expected = OTHERS[robot]
+    np.testing.assert_allclose([found[name] for name in names], expected, rtol=1e-8, atol=5e-9)
+    of_urdf = moments(urdf.read_text(), *motion)
+    np.testing.assert_allclose([found[name] for name in names], [of_urdf[name] for name in names], atol=1e-11)
+
+
+@pytest.fixture(scope="module", params=[1, 2, 3])
+def tree(request, tmp_path_factory, ffrobot):
+    """A random tree, its motion, and the moments that `solve` finds."""
+    rng = np.random.default_rng(request.param)
+    folder = tmp_path_factory.mktemp("tree")
+    urdf = folder / "random.urdf"
+    urdf.write_text(random_urdf(rng))
+    names = joint_names(urdf)
+    motion = [{name: float(rng.uniform(-1, 1)) for name in names} for _ in range(3)]
+    return urdf, names, motion, solved_moments(ffrobot, urdf, folder / "scene", motion)
+
+
+def test_random_trees(tree):
+    urdf, names, motion, found = tree
+    expected = moments(urdf.read_text(), *motion)
+    scale = max(map(abs, expected.values()))
+    np.testing.assert_allclose([found[name] for name in names], [expected[name] for name in names], atol=1e-11 * scale)
+
+
+def test_random_trees_against_pinocchio(tree):
+    """With FFROBOT_PINOCCHIO a Python that has the package `pin`."""
+    python = os.environ.get("FFROBOT_PINOCCHIO")
+    if python is None:
+        pytest.skip("FFROBOT_PINOCCHIO names no Python with Pinocchio")
+    urdf, names, motion, found = tree
+    numbers = [repr(values[name]) for values in motion for name in names]
+    script = Path(__file__).parent / "pinocchio_moments.py"
+    done = subprocess.run([python, script, urdf, *names, *numbers], capture_output=True, text=True, check=True)
+    expected = np.array(done.stdout.split(), dtype=float)
+    np.testing.assert_allclose([found[name] for name in names], expected, atol=1e-10 * np.abs(expected).max())

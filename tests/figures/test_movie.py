@@ -1,0 +1,140 @@
+"""Movies: what is in them, read back by Pillow and by ffmpeg, and what is refused."""
+
+import io
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ffrobot.cli import cli
+from ffrobot.common.errors import InputError, SolveError
+from ffrobot.pictures.figures.movie import SIZE, write_motion
+from ffrobot.pictures.figures.palette import COLORS
+from ffrobot.pictures.movie_file import MovieOptions, gif_image, movie_outputs
+from ffrobot.pictures.view import view_movie
+
+HALF = MovieOptions(analysis="forward", seconds=0.52, scale=1.0)
+PIXELS = (576, 960)
+
+
+@pytest.fixture(scope="module")
+def results(slider_crank):
+    return slider_crank.folder / "scene.results.h5"
+
+
+@pytest.fixture(scope="module")
+def gif(results, tmp_path_factory):
+    path = tmp_path_factory.mktemp("movie") / "m.gif"
+    assert write_motion(results, path, HALF) == []
+    with Image.open(path) as movie:
+        frames = []
+        for k in range(movie.n_frames):
+            movie.seek(k)
+            assert movie.info["duration"] == 40  # ms
+            frames.append(np.asarray(movie.convert("RGB"), dtype=int))
+        assert movie.info["loop"] == 0
+    return np.array(frames)
+
+
+def near(frames, color, reach=40):
+    """Where pixels have that colour."""
+    wanted = [int(color[k : k + 2], 16) for k in (1, 3, 5)]
+    return np.abs(frames - wanted).max(axis=-1) <= reach
+
+
+def test_gif_shows_the_whole_motion(gif, slider_crank):
+    """The crank pin goes round: its angle in the picture, seen from the ground, against that of the solver."""
+    assert gif.shape == (13, *PIXELS, 3)
+    time = slider_crank.file["forward/time"][()]
+    angle = slider_crank.file["forward/bodies/crank/angle"][()]
+    ground_y, ground_x = centre_of(near(gif[0], "#8b95a3", 20))
+    for k, t in enumerate(np.linspace(time[0], time[-1], 13)):
+        row = np.flatnonzero(time <= t + 1e-9)[-1]
+        way = np.array([np.cos(angle[row]), np.sin(angle[row])])
+        blue = np.argwhere(near(gif[k], COLORS[0], 60))
+        arm = np.stack([blue[:, 1] - ground_x, ground_y - blue[:, 0]], axis=1)
+        across, along = np.abs(arm @ [-way[1], way[0]]), arm @ way
+        assert np.count_nonzero((across < 6) & (along > 20) & (along < 100)) > 60, k
+
+
+def centre_of(where):
+    """Row and column of the middle of what is there, inside of the axes."""
+    rows, columns = np.nonzero(where[60:500, 90:950])
+    return 60 + (rows.min() + rows.max()) / 2, 90 + (columns.min() + columns.max()) / 2
+
+
+def test_mp4_shows_the_same(gif, results, tmp_path):
+    """H.264 decoded again by ffmpeg."""
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    arguments = ["plot", results, "--movie", tmp_path / "m.mp4", "--seconds", 0.52, "--analysis", "forward"]
+    cli([*map(str, arguments), "--scale", "1"], standalone_mode=False)
+    assert [path.name for path in tmp_path.iterdir()] == ["m.mp4"]
+    reader = imageio_ffmpeg.read_frames(str(tmp_path / "m.mp4"))
+    about = next(reader)
+    assert about["size"] == PIXELS[::-1]
+    assert about["fps"] == 25
+    frames = np.array([np.frombuffer(frame, np.uint8).reshape(*PIXELS, 3) for frame in reader], dtype=int)
+    assert frames.shape == gif.shape
+    differences = np.abs(frames[:, None] - gif[None, :]).mean(axis=(2, 3, 4))
+    assert (differences.argmin(axis=1) == np.arange(13)).all()  # each like its own frame more than like any other
+    assert differences.diagonal().max() < 3.0  # of 255
+
+
+def test_movie_of_uneven_outputs_keeps_time():
+    """Frames show the latest output not after their time, the first and the last at its ends."""
+    time = np.array([0.0, 0.1, 0.15, 0.6, 1.0])
+    outputs = movie_outputs(time, 0.44)
+    assert len(outputs) == 11  # 25 a second
+    np.testing.assert_array_equal(outputs, [0, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4])
+    np.testing.assert_array_equal(movie_outputs(np.array([0.3]), 8.0), [0])
+
+
+def test_gif_keeps_colours():
+    frames = [np.full((20, 30, 3), color, dtype=np.uint8) for color in ((255, 0, 0), (0, 114, 178))]
+    with Image.open(io.BytesIO(gif_image(frames))) as movie:
+        for k, frame in enumerate(frames):
+            movie.seek(k)
+            assert np.abs(np.asarray(movie.convert("RGB"), dtype=int) - frame).max() <= 8
+
+
+def test_movie_in_space_follows_the_slider(results, slider_crank, tmp_path):
+    """By PyVista: the rod ends where the solver has the slider."""
+    pytest.importorskip("pyvista")
+    path = tmp_path / "m.gif"
+    view_movie(results, path, MovieOptions(analysis="forward", seconds=0.2, scale=1.0))
+    with Image.open(path) as movie:
+        frames = []
+        for k in range(movie.n_frames):
+            movie.seek(k)
+            frames.append(np.asarray(movie.convert("RGB"), dtype=int))
+    assert np.shape(frames) == (5, *PIXELS, 3)
+    colored = [np.argwhere(np.ptp(frame[40:480], axis=-1) > 40) for frame in frames]
+    assert all(len(places) > 500 for places in colored)
+    right_ends = np.array([places[:, 1].max() for places in colored])
+    time = slider_crank.file["forward/time"][()]
+    rows = [np.flatnonzero(time <= t + 1e-9)[-1] for t in np.linspace(time[0], time[-1], 5)]
+    slider = slider_crank.file["forward/bodies/slider/position"][rows, 0]
+    scale, start = np.polyfit(slider, right_ends, 1)
+    assert np.abs(start + scale * slider - right_ends).max() < 3.0  # pixels
+    assert scale * np.ptp(slider) > 20.0
+
+
+def test_what_is_refused(results, two_link, tmp_path, monkeypatch):
+    with pytest.raises(InputError, match=r'expected a name that ends in "\.gif" or "\.mp4", found "m\.avi"'):
+        write_motion(results, tmp_path / "m.avi")
+    with pytest.raises(InputError, match=r"expected an analysis that goes through time \(inverse, forward\), found"):
+        write_motion(results, tmp_path / "m.gif", MovieOptions(analysis="forwards"))
+    body = two_link.folder / "link1.h5"
+    if body.exists():
+        with pytest.raises(InputError, match="found a modal body"):
+            view_movie(body, tmp_path / "m.gif")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(SolveError, match=r"needs ffmpeg, which is not installed: .* pip install 'ffrobot\[movie\]'"):
+        write_motion(results, tmp_path / "m.mp4")
+    assert not list(tmp_path.iterdir())
+
+
+def test_size_of_frames():
+    assert tuple(round(120 * length) for length in SIZE[::-1]) == PIXELS

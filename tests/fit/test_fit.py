@@ -1,0 +1,155 @@
+"""`ffrobot fit`: links and robots from frequencies that closed forms or other files give."""
+
+import csv
+import tomllib
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import ffrobot
+from ffrobot.common.errors import InputError
+from ffrobot.fe_models.link import computed_modal_body
+from ffrobot.fit.robot_target import RobotTarget
+from ffrobot.fit.toml_edit import with_values
+
+LINK = """
+name = "arm"
+material = {{ youngs_modulus = {E!r}, density = {rho!r} }}  # of the data sheet
+geometry = {{ kind = "beam", length = 0.6, section = {{ shape = "tube", outer = 0.02, inner = 0.016 }} }}
+mesh = {{ elements = 20 }}
+reference = {{ condition = "cantilever" }}
+modes = {{ count = 4, family = "in-plane-bending" }}
+interface = [{{ name = "tip", mass = {tip!r} }}]
+"""
+E, RHO = 70e9, 2700.0
+AREA, I = np.pi * (0.02**2 - 0.016**2) / 4, np.pi * (0.02**4 - 0.016**4) / 64  # noqa: E741
+
+ROBOT = """
+name = "arm on a spring"
+gravity = [0.0, 0.0]
+body = [{ name = "arm", link = "arm.toml" }]
+initial = { angles = { arm = 0.5 } }
+analysis = [{ name = "linear", kind = "linear" }]
+
+[[joint]]
+name = "shoulder"
+type = "revolute"
+between = ["ground", "arm.root"]
+gear_ratio = 100.0
+rotor_inertia = 3e-5
+stiffness = 500.0
+"""
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def link(E=E, rho=RHO, tip=0.0, name="arm"):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(LINK.format(E=E, rho=rho, tip=tip), encoding="utf-8")
+        return path
+
+    return link
+
+
+def table(path, frequencies, uncertainty=None):
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["mode", "frequency", *(["uncertainty"] if uncertainty else [])])
+        for k, f in enumerate(frequencies, 1):
+            writer.writerow([k, repr(float(f)), *([uncertainty * f] if uncertainty else [])])
+    return path
+
+
+def test_stiffness_and_density_of_a_link_with_a_known_mass(write, tmp_path):
+    """A known mass at the tip tells E and ρ apart: both are found, and the new file has them, and its comment."""
+    truth = computed_modal_body(write(E=66e9, rho=2900.0, tip=0.1, name="truth"))
+    measured = table(tmp_path / "modes.csv", truth.frequency[:4])
+    fit = ffrobot.fit_measured(write(tip=0.1), measured, ["material.youngs_modulus", "material.density"])
+    np.testing.assert_allclose(fit.value, [66e9, 2900.0], rtol=1e-6)
+    text = (tmp_path / "arm.fitted.toml").read_text()
+    assert "# of the data sheet" in text
+    assert tomllib.loads(text)["material"]["density"] == pytest.approx(2900.0, rel=1e-6)
+
+
+def test_without_it_they_are_refused(write, tmp_path):
+    measured = table(tmp_path / "modes.csv", [49.0, 307.0, 860.0])
+    with pytest.raises(InputError, match=r"material\.youngs_modulus times c, material\.density times c, for any c"):
+        ffrobot.fit_measured(write(), measured, ["material.youngs_modulus", "material.density"])
+    with pytest.raises(InputError, match=r"material.youngs_modulus times c, geometry.length times c\^0.25"):
+        ffrobot.fit_measured(write(), measured, ["material.youngs_modulus", "geometry.length"])
+    assert not (tmp_path / "arm.fitted.toml").exists()
+
+
+def spring_beam(k, count, free=False):
+    """Frequencies, Hz, of an Euler–Bernoulli beam that is free at one end and on a spring k at a hinge at the other.
+
+    κ (1 + cos x cosh x) = x (sin x cosh x − cos x sinh x) with κ = kL/EI; divided by cosh x.
+    """
+    kappa = k * 0.6 / (E * I)
+
+    def equation(x):
+        return kappa * (1 / np.cosh(x) + np.cos(x)) - x * (np.sin(x) - np.cos(x) * np.tanh(x))
+
+    grid = np.linspace(1e-3, 20.0, 4001)
+    values = equation(grid)
+    roots = [brentq(equation, *grid[i : i + 2], xtol=1e-13) for i in np.flatnonzero(values[:-1] * values[1:] < 0)]
+    return np.array(roots[:count]) ** 2 * np.sqrt(E * I / (RHO * AREA * 0.6**4)) / (2 * np.pi)
+
+
+def test_stiffness_of_a_joint_from_the_closed_form(write, tmp_path):
+    """The motor is held: the spring of the gear is between the arm and the ground."""
+    write()
+    scene = tmp_path / "scene.toml"
+    scene.write_text(ROBOT, encoding="utf-8")
+    measured = table(tmp_path / "robot.csv", spring_beam(820.0, 3), uncertainty=1e-3)
+    fit = ffrobot.fit_measured(scene, measured, ["joint.shoulder.stiffness"], motors="held")
+    assert fit.value[0] == pytest.approx(820.0, rel=1e-4)  # elements and modes leave 1e-5 of the frequencies
+    (joint,) = tomllib.loads((tmp_path / "scene.fitted.toml").read_text())["joint"]
+    assert joint["stiffness"] == pytest.approx(fit.value[0], rel=1e-7)
+
+
+def test_frequencies_of_held_and_free_motors(write, tmp_path):
+    """Held, without a spring in the gear: the cantilever's. Free, without rotor: those of a pinned beam."""
+    write()
+    scene = tmp_path / "scene.toml"
+    scene.write_text(ROBOT.partition("gear_ratio")[0], encoding="utf-8")
+    held = RobotTarget(scene, "held").modes({})[1]
+    free = RobotTarget(scene, "free").modes({})[1]
+    # twenty cubic elements: (βh)⁴/1440 = 1.7e-5 of the third frequency
+    np.testing.assert_allclose(held[:3], spring_beam(1e12, 3), rtol=2e-5)
+    # six shapes of a cantilever: those of a pinned beam lie below (Rayleigh and Ritz), the first two close
+    assert np.all(free[:3] >= spring_beam(0.0, 3))
+    np.testing.assert_allclose(free[:2], spring_beam(0.0, 2), rtol=5e-4)
+
+
+def test_links_of_a_scene_get_files_of_their_own(write, tmp_path):
+    write()
+    scene = tmp_path / "scene.toml"
+    scene.write_text(ROBOT, encoding="utf-8")
+    truth = RobotTarget(scene, "held").modes({("links", "arm", "material", "youngs_modulus"): 60e9})[1]
+    measured = table(tmp_path / "robot.csv", truth[:3])
+    vary = ["links.arm.material.youngs_modulus"]
+    fit = ffrobot.fit_measured(scene, measured, vary, motors="held")
+    assert fit.value[0] == pytest.approx(60e9, rel=1e-6)
+    assert tomllib.loads((tmp_path / "scene.fitted.toml").read_text())["body"][0]["link"] == "arm.arm.fitted.toml"
+    assert ffrobot.load_scene(tmp_path / "scene.fitted.toml").body[0].link == tmp_path / "arm.arm.fitted.toml"
+    with pytest.raises(InputError, match="output: expected a new name, or --force to replace it"):
+        ffrobot.fit_measured(scene, measured, vary, motors="held")
+    ffrobot.fit_measured(scene, measured, vary, motors="held", force=True)
+
+
+def test_values_are_replaced_where_they_stand():
+    text = 'a = 1.0  # first\n[b]\na = 1.0 # second\nc = { a = 1.0, d = "x" }\n'
+    text += '[[e]]\nname = "n"\na = 1.0\nv = [1.0, 2.0]\n'
+    changed = with_values(text, {("b", "c", "a"): 2.5, ("e", "n", "a"): 3.0, ("b", "c", "d"): 'y"#'})
+    assert changed == text.replace("{ a = 1.0", "{ a = 2.5").replace('"n"\na = 1.0', '"n"\na = 3.0').replace(
+        '"x"', '"y\\"#"'
+    )
+    assert tomllib.loads(with_values(text, {("e", "n", "v", "1"): 7.0}))["e"][0]["v"] == [1.0, 7.0]
