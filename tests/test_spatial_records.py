@@ -207,7 +207,7 @@ MISTAKES = {
         put("analysis", kind="motors-only"),
         'kind: expected "pcid", "fcid", "forward", "static" in space = "spatial", found "motors-only", which is not',
     ),
-    "what is applied and not there yet": (
+    "what is applied by patches that are not there": (
         add("analysis", name="again", kind="forward", actuation="inverse", apply="joints+pzt"),
         r'analysis "again": apply: expected at least one \\[\\[pzt\\]\\] for "joints\+pzt", found none',
     ),

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from ..actuation.patches.spatial_patches import LinkPatches
@@ -20,7 +21,13 @@ from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
-from .spatial_actuation import SpatialActuation, actuated_in_space, patches_in_space
+from .spatial_actuation import (
+    SpatialActuation,
+    actuated_in_space,
+    given_voltages,
+    patches_in_space,
+    supplied_by_patches,
+)
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
 from .watcher import Interruption, Watcher
 
@@ -108,6 +115,7 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     model = build_spatial_model(scene, [body.spatial for body in loaded])
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
     patches = patches_in_space(scene, bodies)
+    model = replace(model, modal_loads=tuple(given_voltages(model, patches)))
     solution = SpatialSolution(scene, model, bodies, patches, {}, seconds)
     with Interruption(watcher.stopping) as interruption:
         solution = _run_all(solution, watcher, interruption)
@@ -154,7 +162,8 @@ def _context(
     def progress(t: float) -> bool:
         return watcher.advance(t, end) and not interruption.requested
 
-    return SpatialContext(solution.model, {name: result.run for name, result in results.items()}, progress)
+    runs = {name: result.run for name, result in results.items()}
+    return SpatialContext(solution.model, runs, progress, partial(supplied_by_patches, solution.patches))
 
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
 from ...common.arrays import Array, as_list
 from .. import _core
+from ..model.spatial_drives import NO_DRIVES, Drives
 from ..model.spatial_model import SpatialModel
-from ..model.spatial_system import Drive, PointDrive, SpatialSystem
+from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.integrators import METHODS
 from ..solve.spatial_limits import left_ranges
@@ -29,8 +29,7 @@ def spatial_drive(
     start: State,
     progress: Progress,
     *,
-    drives: Sequence[Drive] = (),
-    point_drives: Sequence[PointDrive] = (),
+    drives: Drives = NO_DRIVES,
     warnings: tuple[str, ...] = (),
     times: Array | None = None,
 ) -> SpatialRun:
@@ -40,7 +39,7 @@ def spatial_drive(
     a posture in which the joints cannot follow the path, with a warning.
     """
     times = analysis.times if times is None else times
-    system, began = SpatialSystem(model, drives, point_drives), time.perf_counter()
+    system, began = SpatialSystem(model, drives), time.perf_counter()
     integrator = INTEGRATORS[analysis.integrator]
     controls = _core.IntegrationControls(
         tolerance=analysis.tolerance,
@@ -55,10 +54,10 @@ def spatial_drive(
     told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q))
 
     def again(others: Array) -> SpatialRun:
-        return spatial_drive(model, analysis, start, progress, drives=drives, point_drives=point_drives, times=others)
+        return spatial_drive(model, analysis, start, progress, drives=drives, times=others)
 
     return SpatialRun(
-        analysis, model, times[: len(q)], q, v, run.accelerations, run.multipliers, applied=tuple(point_drives),
+        analysis, model, times[: len(q)], q, v, run.accelerations, run.multipliers, applied=drives.at_points,
         status=STATUS[run.status], integrator=integrator, steps=run.steps, evaluations=run.evaluations,
         wall_seconds=time.perf_counter() - began, warnings=told, again=again,
     )  # fmt: skip

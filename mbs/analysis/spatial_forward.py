@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..model.spatial_system import Drive, PointDrive
+from .._core import TimeFunction
+from ..model.spatial_drives import Drive, Drives, FrameDrive, PointDrive
+from ..model.spatial_model import SpatialModel, modal_direction
+from ..model.spatial_motors import MotorForces
 from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_statics import initial_state
 from ..solve.state import State
@@ -14,6 +20,13 @@ from .forward import Forward
 from .spatial_drive import spatial_drive
 from .spatial_replay import motor_forces_of, path_wrenches, replayed
 from .spatial_run import SpatialContext, SpatialRun, without_paths
+
+
+class Applied(NamedTuple):
+    """What acts, and how far its functions of time are off (share of the largest value)."""
+
+    drives: Drives
+    unresolved: float
 
 
 def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRun:
@@ -26,21 +39,17 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
     if analysis.actuation is None:
         return spatial_drive(model, analysis, initial_state(model), progress)
     source = context.runs[analysis.actuation]
-    drives: list[Drive] = []
-    points: list[PointDrive] = []
-    if analysis.apply == "joints":
-        drives, unresolved = _motors(source, analysis)
-    else:
-        drives, points, unresolved = _paths(source, analysis)
+    by_paths = analysis.apply == "trajectory"
+    applied = _paths(source, analysis) if by_paths else _actuators(context, source, analysis)
     start = State(source.q[0], source.v[0])
     warnings: tuple[str, ...] = ()
-    if unresolved > analysis.tolerance:
-        off = f"off by {unresolved:.1e} of the largest"
+    if applied.unresolved > analysis.tolerance:
+        off = f"off by {applied.unresolved:.1e} of the largest"
         warnings = (f'the forces of "{analysis.actuation}" change too fast to be replayed: {off}',)
-    return spatial_drive(model, analysis, start, progress, drives=drives, point_drives=points, warnings=warnings)
+    return spatial_drive(model, analysis, start, progress, drives=applied.drives, warnings=warnings)
 
 
-def _paths(source: SpatialRun, analysis: Forward) -> tuple[list[Drive], list[PointDrive], float]:
+def _paths(source: SpatialRun, analysis: Forward) -> Applied:
     """Forces and moments on the points of paths, and along the coordinates of joints that follow one."""
     model = source.model
     rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory and row.kind == "coordinate"]
@@ -51,36 +60,65 @@ def _paths(source: SpatialRun, analysis: Forward) -> tuple[list[Drive], list[Poi
 
     found = replayed(source, forces, analysis.last_time, analysis.tolerance)
     directions = np.eye(model.tree.n_v)[[row.coordinate for _, row in rows]]
-    drives = [Drive(direction, size) for direction, size in zip(directions, found.functions, strict=False)]
+    along = [Drive(direction, size) for direction, size in zip(directions, found.functions, strict=False)]
     sizes = iter(found.functions[len(rows) :])
     points = [
         PointDrive(point, {component: next(sizes) for component in OF_POINT})
         for point in path_wrenches(source.rows(slice(0, 1)))
     ]
-    return drives, points, found.unresolved
+    return Applied(Drives(tuple(along), tuple(points)), found.unresolved)
 
 
-def _motors(source: SpatialRun, analysis: Forward) -> tuple[list[Drive], float]:
-    """Moments of all motors along their coordinates."""
+def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -> Applied:
+    """Moments of all motors along their coordinates, and what voltages of patches do on modes."""
     model = source.model
-    if not model.motors:
-        raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected joints with motors for "joints", found'
-            " none: name them with motor = true"
-        )
-
+    _check_motors(model, analysis)
     joints = {joint.name: joint for joint in model.scene.joint}
     most = np.array([limits.moment for name in model.motors for limits in joints[name].motor_limits])
     most = most if analysis.limits else np.full_like(most, np.inf)
 
-    def moments(run: SpatialRun) -> Array:
-        return np.clip(np.hstack(list(motor_forces_of(run).moments.values())), -most, most)
+    def forces(run: SpatialRun) -> Array:
+        found = motor_forces_of(run)
+        moments = np.clip(np.hstack(list(found.moments.values())), -most, most)
+        return np.hstack([moments, *_supplied(context, analysis, found).values()])
 
-    found = replayed(source, moments, analysis.last_time, analysis.tolerance)
-    directions = [
-        model.sign(joint) * np.eye(model.tree.n_v)[column]
-        for joint, columns in model.motors.items()
-        for column in columns
-    ]
-    drives = [Drive(direction, size) for direction, size in zip(directions, found.functions, strict=True)]
-    return drives, found.unresolved
+    found = replayed(source, forces, analysis.last_time, analysis.tolerance)
+    sizes = iter(found.functions)
+    motors = list(_motors(model, sizes))
+    with_patches = _supplied(context, analysis, motor_forces_of(source.rows(slice(0, 1))))
+    modal = tuple(drive for body in with_patches for drive in modal_drives(model, body, sizes))
+    along = tuple(drive for drive in motors if isinstance(drive, Drive))
+    on_frames = tuple(drive for drive in motors if isinstance(drive, FrameDrive))
+    return Applied(Drives(along + modal, on_frames=on_frames), found.unresolved)
+
+
+def _supplied(context: SpatialContext, analysis: Forward, found: MotorForces) -> dict[str, Array]:
+    """Modal forces of patches (T, n) by body, where they are applied."""
+    return dict(context.supply(found.modal, analysis.limits)) if analysis.apply == "joints+pzt" else {}
+
+
+def _motors(model: SpatialModel, sizes: Iterator[TimeFunction]) -> Iterator[Drive | FrameDrive]:
+    """The motors with the next functions, in the order of `SpatialModel.motors`; their signs are those of the joint."""
+    joints = {joint.name: joint for joint in model.scene.joint}
+    for joint, columns in model.motors.items():
+        for column in columns:
+            size = next(sizes)
+            if model.scene.motors == "frame" and joints[joint].units == ("rad",):
+                yield FrameDrive(model.tree.carried[joint], model.sign(joint), size)
+            else:
+                yield Drive(model.sign(joint) * np.eye(model.tree.n_v)[column], size)
+
+
+def modal_drives(model: SpatialModel, body: str, sizes: Iterator[TimeFunction]) -> Iterator[Drive]:
+    """Forces on the modes of the file of a body, one function of time after the other, along v of its tree."""
+    modes = model.tree.nodes[model.tree.index[body]].body.modal_transform
+    for unit in np.eye(len(modes)):
+        yield Drive(modal_direction(model, body, unit), next(sizes))
+
+
+def _check_motors(model: SpatialModel, analysis: Forward) -> None:
+    if not model.motors:
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected joints with motors for'
+            f' "{analysis.apply}", found none: name them with motor = true'
+        )

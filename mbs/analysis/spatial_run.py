@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
+from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel
-from ..model.spatial_system import PointDrive
 from ..scene.analysis import Analysis
 from .drive import Progress
 from .outcome import ADVICE
@@ -74,6 +74,18 @@ class SpatialRun:
             )
 
 
+ModalForces = Mapping[str, Array]
+"""By body, (T, n) on the modes of its file."""
+
+Supply = Callable[[ModalForces, bool], ModalForces]
+"""What patches do of modal forces, within their limits or not; bodies without patches are left out."""
+
+
+def no_patches(wanted: ModalForces, limited: bool) -> ModalForces:
+    """Nothing."""
+    return {}
+
+
 @dataclass(frozen=True)
 class SpatialContext:
     """What the run of an analysis in space starts from.
@@ -82,11 +94,13 @@ class SpatialContext:
         model: the robot, with the rows of all joints that close loops and of all trajectories.
         runs: of the analyses before, by name.
         progress: see `drive.Progress`.
+        supply: what patches do.
     """
 
     model: SpatialModel
     runs: Mapping[str, SpatialRun]
     progress: Progress
+    supply: Supply = no_patches
 
 
 def without_paths(model: SpatialModel) -> SpatialModel:

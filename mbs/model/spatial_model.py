@@ -18,6 +18,7 @@ from ..joints.spatial.joint import SpatialJoint
 from ..scene.spatial.mechanism import SpatialMechanismScene
 from ..scene.spatial.trajectories import SpatialTrajectory
 from .spatial_body import SpatialBody
+from .spatial_drives import Drive
 from .spatial_tree import Motion, Section, SpatialTree
 
 RowKind = Literal["point", "slide", "dot", "rotation", "coordinate"]
@@ -57,11 +58,12 @@ class SpatialRow:
 
 @dataclass(frozen=True)
 class SpatialModel:
-    """A scene in space with its bodies: everything analyses share."""
+    """A scene in space with its bodies: everything analyses share. `modal_loads` act beside the loads of the scene."""
 
     scene: SpatialMechanismScene
     tree: SpatialTree
     rows: tuple[SpatialRow, ...]
+    modal_loads: tuple[Drive, ...] = ()
 
     @property
     def loop_rows(self) -> Array:
@@ -87,6 +89,13 @@ class SpatialModel:
     def sign(self, joint: str) -> float:
         """−1 where the tree has a joint's coordinates the other way round."""
         return -1.0 if self.tree.nodes[self.tree.carried[joint]].backwards else 1.0
+
+
+def modal_direction(model: SpatialModel, body: str, on_modes: Array) -> Array:
+    """Along v of the tree (n_v,): forces (n,) on the modes of the file of a body."""
+    node, direction = model.tree.nodes[model.tree.index[body]], np.zeros(model.tree.n_v)
+    direction[node.p_v] = on_modes @ node.body.modal_transform
+    return direction
 
 
 def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBody]) -> SpatialModel:

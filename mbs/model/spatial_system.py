@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
 from .spatial_body import SpatialBody
+from .spatial_drives import NO_DRIVES, Drive, Drives, FrameDrive, PointDrive
 from .spatial_model import SpatialModel, SpatialRow
 from .spatial_transmission import rotor
 from .spatial_tree import Node, Section
@@ -28,20 +28,6 @@ def _moves(node: Node) -> bool:
     return bool(np.any(_rows_of(node.body, node.outer)[0]))
 
 
-class Drive(NamedTuple):
-    """A force of time on what it drives, by direction: generalized (n_v,)."""
-
-    direction: Array
-    size: TimeFunction
-
-
-class PointDrive(NamedTuple):
-    """Forces and moments of time on "BODY.POINT", by component ("x" … "mz"), global axes."""
-
-    point: str
-    components: Mapping[str, TimeFunction]
-
-
 class SpatialSystem:
     """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
 
@@ -51,9 +37,7 @@ class SpatialSystem:
         scene: what its rows follow, and what acts on it.
     """
 
-    def __init__(
-        self, model: SpatialModel, drives: Sequence[Drive] = (), point_drives: Sequence[PointDrive] = ()
-    ) -> None:
+    def __init__(self, model: SpatialModel, drives: Drives = NO_DRIVES) -> None:
         """`drives` act beside the loads of the scene."""
         self.model, tree = model, model.tree
         self._markers: list[list[Section]] = [[] for _ in tree.nodes]
@@ -66,7 +50,7 @@ class SpatialSystem:
         driven |= {node.joint.name for node in tree.nodes if node.joint.frictions}
         self._wrenches: list[tuple[int, int]] = []
         loads = [PointDrive(load.point, load.components) for load in model.scene.load if load.point is not None]
-        self._at_points = [self._point_drive(drive) for drive in (*loads, *point_drives)]
+        self._at_points = [self._point_drive(drive) for drive in (*loads, *drives.at_points)]
         self._check()
         bodies = []
         for number, (node, (inner, outer)) in enumerate(zip(tree.nodes, sides, strict=True)):
@@ -84,7 +68,9 @@ class SpatialSystem:
             ground[number].turns = True
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
         self.core = _core.SpatialModel(bodies, ground, rows, wrenches, np.array(model.scene.gravity))
-        self._along = [self._load(load) for load in model.scene.load if load.joint is not None] + list(drives)
+        moments = [self._load(load) for load in model.scene.load if load.joint is not None]
+        self._along = [*moments, *model.modal_loads, *drives.along]
+        self._on_frames = drives.on_frames
         self.scene = self._follow()
 
     def _check(self) -> None:
@@ -135,6 +121,8 @@ class SpatialSystem:
         for wrench, components in self._at_points:
             for name, magnitude in components.items():
                 scene.add_point_load(wrench, OF_POINT.index(name), magnitude)
+        for drive in self._on_frames:
+            self._turn_frames(scene, drive)
         for node in self.model.tree.nodes:
             for number, friction in enumerate(node.joint.frictions):  # the same along all of a joint's coordinates
                 at = node.q.start + number, node.v.start + number
@@ -142,6 +130,16 @@ class SpatialSystem:
         for number, law in self._turning:
             scene.turn_marker(number, _turning_law(law))
         return scene
+
+    def _turn_frames(self, scene: _core.TreeScene, drive: FrameDrive) -> None:
+        """A moment along the joint, less what the sections at it would do on the modes of its two bodies."""
+        node, direction = self.model.tree.nodes[drive.body], np.zeros(self.model.tree.n_v)
+        direction[node.v] = drive.sign
+        scene.add_load(direction, drive.size)
+        for section, sign in ((node.outer, 1.0), (node.inner, -1.0)):
+            if section.body >= 0 and (of := self.model.tree.nodes[section.body]).body.n_modes:
+                Phi_r, axis = _rows_of(of.body, section)[0][3:], drive.sign * sign * section.triad[:, 2]
+                scene.add_frame_motor(of.p_q.start, of.p_v.start, Phi_r, axis, drive.size)
 
     def _load(self, load: SpatialLoad) -> Drive:
         """Direction (n_v,) and size of the moment of a joint."""

@@ -13,9 +13,9 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.rotations import quaternions
 from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
-from ..model.spatial_system import PointDrive
 from ..model.spatial_tree import Motion, Node
 from ..scene.spatial.trajectories import SpatialTrajectory
 

@@ -38,6 +38,12 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
   }
   for (const JointForce &force : scene.joint_forces)
     check_index("q of a joint's force", force.q, n_q), check_index("v of a joint's force", force.v, n_v);
+  for (const FrameMotor &motor : scene.frame_motors) {
+    const auto last = static_cast<int>(motor.Phi_r.cols()) - 1;
+    check_index("q of a motor on frames", motor.q, n_q), check_index("v of a motor on frames", motor.v, n_v);
+    check_index("q of a motor on frames", motor.q + last, n_q);
+    check_index("v of a motor on frames", motor.v + last, n_v);
+  }
   if (scene.watch)
     check_size("is_path", static_cast<Index>(scene.watch->is_path.size()), model.rows());
   for (const DrivenMarker &driven : scene.driven)
@@ -215,6 +221,15 @@ void bind_tree_motion(nb::module_ &m) {
           },
           "q"_a, "v"_a, "stiffness"_a, "rest"_a, "viscous"_a, "coulomb"_a, "speed"_a,
           "Spring and friction along the coordinate with these indices in q and v.")
+      .def(
+          "add_frame_motor",
+          [](Scene &s, int q, int v, const Eigen::MatrixXd &rotation, const Eigen::Vector3d &axis,
+             const TimeFunction &magnitude) {
+            check_size("rotation", rotation.rows(), 3);
+            s.frame_motors.push_back({q, v, rotation, axis, magnitude});
+          },
+          "q"_a, "v"_a, "rotation"_a, "axis"_a, "magnitude"_a,
+          "What a motor that turns the frame of a body takes back on its modes: see core/recursion/frame_motor.h.")
       .def(
           "watch_posture",
           [](Scene &s, const std::vector<bool> &is_path, double length) {

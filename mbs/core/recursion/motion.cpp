@@ -57,7 +57,7 @@ template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
 template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
   update_targets(t);
   Forces<double> forces;
-  if (!scene_.loads.empty() || !scene_.joint_forces.empty()) {
+  if (!scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.frame_motors.empty()) {
     force_.setZero();
     for (const Load &load : scene_.loads) {
       const double magnitude = load.magnitude(t).value;
@@ -66,6 +66,8 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
     }
     for (const JointForce &joint : scene_.joint_forces)
       force_[joint.v] -= joint.stiffness * (q[joint.q] - joint.rest) + joint.friction.resistance(v[joint.v]);
+    for (const FrameMotor &motor : scene_.frame_motors)
+      motor.add(t, q, force_.data());
     forces.generalized = force_.data();
   }
   if (!scene_.point_loads.empty()) {
