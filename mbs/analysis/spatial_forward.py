@@ -18,7 +18,7 @@ from ..solve.spatial_statics import initial_state
 from ..solve.state import State
 from .forward import Forward
 from .spatial_drive import spatial_drive
-from .spatial_replay import motor_forces_of, path_wrenches, replayed
+from .spatial_replay import motor_forces_of, path_wrenches, replay_times, replayed
 from .spatial_run import SpatialContext, SpatialRun, without_paths
 
 
@@ -46,7 +46,8 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
     if applied.unresolved > analysis.tolerance:
         off = f"off by {applied.unresolved:.1e} of the largest"
         warnings = (f'the forces of "{analysis.actuation}" change too fast to be replayed: {off}',)
-    return spatial_drive(model, analysis, start, progress, drives=applied.drives, warnings=warnings)
+    times = replay_times(source, analysis)
+    return spatial_drive(model, analysis, start, progress, drives=applied.drives, warnings=warnings, times=times)
 
 
 def _paths(source: SpatialRun, analysis: Forward) -> Applied:
@@ -58,7 +59,7 @@ def _paths(source: SpatialRun, analysis: Forward) -> Applied:
         along = [-run.multipliers[:, k : k + 1] * row.sign for k, row in rows]
         return np.hstack([*along, *path_wrenches(run).values()])
 
-    found = replayed(source, forces, analysis.last_time, analysis.tolerance)
+    found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
     directions = np.eye(model.tree.n_v)[[row.coordinate for _, row in rows]]
     along = [Drive(direction, size) for direction, size in zip(directions, found.functions, strict=False)]
     sizes = iter(found.functions[len(rows) :])
@@ -82,7 +83,7 @@ def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -
         moments = np.clip(np.hstack(list(found.moments.values())), -most, most)
         return np.hstack([moments, *_supplied(context, analysis, found).values()])
 
-    found = replayed(source, forces, analysis.last_time, analysis.tolerance)
+    found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
     sizes = iter(found.functions)
     motors = list(_motors(model, sizes))
     with_patches = _supplied(context, analysis, motor_forces_of(source.rows(slice(0, 1))))

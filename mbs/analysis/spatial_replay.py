@@ -17,6 +17,7 @@ from ..fields.waypoints import spline
 from ..model.spatial_model import row_values
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
 from ..model.spatial_wrench import row_wrenches
+from ..scene.analysis import TimedAnalysis, output_times
 from .spatial_run import SpatialRun
 
 FEWEST_NODES = 401
@@ -33,12 +34,21 @@ class Replayed(NamedTuple):
     unresolved: float
 
 
-def replayed(source: SpatialRun, read: Callable[[SpatialRun], Array], end: float, tolerance: float) -> Replayed:
-    """What `read` (T, columns) finds of a run, up to `end` (s), to a share of the tolerance where that can be had."""
+def replay_times(source: SpatialRun, analysis: TimedAnalysis) -> Array:
+    """Output times (T,) of a run under what `source` found, s.
+
+    With what it does before t = 0 and, where the run goes to the end of the path, after that.
+    """
+    after = source.after if analysis.end == source.analysis.last_time else 0.0
+    return output_times(analysis.end, analysis.output_step, source.before, after)
+
+
+def replayed(source: SpatialRun, read: Callable[[SpatialRun], Array], times: Array, tolerance: float) -> Replayed:
+    """What `read` (T, columns) finds of a run over `times` (s), to a share of the tolerance where that can be had."""
     assert source.again is not None
     count = 2 * max(FEWEST_NODES // 2, source.steps) + 1
     while True:
-        nodes = as_floats(np.linspace(0.0, end, count))
+        nodes = as_floats(np.linspace(times[0], times[-1], count))
         values = _in_parts(source.again(nodes), read)
         peak = float(np.abs(values).max(initial=0.0))
         rough = np.array([f.sample(nodes[1::2])[0] for f in spline(nodes[::2], values[::2])]).T

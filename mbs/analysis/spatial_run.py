@@ -31,6 +31,7 @@ class SpatialRun:
         integrator: its name.
         steps, evaluations: how many.
         wall_seconds: of all.
+        before, after: s, how long it acts before t = 0 and after the end of the analysis.
         warnings: on what is left open.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
     """
@@ -50,6 +51,8 @@ class SpatialRun:
     steps: int = 0
     evaluations: int = 0
     wall_seconds: float = 0.0
+    before: float = 0.0
+    after: float = 0.0
     warnings: tuple[str, ...] = ()
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
 

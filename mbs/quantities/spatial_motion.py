@@ -145,8 +145,8 @@ class SpatialMotion:
 
     @cached_property
     def motor_forces(self) -> MotorForces | None:
-        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is followed."""
-        if not self.followed:
+        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is followed or required."""
+        if not self.followed and self.required is None:
             return None
         return motor_forces(self.model, self.q, self.frames, self.rows[1], self.supplied)
 
