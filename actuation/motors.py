@@ -13,7 +13,7 @@ from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.joints.joint import JointRecord
 from ..mbs.joints.transmission import MotorLimits
-from ..mbs.quantities.joint_motion import joint_motions
+from ..mbs.quantities.joint_motion import joint_motions, motor_motion
 
 SHORT = 0.01  # of the time: a peak that lasts less is one of its own
 APART = 1.1  # times the moment of the other 99 % of the time: likewise
@@ -72,12 +72,12 @@ class MotorFeasibility:
 
 
 def judge_motors(outcome: Outcome, joints: Mapping[str, JointRecord]) -> dict[str, MotorFeasibility]:
-    """What every motor has to do against its limits."""
+    """What every motor has to do against its limits; behind a gear that gives it turns otherwise than its joint."""
     moments = outcome.motor_moments
     assert moments is not None
     motions = joint_motions(outcome)
     return {
-        name: _judge(outcome, joints[name], moments[:, k], motions[name].rate)
+        name: _judge(outcome, joints[name], moments[:, k], (motor_motion(outcome, name) or motions[name]).rate)
         for k, name in enumerate(outcome.assembly.model.motors)
     }
 

@@ -45,6 +45,12 @@ def test_fastest_rigid_arm_takes_its_limit(limit):
     assert np.abs(results["inverse/joints/shoulder/moment"]).max() <= limit * (1 + 1e-9)
 
 
+def test_the_fastest_motion_is_sought_with_given_numbers_of_modes():
+    scene = arm(BEAM | {"modes": "auto"}, {"duration": 0.5, "fastest": True}, {"moment_limit": 5.0})
+    with pytest.raises(InputError, match='found modes = "auto": solve once without fastest'):
+        ffrobot.solve(scene)
+
+
 def test_limits_of_the_path_hold_for_the_fastest_motion():
     """Motors that are strong enough leave the path as it is."""
     path = {"speed": 1.0, "acceleration": 5.0, "fastest": True}

@@ -24,12 +24,13 @@ MOST_TICKS = 6  # at the points themselves
 def draw_work_precision(rows: Rows, peer: Rows, title: str, folder: Path) -> list[Path]:
     """Run time against error, a figure for each kind of quantity and a curve for each integrator (and the peer)."""
     written: list[Path] = []
+    time, error = "least run time (s)", "error / peak"
     for kind in KINDS:
         key = f"error_{kind}"
         curves = {name: _points(rows, "integrator", name, TIME, key) for name in _names(rows, "integrator")}
         for gravity in _names(peer, "gravity"):
             curves[f"EXUDYN, {gravity} gravity"] = _points(peer, "gravity", gravity, "seconds", key)
-        written += _draw(curves, f"{title}: {kind}", "run time (s)", "error / peak", folder, f"work_precision_{kind}")
+        written += _draw(curves, f"{title}: {kind}", time, error, folder, f"work_precision_{kind}")
     return written
 
 
@@ -50,8 +51,8 @@ def draw_growth(rows: Rows, folder: Path) -> list[Path]:
     curves = {kind: _points(rows, "with", kind, "size", TIME) for kind in kinds}
     outputs = {"a run of 0.1 s": _points(rows, "with", "outputs", "size", TIME)}
     return [
-        *_draw(curves, "accelerations and multipliers", "modes, links", "time per evaluation (s)", folder, "growth"),
-        *_draw(outputs, "outputs of a run", "outputs", "run time (s)", folder, "growth_outputs"),
+        *_draw(curves, "accelerations and multipliers", "modes, links", "least time each (s)", folder, "growth"),
+        *_draw(outputs, "outputs of a run", "outputs", "least run time (s)", folder, "growth_outputs"),
     ]
 
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 
+import numpy as np
+
 from ..common.arrays import Array
 from ..common.errors import SolveError
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
@@ -22,6 +24,8 @@ TIGHTER, PATIENCE = 1e-2, 20
 # In this order, with their tolerance over that of the reference: the first that completes is the reference, the
 # difference of the second is its error.
 CANDIDATES = (("dop853", 1.0), ("radau", 10.0), ("dopri5", 10.0), ("dop853", 10.0))
+
+HOPELESS = 100.0  # times as long as the best at the same tolerance
 
 Row = dict[str, object]
 
@@ -112,11 +116,14 @@ def measure_points(
 ) -> list[Point]:
     """Every integrator at every tolerance, `repeat` times in turn, so that a busy machine harms all of them alike.
 
-    What does not complete is kept with its status and tried once.
+    What does not complete is kept with its status and tried once. An integrator that took a hundred times as long as
+    the best one before it is not asked for tighter tolerances.
     """
     points: list[Point] = []
     for integrator in integrators:
         for tolerance in tolerances:
+            if _is_hopeless(points, integrator, tolerance):
+                continue
             display.stage(f"{name}: {integrator} at {tolerance:.0e}")
             first = run(at(scene, name, integrator, tolerance), name, budget, display)
             points.append(
@@ -128,6 +135,20 @@ def measure_points(
                 display.stage(f"{name}: {point.integrator} at {point.tolerance:.0e}, repetition {repetition + 1}")
                 repeat_point(scene, name, point, budget, display)
     return points
+
+
+def _is_hopeless(points: Sequence[Point], integrator: str, tolerance: float) -> bool:
+    """Whether an integrator was that slow at this tolerance, or a looser one, against others at the same."""
+    own = [point for point in points if point.integrator == integrator and point.tolerance >= tolerance]
+    return any(
+        point.seconds[0]
+        > HOPELESS * min((other.seconds[0] for other in points if _rivals(other, point)), default=np.inf)
+        for point in own
+    )
+
+
+def _rivals(other: Point, point: Point) -> bool:
+    return other.integrator != point.integrator and other.tolerance == point.tolerance and other.first.completed
 
 
 def repeat_point(scene: Scene, name: str, point: Point, budget: float, display: Watcher) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from io import StringIO
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from ..fe_models.modal_body_file import read_modal_body
 from ..results.control import read_metrics
 from ..results.file import FORMAT as RESULTS_FORMAT
 from ..results.file import status_in_words
+from ..results.meanings import MODAL_BODY, RESULTS, Meaning, meaning
 from .control import LOOP_COLUMNS, loop_row
 
 
@@ -37,7 +38,11 @@ def describe(path: Path) -> str:
             reason = "a folder" if path.is_dir() else "no such file"
         raise InputError(f"{path}: expected a modal body file or a results file, found {reason}") from None
     if kind == MODAL_FORMAT:
-        return _modal_body(read_modal_body(path))
+        body = read_modal_body(path)
+        with open_checked(path) as file:
+            datasets = Table("dataset", "shape", "unit", "what")
+            _add_datasets(datasets, file, MODAL_BODY)
+        return _modal_body(body) + _rendered(datasets)
     raise InputError(f"{path}: expected a modal body file or a results file, found format {kind!r}")
 
 
@@ -99,7 +104,7 @@ def _results(file: h5py.File) -> str:
     for name, body in json.loads(file.attrs["modal_bodies"]).items():
         lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
     analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "wall (s)")
-    datasets = Table("dataset", "shape")
+    datasets = Table("dataset", "shape", "unit", "what")
     loops = Table(*LOOP_COLUMNS, box=None, padding=(0, 1, 0, 0))
     for name, group in file.items():
         time, attributes = group["time"], group.attrs
@@ -110,11 +115,20 @@ def _results(file: h5py.File) -> str:
         )  # fmt: skip
         if "control/commands" in group:
             loops.add_row(*loop_row(name, read_metrics(group["control"].attrs)))
-        group.visititems(
-            lambda _, item: datasets.add_row(item.name, str(item.shape)) if isinstance(item, h5py.Dataset) else None
-        )
+        _add_datasets(datasets, group, RESULTS)
     tables = [analyses, loops, datasets] if loops.row_count else [analyses, datasets]
     return "\n".join(lines) + "\n" + "".join(map(_rendered, tables))
+
+
+def _add_datasets(table: Table, group: h5py.Group, meanings: Mapping[str, Meaning]) -> None:
+    """A line for each dataset below a group: name, shape, unit, a few words."""
+
+    def add(name: str, item: h5py.Dataset | h5py.Group) -> None:
+        if isinstance(item, h5py.Dataset):
+            found = meaning(name, meanings) or Meaning("", "")
+            table.add_row(item.name, str(item.shape), found.unit, found.what)
+
+    group.visititems(add)
 
 
 def _rendered(table: Table) -> str:

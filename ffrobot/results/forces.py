@@ -7,8 +7,8 @@ import numpy as np
 
 from ..mbs.analysis.motors_only import InvertedPath, is_minimum_phase, path_error
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.quantities.joint_motion import joint_motions
-from ..mbs.quantities.observation import joint_forces, motor_angle, trajectory_force, trajectory_target
+from ..mbs.quantities.joint_motion import joint_motions, motor_motion
+from ..mbs.quantities.observation import joint_forces, trajectory_force, trajectory_target
 from ..mbs.scene.trajectories import Trajectory
 
 
@@ -36,9 +36,8 @@ def write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["moment"] = forces.motor
             if joint.given_gear_ratio is not None:
                 entry["motor_moment"] = forces.motor / joint.given_gear_ratio
-        angle = motor_angle(outcome, joint.name)
-        if angle is not None:
-            entry["motor_angle"] = angle
+        if (motor := motor_motion(outcome, joint.name)) is not None:
+            entry["motor_angle"], entry["motor_rate"] = motor.coordinate, motor.rate
         if (gear := outcome.gears.get(joint.name)) is not None:
             entry["gear_moment"] = gear.gear_moment
             entry.attrs["unresolved"] = gear.unresolved

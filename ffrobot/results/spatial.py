@@ -9,6 +9,7 @@ import numpy as np
 
 from ..common.checksum import sealed
 from ..common.files import write_atomically
+from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..run.spatial import SpatialResult, SpatialSolution
 from .spatial_actuation import write_actuation
 from .write import write_head
@@ -61,8 +62,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
 
 def _write_bodies(group: h5py.Group, result: SpatialResult) -> None:
     motion = result.motion
-    for node in motion.model.tree.nodes:
-        name = node.body.name
+    for name in (body.name for body in motion.model.scene.body):
+        node = motion.node(name)
         for key, values in vars(motion.body(name)).items():
             group[f"bodies/{name}/{key}"] = values
         if motion.motor_forces is not None:
@@ -86,3 +87,14 @@ def _write_joints(group: h5py.Group, result: SpatialResult) -> None:
         moment = None if motion.motor_forces is None else motion.motor_forces.moments.get(joint.name)
         if moment is not None:
             entry["moment"] = np.squeeze(moment, 1) if len(joint.units) == 1 else moment
+        _write_gear(entry, motion, joint.name)
+
+
+def _write_gear(entry: h5py.Group, motion: SpatialMotion, joint: str) -> None:
+    """What a gear that gives adds to a joint."""
+    angle = motion.motor_angle(joint)
+    if angle is not None:
+        entry["motor_angle"] = angle
+    if (gear := motion.gears.get(joint)) is not None:
+        entry["gear_moment"] = gear.gear_moment
+        entry.attrs["unresolved"] = gear.unresolved

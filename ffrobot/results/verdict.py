@@ -141,7 +141,8 @@ def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasi
     for label, (joint, coordinate) in coordinates.items():
         entry = group.get(f"joints/{joint}")
         if entry is not None and "moment" in entry and "rate" in entry:
-            moment, rate = (coordinate.of(entry[dataset][()]) for dataset in ("moment", "rate"))
+            rate_of = "motor_rate" if "motor_rate" in entry else "rate"
+            moment, rate = (coordinate.of(entry[dataset][()]) for dataset in ("moment", rate_of))
             found[label] = judge_motion(time, moment, rate, coordinate.limits)
     return found
 

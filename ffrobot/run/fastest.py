@@ -114,7 +114,10 @@ def _judging(scene: Scene) -> TimedAnalysis:
     if not limited and not any(layout.limit for layout in scene.pzt):
         raise InputError(f"{where}: expected limits of motors (moment_limit, speed_limit, …) or of patches, found none")
     if any(body.modes == "auto" for body in scene.body):
-        raise InputError(f'{where}: expected bodies with a number of modes, found modes = "auto"')
+        raise InputError(
+            f'{where}: expected bodies with a number of modes, found modes = "auto": solve once without fastest, whose'
+            " summary says how many are enough, and write these"
+        )
     return inverse[0]
 
 

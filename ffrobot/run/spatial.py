@@ -12,6 +12,7 @@ from pathlib import Path
 from ..actuation.patches.spatial_patches import LinkPatches
 from ..common.errors import of_file
 from ..fe_models.modal_body import ModalBody
+from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.spatial_kinds import IN_SPACE
 from ..mbs.analysis.spatial_run import SpatialContext, SpatialRun
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
@@ -57,7 +58,8 @@ class SpatialResult:
     def warnings(self) -> tuple[str, ...]:
         """Why results may be wrong, or not mean what they seem to, a text each."""
         missed = None if self.actuation is None else self.actuation.unsupplied
-        return self.run.warnings if missed is None else (*self.run.warnings, missed.in_words)
+        told = (*self.run.warnings, *unresolved_gears(self.motion.gears))
+        return told if missed is None else (*told, missed.in_words)
 
 
 @dataclass(frozen=True)

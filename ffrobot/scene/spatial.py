@@ -177,8 +177,6 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
         for key, problem in _not_available_of(analysis, scene):
             yield f'analysis "{analysis.name}": {key}: expected {problem}'
     for joint in scene.joint:
-        if getattr(joint, "stiffness", None) is not None:
-            yield f'{joint.label}: stiffness: expected none in space = "spatial", found it: not available there yet'
         if not joint.units and getattr(joint, "motor", False):
             yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
     for layout in scene.pzt:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -97,7 +98,9 @@ def add_transmission(outcome: Outcome) -> Outcome:
     for gear in gears:
         m = list(outcome.assembly.model.motors).index(gear.joint)
         gamma, alpha = _angles(outcome, gear)
-        motions[gear.joint] = _gear_motion(gear, outcome.time, outcome.tau[:, m], gamma, alpha)
+        tau, psi_ddot = outcome.tau[:, m], gear.ratio * gamma[:, 2] + alpha[:, 2]
+        spring = GearSpring(gear.stiffness, gear.damping, gear.inertia * gear.ratio**2)
+        motions[gear.joint] = gear_motion(spring, outcome.time, tau, gear.inertia * gear.ratio * psi_ddot, gamma)
     return replace(outcome, gears=motions)
 
 
@@ -113,21 +116,31 @@ def _angles(outcome: Outcome, gear: ElasticGear) -> tuple[Array, Array]:
     return read[:, :3], read[:, 3:] if len(rows) > 1 else np.zeros((len(read), 3))
 
 
-def _gear_motion(gear: ElasticGear, time: Array, tau: Array, gamma: Array, alpha: Array) -> GearMotion:
-    J, N = gear.inertia, gear.ratio
-    psi_ddot = N * gamma[:, 2] + alpha[:, 2]
-    transmitted = tau - J * N * psi_ddot
-    twist = _twist(gear, time, transmitted)
-    moment = tau + J * N**2 * twist[:, 2]
+class GearSpring(NamedTuple):
+    """k (N·m/rad), c (N·m·s/rad), and J N² (kg·m²) of the rotor in front of it."""
+
+    stiffness: float
+    damping: float
+    inertia: float
+
+
+def gear_motion(spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array) -> GearMotion:
+    """Of a gear whose motor supplies `tau` (T,) where it is rigid, `rotor` (T,) of which its rotor takes, J N ψ̈.
+
+    `gamma` (T, 3): the joint's coordinate, its rate and acceleration.
+    """
+    transmitted = tau - rotor
+    twist = _twist(spring, time, transmitted)
+    moment = tau + spring.inertia * twist[:, 2]
     unresolved, largest = 0.0, float(np.abs(moment).max())
     if len(time) > 2 * DEGREE + 1 and largest:
-        coarse = tau[::2] + J * N**2 * _twist(gear, time[::2], transmitted[::2])[:, 2]
+        coarse = tau[::2] + spring.inertia * _twist(spring, time[::2], transmitted[::2])[:, 2]
         unresolved = float(np.abs(coarse - moment[::2]).max()) / largest
     angle, rate, acceleration = (gamma + twist).T
     return GearMotion(transmitted, angle, rate, acceleration, moment, unresolved)
 
 
-def _twist(gear: ElasticGear, time: Array, moment: Array) -> Array:
+def _twist(gear: GearSpring, time: Array, moment: Array) -> Array:
     """δ, δ̇, δ̈ (T, 3) with k δ + c δ̇ = `moment` at all outputs, δ a quintic spline without knots next to the ends."""
     if len(time) <= DEGREE:
         return np.column_stack([moment / gear.stiffness, *np.zeros((2, len(time)))])

@@ -10,14 +10,19 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from .._core import TimeFunction
+from ..fields.waypoints import spline
+from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_drives import Drive, Drives, FrameDrive, PointDrive
+from ..model.spatial_gears import with_compliance_in_space
 from ..model.spatial_model import SpatialModel, modal_direction
 from ..model.spatial_motors import MotorForces
 from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_statics import initial_state
 from ..solve.state import State
+from .elastic_joints import DEGREE
 from .forward import Forward
 from .spatial_drive import spatial_drive
+from .spatial_gears import gears_of_motion
 from .spatial_replay import motor_forces_of, path_wrenches, replay_times, replayed
 from .spatial_run import SpatialContext, SpatialRun, without_paths
 
@@ -35,10 +40,12 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
     Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no equilibrium
     to start from.
     """
-    model, progress = without_paths(context.model), context.progress
+    model, progress = with_compliance_in_space(without_paths(context.model)), context.progress
     if analysis.actuation is None:
         return spatial_drive(model, analysis, initial_state(model), progress)
     source = context.runs[analysis.actuation]
+    if model.tree.gears:
+        return _behind_gears(source, model, analysis, context)
     by_paths = analysis.apply == "trajectory"
     applied = _paths(source, analysis) if by_paths else _actuators(context, source, analysis)
     start = State(source.q[0], source.v[0])
@@ -48,6 +55,53 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
         warnings = (f'the forces of "{analysis.actuation}" change too fast to be replayed: {off}',)
     times = replay_times(source, analysis)
     return spatial_drive(model, analysis, start, progress, drives=applied.drives, warnings=warnings, times=times)
+
+
+def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, context: SpatialContext) -> SpatialRun:
+    """Where gears of `model` give: moments at the outputs of `source` and splines between these, as in the plane."""
+    if analysis.apply != "joints":
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" beside joints with stiffness,'
+            f' found "{analysis.apply}"'
+        )
+    if model.scene.motors == "frame":
+        raise InputError(
+            f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven forward, found'
+            ' "frame"'
+        )
+    if source.model.tree.gears:
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": actuation: expected an inverse analysis beside joints'
+            f' with stiffness, found "{source.analysis.name}"'
+        )
+    state = Accelerated(source.model.tree, source.q, source.v, source.a, source.model.tree.frames(source.q))
+    moments = motor_forces_of(source).moments
+    gears = gears_of_motion(source.model, state, source.time, moments)
+    supplied = {**moments, **{joint: gear.moment[:, None] for joint, gear in gears.items()}}
+    most = _largest_moments(source.model, limits=analysis.limits)
+    wanted = np.hstack([supplied[joint] for joint in model.motors])
+    given = np.clip(wanted, -most, most)
+    sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
+    outputs = [gear.motor for gear in model.tree.gears]
+    known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
+    first = State(np.append(source.q[0], [0.0] * len(outputs)), np.append(source.v[0], [0.0] * len(outputs)))
+    for node, found in zip(outputs, known, strict=True):
+        first.q[node.q.start], first.v[node.v.start] = found.angle[0], found.rate[0]
+    along = [Drive(direction, size) for direction, size in zip(_directions(model), sizes, strict=True)]
+    times = replay_times(source, analysis)
+    return spatial_drive(model, analysis, first, context.progress, drives=Drives(tuple(along)), times=times)
+
+
+def _largest_moments(model: SpatialModel, *, limits: bool) -> Array:
+    """(motors,) N·m or N, infinite where limits do not count."""
+    joints = {joint.name: joint for joint in model.scene.joint}
+    most = np.array([of.moment for name in model.motors for of in joints[name].motor_limits])
+    return most if limits else np.full_like(most, np.inf)
+
+
+def _directions(model: SpatialModel) -> list[Array]:
+    """Along v (n_v,), of each motor."""
+    return [model.sign(joint) * np.eye(model.tree.n_v)[k] for joint, columns in model.motors.items() for k in columns]
 
 
 def _paths(source: SpatialRun, analysis: Forward) -> Applied:
@@ -74,9 +128,7 @@ def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -
     """Moments of all motors along their coordinates, and what voltages of patches do on modes."""
     model = source.model
     _check_motors(model, analysis)
-    joints = {joint.name: joint for joint in model.scene.joint}
-    most = np.array([limits.moment for name in model.motors for limits in joints[name].motor_limits])
-    most = most if analysis.limits else np.full_like(most, np.inf)
+    most = _largest_moments(model, limits=analysis.limits)
 
     def forces(run: SpatialRun) -> Array:
         found = motor_forces_of(run)

@@ -15,7 +15,7 @@ from ...common.arrays import Array
 from .spatial_accelerations import Accelerated, Acceleration
 from .spatial_body import SpatialBody
 from .spatial_model import SpatialModel
-from .spatial_transmission import resistance, rotor_forces
+from .spatial_transmission import gear_forces, resistance, rotor_forces
 from .spatial_tree import Motion, Node
 
 
@@ -64,6 +64,7 @@ def required_forces(model: SpatialModel, state: Accelerated, times: Array) -> Ar
     """M v̇ − Q (T, n_v) along v: what gravity, elasticity, friction and given loads leave for others to supply."""
     gravity = np.array(model.scene.gravity)
     found = resistance(model.tree, state.v) + rotor_forces(state) - given_forces(model, state.q, state.frames, times)
+    found -= gear_forces(model.tree, state.q, state.v)
     for node, frame, of_frame in zip(model.tree.nodes, state.frames, state.of_frames(), strict=True):
         needed = body_forces(node, state, of_frame, gravity)
         found += np.einsum("tij,ti->tj", frame.L[:, :3], needed.force)
@@ -85,7 +86,7 @@ def given_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], times:
             wrench = np.stack([values.get(name, none) for name in ("x", "y", "z", "mx", "my", "mz")], axis=1)
             found += np.einsum("tij,ti->tj", L, wrench)
         elif load.joint is not None:
-            found[:, tree.nodes[tree.carried[load.joint]].v] += model.sign(load.joint) * values["moment"][:, None]
+            found[:, model.driven(load.joint).v] += model.sign(load.joint) * values["moment"][:, None]
     return found
 
 

@@ -19,7 +19,7 @@ from ..scene.spatial.mechanism import SpatialMechanismScene
 from ..scene.spatial.trajectories import SpatialTrajectory
 from .spatial_body import SpatialBody
 from .spatial_drives import Drive
-from .spatial_tree import Motion, Section, SpatialTree
+from .spatial_tree import Motion, Node, Section, SpatialTree
 
 RowKind = Literal["point", "slide", "dot", "rotation", "coordinate"]
 
@@ -80,7 +80,7 @@ class SpatialModel:
                     f"{self.scene.path}: {joint.label}: motor: expected a joint of the tree, found the one at which the"
                     " loop is cut; list it before the others of its loop"
                 )
-            node = self.tree.nodes[self.tree.carried[joint.name]]
+            node = self.driven(joint.name)
             indices = np.arange(node.v.start, node.v.stop)
             ordered = joint.coordinates(indices)
             found[joint.name] = ordered[::-1] if node.backwards and joint.type == "universal" else ordered
@@ -88,7 +88,12 @@ class SpatialModel:
 
     def sign(self, joint: str) -> float:
         """−1 where the tree has a joint's coordinates the other way round."""
-        return -1.0 if self.tree.nodes[self.tree.carried[joint]].backwards else 1.0
+        return -1.0 if self.driven(joint).backwards else 1.0
+
+    def driven(self, joint: str) -> Node:
+        """What moments on a joint of the tree turn: the body that it carries, or its motor behind a gear that gives."""
+        behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
+        return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
 
 
 def modal_direction(model: SpatialModel, body: str, on_modes: Array) -> Array:

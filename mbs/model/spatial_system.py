@@ -48,6 +48,7 @@ class SpatialSystem:
         driven = {name for name in model.motors} | {load.joint for load in model.scene.load}
         driven |= {trajectory.joint for trajectory in model.scene.trajectory}
         driven |= {node.joint.name for node in tree.nodes if node.joint.frictions}
+        driven |= {gear.joint.joint.name for gear in tree.gears}
         self._wrenches: list[tuple[int, int]] = []
         loads = [PointDrive(load.point, load.components) for load in model.scene.load if load.point is not None]
         self._at_points = [self._point_drive(drive) for drive in (*loads, *drives.at_points)]
@@ -127,6 +128,9 @@ class SpatialSystem:
             for number, friction in enumerate(node.joint.frictions):  # the same along all of a joint's coordinates
                 at = node.q.start + number, node.v.start + number
                 scene.add_joint_force(*at, 0.0, 0.0, friction.viscous, friction.coulomb, friction.speed)
+        for gear in self.model.tree.gears:
+            motor, joint = ((node.q.start, node.v.start) for node in (gear.motor, gear.joint))
+            scene.add_gear(motor, joint, gear.sign, gear.stiffness, gear.damping)
         for number, law in self._turning:
             scene.turn_marker(number, _turning_law(law))
         return scene
@@ -145,7 +149,7 @@ class SpatialSystem:
         """Direction (n_v,) and size of the moment of a joint."""
         assert load.joint is not None
         direction = np.zeros(self.model.tree.n_v)
-        direction[self.model.tree.nodes[self.model.tree.carried[load.joint]].v] = self.model.sign(load.joint)
+        direction[self.model.driven(load.joint).v] = self.model.sign(load.joint)
         return Drive(direction, load.components["moment"])
 
     def _point_drive(self, drive: PointDrive) -> tuple[int, Mapping[str, TimeFunction]]:

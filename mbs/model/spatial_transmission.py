@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
+from ..joints.spatial.revolute import SpatialRevolute
 from .spatial_accelerations import Accelerated
 from .spatial_tree import Node, Section, SpatialTree
 
@@ -38,6 +39,12 @@ class RotorMotion(NamedTuple):
 def rotor(node: Node) -> tuple[float, float]:
     """Inertia J (kg·m²) of the rotor in the joint that carries a body, 0 without one, and its ratio N."""
     return float(getattr(node.joint, "rotor_inertia", 0.0)), float(getattr(node.joint, "gear_ratio", 1.0))
+
+
+def compliance(node: Node) -> tuple[float, float] | None:
+    """Stiffness (N·m/rad) and damping (N·m·s/rad) of the gear in the joint that carries a body; None of a firm one."""
+    joint = node.joint
+    return (joint.stiffness, joint.damping) if isinstance(joint, SpatialRevolute) and joint.stiffness else None
 
 
 def rotors(state: Accelerated) -> Iterator[RotorMotion]:
@@ -80,3 +87,24 @@ def resistance(tree: SpatialTree, v: Array) -> Array:
             rate = v[:, column]
             found[:, column] = friction.viscous * rate + friction.coulomb * np.tanh(rate / friction.speed)
     return found
+
+
+def gear_forces(tree: SpatialTree, q: Array, v: Array) -> Array:
+    """Of gears that give (T, n_v): k δ + c δ̇ on the second side of the joint, the opposite on the motor."""
+    found = np.zeros_like(v)
+    for gear in tree.gears:
+        way, rate = gear.twist(q, v)
+        moment = gear.stiffness * way + gear.damping * rate
+        found[:, gear.motor.v.start] -= moment
+        found[:, gear.joint.v.start] += gear.sign * moment
+    return found
+
+
+def gear_energy(tree: SpatialTree, q: Array, v: Array) -> tuple[Array, Array]:
+    """½ k δ² (T,) J of all gears that give, and c δ̇² (T,) W that they dissipate."""
+    strain, dissipated = np.zeros((2, len(q)))
+    for gear in tree.gears:
+        way, rate = gear.twist(q, v)
+        strain += 0.5 * gear.stiffness * way**2
+        dissipated += gear.damping * rate**2
+    return strain, dissipated

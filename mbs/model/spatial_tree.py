@@ -62,8 +62,32 @@ class Node:
     p_v: slice
 
 
+class ElasticGearInSpace(NamedTuple):
+    """A gear that gives: spring `stiffness` k (N·m/rad) and damper `damping` c (N·m·s/rad) behind a motor of the tree.
+
+    The twist δ is that of `motor`, whose coordinate is θ_m, against `joint`, whose coordinate is `sign` γ: δ = θ_m − γ.
+    """
+
+    motor: Node
+    joint: Node
+    sign: float
+    stiffness: float
+    damping: float
+
+    def twist(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """δ and δ̇ (…,) at q (…, n_q), v (…, n_v)."""
+        a, b = self.motor, self.joint
+        way, rate = q[..., a.q.start] - self.sign * q[..., b.q.start], v[..., a.v.start] - self.sign * v[..., b.v.start]
+        return way, rate
+
+
 class SpatialTree:
-    """Bodies on the joints of a spanning forest; `loops` are the joints beside it, in the scene's order."""
+    """Bodies on the joints of a spanning forest; `loops` are the joints beside it, in the scene's order.
+
+    `gears` are between its joints: none where they are taken for rigid (see `spatial_gears.with_compliance_in_space`).
+    """
+
+    gears: tuple[ElasticGearInSpace, ...] = ()
 
     def __init__(self, bodies: Sequence[SpatialBody], joints: Sequence[SpatialJoint], topology: Topology) -> None:
         by_name = {body.name: body for body in bodies}

@@ -1,4 +1,4 @@
-"""Coordinates of the joints over time."""
+"""Coordinates of the joints, and of motors behind gears that give, over time."""
 
 from __future__ import annotations
 
@@ -31,3 +31,16 @@ def joint_motions(outcome: Outcome) -> dict[str, JointMotion]:
     along = [(measure, order) for measure in assembly.motor_measures for order in (0, 1)]
     readings = _core.Sensing(assembly.system, along, []).read(outcome.q, outcome.v, outcome.a)
     return {name: JointMotion(*readings[:, 2 * k : 2 * k + 2].T.copy()) for k, name in enumerate(moving)}
+
+
+def motor_motion(outcome: Outcome, joint: str) -> JointMotion | None:
+    """θ_m of the motor of a joint whose gear gives, behind the gear; None of others, which move as their joint does."""
+    if joint in outcome.gears:
+        return JointMotion(outcome.gears[joint].angle, outcome.gears[joint].rate)
+    model = outcome.assembly.model
+    rows = [gear.motor for gear in model.gears if gear.joint == joint]
+    if not rows:
+        return None
+    assembly = MechanismSystem(model, model.joints, (), rows)
+    along = [(assembly.motor_measures[0], order) for order in (0, 1)]
+    return JointMotion(*_core.Sensing(assembly.system, along, []).read(outcome.q, outcome.v, outcome.a).T.copy())

@@ -8,12 +8,10 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.plane import rotated
-from .. import _core
 from ..analysis.outcome import Outcome
 from ..fields.field_types import split_point
 from ..model.geometric_stiffening import second_order_displacement
 from ..model.planar_body import PlanarBody
-from ..model.system import MechanismSystem
 
 
 @dataclass(frozen=True)
@@ -125,20 +123,6 @@ def joint_forces(outcome: Outcome, joint: str) -> JointForces:
     moments = outcome.motor_moments
     motor = moments[:, motors.index(joint)] if moments is not None and joint in motors else None
     return JointForces(reaction, moment, motor)
-
-
-def motor_angle(outcome: Outcome, joint: str) -> Array | None:
-    """θ_m (T,) of the motor of a joint whose gear gives, behind the gear; None of others."""
-    if joint in outcome.gears:
-        return outcome.gears[joint].angle
-    model = outcome.assembly.model
-    rows = [gear.motor for gear in model.gears if gear.joint == joint]
-    if not rows:
-        return None
-    assembly = MechanismSystem(model, model.joints, (), rows)
-    sensing = _core.Sensing(assembly.system, [(assembly.motor_measures[0], 0)], [])
-    angle: Array = sensing.read(outcome.q, outcome.v, outcome.a)[:, 0]
-    return angle
 
 
 def energies(outcome: Outcome) -> dict[str, Array]:

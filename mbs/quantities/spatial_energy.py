@@ -8,13 +8,13 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..model.spatial_inverse import bent_inertia
-from ..model.spatial_transmission import resistance, rotors
+from ..model.spatial_transmission import gear_energy, resistance, rotors
 from .spatial_motion import SpatialMotion
 
 
 @dataclass(frozen=True)
 class Energies:
-    """Kinetic, strain and gravitational energy (T,) J, and the power (T,) W that damping of modes and friction take."""
+    """Kinetic, strain and gravitational energy (T,) J, and the power (T,) W that modes, gears, friction dissipate."""
 
     kinetic: Array
     strain: Array
@@ -31,7 +31,10 @@ class Momentum:
 
 
 def energies(motion: SpatialMotion) -> Energies:
-    """Of all bodies: ½ (m Ṙ² + ωᵀJω + ṗᵀṗ) + Ṙ·(ω × s + S̄ṗ) + ω·hṗ, in axes of the body; ½ pᵀKp; −g·(mR + As)."""
+    """Of all bodies: ½ (m Ṙ² + ωᵀJω + ṗᵀṗ) + Ṙ·(ω × s + S̄ṗ) + ω·hṗ, in axes of the body; ½ pᵀKp; −g·(mR + As).
+
+    Gears that give store ½ k δ² beside.
+    """
     count, gravity = len(motion.time), np.array(motion.model.scene.gravity)
     kinetic, strain, gravitational, dissipated = np.zeros((4, count))
     for node, frame in zip(motion.model.tree.nodes, motion.frames, strict=True):
@@ -44,6 +47,8 @@ def energies(motion: SpatialMotion) -> Energies:
         strain += 0.5 * np.square(p) @ body.stiffness
         gravitational -= (body.mass * frame.r + np.einsum("tij,tj->ti", frame.F, s)) @ gravity
         dissipated += np.einsum("ti,ij,tj->t", p_dot, body.damping, p_dot)
+    of_gears = gear_energy(motion.model.tree, motion.q, motion.v)
+    strain, dissipated = strain + of_gears[0], dissipated + of_gears[1]
     dissipated += np.sum(motion.v * resistance(motion.model.tree, motion.v), axis=1)
     for rotor in rotors(motion.accelerated):
         kinetic += 0.5 * rotor.inertia * rotor.spin**2

@@ -5,13 +5,15 @@ All arrays are over the output times (T, …), SI units, global axes unless a na
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.rotations import quaternions
+from ..analysis.outcome import GearMotion
+from ..analysis.spatial_gears import gears_of_motion
 from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel, row_values, target_rates
@@ -143,12 +145,40 @@ class SpatialMotion:
         held = {row.owner for row in self.model.rows if row.is_trajectory}
         return [trajectory for trajectory in self.model.scene.trajectory if trajectory.name in held]
 
+    @property
+    def is_inverse(self) -> bool:
+        """Whether it is prescribed, so that forces are found for it."""
+        return bool(self.followed) or self.required is not None
+
     @cached_property
     def motor_forces(self) -> MotorForces | None:
-        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is followed or required."""
-        if not self.followed and self.required is None:
+        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is followed or required.
+
+        Moments behind gears that give are what motors must do there.
+        """
+        if not self.is_inverse:
             return None
+        rigid = self._with_rigid_gears
+        behind = {joint: gear.moment[:, None] for joint, gear in self.gears.items()}
+        return replace(rigid, moments={**rigid.moments, **behind})
+
+    @cached_property
+    def _with_rigid_gears(self) -> MotorForces:
         return motor_forces(self.model, self.q, self.frames, self.rows[1], self.supplied)
+
+    @cached_property
+    def gears(self) -> dict[str, GearMotion]:
+        """By joint, of inverse analyses and equilibria with gears that give."""
+        if not self.is_inverse:
+            return {}
+        return gears_of_motion(self.model, self.accelerated, self.time, self._with_rigid_gears.moments)
+
+    def motor_angle(self, joint: str) -> Array | None:
+        """(T,) rad of the motor behind a gear that gives, reduced to its joint; None without such a gear."""
+        if joint in self.gears:
+            return self.gears[joint].angle
+        behind = [gear.motor for gear in self.model.tree.gears if gear.joint.joint.name == joint]
+        return self.q[:, behind[0].q.start] if behind else None
 
 
 def continuous(e: Array) -> Array:

@@ -50,7 +50,17 @@ def undeformed_posture(model: SpatialModel) -> State:
             f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
             f" {owners} at t = 0, found none within {MOST_ITERATIONS} steps (out of reach, or on another branch?)"
         )
-    return with_rates(model, q, _guessed_rates(model))
+    return relaxed_gears(model, with_rates(model, q, _guessed_rates(model)))
+
+
+def relaxed_gears(model: SpatialModel, state: State) -> State:
+    """The state with motors where their gears are not strained."""
+    q, v = state.q.copy(), state.v.copy()
+    for gear in model.tree.gears:
+        way, rate = gear.twist(q, v)
+        q[gear.motor.q.start] -= way
+        v[gear.motor.v.start] -= rate
+    return State(q, v)
 
 
 def solve_posture(model: SpatialModel, t: float, q: Array) -> Array | None:
@@ -233,7 +243,8 @@ def _check_motors(model: SpatialModel, found: Mobility) -> Iterator[str]:
     if count < found.freedom and (named or model.scene.topology.is_open_chain):
         moving = [joint.name for joint in _movable(model) if joint.name not in motors and joint.type != "free"]
         if moving:
-            yield f"joints without motor: {', '.join(moving)}: motors alone cannot hold the path, their moments are none"
+            names = ", ".join(moving)
+            yield f"joints without motor: {names}: motors alone cannot hold the path, their moments are none"
 
 
 def _movable(model: SpatialModel) -> Iterator[SpatialJoint]:

@@ -8,6 +8,7 @@ from ...common.arrays import Array
 from ...common.errors import SolveError
 from ..model.spatial_inverse import given_forces
 from ..model.spatial_model import SpatialModel, row_values
+from ..model.spatial_transmission import gear_forces
 from .spatial_posture import robot_size, undeformed_posture, with_rates
 from .state import State
 
@@ -27,6 +28,7 @@ def forces_at_rest(model: SpatialModel, q: Array, t: float = 0.0) -> Array:
         found += frame.L[:, :3].transpose(0, 2, 1) @ (node.body.mass * gravity)
         found += np.einsum("tij,ti->tj", frame.L[:, 3:], np.cross(s, gravity))
         found[:, node.p_v] += np.einsum("tji,j->ti", frame.F, gravity) @ node.body.S_bar - node.body.stiffness * p
+    found += gear_forces(tree, q, np.zeros_like(found))
     return found + given_forces(model, q, frames, np.full(len(q), t))
 
 

@@ -73,7 +73,7 @@ S = "10*(t/0.4)**3 - 15*(t/0.4)**4 + 6*(t/0.4)**5"
 @pytest.mark.parametrize("motors", ["section", "frame"])
 def test_moments_carry_the_arm_along_its_path_and_to_rest(motors, tmp_path):
     """A link that bends in both planes, yaw and pitch: motors alone keep its tip on the path, and it rests after."""
-    modes = 'count = 1\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
+    modes = 'count = 2\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
     (tmp_path / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012))
     (tmp_path / "scene.toml").write_text(ARM.format(motors=motors) + PATH.format(s=S))
     with ffrobot.solve(tmp_path / "scene.toml") as results:
@@ -84,7 +84,7 @@ def test_moments_carry_the_arm_along_its_path_and_to_rest(motors, tmp_path):
         s = 10 * u**3 - 15 * u**4 + 6 * u**5
         expected = np.column_stack([0.1 * s, 0.25 - 0.15 * s])
         np.testing.assert_allclose(tip[:, 1:], expected, atol=2e-6)
-        assert np.abs(results["exact/points/link.tip/deflection"]).max() > 1e-3
+        assert np.abs(results["exact/points/link.tip/deflection"]).max(axis=0)[1:].min() > 1e-4
         swing = np.abs(results["again/bodies/link/modal_velocity"])
         assert swing[-1].max() < 1e-4 * swing.max()
 
@@ -97,7 +97,7 @@ def test_moments_carry_the_arm_along_its_path_and_to_rest(motors, tmp_path):
     ],
 )
 def test_mistakes(old, new, message, tmp_path):
-    modes = 'count = 1\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
+    modes = 'count = 2\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
     (tmp_path / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012))
     text = ARM.format(motors="section") + PATH.format(s=S)
     assert old in text

@@ -7,6 +7,10 @@ import re
 import pytest
 
 from ffrobot import InputError
+from ffrobot.bench.figures import TIME
+from ffrobot.bench.measuring import Run
+from ffrobot.bench.precision import Point, _is_hopeless
+from ffrobot.bench.record import as_text
 from ffrobot.cli import cli
 
 LINK = """
@@ -116,6 +120,28 @@ def test_runs_over_budget_stay_in_the_table(ffrobot, folder):
     explicit, implicit = read(folder / "short" / "work_precision.csv")
     assert (explicit["status"], explicit["repetitions"]) == ("completed", "5")
     assert (implicit["status"], implicit["repetitions"], implicit["error_force"]) == ("over budget", "1", "")
+
+
+def test_an_integrator_a_hundred_times_slower_is_asked_no_further():
+    """At 1e-4 it is measured, as at that tolerance nothing was known of it; at 1e-5 not, whatever others take there."""
+
+    def point(integrator, tolerance, seconds, status="completed"):
+        return Point(integrator, tolerance, Run(integrator, status, seconds, 1, 0, 1, {}, {}), {}, [seconds])
+
+    known = [point("dop853", 1e-3, 0.01), point("dop853", 1e-4, 0.02), point("dop853", 1e-5, 0.04)]
+    slow = [point("generalized-alpha", 1e-3, 0.5), point("generalized-alpha", 1e-4, 2.1)]
+    assert not _is_hopeless([*known, slow[0]], "generalized-alpha", 1e-4)
+    assert _is_hopeless([*known, *slow], "generalized-alpha", 1e-5)
+    assert not _is_hopeless([*known, *slow], "radau", 1e-5)
+    assert not _is_hopeless(slow, "generalized-alpha", 1e-5)  # with nothing to compare with
+
+
+def test_table_and_figure_show_the_same_named_time(done):
+    (row, *_) = read(done / "work_precision.csv")
+    headings, cells = as_text([row | {"seconds_min": 0.25, "seconds": 0.5}], "work-precision")
+    assert cells[0][headings.index("least seconds")] == "0.25"
+    assert "seconds" not in headings
+    assert TIME == "seconds_min"
 
 
 MISTAKES = {

@@ -11,6 +11,7 @@ from scipy.integrate import simpson
 from ffrobot.actuation.control.linear import Linear
 from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import robot_modes
+from ffrobot.actuation.motors import judge_motors
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.elastic_joints import add_transmission, unresolved_gears, with_compliance
 from ffrobot.mbs.analysis.forward import run_forward
@@ -19,7 +20,8 @@ from ffrobot.mbs.analysis.operating_points import operating_points
 from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.analysis.static import Static, run_static
-from ffrobot.mbs.quantities.observation import joint_forces, motor_angle, point_motion
+from ffrobot.mbs.quantities.joint_motion import motor_motion
+from ffrobot.mbs.quantities.observation import joint_forces, point_motion
 from ffrobot.mbs.solve.linearisation import linearise
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
@@ -29,11 +31,11 @@ GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping"
 RIGID = {key: GEARED[key] for key in ("gear_ratio", "rotor_inertia")}
 
 
-def pendulum(load="0", **keys):
+def pendulum(load="0", trajectory=(), **keys):
     """A rod in no field of gravity, turned by a motor behind a gear that gives."""
     return make_model(
         [rod("a", L, M)], joint=[revolute("O", "ground", "a.root", **(GIVES | keys))],
-        load=[{"joint": "O", "moment": load}], gravity=(0.0, 0.0),
+        load=[] if trajectory else [{"joint": "O", "moment": load}], trajectory=trajectory, gravity=(0.0, 0.0),
     )  # fmt: skip
 
 
@@ -55,7 +57,7 @@ def test_two_masses_turn_and_swing():
     omega, total = np.sqrt(K * (1 / MOTOR + 1 / LINK)), MOTOR + LINK
     twist = tau * LINK / total / K * (1 - np.cos(omega * t))
     turned = tau * t**2 / 2 / total
-    link, motor = outcome.q[:, 2], motor_angle(outcome, "O")
+    link, motor = outcome.q[:, 2], motor_motion(outcome, "O").coordinate
     assert relative(link, turned - MOTOR / total * twist) < 1e-7
     assert relative(motor - link, twist) < 1e-6
 
@@ -93,7 +95,7 @@ def test_dampers_take_the_energy_that_is_missing():
         geared_arm(soft, load=load, **keys), forward(output_step=OUTPUT_STEP, tolerance=1e-9), None, {}, always
     )
     total, losses = energy_and_losses(outcome)
-    motor_rate = np.gradient(motor_angle(outcome, "O"), OUTPUT_STEP, edge_order=2)
+    motor_rate = np.gradient(motor_motion(outcome, "O").coordinate, OUTPUT_STEP, edge_order=2)
     work = simpson(20 * np.sin(10 * outcome.time) * motor_rate, x=outcome.time)
     assert losses > 0.3
     assert abs(work - losses - (total[-1] - total[0])) < 1e-5 * losses
@@ -112,6 +114,18 @@ def test_stiff_gears_approach_rigid_ones_as_one_over_their_stiffness():
     order = -np.diff(np.log(errors)) / np.log(2)
     assert errors[-1] < 1e-3
     np.testing.assert_allclose(order, 1.0, atol=0.1)
+
+
+def test_motors_behind_soft_gears_are_judged_by_their_own_speed():
+    """θ_m = γ + I γ̈/k: under γ = (1 − cos πt)/2 the rate is that of the joint times 1 − I π²/k, the power likewise."""
+    path = {"name": "swing", "joint": "O", "value": "0.5*(1 - cos(pi*t))"}
+    model = pendulum(stiffness=10.0, trajectory=[path])
+    outcome = add_transmission(run_pcid(model, pcid(tolerance=1e-9, output_step=0.005), True, always))
+    judged = judge_motors(outcome, {joint.name: joint for joint in model.scene.joint})["O"]
+    slower = 1 - LINK * np.pi**2 / 10.0
+    np.testing.assert_allclose(judged.speed, 0.5 * np.pi * slower, rtol=1e-5)
+    moment = 0.5 * np.pi**2 * (LINK + MOTOR * slower)
+    np.testing.assert_allclose(judged.power, 0.5 * moment * judged.speed, rtol=1e-4)
 
 
 @pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
@@ -138,7 +152,7 @@ def test_motor_moments_carry_out_the_path():
     """Of one gear that gives at the ground: nothing is left out but the spline between outputs."""
     error, source, outcome = carried_out(rigid_arm(GEARED, RIGID))
     assert error.max() < 1e-9  # of a path of 1.4 m; measured 7e-12, and 5e-3 with rigid moments
-    assert relative(motor_angle(outcome, "O"), source.gears["O"].angle) < 1e-9
+    assert relative(motor_motion(outcome, "O").coordinate, source.gears["O"].angle) < 1e-9
     twist = source.gears["O"].angle - source.q[:, 2]
     assert twist.max() > 2e-3
     assert not list(unresolved_gears(source.gears))

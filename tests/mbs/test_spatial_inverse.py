@@ -5,16 +5,21 @@ import pytest
 from spatial_scenes import as_scene, coordinates, tree_model
 from spatial_trees import TYPES, random_tree
 
+from ffrobot.mbs import _core
 from ffrobot.mbs.model.spatial_accelerations import Accelerated, row_accelerations
+from ffrobot.mbs.model.spatial_gears import with_compliance_in_space
 from ffrobot.mbs.model.spatial_inverse import required_forces
 from ffrobot.mbs.model.spatial_model import row_values
 from ffrobot.mbs.model.spatial_motors import path_forces
-from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.model.spatial_system import Drive, SpatialSystem
+from ffrobot.mbs.model.spatial_transmission import gear_forces
 from ffrobot.mbs.quantities.spatial_energy import energies, momentum
 from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
+from ffrobot.mbs.solve.integrators import METHODS
 
 SMALL = 0.01  # modal coordinates: sections turn by about 0.1 rad
 NOW = np.zeros(1)
+ONE = _core.TimeFunction.constant(1.0)
 
 
 def moving(rng, types, kinds, loops=0):
@@ -49,6 +54,31 @@ def test_accelerations_take_no_force(joint):
         np.testing.assert_allclose(left, 0, atol=1e-10 * np.abs(motion.a).max())
         if np.abs(motion.v).max() > 0.1 and left.size > 3:
             assert np.abs(still).max() > 1e-3  # velocities matter here
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_gears_that_give_take_no_force(turned):
+    """Outputs of gears hang on sections that modes move and turn, and carry the spin of their rotors alone."""
+    rng, keys = np.random.default_rng(5), {"rotor_inertia": 0.02, "gear_ratio": 7.0, "stiffness": 9.0, "damping": 0.6}
+    for kinds in (("rigid",), ("beam",), ("solid",), ("supported beam",)):
+        plain, tables = as_scene(random_tree(rng, ["revolute"] * 3, kinds, chain=True, size=SMALL), turned)
+        model = with_compliance_in_space(tree_model(plain, [table | keys for table in tables]))
+        tree = model.tree
+        q, v = SMALL * rng.standard_normal(tree.n_q), rng.standard_normal(tree.n_v)
+        system, load = SpatialSystem(model), rng.standard_normal(tree.n_v)
+        of_gears = gear_forces(tree, q[None], v[None])[0]
+        a, _ = system.core.evaluate(q, v, np.zeros(0), load + of_gears, None)
+        state = Accelerated(tree, q[None], v[None], a[None], tree.frames(q[None]))
+        left = required_forces(model, state, NOW)[0] - load
+        np.testing.assert_allclose(left, 0, atol=1e-10 * np.abs(a).max())
+        assert len(tree.gears) == 3
+        assert np.abs(of_gears).max() > 0.1
+        controls = _core.IntegrationControls(
+            tolerance=1e-6, max_steps=1, methods=[(METHODS["dop853"], 1.0, 0.0)], spectral_radius=0.8
+        )
+        scene = SpatialSystem(model, [Drive(load, ONE)]).scene
+        run = _core.tree_motion(system.core, scene, [0.0], q, v, controls, lambda t: True)
+        np.testing.assert_allclose(run.accelerations[0], a, atol=1e-12 * np.abs(a).max())
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -58,7 +58,8 @@ def _coordinate_figures(results: Results, joint: str, coordinate: Coordinate) ->
 def _torque_speed(results: Results, joint: str, coordinate: Coordinate, y_label: str) -> Iterator[FigureRecord]:
     curves, label = [], joint + coordinate.label
     for analysis in results.analyses:
-        moment, rate = (f"{analysis}/joints/{joint}/{dataset}" for dataset in ("moment", "rate"))
+        moment, rate, of_motor = (f"{analysis}/joints/{joint}/{key}" for key in ("moment", "rate", "motor_rate"))
+        rate = of_motor if results.has(of_motor) else rate  # behind a gear that gives
         if results.has(moment) and results.has(rate) and len(results.time(analysis)) > 1:
             curves.append(Curve(data=moment + coordinate.column, x=rate + coordinate.column, label=analysis))
     if curves:

@@ -4,6 +4,7 @@
 #include "core/recursion/observe.h"
 
 #include <nanobind/stl/function.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
@@ -44,6 +45,9 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
     check_index("q of a motor on frames", motor.q + last, n_q);
     check_index("v of a motor on frames", motor.v + last, n_v);
   }
+  for (const GearSpring &gear : scene.gears)
+    for (const GearSpring::Side &side : {gear.a, gear.b})
+      check_index("q of a gear", side.q, n_q), check_index("v of a gear", side.v, n_v);
   if (scene.watch)
     check_size("is_path", static_cast<Index>(scene.watch->is_path.size()), model.rows());
   for (const DrivenMarker &driven : scene.driven)
@@ -230,6 +234,13 @@ void bind_tree_motion(nb::module_ &m) {
           },
           "q"_a, "v"_a, "rotation"_a, "axis"_a, "magnitude"_a,
           "What a motor that turns the frame of a body takes back on its modes: see core/recursion/frame_motor.h.")
+      .def(
+          "add_gear",
+          [](Scene &s, std::pair<int, int> a, std::pair<int, int> b, double ratio, double stiffness, double damping) {
+            s.gears.push_back({{a.first, a.second}, {b.first, b.second}, ratio, stiffness, damping});
+          },
+          "a"_a, "b"_a, "ratio"_a, "stiffness"_a, "damping"_a,
+          "Spring and damper between two coordinates, indices in q and v each: of the twist a - ratio b.")
       .def(
           "watch_posture",
           [](Scene &s, const std::vector<bool> &is_path, double length) {

@@ -35,6 +35,8 @@ template <class Cols, int W> FFROBOT_INLINE void lose(Cols (&S)[W], const Cols &
 template <class Space, class T>
 FFROBOT_APART int factors(const Node<Space> &child, const Hinge<Space, T> &hinge, Pack<T, Space::dim> *C, T *D) {
   constexpr int d = Space::dim;
+  if (child.is_weightless) // a joint takes the one inertia that there is
+    return 0;
   int kept[d], rank = 0;
   const bool full = child.rotor_inertia > 0;
   for (int i = 0, k = 0; i < d; ++i)

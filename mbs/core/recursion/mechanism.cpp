@@ -84,6 +84,11 @@ void check(const BodyModel<Data> &body, std::size_t index, std::size_t ground_ma
     refuse(name + ": rotor_inertia: expected a revolute joint under a rotor");
 }
 
+bool is_weightless(const PlanarData &data) { return data.mass == 0 && data.inertia == 0 && data.modes() == 0; }
+bool is_weightless(const SpatialData &data) {
+  return data.mass == 0 && data.J2.isZero(0) && data.J_spin == 0 && data.modes() == 0;
+}
+
 bool turns(const PlanarMarker &) { return false; }
 bool turns(const SpatialMarker &marker) { return marker.turns; }
 
@@ -167,6 +172,9 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
       model.data = at_marker(model.data, inboard), node.origin = origin_from(inboard);
     else
       node.inboard = node.outboard, used[i].push_back(model.inboard_marker);
+    node.is_weightless = is_weightless(model.data) && node.outboard == 0;
+    if (is_weightless(model.data) && (node.rotor_inertia <= 0 || node.outboard > 0))
+      refuse("body " + model.name + ": mass: expected one above 0 of a body that is more than the output of a rotor");
     node.body = typename Space::Body(model.data, used[i]);
     node.first_port = ports, ports += node.ports();
     const int n_ports = node.ports();

@@ -50,12 +50,22 @@ struct JointForce {
   Friction friction;
 };
 
+// Between two joint coordinates, as a gear that gives: moments (N m) of the twist a - ratio b on both.
+struct GearSpring {
+  struct Side {
+    int q = 0, v = 0;
+  } a, b;
+  double ratio = 1;
+  double stiffness = 0, damping = 0; // N m/rad, N m s/rad
+};
+
 struct Scene {
   std::vector<TimeFunction> targets; // of rows: value, rate and acceleration
   std::vector<Load> loads;
   std::vector<PointLoad> point_loads;
   std::vector<JointForce> joint_forces;
   std::vector<FrameMotor> frame_motors;
+  std::vector<GearSpring> gears;
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;
 };

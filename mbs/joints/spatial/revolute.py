@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+from pydantic import model_validator
 
 from ....common.arrays import Array
 from ....common.rotations import about
@@ -17,7 +18,8 @@ class SpatialRevolute(AxialJoint):
     """Two points coincide, the second side turns about `axis` by its coordinate, rad.
 
     As it is built: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body, its axis that of the joint, and
-    turns `gear_ratio` times as fast as the second side does on the first.
+    turns `gear_ratio` times as fast as the second side does on the first. Between the gear of a motor and the second
+    body a spring `stiffness` (N·m/rad; rigid where it is not given) and a damper `damping` (N·m·s/rad).
     """
 
     type: Literal["revolute"]
@@ -29,6 +31,14 @@ class SpatialRevolute(AxialJoint):
     """Of a gear that gives, N·m/rad; rigid where it is left out."""
     damping: NotNegative = 0.0
     """Of that gear, N·m·s/rad."""
+
+    @model_validator(mode="after")
+    def _has_rotor_behind_spring(self) -> SpatialRevolute:
+        if self.stiffness is None and self.damping:
+            raise ValueError('expected the key "damping" only beside stiffness, found it alone')
+        if self.stiffness is not None and not self.rotor_inertia:
+            raise ValueError("expected a rotor_inertia above 0 beside stiffness, found none: the rotor turns by itself")
+        return self
 
     units = ("rad",)
     q_count = 1

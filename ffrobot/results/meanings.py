@@ -1,0 +1,169 @@
+"""Unit and meaning of every dataset of results and modal body files: for `ffrobot info`.
+
+docs/reference/files.md says more of them; a test compares both with files as they are written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from types import MappingProxyType
+from typing import NamedTuple
+
+
+class Meaning(NamedTuple):
+    """`unit` (empty: none) and a few words."""
+
+    unit: str
+    what: str
+
+
+def _table(text: str) -> Mapping[str, Meaning]:
+    """Lines "PATTERN | unit | what"; * stands for a name, ** at the end for all below."""
+    rows = (tuple(part.strip() for part in line.split("|")) for line in text.strip().splitlines())
+    return MappingProxyType({pattern: Meaning(unit, what) for pattern, unit, what in rows})
+
+
+RESULTS = _table("""
+time | s | of outputs
+bodies/*/position | m | of the body's frame
+bodies/*/angle | rad | of the body's frame
+bodies/*/quaternion | | of the body's frame, w first
+bodies/*/velocity | m/s | of the body's frame
+bodies/*/angular_velocity | rad/s | of the body's frame
+bodies/*/modal | m √kg | modal coordinates
+bodies/*/modal_velocity | m √kg/s | their rates
+bodies/*/modal_transform | | from fewer modes to those of the file
+bodies/*/modal_force | N/√kg | what patches would have to supply
+points/*/position | m | of the point
+points/*/deflection | m | in the body's frame
+points/*/quaternion | | of the section, w first
+points/*/predicted_shift | m | by unmet modal forces
+trajectories/*/force | N, N m | on the point, or on the joint
+trajectories/*/target | m, rad | the path
+trajectories/*/error | m, rad | how far the point is off the path
+joints/*/coordinate | rad, m | of the second body on the first
+joints/*/rate | rad/s, m/s | of the coordinate
+joints/*/moment | N m, N | of the motor, at the joint
+joints/*/motor_moment | N m, N | of the motor, before its gear
+joints/*/motor_angle | rad | of the motor, behind its gear that gives
+joints/*/motor_rate | rad/s | likewise
+joints/*/gear_moment | N m | that the gear transmits
+joints/*/reaction | N | on the second body
+joints/*/reaction_moment | N m | on the second body
+pzt/*/voltage | V | within the limit
+pzt/*/required_voltage | V | without the limit
+pzt/*/residual | N/√kg | modal force left unmet, its size
+pzt/*/residual_force | N/√kg | modal force left unmet, by mode
+pzt/*/edges | m | begin and end of each patch
+pzt/*/moment_per_volt | N m/V | of each patch
+pzt/*/stiffness_ratio | | of link to patch
+pzt/*/authority | | part of the curvature that is left
+actuation_points/*/force | N | of each component
+actuation_points/*/residual | N/√kg | modal force left unmet, its size
+actuation_points/*/residual_force | N/√kg | modal force left unmet, by mode
+actuation_points/*/position | m | where a component acts
+actuation_points/*/direction | | of a component
+patch_structure/** | | without and with the patches' mass and stiffness
+feasibility/** | | required against available
+stress/*/points/*/stress | Pa | xx, yy, zz, yz, xz, xy
+stress/*/points/*/von_mises | Pa | von Mises
+stress/*/surface/von_mises_max | Pa | largest on the surface
+stress/*/surface/position_of_max | m | where, in the undeformed link
+stress/*/layers/** | SI | below patches that stiffen the link
+stress/*/modal | m √kg | vibrations beside static deflection
+stress/*/loads | N, N m, m/s², 1/s² | sizes of the unit loads
+energy/kinetic | J | of all bodies
+energy/strain | J | of all links
+energy/gravitational | J | of all bodies
+energy/dissipated_power | W | by damping and friction
+momentum/linear | kg m/s | of all bodies
+momentum/angular | kg m²/s | of all bodies, about the origin
+constraint_violation | | of position, velocity, acceleration; relative
+resume/** | | what --resume needs
+zero_dynamics/time | s | of the zeros
+zero_dynamics/zeros | 1/s | along the path, real and imaginary part
+linear/A | | of x' = A x + B u
+linear/B | | of x' = A x + B u
+linear/C | | of y = C x + D u
+linear/D | | of y = C x + D u
+linear/mass | | of the coordinates, δsᵀ M δs
+linear/transformation | | ∂q/∂s
+linear/frequency | Hz | of the robot, undamped
+linear/damping_ratio | | of the robot
+linear/pole | 1/s | real and imaginary part
+linear/modes/** | | mode shapes of the robot
+linear/controllability | | of each mode, 0 to 1
+linear/observability | | of each mode, 0 to 1
+linear/zeros/* | rad/s | real and imaginary part
+placement/** | | patches that were found
+tip_error | m | distance from the reference
+control/time | s | of samples
+control/readings | | of sensors, in their units
+control/reference | | what they would read on the reference
+control/commands | N m, V | within limits
+control/wanted | N m, V | before limits
+""")
+
+MODAL_BODY = _table("""
+length | m | from root to tip
+mass | kg | of the link
+first_moment | kg m | ∫ρx dV
+second_moment | kg m² | ∫ρxxᵀ dV
+modes/frequency | Hz | under the reference condition
+modes/stiffness | 1/s² | diag(ω²)
+modes/mass | | the identity
+modes/damping_ratio | | of each mode
+modes/family | | of each mode
+modes/residual | | 1 of attachment modes
+modes/measured/frequency | | 1 where measured
+modes/measured/damping_ratio | | 1 where measured
+modes/measured/computed_frequency | Hz | of the finite element model
+invariants/S_bar | √kg | ∫ρΦ dV
+invariants/I_bar | m √kg | ∫ρ x_k Φ_l dV
+invariants/S_bar_kl | | ∫ρ Φ_kᵀ Φ_l dV
+invariants/J_spin | kg m² | ∫ρI_p dx
+invariants/h_spin | m √kg | ∫ρI_p φ dx
+invariants/S_spin | | ∫ρI_p φᵀφ dx
+geometric_stiffness/** | | of a unit load
+interfaces/*/position | m | undeformed
+interfaces/*/translation | 1/√kg | per unit of each mode
+interfaces/*/rotation | rad/(m √kg) | per unit of each mode
+stations/position | m | along the axis
+stations/translation | 1/√kg | per unit of each mode
+stations/rotation | rad/(m √kg) | per unit of each mode
+stations/height | m | of the section, along y
+stations/element | | stations of each element
+stations/outline | m | corners of the section
+stations/rigidity | N, N m² | EA and EI of in-plane bending
+stations/width | m | of the section, along z
+stations/out_of_plane_rigidity | N m² | EI of bending along z
+stations/torsional_rigidity | N m² | GJ
+mesh/points | m | for pictures
+mesh/cells | | points of each cell
+mesh/edges | | points of edges
+mesh/mode_shapes | 1/√kg | per unit of each mode
+stress/points/*/position | m | undeformed
+stress/points/*/stress | Pa/(m √kg) | per unit of each mode
+stress/points/*/strain | 1/(m √kg) | per unit of each mode
+stress/points/*/static | Pa per unit | of unit loads
+stress/surface | Pa/(m √kg) | per unit of each mode
+stress/surface_static | Pa per unit | of unit loads
+stress/loads | | names of the unit loads
+craig_bampton/** | | matrices for other programs
+surface_patches/** | | outlines and modal forces of patches
+""")
+
+
+def meaning(name: str, table: Mapping[str, Meaning]) -> Meaning | None:
+    """Of a dataset by its name below its analysis, or in its file; None of one that is not known."""
+    if name in table:
+        return table[name]
+    parts = name.split("/")
+    return next((found for pattern, found in table.items() if _matches(parts, pattern.split("/"))), None)
+
+
+def _matches(parts: list[str], pattern: list[str]) -> bool:
+    if pattern[-1] == "**":
+        pattern, parts = pattern[:-1], parts[: len(pattern) - 1]
+    return len(parts) == len(pattern) and all(map(fnmatchcase, parts, pattern))

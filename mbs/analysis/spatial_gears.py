@@ -1,0 +1,49 @@
+"""Gears that give in space: what motors must do behind them for a motion found with rigid ones.
+
+The equations are those of the plane (`elastic_joints`), with the rotor's acceleration about its axis in space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_gears import elastic_joints
+from ..model.spatial_model import SpatialModel
+from ..model.spatial_transmission import compliance, rotor, rotors
+from .elastic_joints import GearSpring, gear_motion
+from .outcome import GearMotion
+
+
+def gears_of_motion(
+    model: SpatialModel, state: Accelerated, time: Array, moments: Mapping[str, Array]
+) -> dict[str, GearMotion]:
+    """By joint with a gear that gives, where `model` takes it for rigid: see `elastic_joints.add_transmission`.
+
+    `moments` (T, 1) by joint are what motors supply in the motion `state` at `time` (T,).
+    Raises `InputError` for such a joint without a motor, or with a load.
+    """
+    if model.tree.gears:
+        return {}
+    elastic = elastic_joints(model)
+    for load in model.scene.load:
+        if any(load.joint == node.joint.name for node in elastic):
+            raise InputError(
+                f"{model.scene.path}: expected no [[load]] on joints with stiffness in inverse analyses and"
+                f' equilibria, found one on "{load.joint}"'
+            )
+    geared = [node for node in model.tree.nodes if rotor(node)[0]] if elastic else []
+    found = {}
+    for node, turning in zip(geared, rotors(state) if elastic else (), strict=True):
+        if (of_gear := compliance(node)) is None:
+            continue
+        sign, N = -1.0 if node.backwards else 1.0, turning.ratio
+        of_joint = ((state.q, node.q), (state.v, node.v), (state.a, node.v))
+        gamma = sign * np.column_stack([values[:, part.start] for values, part in of_joint])
+        spring = GearSpring(*of_gear, turning.inertia * N**2)
+        found[node.joint.name] = gear_motion(spring, time, moments[node.joint.name][:, 0], N * turning.torque, gamma)
+    return found

@@ -1,0 +1,75 @@
+"""Robots in space with gears that give: motors as coordinates of their own, with springs to those of the joints."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.errors import InputError
+from .spatial_body import rigid_body
+from .spatial_drives import Drive
+from .spatial_model import SpatialModel
+from .spatial_transmission import compliance
+from .spatial_tree import ElasticGearInSpace, Node, Section, SpatialTree
+
+
+def elastic_joints(model: SpatialModel) -> list[Node]:
+    """The nodes whose joints have gears that give, in the order of the tree.
+
+    Raises `InputError` for such a gear in a joint without a motor of the tree.
+    """
+    for joint in model.scene.joint:
+        if getattr(joint, "stiffness", None) is not None and joint.name not in model.motors:
+            raise InputError(
+                f"{model.scene.path}: {joint.label}: stiffness: expected a joint with a motor, found one without"
+            )
+    return [node for node in model.tree.nodes if compliance(node) is not None]
+
+
+def with_compliance_in_space(model: SpatialModel) -> SpatialModel:
+    """The robot with gears that give where the scene says so; motors and moments on joints act before these gears.
+
+    The output of such a gear is a body of the tree without inertia. It turns on the first side of the joint by θ_m, the
+    rotor N times as fast (J. Spong, J. Dyn. Syst. Meas. Control 109, 1987, with the rotor's whole angular velocity).
+    Coordinates of the outputs stand after all others.
+    """
+    elastic = elastic_joints(model)
+    if not elastic or model.tree.gears:
+        return model
+    tree = copy.copy(model.tree)
+    outputs = [_output(tree, node, number) for number, node in enumerate(elastic)]
+    firm = {node.body.name: _without_rotor(node) for node in elastic}
+    tree.nodes = (*(firm.get(node.body.name, node) for node in tree.nodes), *outputs)
+    tree.n_q, tree.n_v = tree.n_q + len(outputs), tree.n_v + len(outputs)
+    tree.index = {node.body.name: number for number, node in enumerate(tree.nodes)}
+    tree.carried = {node.joint.name: number for number, node in enumerate(tree.nodes)}
+    tree.gears = tuple(
+        ElasticGearInSpace(output, firm[node.body.name], -1.0 if node.backwards else 1.0, *(compliance(node) or (0, 0)))
+        for output, node in zip(outputs, elastic, strict=True)
+    )
+    more = np.zeros(len(outputs))
+    return replace(
+        model, tree=tree, modal_loads=tuple(Drive(np.append(at, more), size) for at, size in model.modal_loads)
+    )
+
+
+def _output(tree: SpatialTree, node: Node, number: int) -> Node:
+    """The output of the gear in the joint of `node`, the tree's last body but for the `number` before it."""
+    label = f"{node.joint.name}/rotor"
+    joint = node.joint.model_copy(
+        update={
+            "name": label, "stiffness": None, "position_limit": None, "viscous_friction": 0.0, "coulomb_friction": 0.0
+        }
+    )  # fmt: skip
+    body = rigid_body(label, 0.0, np.zeros(3), np.zeros((3, 3)), {})
+    q, v = tree.n_q + number, tree.n_v + number
+    inner = node.outer if node.backwards else node.inner
+    outer = Section(len(tree.nodes) + number, "", np.eye(3), np.zeros(3))
+    none_q, none_v = slice(q + 1, q + 1), slice(v + 1, v + 1)
+    return Node(body, joint, False, inner, outer, slice(q, q + 1), none_q, slice(v, v + 1), none_v)
+
+
+def _without_rotor(node: Node) -> Node:
+    return replace(node, joint=node.joint.model_copy(update={"rotor_inertia": 0.0}))

@@ -1,0 +1,169 @@
+"""Gears that give, in space: two masses on a spring, momentum and energy, the plane's numbers, acting again."""
+
+import numpy as np
+import planar_in_space
+import pytest
+from checkpoints import CASES
+from scipy.integrate import simpson
+from space import write_scene
+
+import ffrobot
+from ffrobot.common.errors import InputError
+
+J, N, K, C = 3e-3, 9.0, 500.0, 0.4
+GIVES = {"gear_ratio": N, "rotor_inertia": J, "stiffness": K}
+GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0}
+RUN = {"name": "run", "kind": "forward", "end": 1.0, "output_step": 0.002, "tolerance": 1e-10, "integrator": "dop853"}
+STRAIGHT, AXIS = [0.0, 0.0, 0.0], np.array([0.48, -0.6, 0.64])  # of length 1
+
+
+def rigid(name, inertia, mass=1.0, center=STRAIGHT):
+    points = {"root": STRAIGHT, "tip": [0.5, 0.1, -0.2]}
+    return {"name": name, "rigid": {"mass": mass, "center": center, "inertia": inertia, "points": points}}
+
+
+def revolute(name, first, second, axis, **keys):
+    return {"name": name, "type": "revolute", "between": [first, second], "axis": list(axis), **keys}
+
+
+def scene(bodies, joints, *analyses, **tables):
+    found = {"name": "gears", "space": "spatial", "gravity": STRAIGHT, "body": bodies, "joint": joints}
+    return found | {"analysis": list(analyses)} | tables
+
+
+def solve(tables, folder, name="scene"):
+    return ffrobot.solve(planar_in_space.write(tables, folder / f"{name}.toml"))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_two_masses_turn_and_swing(tmp_path, turned):
+    """A moment τ behind the gear: the center of inertia turns with τ/(I_m + I), the twist goes as 1 − cos ωt.
+
+    ω² = k (1/I_m + 1/I). I_m = J N² where the rotor sits on the ground; on the body, that turns then (first of
+    `between`), u = (N − 1) γ̇' and I has its part: with coordinates q of the body and θ_m the kinetic energy is
+    ½ I q̇² + ½ J (N θ̇_m + q̇)², and q = −γ.
+    """
+    tau, inertia = 2.0, np.diag([0.3, 0.2, 0.4])
+    I = AXIS @ inertia @ AXIS  # noqa: E741
+    sides = ("b.root", "ground") if turned else ("ground", "b.root")
+    joint = revolute("O", *sides, AXIS, **GIVES)
+    with solve(scene([rigid("b", inertia.tolist())], [joint], RUN, load=[{"joint": "O", "moment": str(tau)}]),
+               tmp_path) as found:  # fmt: skip
+        t, gamma, motor = (found[f"run/{key}"] for key in ("time", "joints/O/coordinate", "joints/O/motor_angle"))
+        M = np.array([[N**2 * J, -N * J], [-N * J, I + J]]) if turned else np.diag([N**2 * J, I])
+        values, S = np.linalg.eigh(np.linalg.inv(np.linalg.cholesky(M)) @ (K * np.array([[1, -1], [-1, 1]]))
+                                   @ np.linalg.inv(np.linalg.cholesky(M)).T)  # fmt: skip
+        T = np.linalg.inv(np.linalg.cholesky(M)).T @ S  # modes of (θ_m, γ)
+        along = T.T @ [tau, 0.0]
+        omega = np.sqrt(values[1])
+        modal = np.stack([along[0] * t**2 / 2, along[1] / omega**2 * (1 - np.cos(omega * t))])
+        expected = T @ modal
+        assert abs(values[0]) < 1e-9 * values[1]
+        np.testing.assert_allclose(motor, expected[0], atol=1e-8 * np.abs(expected).max())
+        np.testing.assert_allclose(gamma, expected[1], atol=1e-8 * np.abs(expected).max())
+
+
+def free_arm(**keys):
+    """Two bodies on a free one, joints askew, rotors on links that turn: no axis is a principal one."""
+    bodies = [
+        rigid("base", [0.3, 0.2, 0.4], 2.0, [0.1, 0.0, 0.05]),
+        rigid("a", [0.05, 0.04, 0.03], 0.8, [0.2, 0.1, 0.0]),
+        rigid("b", [0.02, 0.05, 0.04], 0.5, [0.1, -0.1, 0.1]),
+    ]
+    soft = GIVES | {"stiffness": 1.0} | keys
+    first = revolute("A", "base.tip", "a.root", AXIS, **soft)
+    second = revolute("B", "b.root", "a.tip", [1.0, 0.5, 0.2], **soft)  # its rotor sits on b
+    return scene(bodies, [first, second], RUN, initial={"joint_rates": {"A": 2.0, "B": -3.0}})
+
+
+def test_momentum_and_energy_of_a_free_arm_are_kept(tmp_path):
+    with solve(free_arm(), tmp_path) as found:
+        for key in ("linear", "angular"):
+            momentum = found[f"run/momentum/{key}"]
+            np.testing.assert_allclose(momentum, momentum[:1] + 0 * momentum, atol=2e-8 * np.abs(momentum).max())
+        energy = found["run/energy/kinetic"] + found["run/energy/strain"]
+        assert np.ptp(found["run/energy/strain"]) > 0.01 * energy[0]
+        np.testing.assert_allclose(energy, energy[0], rtol=2e-8)
+
+
+def test_dampers_and_motors_make_up_the_energy(tmp_path):
+    tables = free_arm(damping=0.05) | {"load": [{"joint": joint, "moment": "5*sin(10*t)"} for joint in "AB"]}
+    with solve(tables, tmp_path) as found:
+        t, energy = found["run/time"], found["run/energy/kinetic"] + found["run/energy/strain"]
+        power = [
+            np.gradient(found[f"run/joints/{joint}/motor_angle"], t, edge_order=2) * 5 * np.sin(10 * t)
+            for joint in "AB"
+        ]
+        losses = simpson(found["run/energy/dissipated_power"], x=t)
+        assert losses > 0.02 * energy[0]
+        assert abs(simpson(sum(power), x=t) - losses - (energy[-1] - energy[0])) < 2e-4 * losses
+
+
+def test_planar_arm_with_gears_that_give_in_space(tmp_path):
+    """PCID, equilibrium and the forward run of the two-link arm: numbers of the plane."""
+    analyses = [
+        {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.002, "tolerance": 1e-9},
+        {"name": "rest", "kind": "static"},
+        RUN | {"actuation": "inverse", "apply": "joints", "end": 0.2, "tolerance": 1e-9},
+    ]
+    planar = planar_in_space.read(CASES / "two_link" / "scene.toml")
+    planar.pop("pzt", None)
+    planar["joint"] = [joint | GEARED for joint in planar["joint"]]
+    planar["analysis"] = analyses
+    spatial = planar_in_space.in_space(planar) | {"analysis": analyses}
+    spatial["initial"] = {"joints": {"O": 0.0, "A": 1.0471975511965976}}
+    with solve(planar, tmp_path, "planar") as plane, solve(spatial, tmp_path, "spatial") as space:
+        for joint in ("O", "A"):
+            for key in ("moment", "gear_moment", "motor_angle"):
+                for analysis, share in (("inverse", 1e-6 if key == "moment" else 1e-8), ("rest", 1e-8)):
+                    name = f"{analysis}/joints/{joint}/{key}"
+                    least = 1e-6 * np.abs(plane[f"inverse/joints/O/{key}"]).max()
+                    np.testing.assert_allclose(
+                        space[name], plane[name], atol=share * max(np.abs(plane[name]).max(), least), rtol=0
+                    )
+            for key in ("coordinate", "motor_angle"):
+                name = f"run/joints/{joint}/{key}"
+                np.testing.assert_allclose(space[name], plane[name], atol=1e-7, rtol=0)
+        name = "run/points/link2.tip/position"
+        np.testing.assert_allclose(space[name][:, :2], plane[name], atol=1e-7)
+
+
+def test_motors_behind_gears_carry_out_an_inverse_analysis(tmp_path):
+    """The 3R arm with rigid links: what the base feels of J N δ̈ besides is left out, 1/N of what the gear does."""
+    tables = planar_in_space.read(write_scene("arm3_line_undeformed", tmp_path))
+    stiff = {"gear_ratio": 100.0, "rotor_inertia": 1e-5, "stiffness": 2e3, "damping": 5.0}
+    tables["joint"] = [joint | stiff for joint in tables["joint"]]
+    tables["body"] = [
+        body if "rigid" in body else {"name": body["name"], **_rod(0.3, 0.7 if body["name"] == "upper" else 0.6)}
+        for body in tables["body"]
+    ]
+    tables["analysis"] = [
+        {"name": "inverse", "kind": "pcid", "end": 0.4, "output_step": 0.001, "tolerance": 1e-10},
+        RUN | {"actuation": "inverse", "apply": "joints", "end": 0.4},
+    ]
+    with solve(tables, tmp_path) as found:
+        for joint in (joint["name"] for joint in tables["joint"]):
+            twist = found[f"inverse/joints/{joint}/motor_angle"] - found[f"inverse/joints/{joint}/coordinate"]
+            assert np.abs(twist).max() > 5e-5
+            off = found[f"run/joints/{joint}/coordinate"] - found[f"inverse/joints/{joint}/coordinate"][::2]
+            assert np.abs(off).max() < 0.02 * np.abs(twist).max()
+
+
+def _rod(mass, length):
+    inertia = [1e-6, mass * length**2 / 12, mass * length**2 / 12]
+    points = {"root": STRAIGHT, "tip": [length, 0.0, 0.0]}
+    return {"rigid": {"mass": mass, "center": [length / 2, 0.0, 0.0], "inertia": inertia, "points": points}}
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"stiffness": 10.0}, "rotor_inertia above 0 beside stiffness"),
+        ({"damping": 1.0}, '"damping" only beside stiffness'),
+        (GIVES | {"motor": False}, "stiffness: expected a joint with a motor, found one without"),
+    ],
+)
+def test_what_is_missing_beside_a_spring_is_told(tmp_path, keys, told):
+    tables = scene([rigid("b", [0.1, 0.1, 0.1])], [revolute("O", "ground", "b.root", AXIS, **keys)], RUN)
+    with pytest.raises(InputError, match=told):
+        solve(tables, tmp_path)

@@ -1,0 +1,46 @@
+"""`ffrobot info` says unit and meaning of every dataset there is."""
+
+import h5py
+import pytest
+
+from ffrobot.present.info import describe
+from ffrobot.results.meanings import MODAL_BODY, RESULTS, meaning
+
+# inverse and forward motion, patches, linear models, gears that give, motion in space
+CASES = ("two_link_patched", "two_link_linear", "compliant_arm", "slider_crank_3d")
+
+
+def datasets(group):
+    found = []
+    group.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_dataset_of_results_has_a_meaning(solved, case):
+    done = solved(case)
+    unknown = [f"{name}/{item}" for name in done.file for item in datasets(done.file[name])
+               if not meaning(item, RESULTS)]  # fmt: skip
+    assert unknown == []
+    text = describe(done.folder / "scene.results.h5")
+    assert "rad/s" in text
+    assert "of the body's frame" in text
+
+
+def test_every_dataset_of_a_modal_body_has_a_meaning(ffrobot, case_copy):
+    folder = case_copy("lightened_arm").parent
+    link = next(path for path in sorted(folder.glob("*.toml")) if "geometry" in path.read_text())
+    assert ffrobot("link", link.name, "-o", "body.h5", cwd=folder).returncode == 0
+    with h5py.File(folder / "body.h5") as file:
+        assert [name for name in datasets(file) if not meaning(name, MODAL_BODY)] == []
+    text = describe(folder / "body.h5")
+    assert "under the reference condition" in text
+    assert "of a unit load" in text
+
+
+def test_names_are_matched_part_by_part():
+    assert meaning("joints/elbow/moment", RESULTS).unit == "N m, N"
+    assert meaning("feasibility/pzt/arm/factor", RESULTS).what == "required against available"
+    assert meaning("joints/elbow/torque", RESULTS) is None
+    assert meaning("joints/moment", RESULTS) is None
+    assert meaning("geometric_stiffness/force/tip/x", MODAL_BODY) is not None
