@@ -23,7 +23,7 @@ from ..model.spatial_inverse import required_forces
 from ..model.spatial_model import SpatialModel, SpatialRow, row_values
 from ..model.spatial_motors import SplitForces, split_forces
 from .internal_dynamics import Target
-from .spatial_posture import mobility, solve_posture, undeformed_posture
+from .spatial_posture import BoolArray, mobility, solve_posture, undeformed_posture
 from .spatial_prescribed import modal_places, motion_near
 
 POSTURES = 201  # along the path, from which others are looked for
@@ -100,7 +100,7 @@ class SpatialServo:
         """The same with what is expected of the deflections that the output leaves out."""
         return replace(self, offset=offset)
 
-    def motion(self, times: Array, modes: Array) -> tuple[ServoMotion, Array]:
+    def motion(self, times: Array, modes: Array) -> tuple[ServoMotion, BoolArray]:
         """With `modes` (3, T, n), p, ṗ and p̈, at `times` (T,); and where a posture was found (T,)."""
         model, tree = self.model, self.model.tree
         guess = self.near[np.abs(times[:, None] - self.near_times).argmin(axis=1)]
