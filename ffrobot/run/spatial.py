@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from ..actuation.control.spatial_linear import ActuatedSpatialContext
 from ..actuation.patches.spatial_patches import LinkPatches
+from ..actuation.spatial_kinds import IN_SPACE
 from ..common.errors import of_file
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
-from ..mbs.analysis.spatial_kinds import IN_SPACE
-from ..mbs.analysis.spatial_run import SpatialContext, SpatialRun
+from ..mbs.analysis.operating_points import InstantAnalysis
+from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.quantities.spatial_energy import Energies, Momentum, energies, momentum
@@ -158,14 +160,15 @@ def _context(
     results: Mapping[str, SpatialResult],
     watcher: Watcher,
     interruption: Interruption,
-) -> SpatialContext:
+) -> ActuatedSpatialContext:
     end = analysis.last_time
 
     def progress(t: float) -> bool:
         return watcher.advance(t, end) and not interruption.requested
 
     runs = {name: result.run for name, result in results.items()}
-    return SpatialContext(solution.model, runs, progress, partial(supplied_by_patches, solution.patches))
+    supply = partial(supplied_by_patches, solution.patches)
+    return ActuatedSpatialContext(solution.model, runs, progress, supply, solution.patches)
 
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
@@ -174,7 +177,8 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
         run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied
     )  # fmt: skip
     actuation = None
-    if motion.motor_forces is not None:  # else nothing is asked of motors and patches
+    is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
+    if is_judged:  # else nothing is asked of motors and patches
         actuation = actuated_in_space(solution.scene, motion, solution.bodies, solution.patches)
     return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion), actuation)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ...common.arrays import Array
@@ -11,7 +11,7 @@ from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel
 from ..scene.analysis import Analysis
 from .drive import Progress
-from .outcome import ADVICE
+from .outcome import ADVICE, Details
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,7 @@ class SpatialRun:
         wall_seconds: of all.
         before, after: s, how long it acts before t = 0 and after the end of the analysis.
         warnings: on what is left open.
+        details: what only its kind finds.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
     """
 
@@ -54,6 +55,7 @@ class SpatialRun:
     before: float = 0.0
     after: float = 0.0
     warnings: tuple[str, ...] = ()
+    details: Details = field(default=Details(), repr=False)
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
 
     @property
@@ -61,7 +63,7 @@ class SpatialRun:
         """Whether it ended before its last time."""
         return self.status != "completed"
 
-    def rows(self, chosen: slice) -> SpatialRun:
+    def rows(self, chosen: slice | Sequence[int]) -> SpatialRun:
         """These outputs alone."""
         names = ("time", "q", "v", "a", "multipliers", "required")
         of_time = {name: getattr(self, name) for name in names}

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import gears_of_motion
@@ -127,7 +127,8 @@ class SpatialMotion:
         h = 1e-6  # of a linear map, but for planar joints
         ahead, behind = (node.joint.turned_around(x + s * x_dot) for s in (h, -h))
         linear = node.joint.type != "planar"
-        return node.joint.turned_around(x), node.joint.turned_around(x_dot) if linear else (ahead - behind) / (2 * h)
+        rate = node.joint.turned_around(x_dot) if linear else as_floats((ahead - behind) / (2 * h))
+        return node.joint.turned_around(x), rate
 
     def path_force(self, trajectory: str) -> Array:
         """−λ (T, m) of its rows: forces on the point, then moments on the section about global axes."""
@@ -146,17 +147,17 @@ class SpatialMotion:
         return [trajectory for trajectory in self.model.scene.trajectory if trajectory.name in held]
 
     @property
-    def is_inverse(self) -> bool:
-        """Whether it is prescribed, so that forces are found for it."""
-        return bool(self.followed) or self.required is not None
+    def is_prescribed(self) -> bool:
+        """Whether trajectories hold in it, or motors their angles, or it is all given, with the forces that it takes."""
+        return any(row.is_trajectory for row in self.model.rows) or self.required is not None
 
     @cached_property
     def motor_forces(self) -> MotorForces | None:
-        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is followed or required.
+        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is prescribed.
 
         Moments behind gears that give are what motors must do there.
         """
-        if not self.is_inverse:
+        if not self.is_prescribed:
             return None
         rigid = self._with_rigid_gears
         behind = {joint: gear.moment[:, None] for joint, gear in self.gears.items()}
@@ -169,7 +170,7 @@ class SpatialMotion:
     @cached_property
     def gears(self) -> dict[str, GearMotion]:
         """By joint, of inverse analyses and equilibria with gears that give."""
-        if not self.is_inverse:
+        if not self.is_prescribed:
             return {}
         return gears_of_motion(self.model, self.accelerated, self.time, self._with_rigid_gears.moments)
 
