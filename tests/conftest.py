@@ -121,6 +121,11 @@ def slider_crank_3d(solved):
     return solved("slider_crank_3d")
 
 
+@pytest.fixture(scope="session")
+def slewing_appendage(solved):
+    return solved("slewing_appendage")
+
+
 @pytest.fixture
 def case_copy(tmp_path):
     """Copy a case by its name; returns the scene file of the copy."""

@@ -1,6 +1,7 @@
 """The Python interface and sweeps with scenes in space: what the command line does."""
 
 import csv
+import signal
 
 import numpy as np
 import pytest
@@ -84,6 +85,35 @@ def test_earlier_analyses_are_kept_where_one_fails(tmp_path):
     with ffrobot.Results(tmp_path / "out.h5") as results:
         np.testing.assert_allclose(results["rest/joints/pin/moment"], [-2.0 * 9.81 * 0.3], rtol=1e-12)
         assert results.attributes("long")["status"] == "too many steps"
+
+
+class Ends(ffrobot.Watcher):
+    """Ends a run when it is first asked, by what it answers or by Ctrl-C."""
+
+    def __init__(self, how):
+        self.how = how
+
+    def advance(self, t, end):
+        if self.how == "Ctrl-C":
+            signal.raise_signal(signal.SIGINT)
+        return self.how == "Ctrl-C"
+
+
+@pytest.mark.parametrize("how", ["answer", "Ctrl-C"])
+def test_what_there_is_when_a_run_is_stopped_is_kept(how, tmp_path):
+    long = {"name": "long", "kind": "pcid", "end": 2000.0, "output_step": 0.5, "tolerance": 1e-10}
+    last = {"name": "last", "kind": "static"}
+    scene = ffrobot.make_scene(folder=tmp_path, **PENDULUM | {"analysis": [long, last]})
+    with pytest.raises(
+        ffrobot.SolveError, match=r'analysis "long" ended at t = .* \(interrupted\): stopped on request'
+    ):
+        ffrobot.solve(scene, tmp_path / "out.h5", Ends(how))
+    with ffrobot.Results(tmp_path / "out.h5") as results:
+        t = results["long/time"]
+        assert 1 <= len(t) < 4001
+        assert results.attributes("long")["status"] == "interrupted"
+        np.testing.assert_allclose(results["long/joints/pin/moment"], moment(t), rtol=1e-7)
+        assert results.analyses == ["long"]
 
 
 def test_sweep_over_the_mass(tmp_path, ffrobot):

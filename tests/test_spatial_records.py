@@ -207,9 +207,9 @@ MISTAKES = {
         put("analysis", kind="motors-only"),
         'kind: expected "pcid", "fcid", "forward", "static" in space = "spatial", found "motors-only", which is not',
     ),
-    "what is applied and not there yet": (
-        add("analysis", name="again", kind="forward", actuation="inverse", apply="trajectory"),
-        'analysis "again": apply: expected "joints" in space = "spatial", found "trajectory", which is not available',
+    "what is applied by patches that are not there": (
+        add("analysis", name="again", kind="forward", actuation="inverse", apply="joints+pzt"),
+        r'analysis "again": apply: expected at least one \\[\\[pzt\\]\\] for "joints\+pzt", found none',
     ),
     "shape of a rigid body": (
         put("analysis", kind="fcid", shape="given", modal={"base": ["0.1*t"]}),

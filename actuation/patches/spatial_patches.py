@@ -88,6 +88,15 @@ class LinkPatches:
             for name, one, other in zip(self.arrays, required, within, strict=True)
         }
 
+    def of_layout(self, name: str) -> Array:
+        """(n, k) modal forces per volt of the patches of one layout."""
+        first = 0
+        for label, array in self.arrays.items():
+            if label == name:
+                return self.Phi_V[:, first : first + len(array.edges)]
+            first += len(array.edges)
+        raise KeyError(name)
+
     def unmet(self, F_p: Array, voltages: Array) -> Array:
         """(T, n) of modal forces F_p, at voltages (T, k) of all patches."""
         return F_p - voltages @ self.Phi_V.T

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from ..actuation.control.spatial_linear import ActuatedSpatialContext
@@ -17,12 +18,19 @@ from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
+from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.quantities.spatial_energy import Energies, Momentum, energies, momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
-from ..mbs.quantities.spatial_reactions import Wrench, reactions
+from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
-from .spatial_actuation import SpatialActuation, actuated_in_space, patches_in_space
+from .spatial_actuation import (
+    SpatialActuation,
+    actuated_in_space,
+    given_voltages,
+    patches_in_space,
+    supplied_by_patches,
+)
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
 from .watcher import Interruption, Watcher
 
@@ -111,6 +119,7 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     model = build_spatial_model(scene, [body.spatial for body in loaded])
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
     patches = patches_in_space(scene, bodies)
+    model = replace(model, modal_loads=tuple(given_voltages(model, patches)))
     solution = SpatialSolution(scene, model, bodies, patches, {}, seconds)
     with Interruption(watcher.stopping) as interruption:
         solution = _run_all(solution, watcher, interruption)
@@ -158,13 +167,14 @@ def _context(
         return watcher.advance(t, end) and not interruption.requested
 
     runs = {name: result.run for name, result in results.items()}
-    return ActuatedSpatialContext(solution.model, runs, progress, solution.patches)
+    supply = partial(supplied_by_patches, solution.patches)
+    return ActuatedSpatialContext(solution.model, runs, progress, supply, solution.patches)
 
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     """What is read off a run."""
     motion = SpatialMotion(
-        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest
+        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied
     )  # fmt: skip
     actuation = None
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,9 @@ from ..actuation.patches.spatial_patches import LinkPatches, by_body, link_patch
 from ..actuation.patches.voltages import Voltages
 from ..actuation.spatial_feasibility import UnsuppliedInSpace, judge_in_space, links_in_motion
 from ..common.arrays import Array
+from ..mbs.analysis.spatial_run import ModalForces
+from ..mbs.model.spatial_drives import Drive
+from ..mbs.model.spatial_model import SpatialModel, modal_direction
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..scene.spatial import SpatialScene
 from .spatial_bodies import LoadedSpatialBody
@@ -48,6 +51,26 @@ def patches_in_space(scene: SpatialScene, bodies: Bodies) -> dict[str, LinkPatch
         body = bodies[name]
         assert body.modal is not None
         found[name] = link_patches(scene.path, layouts, body.modal, body.spatial)
+    return found
+
+
+def given_voltages(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
+    """What the voltages that the scene gives to patches do on modes."""
+    bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
+    for load in model.scene.load:
+        if load.pzt is not None:
+            per_volt = patches[bodies[load.pzt]].of_layout(load.pzt)
+            for column, voltage in zip(per_volt.T, load.voltage or (), strict=True):
+                yield Drive(modal_direction(model, bodies[load.pzt], column), voltage)
+
+
+def supplied_by_patches(patches: Mapping[str, LinkPatches], wanted: ModalForces, limited: bool) -> ModalForces:
+    """What voltages do of modal forces, as much of them as they can: with limits or without."""
+    found = {}
+    for body, of_link in patches.items():
+        voltages = of_link.voltages(wanted[body]).values()
+        chosen = [each.within_limit if limited else each.required for each in voltages]
+        found[body] = np.concatenate(chosen, axis=1) @ of_link.Phi_V.T
     return found
 
 

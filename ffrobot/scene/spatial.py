@@ -26,14 +26,14 @@ from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from .actuation_times import with_times_of_actuation
 from .kinds import KINDS, Analysis
 
-APPLICABLE = ("joints",)  # values of `apply`
+APPLICABLE = ("joints", "joints+pzt", "trajectory")  # values of `apply`
 
 # Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
 UNAVAILABLE = {
     "": ("geometric_stiffening", "actuation_points"),
     "body": ("modes", "pieces"),
     "trajectory": ("via", "profile", "shaper"),
-    "load": ("pzt", "voltage", "force"),
+    "load": ("force",),
 }
 
 
@@ -129,6 +129,12 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
         if count > 1:
             yield f'pzt "{label}": name: expected a name of its own for each layout on a body, found {count} of this'
     yield from _reference_problems(scene)
+    counts = {layout.label: layout.patch_count for layout in scene.pzt}
+    for k, load in enumerate(scene.load, 1):
+        count, found = counts.get(load.pzt or "", 0), len(load.voltage or ())
+        if count and found != count:
+            of = f'one for each patch of "{load.pzt}"'
+            yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {found}"
     for k, analysis in enumerate(scene.analysis):
         for problem in analysis.problems(Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS)):
             yield f'analysis "{analysis.name}": {problem}'
@@ -141,6 +147,7 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
 def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     bodies, joints = [body.name for body in scene.body], {joint.name: joint for joint in scene.joint}
     rigid = [body.name for body in scene.body if body.rigid is not None]
+    layouts = [layout.label for layout in scene.pzt]
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
     for reference in scene.references():
@@ -152,6 +159,10 @@ def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
                 )
             elif not (joints[name].units or joints[name].guess_units):
                 yield f'{reference.key}: expected a joint that moves, found "{name}", a {joints[name].type}'
+        elif reference.kind == "patches":
+            if name not in layouts:
+                known = f"one of the layouts {quoted(layouts)}" if layouts else "a layout of patches ([[pzt]])"
+                yield f'{reference.key}: expected {known}, found "{name}"' + did_you_mean(name, layouts)
         elif (body := name.partition(".")[0]) not in bodies:
             yield f'{reference.key}: expected one of the bodies {quoted(bodies)}, found "{body}"' + did_you_mean(
                 body, bodies
@@ -187,8 +198,6 @@ def _not_available_of(analysis: Analysis, scene: SpatialSceneKeys) -> Iterator[t
         yield "check", 'none in space = "spatial", found it: not available yet'
     if apply not in (None, *APPLICABLE):
         yield "apply", f'{quoted(APPLICABLE)} in space = "spatial", found "{apply}", {not_yet}'
-    if apply == "joints" and scene.motors == "frame":
-        yield "apply", 'motors = "section" beside "joints" in space = "spatial", found "frame": not available yet'
 
 
 def _check_functions(scene: SpatialSceneKeys, path: Path) -> None:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -27,8 +28,9 @@ from ..joints.measure import Measure
 from ..model.model import Model
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
+from ..solve.internal_dynamics import Output
 from ..solve.servo import SINGULAR, Servo, is_unstable, make_servo
-from ..solve.stable_inversion import Inversion, Linearisation, invert, linearise
+from ..solve.stable_inversion import Inversion, Linearisation, S, invert, linearise
 from .context import Context
 from .drive import Progress, motion_of
 from .elastic_joints import add_transmission
@@ -92,14 +94,14 @@ class MotorsOnly(TimedAnalysis):
 class InvertedPath(Details):
     """How the path was inverted; `loads` are held before and after it."""
 
-    inversion: Inversion
+    inversion: Inversion[Servo]
     pre_actuation: float
     post_actuation: float
     loads: tuple[tuple[Measure, TimeFunction], ...]
 
     def actuation_source(self, outcome: Outcome) -> _core.ActuationSource:
         """The motors' forces at any time, from p(t)."""
-        return self.inversion.source()
+        return self.inversion.servo.source(self.inversion.shape)
 
 
 def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> Outcome:
@@ -110,15 +112,15 @@ def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> O
     found.
     """
     began = time.perf_counter()
-    servo, linear = _output(model, analysis)
+    servo, linear = choose_output(partial(make_servo, model, analysis.end), analysis)
     needs_future = bool(is_unstable(linear.zeros[0]).any())
-    _check_rest(servo, analysis, needs_future)
-    pre, post = _durations(analysis, linear, needs_future)
+    check_rest(servo, analysis, needs_future)
+    pre, post = durations(analysis, linear, needs_future)
     inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
     return _outcome(analysis, InvertedPath(inversion, pre, post, servo.loads), time.perf_counter() - began)
 
 
-def path_error(inversion: Inversion, times: Array, q: Array) -> Array:
+def path_error(inversion: Inversion[Servo], times: Array, q: Array) -> Array:
     """How far (T, components) the specified points, joints and angles themselves are from their path."""
     path = inversion.servo.path
     rest = np.zeros(q.shape[1])
@@ -126,40 +128,43 @@ def path_error(inversion: Inversion, times: Array, q: Array) -> Array:
     return np.array([path.system.constraints(t, one, rest)[0][rows] for t, one in zip(times, q, strict=True)])
 
 
-def _output(model: Model, analysis: MotorsOnly) -> tuple[Servo, Linearisation]:
-    """The output the path is for: the point itself, or as near to it as is minimum phase or as the scene says."""
+def choose_output(make: Callable[[float], S], analysis: MotorsOnly) -> tuple[S, Linearisation]:
+    """The output the path is for: the point itself, or as near to it as is minimum phase or as the scene says.
+
+    `make` gives the output of a factor.
+    """
     end = analysis.end
     if analysis.output == "tip" or analysis.factor is not None:
-        servo = make_servo(model, end, 1.0 if analysis.output == "tip" else float(analysis.factor or 0.0))
+        servo = make(1.0 if analysis.output == "tip" else float(analysis.factor or 0.0))
         linear = linearise(servo, end)
         _check_relative_degree(servo, linear)
         if analysis.output == "redefined" and not is_minimum_phase(linear):
             raise InputError(
-                f'{model.scene.path}: analysis "{analysis.name}": factor: expected one whose output is minimum phase,'
+                f'{servo.scene_path}: analysis "{analysis.name}": factor: expected one whose output is minimum phase,'
                 f" since it is integrated forward, found {analysis.factor:g} with zeros in the right half plane:"
                 f' {describe_zeros(linear)}; use a smaller factor, leave it out, or use output = "tip"'
             )
         return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, linear)
-    joints = make_servo(model, end, 0.0)
+    joints = make(0.0)
     for k in range(round(1 / FACTOR_STEP) + 1):
-        servo = replace(joints, factor=max(0.0, 1.0 - k * FACTOR_STEP))
+        servo = joints.with_factor(max(0.0, 1.0 - k * FACTOR_STEP))
         linear = linearise(servo, end)
         if is_minimum_phase(linear):
-            return _with_expected_deflections(replace(servo, factor=MARGIN * servo.factor), linear)
+            return _with_expected_deflections(servo.with_factor(MARGIN * servo.factor), linear)
     raise InputError(
-        f'{model.scene.path}: analysis "{analysis.name}": output: expected a robot whose joint motion is minimum phase'
+        f'{joints.scene_path}: analysis "{analysis.name}": output: expected a robot whose joint motion is minimum phase'
         f' for "redefined", found zeros in the right half plane even then: {describe_zeros(linear)}'
     )
 
 
-def _with_expected_deflections(servo: Servo, linear: Linearisation) -> tuple[Servo, Linearisation]:
+def _with_expected_deflections(servo: S, linear: Linearisation) -> tuple[S, Linearisation]:
     """The part of the deflections that the output leaves out, replaced by what the path's loads bend without vibration.
 
     A function of time alone: it changes the output's target, not its zeros.
     """
-    sag = linearise(replace(servo, factor=1.0), float(linear.times[-1])).shape
+    sag = linearise(servo.with_factor(1.0), float(linear.times[-1])).shape
     offset = [f.held(0.0, linear.times[-1]) for f in spline(linear.times, (1 - servo.factor) * sag, at_rest=True)]
-    servo = replace(servo, offset=tuple(offset))
+    servo = servo.with_offset(tuple(offset))
     return servo, linearise(servo, float(linear.times[-1]))
 
 
@@ -178,34 +183,34 @@ def describe_zeros(linear: Linearisation) -> str:
     return shown if len(shown) < 120 else ", ".join(shown.split(", ")[:4]) + f" … ({len(found)} in all)"
 
 
-def _check_relative_degree(servo: Servo, linear: Linearisation) -> None:
+def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
     """Raise `InputError` where some time of the path the motors cannot accelerate its output."""
     values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
     worst = int((values[:, -1] / values[:, 0]).argmin())
     if values[worst, -1] < SINGULAR * values[worst, 0]:
         raise InputError(
-            f"{servo.path.model.scene.path}: expected motors that accelerate every component of the path, found at"
+            f"{servo.scene_path}: expected motors that accelerate every component of the path, found at"
             f" t = {linear.times[worst]:g} s a singular coupling: take another number of modes or another factor"
         )
 
 
-def _check_rest(servo: Servo, analysis: MotorsOnly, needs_future: bool) -> None:
+def check_rest(servo: Output, analysis: MotorsOnly, needs_future: bool) -> None:
     """Raise `InputError` for a path that moves where the robot has to be at rest."""
     ends = [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
-    for constraint in servo.path.model.trajectories:
-        values = constraint.target.sample(as_floats(np.linspace(0.0, analysis.end, 101)))[0]
+    for target in servo.targets():
+        values = target.function.sample(as_floats(np.linspace(0.0, analysis.end, 101)))[0]
         mean = float(np.ptp(values)) / analysis.end
         for t in ends:
-            rate = constraint.target(t)[1]
+            rate = target.function(t)[1]
             if abs(rate) > REST * max(mean, 1.0):
                 raise InputError(
-                    f'{servo.path.model.scene.path}: trajectory "{constraint.owner}": {constraint.component}: expected'
+                    f'{servo.scene_path}: trajectory "{target.owner}": {target.component}: expected'
                     f' a path at rest at t = {t:g} s, before or after which "{analysis.name}" holds it, found the rate'
                     f" {rate:.4g}: start and end with zero speed, as 10*s**3 - 15*s**4 + 6*s**5 does"
                 )
 
 
-def _durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
+def durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
     """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
     s = linear.zeros[[0, -1]]
     grow, decay = s.real[is_unstable(s)], -s.real[s.real < 0]
@@ -217,7 +222,7 @@ def _durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) 
     return tuple(math.ceil(value / step - 1e-9) * step for value in chosen)  # type: ignore[return-value]
 
 
-def _cause(inversion: Inversion) -> str:
+def cause_of(inversion: Inversion[S]) -> str:
     """Whether the zeros explain that no motion was found: where their sides change, no bounded one need exist."""
     linear = inversion.linearisation
     count = is_unstable(linear.zeros).sum(axis=1)
@@ -251,7 +256,7 @@ def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> Outco
             evaluations=inversion.iterations,
             wall_seconds=seconds,
             time_reached=None if run.reached else float(inversion.curve.x[0]),
-            cause=_cause(inversion),
+            cause=cause_of(inversion),
         ),
         details=found,
     )

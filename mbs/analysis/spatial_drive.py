@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
 from ...common.arrays import Array, as_list
 from .. import _core
+from ..model.spatial_drives import NO_DRIVES, Drives
 from ..model.spatial_model import SpatialModel
-from ..model.spatial_system import Drive, SpatialSystem
+from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.integrators import METHODS
 from ..solve.spatial_limits import left_ranges
@@ -29,7 +29,7 @@ def spatial_drive(
     start: State,
     progress: Progress,
     *,
-    drives: Sequence[Drive] = (),
+    drives: Drives = NO_DRIVES,
     warnings: tuple[str, ...] = (),
     times: Array | None = None,
 ) -> SpatialRun:
@@ -58,7 +58,7 @@ def spatial_drive(
         return spatial_drive(model, analysis, start, progress, drives=drives, times=others)
 
     return SpatialRun(
-        analysis, model, times[: len(q)], q, v, run.accelerations, run.multipliers,
+        analysis, model, times[: len(q)], q, v, run.accelerations, run.multipliers, applied=drives.at_points,
         status=STATUS[run.status], integrator=integrator, steps=run.steps, evaluations=run.evaluations,
         wall_seconds=time.perf_counter() - began, warnings=told, cause=cause, again=again,
     )  # fmt: skip

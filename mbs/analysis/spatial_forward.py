@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_drives import Drive, Drives, FrameDrive, PointDrive
 from ..model.spatial_gears import with_compliance_in_space
-from ..model.spatial_model import SpatialModel
-from ..model.spatial_system import Drive
+from ..model.spatial_model import SpatialModel, modal_direction
+from ..model.spatial_motors import MotorForces
+from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_statics import initial_state
 from ..solve.state import State
 from .elastic_joints import DEGREE
 from .forward import Forward
 from .spatial_drive import spatial_drive
 from .spatial_gears import gears_of_motion
-from .spatial_replay import motor_forces_of, replayed
+from .spatial_replay import motor_forces_of, path_wrenches, replay_times, replayed
 from .spatial_run import SpatialContext, SpatialRun, without_paths
+
+
+class Applied(NamedTuple):
+    """What acts, and how far its functions of time are off (share of the largest value)."""
+
+    drives: Drives
+    unresolved: float
 
 
 def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRun:
@@ -27,19 +40,21 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
     Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no equilibrium
     to start from.
     """
-    model = with_compliance_in_space(without_paths(context.model))
+    model, progress = with_compliance_in_space(without_paths(context.model)), context.progress
     if analysis.actuation is None:
-        return spatial_drive(model, analysis, initial_state(model), context.progress)
+        return spatial_drive(model, analysis, initial_state(model), progress)
     source = context.runs[analysis.actuation]
     if model.tree.gears:
         return _behind_gears(source, model, analysis, context)
-    drives, unresolved = _motors(source, analysis)
+    by_paths = analysis.apply == "trajectory"
+    applied = _paths(source, analysis) if by_paths else _actuators(context, source, analysis)
     start = State(source.q[0], source.v[0])
     warnings: tuple[str, ...] = ()
-    if unresolved > analysis.tolerance:
-        off = f"off by {unresolved:.1e} of the largest"
+    if applied.unresolved > analysis.tolerance:
+        off = f"off by {applied.unresolved:.1e} of the largest"
         warnings = (f'the forces of "{analysis.actuation}" change too fast to be replayed: {off}',)
-    return spatial_drive(model, analysis, start, context.progress, drives=drives, warnings=warnings)
+    times = replay_times(source, analysis)
+    return spatial_drive(model, analysis, start, progress, drives=applied.drives, warnings=warnings, times=times)
 
 
 def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, context: SpatialContext) -> SpatialRun:
@@ -48,6 +63,11 @@ def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, co
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" beside joints with stiffness,'
             f' found "{analysis.apply}"'
+        )
+    if model.scene.motors == "frame":
+        raise InputError(
+            f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven forward, found'
+            ' "frame"'
         )
     if source.model.tree.gears:
         raise InputError(
@@ -67,8 +87,9 @@ def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, co
     first = State(np.append(source.q[0], [0.0] * len(outputs)), np.append(source.v[0], [0.0] * len(outputs)))
     for node, found in zip(outputs, known, strict=True):
         first.q[node.q.start], first.v[node.v.start] = found.angle[0], found.rate[0]
-    drives = [Drive(direction, size) for direction, size in zip(_directions(model), sizes, strict=True)]
-    return spatial_drive(model, analysis, first, context.progress, drives=drives)
+    along = [Drive(direction, size) for direction, size in zip(_directions(model), sizes, strict=True)]
+    times = replay_times(source, analysis)
+    return spatial_drive(model, analysis, first, context.progress, drives=Drives(tuple(along)), times=times)
 
 
 def _largest_moments(model: SpatialModel, *, limits: bool) -> Array:
@@ -83,20 +104,74 @@ def _directions(model: SpatialModel) -> list[Array]:
     return [model.sign(joint) * np.eye(model.tree.n_v)[k] for joint, columns in model.motors.items() for k in columns]
 
 
-def _motors(source: SpatialRun, analysis: Forward) -> tuple[list[Drive], float]:
-    """Moments of all motors along their coordinates."""
+def _paths(source: SpatialRun, analysis: Forward) -> Applied:
+    """Forces and moments on the points of paths, and along the coordinates of joints that follow one."""
     model = source.model
-    if not model.motors:
-        raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected joints with motors for "joints", found'
-            " none: name them with motor = true"
-        )
+    rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory and row.kind == "coordinate"]
 
+    def forces(run: SpatialRun) -> Array:
+        along = [-run.multipliers[:, k : k + 1] * row.sign for k, row in rows]
+        return np.hstack([*along, *path_wrenches(run).values()])
+
+    found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
+    directions = np.eye(model.tree.n_v)[[row.coordinate for _, row in rows]]
+    along = [Drive(direction, size) for direction, size in zip(directions, found.functions, strict=False)]
+    sizes = iter(found.functions[len(rows) :])
+    points = [
+        PointDrive(point, {component: next(sizes) for component in OF_POINT})
+        for point in path_wrenches(source.rows(slice(0, 1)))
+    ]
+    return Applied(Drives(tuple(along), tuple(points)), found.unresolved)
+
+
+def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -> Applied:
+    """Moments of all motors along their coordinates, and what voltages of patches do on modes."""
+    model = source.model
+    _check_motors(model, analysis)
     most = _largest_moments(model, limits=analysis.limits)
 
-    def moments(run: SpatialRun) -> Array:
-        return np.clip(np.hstack(list(motor_forces_of(run).moments.values())), -most, most)
+    def forces(run: SpatialRun) -> Array:
+        found = motor_forces_of(run)
+        moments = np.clip(np.hstack(list(found.moments.values())), -most, most)
+        return np.hstack([moments, *_supplied(context, analysis, found).values()])
 
-    found = replayed(source, moments, analysis.last_time, analysis.tolerance)
-    drives = [Drive(direction, size) for direction, size in zip(_directions(model), found.functions, strict=True)]
-    return drives, found.unresolved
+    found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
+    sizes = iter(found.functions)
+    motors = list(_motors(model, sizes))
+    with_patches = _supplied(context, analysis, motor_forces_of(source.rows(slice(0, 1))))
+    modal = tuple(drive for body in with_patches for drive in modal_drives(model, body, sizes))
+    along = tuple(drive for drive in motors if isinstance(drive, Drive))
+    on_frames = tuple(drive for drive in motors if isinstance(drive, FrameDrive))
+    return Applied(Drives(along + modal, on_frames=on_frames), found.unresolved)
+
+
+def _supplied(context: SpatialContext, analysis: Forward, found: MotorForces) -> dict[str, Array]:
+    """Modal forces of patches (T, n) by body, where they are applied."""
+    return dict(context.supply(found.modal, analysis.limits)) if analysis.apply == "joints+pzt" else {}
+
+
+def _motors(model: SpatialModel, sizes: Iterator[TimeFunction]) -> Iterator[Drive | FrameDrive]:
+    """The motors with the next functions, in the order of `SpatialModel.motors`; their signs are those of the joint."""
+    joints = {joint.name: joint for joint in model.scene.joint}
+    for joint, columns in model.motors.items():
+        for column in columns:
+            size = next(sizes)
+            if model.scene.motors == "frame" and joints[joint].units == ("rad",):
+                yield FrameDrive(model.tree.carried[joint], model.sign(joint), size)
+            else:
+                yield Drive(model.sign(joint) * np.eye(model.tree.n_v)[column], size)
+
+
+def modal_drives(model: SpatialModel, body: str, sizes: Iterator[TimeFunction]) -> Iterator[Drive]:
+    """Forces on the modes of the file of a body, one function of time after the other, along v of its tree."""
+    modes = model.tree.nodes[model.tree.index[body]].body.modal_transform
+    for unit in np.eye(len(modes)):
+        yield Drive(modal_direction(model, body, unit), next(sizes))
+
+
+def _check_motors(model: SpatialModel, analysis: Forward) -> None:
+    if not model.motors:
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected joints with motors for'
+            f' "{analysis.apply}", found none: name them with motor = true'
+        )

@@ -7,6 +7,7 @@ from typing import Any
 
 from .spatial_fcid import run_spatial_fcid
 from .spatial_forward import run_spatial_forward
+from .spatial_motors_only import run_spatial_motors_only
 from .spatial_pcid import run_spatial_pcid
 from .spatial_run import SpatialContext, SpatialRun
 from .spatial_static import run_spatial_static
@@ -16,5 +17,6 @@ MECHANICAL_IN_SPACE: Mapping[str, Callable[[SpatialContext, Any], SpatialRun]] =
     "fcid": run_spatial_fcid,
     "forward": run_spatial_forward,
     "static": run_spatial_static,
+    "motors-only": run_spatial_motors_only,
 }
 """By `kind`; each takes the record of its kind, which is that of planar scenes."""

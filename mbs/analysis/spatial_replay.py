@@ -16,6 +16,8 @@ from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.spatial_model import row_values
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
+from ..model.spatial_wrench import row_wrenches
+from ..scene.analysis import TimedAnalysis, output_times
 from .spatial_run import SpatialRun
 
 FEWEST_NODES = 401
@@ -32,12 +34,21 @@ class Replayed(NamedTuple):
     unresolved: float
 
 
-def replayed(source: SpatialRun, read: Callable[[SpatialRun], Array], end: float, tolerance: float) -> Replayed:
-    """What `read` (T, columns) finds of a run, up to `end` (s), to a share of the tolerance where that can be had."""
+def replay_times(source: SpatialRun, analysis: TimedAnalysis) -> Array:
+    """Output times (T,) of a run under what `source` found, s.
+
+    With what it does before t = 0 and, where the run goes to the end of the path, after that.
+    """
+    after = source.after if analysis.end == source.analysis.last_time else 0.0
+    return output_times(analysis.end, analysis.output_step, source.before, after)
+
+
+def replayed(source: SpatialRun, read: Callable[[SpatialRun], Array], times: Array, tolerance: float) -> Replayed:
+    """What `read` (T, columns) finds of a run over `times` (s), to a share of the tolerance where that can be had."""
     assert source.again is not None
     count = 2 * max(FEWEST_NODES // 2, source.steps) + 1
     while True:
-        nodes = as_floats(np.linspace(0.0, end, count))
+        nodes = as_floats(np.linspace(times[0], times[-1], count))
         values = _in_parts(source.again(nodes), read)
         peak = float(np.abs(values).max(initial=0.0))
         rough = np.array([f.sample(nodes[1::2])[0] for f in spline(nodes[::2], values[::2])]).T
@@ -54,6 +65,23 @@ def motor_forces_of(run: SpatialRun) -> MotorForces:
     C_v = row_values(run.model, run.q, run.time, frames)[1]
     wanted = path_forces(run.model, C_v, run.multipliers) if run.required is None else run.required
     return motor_forces(run.model, run.q, frames, C_v, wanted)
+
+
+def path_wrenches(run: SpatialRun) -> dict[str, Array]:
+    """What a path does on its point: force and moment (T, 6) about there, by point, of a run's motion."""
+    tree, frames = run.model.tree, run.model.tree.frames(run.q)
+    found: dict[str, Array] = {}
+    paths = {path.name: path for path in run.model.scene.trajectory if path.point is not None}
+    for k, row in enumerate(run.model.rows):
+        if not row.is_trajectory or row.owner not in paths:
+            continue
+        point = paths[row.owner].point
+        assert point is not None
+        of_a, of_b = row_wrenches(tree, row, -run.multipliers[:, k], run.q, run.time, frames)
+        arm = tree.motion(tree.section(point, np.eye(3)), run.q, frames).r
+        acting = (of_b if row.a.body < 0 else of_a).seen_from(-arm)
+        found[point] = found.get(point, 0.0) + np.hstack([acting.force, acting.moment])
+    return found
 
 
 def _in_parts(run: SpatialRun, read: Callable[[SpatialRun], Array]) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
+from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel
 from ..scene.analysis import Analysis
 from .drive import Progress
@@ -25,10 +26,12 @@ class SpatialRun:
         multipliers: (T, rows).
         required: (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are all.
         is_at_rest: whether targets stand still, as in an equilibrium.
+        applied: forces on points beside the loads of the scene.
         status: how it ended.
         integrator: its name.
         steps, evaluations: how many.
         wall_seconds: of all.
+        before, after: s, how long it acts before t = 0 and after the end of the analysis.
         warnings: on what is left open.
         cause: why it ended early, where more is known than its status says.
         details: what only its kind finds.
@@ -44,11 +47,14 @@ class SpatialRun:
     multipliers: Array
     required: Array | None = None
     is_at_rest: bool = False
+    applied: tuple[PointDrive, ...] = ()
     status: str = "completed"
     integrator: str = "none"
     steps: int = 0
     evaluations: int = 0
     wall_seconds: float = 0.0
+    before: float = 0.0
+    after: float = 0.0
     warnings: tuple[str, ...] = ()
     cause: str = ""
     details: Details = field(default=Details(), repr=False)
@@ -75,6 +81,18 @@ class SpatialRun:
             )
 
 
+ModalForces = Mapping[str, Array]
+"""By body, (T, n) on the modes of its file."""
+
+Supply = Callable[[ModalForces, bool], ModalForces]
+"""What patches do of modal forces, within their limits or not; bodies without patches are left out."""
+
+
+def no_patches(wanted: ModalForces, limited: bool) -> ModalForces:
+    """Nothing."""
+    return {}
+
+
 @dataclass(frozen=True)
 class SpatialContext:
     """What the run of an analysis in space starts from.
@@ -83,11 +101,13 @@ class SpatialContext:
         model: the robot, with the rows of all joints that close loops and of all trajectories.
         runs: of the analyses before, by name.
         progress: see `drive.Progress`.
+        supply: what patches do.
     """
 
     model: SpatialModel
     runs: Mapping[str, SpatialRun]
     progress: Progress
+    supply: Supply = no_patches
 
 
 def without_paths(model: SpatialModel) -> SpatialModel:

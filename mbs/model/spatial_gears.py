@@ -9,6 +9,7 @@ import numpy as np
 
 from ...common.errors import InputError
 from .spatial_body import rigid_body
+from .spatial_drives import Drive
 from .spatial_model import SpatialModel
 from .spatial_transmission import compliance
 from .spatial_tree import ElasticGearInSpace, Node, Section, SpatialTree
@@ -48,7 +49,10 @@ def with_compliance_in_space(model: SpatialModel) -> SpatialModel:
         ElasticGearInSpace(output, firm[node.body.name], -1.0 if node.backwards else 1.0, *(compliance(node) or (0, 0)))
         for output, node in zip(outputs, elastic, strict=True)
     )
-    return replace(model, tree=tree)
+    more = np.zeros(len(outputs))
+    return replace(
+        model, tree=tree, modal_loads=tuple(Drive(np.append(at, more), size) for at, size in model.modal_loads)
+    )
 
 
 def _output(tree: SpatialTree, node: Node, number: int) -> Node:

@@ -74,8 +74,10 @@ def required_forces(model: SpatialModel, state: Accelerated, times: Array) -> Ar
 
 
 def given_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], times: Array) -> Array:
-    """Generalized forces (T, n_v) of the scene's loads at q (T, n_q) and `times` (T,)."""
+    """Generalized forces (T, n_v) of all given loads at q (T, n_q) and `times` (T,)."""
     tree, found = model.tree, np.zeros((len(q), model.tree.n_v))
+    for direction, size in model.modal_loads:
+        found += size.sample(times)[0][:, None] * direction
     for load in model.scene.load:
         values = {name: function.sample(times)[0] for name, function in load.components.items()}
         if load.point is not None:

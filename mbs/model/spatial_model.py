@@ -18,6 +18,7 @@ from ..joints.spatial.joint import SpatialJoint
 from ..scene.spatial.mechanism import SpatialMechanismScene
 from ..scene.spatial.trajectories import SpatialTrajectory
 from .spatial_body import SpatialBody
+from .spatial_drives import Drive
 from .spatial_tree import Motion, Node, Section, SpatialTree
 
 RowKind = Literal["point", "slide", "dot", "rotation", "coordinate"]
@@ -57,11 +58,12 @@ class SpatialRow:
 
 @dataclass(frozen=True)
 class SpatialModel:
-    """A scene in space with its bodies: everything analyses share."""
+    """A scene in space with its bodies: everything analyses share. `modal_loads` act beside the loads of the scene."""
 
     scene: SpatialMechanismScene
     tree: SpatialTree
     rows: tuple[SpatialRow, ...]
+    modal_loads: tuple[Drive, ...] = ()
 
     @property
     def loop_rows(self) -> Booleans:
@@ -93,6 +95,13 @@ class SpatialModel:
         """What moments on a joint of the tree turn: the body that it carries, or its motor behind a gear that gives."""
         behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
+
+
+def modal_direction(model: SpatialModel, body: str, on_modes: Array) -> Array:
+    """Along v of the tree (n_v,): forces (n,) on the modes of the file of a body."""
+    node, direction = model.tree.nodes[model.tree.index[body]], np.zeros(model.tree.n_v)
+    direction[node.p_v] = on_modes @ node.body.modal_transform
+    return direction
 
 
 def _in_order(node: Node) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,10 +32,16 @@ def path_forces(model: SpatialModel, C_v: Array, multipliers: Array) -> Array:
     return found
 
 
-def split_forces(
-    model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array
-) -> tuple[dict[str, Array], Array]:
-    """Gᵀτ + EᵀF_p + C_mᵀν = `wanted` (T, n_v), with C_v (T, rows, n_v) at q (T, n_q): τ by joint, and EᵀF_p (T, n_v).
+class SplitForces(NamedTuple):
+    """τ (T, k) by joint, EᵀF_p (T, n_v) and ν (T, loop rows)."""
+
+    moments: dict[str, Array]
+    left: Array
+    loops: Array
+
+
+def split_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array) -> SplitForces:
+    """Gᵀτ + EᵀF_p + C_mᵀν = `wanted` (T, n_v), with C_v (T, rows, n_v) at q (T, n_q).
 
     In joint coordinates without loops τ are the components of the right side along the motors' coordinates and F_p
     those along the modes; loops share them out with ν.
@@ -51,12 +58,12 @@ def split_forces(
         first += len(numbers)
     if model.scene.motors == "frame":
         _move_to_frames(model, q, frames, moments, left)
-    return moments, left
+    return SplitForces(moments, left, found[:, : loops.shape[1]])
 
 
 def motor_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array) -> MotorForces:
     """The same, modal forces by body and in the modes of the modal body files."""
-    moments, left = split_forces(model, q, frames, C_v, wanted)
+    moments, left, _ = split_forces(model, q, frames, C_v, wanted)
     stored = {
         node.body.name: left[:, node.p_v] @ np.linalg.pinv(node.body.modal_transform) for node in model.tree.nodes
     }

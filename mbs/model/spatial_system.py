@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
 from .spatial_body import SpatialBody
+from .spatial_drives import NO_DRIVES, Drive, Drives, FrameDrive, PointDrive
 from .spatial_model import SpatialModel, SpatialRow
 from .spatial_transmission import resistance, resistance_slope, rotor
 from .spatial_tree import Node, Section
@@ -26,13 +27,6 @@ MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
 def _moves(node: Node) -> bool:
     """Whether modes move the section of the body at its joint."""
     return bool(np.any(_rows_of(node.body, node.outer)[0]))
-
-
-class Drive(NamedTuple):
-    """A force of time on what it drives, by direction: generalized (n_v,)."""
-
-    direction: Array
-    size: TimeFunction
 
 
 class Derivatives(NamedTuple):
@@ -60,7 +54,7 @@ class SpatialSystem:
         scene: what its rows follow, and what acts on it.
     """
 
-    def __init__(self, model: SpatialModel, drives: Sequence[Drive] = ()) -> None:
+    def __init__(self, model: SpatialModel, drives: Drives = NO_DRIVES) -> None:
         """`drives` act beside the loads of the scene."""
         self.model, tree = model, model.tree
         self._markers: list[list[Section]] = [[] for _ in tree.nodes]
@@ -73,7 +67,8 @@ class SpatialSystem:
         driven |= {node.joint.name for node in tree.nodes if node.joint.frictions}
         driven |= {gear.joint.joint.name for gear in tree.gears}
         self._wrenches: list[tuple[int, int]] = []
-        self._at_points = [self._point_load(load) for load in model.scene.load if load.point is not None]
+        loads = [PointDrive(load.point, load.components) for load in model.scene.load if load.point is not None]
+        self._at_points = [self._point_drive(drive) for drive in (*loads, *drives.at_points)]
         self._check()
         bodies = []
         for number, (node, (inner, outer)) in enumerate(zip(tree.nodes, sides, strict=True)):
@@ -91,7 +86,9 @@ class SpatialSystem:
             ground[number].turns = True
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
         self.core = _core.SpatialModel(bodies, ground, rows, wrenches, np.array(model.scene.gravity))
-        self._along = [self._load(load) for load in model.scene.load if load.joint is not None] + list(drives)
+        moments = [self._load(load) for load in model.scene.load if load.joint is not None]
+        self._along = [*moments, *model.modal_loads, *drives.along]
+        self._on_frames = drives.on_frames
         self.scene = self._follow()
 
     def _check(self) -> None:
@@ -160,6 +157,8 @@ class SpatialSystem:
         for wrench, components in self._at_points:
             for name, magnitude in components.items():
                 scene.add_point_load(wrench, OF_POINT.index(name), magnitude)
+        for drive in self._on_frames:
+            self._turn_frames(scene, drive)
         for node in self.model.tree.nodes:
             for number, friction in enumerate(node.joint.frictions):  # the same along all of a joint's coordinates
                 at = node.q.start + number, node.v.start + number
@@ -171,6 +170,16 @@ class SpatialSystem:
             scene.turn_marker(number, _turning_law(law))
         return scene
 
+    def _turn_frames(self, scene: _core.TreeScene, drive: FrameDrive) -> None:
+        """A moment along the joint, less what the sections at it would do on the modes of its two bodies."""
+        node, direction = self.model.tree.nodes[drive.body], np.zeros(self.model.tree.n_v)
+        direction[node.v] = drive.sign
+        scene.add_load(direction, drive.size)
+        for section, sign in ((node.outer, 1.0), (node.inner, -1.0)):
+            if section.body >= 0 and (of := self.model.tree.nodes[section.body]).body.n_modes:
+                Phi_r, axis = _rows_of(of.body, section)[0][3:], drive.sign * sign * section.triad[:, 2]
+                scene.add_frame_motor(of.p_q.start, of.p_v.start, Phi_r, axis, drive.size)
+
     def _load(self, load: SpatialLoad) -> Drive:
         """Direction (n_v,) and size of the moment of a joint."""
         assert load.joint is not None
@@ -178,11 +187,10 @@ class SpatialSystem:
         direction[self.model.driven(load.joint).v] = self.model.sign(load.joint)
         return Drive(direction, load.components["moment"])
 
-    def _point_load(self, load: SpatialLoad) -> tuple[int, dict[str, TimeFunction]]:
+    def _point_drive(self, drive: PointDrive) -> tuple[int, Mapping[str, TimeFunction]]:
         """Number of the wrench, and its components over time."""
-        assert load.point is not None
-        self._wrenches.append(self._place(self.model.tree.section(load.point, np.eye(3))))
-        return len(self._wrenches) - 1, load.components
+        self._wrenches.append(self._place(self.model.tree.section(drive.point, np.eye(3))))
+        return len(self._wrenches) - 1, drive.components
 
     def _turning_marker(self, law: OrientationLaw) -> int:
         """Number of the ground's marker that turns as `law` says; made where it is new."""

@@ -15,6 +15,7 @@ from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import gears_of_motion
 from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
 from ..model.spatial_tree import Motion, Node
@@ -50,7 +51,7 @@ class SpatialMotion:
     """States q (T, n_q), v and a (T, n_v) of a model's tree, and multipliers (T, rows) of its rows, at `time` (T,).
 
     `required` (T, n_v): generalized forces that prescribed motion takes, of links that are held to a shape as well.
-    `is_at_rest`: targets stand still, as in an equilibrium.
+    `is_at_rest`: targets stand still, as in an equilibrium. `applied`: forces on points beside the scene's loads.
     """
 
     model: SpatialModel
@@ -61,6 +62,7 @@ class SpatialMotion:
     multipliers: Array
     required: Array | None = None
     is_at_rest: bool = False
+    applied: tuple[PointDrive, ...] = ()
 
     @cached_property
     def frames(self) -> list[Motion]:
@@ -146,8 +148,8 @@ class SpatialMotion:
 
     @property
     def is_prescribed(self) -> bool:
-        """Whether trajectories hold in it, or motors their angles."""
-        return any(row.is_trajectory for row in self.model.rows)
+        """Whether trajectories hold in it, or motors their angles, or it is all given, with the forces that it takes."""
+        return any(row.is_trajectory for row in self.model.rows) or self.required is not None
 
     @cached_property
     def motor_forces(self) -> MotorForces | None:

@@ -6,7 +6,9 @@ Kolodziejczyk 2004; Seifried 2014, ch. 4). It is the zero dynamics about a path 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from ..joints.measure import Measure
 from ..model.model import ZERO, Constraint, Model
 from ..model.system import MechanismSystem
 from .initial_state import undeformed_state
+from .internal_dynamics import Evaluator, Output, Target
 from .reach import REACH_CHECKS, Followed, check_reach
 
 MOST_ITERATIONS = 50
@@ -63,6 +66,29 @@ class Servo:
         """Frequencies ω of all modes (n,), rad/s."""
         omega: Array = np.sqrt(np.concatenate([body.stiffness for body in self.path.model.bodies]))
         return omega
+
+    @property
+    def scene_path(self) -> Path:
+        """Of the scene, for messages."""
+        return self.path.model.scene.path
+
+    @property
+    def mode_counts(self) -> list[int]:
+        """By body."""
+        return [body.n_modes for body in self.path.model.bodies]
+
+    def targets(self) -> Iterator[Target]:
+        """What the path follows."""
+        for constraint in self.path.model.trajectories:
+            yield Target(constraint.owner, constraint.component, constraint.target)
+
+    def with_factor(self, factor: float) -> Servo:
+        """The same with another factor."""
+        return replace(self, factor=factor)
+
+    def with_offset(self, offset: tuple[TimeFunction, ...]) -> Servo:
+        """The same with what is expected of the deflections that the output leaves out."""
+        return replace(self, offset=offset)
 
 
 def motor_owner(joint: str) -> str:
@@ -116,7 +142,7 @@ class LinearDynamics:
         return M, D, K
 
 
-def linear_dynamics(core: _core.ServoConstraint, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
+def linear_dynamics(core: Evaluator, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
     """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n)."""
     n = p.shape[1]
     found = core.derivatives(as_list(times), p, v, a)
@@ -124,7 +150,7 @@ def linear_dynamics(core: _core.ServoConstraint, times: Array, p: Array, v: Arra
     return LinearDynamics(times, M, D, K)
 
 
-def equilibrium(servo: Servo, core: _core.ServoConstraint, t: float) -> Array:
+def equilibrium(servo: Output, core: Evaluator, t: float) -> Array:
     """Shape p (n,) at rest under path and loads as at time t. Raises `SolveError` where there is none."""
     p: Array = np.zeros((1, len(servo.scale)))
     rest = np.zeros_like(p)
@@ -138,7 +164,7 @@ def equilibrium(servo: Servo, core: _core.ServoConstraint, t: float) -> Array:
         if np.linalg.norm(step) <= TOLERANCE * (np.linalg.norm(p) + 1e-12):
             return np.asarray(p[0])
     raise SolveError(
-        f"{servo.path.model.scene.path}: no equilibrium under the motors was found at t = {t:g} s: the links are too"
+        f"{servo.scene_path}: no equilibrium under the motors was found at t = {t:g} s: the links are too"
         " soft for their loads there"
     )
 

@@ -242,8 +242,10 @@ def _check_motors(model: SpatialModel, found: Mobility) -> Iterator[str]:
             f" ({found.freedom}), found {count} ({quoted(motors)})"
         )
     if count < found.freedom and (named or model.scene.topology.is_open_chain):
-        moving = [joint.name for joint in _movable(model) if joint.name not in motors]
-        yield f"joints without motor: {', '.join(moving)}: motors alone cannot hold the path, their moments are none"
+        moving = [joint.name for joint in _movable(model) if joint.name not in motors and joint.type != "free"]
+        if moving:
+            names = ", ".join(moving)
+            yield f"joints without motor: {names}: motors alone cannot hold the path, their moments are none"
 
 
 def _movable(model: SpatialModel) -> Iterator[SpatialJoint]:

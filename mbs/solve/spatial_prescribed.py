@@ -43,24 +43,41 @@ def prescribed_motion(
     Raises `SolveError` where no posture meets the rows.
     """
     tree, joints = model.tree, model.tree.joint_columns
-    q, v, a = np.tile(start.q, (len(times), 1)), *np.zeros((2, len(times), tree.n_v))
-    q[:, _modal_places(model)], v[:, ~joints], a[:, ~joints] = modes
+    q = np.tile(start.q, (len(times), 1))
+    q[:, modal_places(model)] = modes[0]
     if near is None:
         q = _postures(model, times, q)
     else:
         q[:, joint_places(model)] = near[:, joint_places(model)]
         q, is_met = solve_postures(model, times, q)
         _check_met(model, times, is_met)
-    C_v = row_values(model, q, times)[1]
+    q, v, a, C_v = _moved(model, modes, times, q)
+    required = required_forces(model, Accelerated(tree, q, v, a, tree.frames(q)), times)
+    multipliers = -np.einsum("tji,tj->ti", np.linalg.pinv(C_v[:, :, joints]), required[:, joints])
+    return Prescribed(q, v, a, required, multipliers)
+
+
+def motion_near(model: SpatialModel, modes: Array, times: Array, guess: Array) -> tuple[Array, Array, Array, BoolArray]:
+    """Q, v and a with `modes` (3, T, n) at `times`, from guesses (T, n_q) of postures; and where one was found (T,)."""
+    q = guess.copy()
+    q[:, modal_places(model)] = modes[0]
+    q, is_met = solve_postures(model, times, q)
+    return *_moved(model, modes, times, q)[:3], is_met
+
+
+def _moved(model: SpatialModel, modes: Array, times: Array, q: Array) -> tuple[Array, Array, Array, Array]:
+    """Q, v, a and C_v (T, rows, n_v) of joints that follow the rows, at postures q (T, n_q) that meet them."""
+    tree, joints = model.tree, model.tree.joint_columns
+    v, a = np.zeros((2, len(times), tree.n_v))
+    v[:, ~joints], a[:, ~joints] = modes[1:]
+    frames = tree.frames(q)
+    C_v = row_values(model, q, times, frames)[1]
     by_joints = np.linalg.pinv(C_v[:, :, joints])
     rates = target_rates(model, q, times) - np.einsum("tij,tj->ti", C_v, v)
     v[:, joints] = np.einsum("tij,tj->ti", by_joints, rates)
-    frames = tree.frames(q)
     bias = row_accelerations(model, Accelerated(tree, q, v, a, frames), times)
     a[:, joints] = -np.einsum("tij,tj->ti", by_joints, bias)
-    required = required_forces(model, Accelerated(tree, q, v, a, frames), times)
-    multipliers = -np.einsum("tji,tj->ti", by_joints, required[:, joints])
-    return Prescribed(q, v, a, required, multipliers)
+    return q, v, a, C_v
 
 
 def quasi_static_shape(model: SpatialModel, times: Array, start: State, *, by_motors: bool) -> Array:
@@ -76,7 +93,7 @@ def quasi_static_shape(model: SpatialModel, times: Array, start: State, *, by_mo
         frames = model.tree.frames(found.q)
         C_v = row_values(model, found.q, times, frames)[1]
         if by_motors:
-            left = split_forces(model, found.q, frames, C_v, found.required)[1]
+            left = split_forces(model, found.q, frames, C_v, found.required).left
         else:
             left = found.required + np.einsum("tij,ti->tj", C_v, found.multipliers)
         step = left[:, ~joints] / K
@@ -92,7 +109,7 @@ def quasi_static_shape(model: SpatialModel, times: Array, start: State, *, by_mo
     )
 
 
-def _modal_places(model: SpatialModel) -> Array:
+def modal_places(model: SpatialModel) -> Array:
     """Where the modes of all bodies stand in q."""
     return np.concatenate([np.arange(node.p_q.start, node.p_q.stop) for node in model.tree.nodes])
 
@@ -113,7 +130,7 @@ def _check_met(model: SpatialModel, times: Array, is_met: BoolArray) -> None:
 
 def _postures(model: SpatialModel, times: Array, q: Array) -> Array:
     """Q (T, n_q) with joints that meet the rows, modes kept: some one after the other, those between from these."""
-    modes = _modal_places(model)
+    modes = modal_places(model)
     found, at, stride = np.zeros_like(q), q[0], -(-len(times) // ONE_BY_ONE)
     for k in range(0, len(times), stride):
         guess = q[k : k + stride].copy()

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from ...common.arrays import Array, ComplexArray, as_floats, as_list
 from ...common.errors import SolveError
 from .. import _core
 from .collocation import GAUSS, Boundary, Found, Problem, collocate
-from .servo import LinearDynamics, Servo, equilibrium, first_order, is_unstable, linear_dynamics, zeros
+from .internal_dynamics import Evaluator, Output
+from .servo import LinearDynamics, equilibrium, first_order, is_unstable, linear_dynamics, zeros
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -52,15 +53,18 @@ class Linearisation:
         return self.dynamics.times
 
 
+S = TypeVar("S", bound=Output)
+
+
 @dataclass(frozen=True)
-class Inversion:
+class Inversion(Generic[S]):
     """p(t) from −pre to end + post, and how it was found.
 
     `unmet` is the largest modal force that nobody supplies between collocation points, relative to the largest elastic
     one; `off_rest` how far from rest the start is: ‖(ω(p − p_0), ṗ)‖ relative to its peak.
     """
 
-    servo: Servo
+    servo: S
     linearisation: Linearisation
     curve: PPoly
     status: str
@@ -73,16 +77,12 @@ class Inversion:
         """p_k(t) of each body, for the core."""
         columns = iter(self.curve.c.transpose(2, 1, 0))
         return [
-            [_core.TimeFunction.polynomial(self.curve.x, np.ascontiguousarray(next(columns))) for _ in body.stiffness]
-            for body in self.servo.path.model.bodies
+            [_core.TimeFunction.polynomial(self.curve.x, np.ascontiguousarray(next(columns))) for _ in range(count)]
+            for count in self.servo.mode_counts
         ]
 
-    def source(self) -> _core.ActuationSource:
-        """The motors' forces at any time."""
-        return self.servo.source(self.shape)
 
-
-def linearise(servo: Servo, end: float) -> Linearisation:
+def linearise(servo: Output, end: float) -> Linearisation:
     """About links that follow their loads on the path as springs would: r(t, p, 0, 0) = 0.
 
     Raises `SolveError` where they are too soft for that.
@@ -97,15 +97,15 @@ def linearise(servo: Servo, end: float) -> Linearisation:
     lost = ~np.isfinite(dynamics.M.sum(axis=(1, 2)) + dynamics.D.sum(axis=(1, 2)) + dynamics.K.sum(axis=(1, 2)))
     if lost.any():
         raise SolveError(
-            f"{servo.path.model.scene.path}: motors alone cannot carry the path at t = {times[lost.argmax()]:g} s: the"
+            f"{servo.scene_path}: motors alone cannot carry the path at t = {times[lost.argmax()]:g} s: the"
             " links are too soft for their loads there; slow the path down"
         )
     return Linearisation(dynamics, p, zeros(dynamics, servo.scale))
 
 
 def invert(
-    servo: Servo, linear: Linearisation, pre: float, post: float, tolerance: float, progress: Callable[[float], bool]
-) -> Inversion:
+    servo: S, linear: Linearisation, pre: float, post: float, tolerance: float, progress: Callable[[float], bool]
+) -> Inversion[S]:
     """Solve r(t, p, ṗ, p̈) = 0 on [−pre, end + post] until nothing above `tolerance` is left between the breaks.
 
     Raises `SolveError` where there is no equilibrium to start from or to end in, or where zeros change sides.
@@ -114,7 +114,7 @@ def invert(
     start, finish = _boundary(servo, core, -pre, unstable=False), _boundary(servo, core, end + post, unstable=True)
     if len(start.rows) + len(finish.rows) != 2 * len(servo.scale):
         raise SolveError(
-            f"{servo.path.model.scene.path}: stable inversion needs as many zeros in the right half plane before the"
+            f"{servo.scene_path}: stable inversion needs as many zeros in the right half plane before the"
             f" path as after it, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}"
         )
     problem = Problem(
@@ -197,7 +197,7 @@ class _Solver:
         return largest
 
 
-def _boundary(servo: Servo, core: _core.ServoConstraint, t: float, unstable: bool) -> Boundary:
+def _boundary(servo: Output, core: Evaluator, t: float, unstable: bool) -> Boundary:
     """No part of y − y_rest in the unstable subspace of the equilibrium at time t, or none in the rest.
 
     An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ. Undamped motions count as
@@ -244,7 +244,7 @@ def _states(curve: PPoly) -> States:
     return lambda times: (curve(times), rate(times), acceleration(times))
 
 
-def _off_rest(servo: Servo, curve: PPoly, rest: Array) -> float:
+def _off_rest(servo: Output, curve: PPoly, rest: Array) -> float:
     p, v, _ = _states(curve)(curve.x)
     size = np.hypot(np.linalg.norm(servo.scale * (p - rest[: p.shape[1]]), axis=1), np.linalg.norm(v, axis=1))
     return float(size[0] / max(float(size.max()), TINY))

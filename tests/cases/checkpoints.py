@@ -52,6 +52,7 @@ TABLES = {
     ("two_link_rest_to_rest", "times less"): 0.03,  # quotients of the above
     ("arm_3r", "run"): 1e-3,
     ("slider_crank_3d", "largest"): 1e-3,
+    ("slewing_appendage", "largest"): 1e-3,
 }
 
 

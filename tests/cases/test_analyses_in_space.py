@@ -143,6 +143,23 @@ def test_moments_of_rigid_arm_carry_it_along_its_path(kind, tmp_path, ffrobot):
         close(file["inverse/momentum/linear"], file["again/momentum/linear"])
 
 
+@pytest.mark.parametrize("name", ["arm3_line_undeformed", "slider_crank_3d", "arm5_tool_axis"])
+def test_forces_on_paths_bring_the_motion_again(name, tmp_path, ffrobot):
+    """Links that vibrate, a loop, a tool axis: the robot alone under the path's forces moves as on the path."""
+    scene = write_scene(name, tmp_path, more=REPLAY.replace('"joints"', '"trajectory"'))
+    with solved(ffrobot, scene) as file:
+        for body, group in file["inverse/bodies"].items():
+            for key in ("position", "modal"):
+                if group[key].size:
+                    close(file[f"again/bodies/{body}/{key}"], group[key][()], 1e-3 if key == "position" else 1e-12)
+        for joint, group in file["inverse/joints"].items():
+            if "coordinate" in group:
+                close(file[f"again/joints/{joint}/coordinate"], group["coordinate"][()], 0.1)
+            largest = np.abs(group["reaction"]).max()
+            np.testing.assert_allclose(file[f"again/joints/{joint}/reaction"], group["reaction"], atol=2e-5 * largest)
+        assert not len(file["again"].attrs["warnings"])
+
+
 def test_motors_keep_within_their_limits(tmp_path, ffrobot):
     """A motor whose limit is below all that is needed lets the arm sink; with one that is above it goes as without."""
     sunk = {}

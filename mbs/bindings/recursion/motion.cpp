@@ -39,6 +39,12 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
   }
   for (const JointForce &force : scene.joint_forces)
     check_index("q of a joint's force", force.q, n_q), check_index("v of a joint's force", force.v, n_v);
+  for (const FrameMotor &motor : scene.frame_motors) {
+    const auto last = static_cast<int>(motor.Phi_r.cols()) - 1;
+    check_index("q of a motor on frames", motor.q, n_q), check_index("v of a motor on frames", motor.v, n_v);
+    check_index("q of a motor on frames", motor.q + last, n_q);
+    check_index("v of a motor on frames", motor.v + last, n_v);
+  }
   for (const GearSpring &gear : scene.gears)
     for (const GearSpring::Side &side : {gear.a, gear.b})
       check_index("q of a gear", side.q, n_q), check_index("v of a gear", side.v, n_v);
@@ -219,6 +225,15 @@ void bind_tree_motion(nb::module_ &m) {
           },
           "q"_a, "v"_a, "stiffness"_a, "rest"_a, "viscous"_a, "coulomb"_a, "speed"_a,
           "Spring and friction along the coordinate with these indices in q and v.")
+      .def(
+          "add_frame_motor",
+          [](Scene &s, int q, int v, const Eigen::MatrixXd &rotation, const Eigen::Vector3d &axis,
+             const TimeFunction &magnitude) {
+            check_size("rotation", rotation.rows(), 3);
+            s.frame_motors.push_back({q, v, rotation, axis, magnitude});
+          },
+          "q"_a, "v"_a, "rotation"_a, "axis"_a, "magnitude"_a,
+          "What a motor that turns the frame of a body takes back on its modes: see core/recursion/frame_motor.h.")
       .def(
           "add_gear",
           [](Scene &s, std::pair<int, int> a, std::pair<int, int> b, double ratio, double stiffness, double damping) {

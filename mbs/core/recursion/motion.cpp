@@ -57,7 +57,7 @@ template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
 template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
   update_targets(t);
   Forces<double> forces;
-  if (!scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.gears.empty()) {
+  if (!scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.frame_motors.empty() || !scene_.gears.empty()) {
     force_.setZero();
     for (const Load &load : scene_.loads) {
       const double magnitude = load.magnitude(t).value;
@@ -66,6 +66,8 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
     }
     for (const JointForce &joint : scene_.joint_forces)
       force_[joint.v] -= joint.stiffness * (q[joint.q] - joint.rest) + joint.friction.resistance(v[joint.v]);
+    for (const FrameMotor &motor : scene_.frame_motors)
+      motor.add(t, q, force_.data());
     for (const auto &[a, b, ratio, stiffness, damping] : scene_.gears) {
       const double moment = stiffness * (q[a.q] - ratio * q[b.q]) + damping * (v[a.v] - ratio * v[b.v]);
       force_[a.v] -= moment, force_[b.v] += ratio * moment;

@@ -6,6 +6,7 @@
 
 #include "core/constraint/constraint.h"
 #include "core/integrate/ode.h"
+#include "core/recursion/frame_motor.h"
 #include "core/recursion/motion_norm.h"
 #include "core/recursion/newton.h"
 #include "core/recursion/posture.h"
@@ -63,6 +64,7 @@ struct Scene {
   std::vector<Load> loads;
   std::vector<PointLoad> point_loads;
   std::vector<JointForce> joint_forces;
+  std::vector<FrameMotor> frame_motors;
   std::vector<GearSpring> gears;
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;

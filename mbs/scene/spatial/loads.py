@@ -15,12 +15,14 @@ OF_POINT = ("x", "y", "z", "mx", "my", "mz")
 
 
 class SpatialLoad(Record):
-    """A given load: force (N) and moment (N·m) on a section, in global axes, or the moment of a joint."""
+    """A given load: force (N) and moment (N·m) on a section, in global axes, the moment of a joint, or voltages (V)."""
 
     point: PointReference | None = None
     """Where it acts, "BODY.POINT"."""
     joint: str | None = None
     """Joint along whose coordinate it acts."""
+    pzt: str | None = None
+    """Layout of patches that get voltages, by its name (the body's where it has none)."""
     x: Expression | None = None
     """Force along the ground's x axis, N; expression in t."""
     y: Expression | None = None
@@ -35,11 +37,14 @@ class SpatialLoad(Record):
     """Moment about the ground's z axis on the section, N·m; expression in t."""
     moment: Expression | None = None
     """On the second side of the joint along its coordinate, N·m (N where it slides); expression in t."""
+    voltage: tuple[Expression, ...] | None = None
+    """One expression in t for each patch of the layout, V."""
 
     @model_validator(mode="after")
     def _consistent(self) -> SpatialLoad:
-        subject = one_of(self, ("point", "joint"))
-        only(self, subject, OF_POINT if subject == "point" else ("moment",), (*OF_POINT, "moment"))
+        subject = one_of(self, ("point", "joint", "pzt"))
+        allowed = {"point": OF_POINT, "joint": ("moment",), "pzt": ("voltage",)}[subject]
+        only(self, subject, allowed, (*OF_POINT, "moment", "voltage"))
         return self
 
     def references(self) -> Iterator[Reference]:
@@ -47,9 +52,12 @@ class SpatialLoad(Record):
         yield from marker_reference("point", self.point, loaded=True)
         if self.joint is not None:
             yield Reference("joint", self.joint, "joint")
+        if self.pzt is not None:
+            yield Reference("pzt", self.pzt, "patches")
 
     @property
     def components(self) -> dict[str, TimeFunction]:
-        """The given functions of time by component."""
+        """The given functions of time by component; of voltages "voltage[k]"."""
         of_point = present(x=self.x, y=self.y, z=self.z, mx=self.mx, my=self.my, mz=self.mz)
-        return of_point | present(moment=self.moment)
+        voltages = {f"voltage[{k}]": function for k, function in enumerate(self.voltage or ())}
+        return of_point | present(moment=self.moment) | voltages

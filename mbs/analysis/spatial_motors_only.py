@@ -1,0 +1,69 @@
+"""Inverse dynamics in space with motors only, by stable inversion: see `motors_only`, whose record and rules it has."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ...common.arrays import Array
+from ..model.spatial_model import SpatialModel, row_values
+from ..scene.analysis import output_times
+from ..solve.servo import is_unstable
+from ..solve.spatial_servo import SpatialServo, make_spatial_servo
+from ..solve.stable_inversion import Inversion, invert
+from .motors_only import MotorsOnly, cause_of, check_rest, choose_output, durations
+from .spatial_run import SpatialContext, SpatialRun, without_paths
+
+NOTABLE = 1e-9  # m, rad: of a path that is left
+
+
+def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> SpatialRun:
+    """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
+
+    Raises `InputError` and `SolveError` as `motors_only.run_motors_only`.
+    """
+    model, began = context.model, time.perf_counter()
+    servo, linear = choose_output(partial(make_spatial_servo, model, analysis.end), analysis)
+    needs_future = bool(is_unstable(linear.zeros[0]).any())
+    check_rest(servo, analysis, needs_future)
+    pre, post = durations(analysis, linear, needs_future)
+    inversion = invert(servo, linear, pre, post, analysis.tolerance, context.progress)
+    times = output_times(analysis.end, analysis.output_step, pre, post)
+    times = times[times <= inversion.curve.x[-1] + 1e-9 * analysis.end]  # what an integration reached
+    run = _run(analysis, model, inversion, times)
+    return replace(
+        run, before=pre, after=post, wall_seconds=time.perf_counter() - began, warnings=_told(inversion, run)
+    )
+
+
+def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[SpatialServo], times: Array) -> SpatialRun:
+    curve = inversion.curve
+    modes = np.array([curve(times), curve.derivative(1)(times), curve.derivative(2)(times)])
+    found, is_met = inversion.servo.motion(times, modes)
+    kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
+
+    def again(others: Array) -> SpatialRun:
+        return _run(analysis, model, inversion, others)
+
+    return SpatialRun(
+        analysis, without_paths(model), times[kept], found.q[kept], found.v[kept], found.a[kept],
+        -found.split.loops[kept], found.required[kept], status=inversion.status, integrator="collocation",
+        steps=len(curve.x) - 1, evaluations=inversion.iterations, again=again,
+    )  # fmt: skip
+
+
+def _told(inversion: Inversion[SpatialServo], run: SpatialRun) -> tuple[str, ...]:
+    """Why the inversion failed, and how far a redefined output leaves the path itself."""
+    told = [cause_of(inversion)] if run.failed else []
+    if not run.failed and inversion.servo.factor < 1:
+        held = inversion.servo.model
+        C = row_values(held, run.q, run.time)[0][:, ~held.loop_rows]
+        if (off := float(np.abs(C).max(initial=0.0))) > NOTABLE:
+            told.append(
+                f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of the trajectory"
+                f" is off by up to {off:.3g} (m or rad)"
+            )
+    return tuple(text for text in told if text)

@@ -1,0 +1,40 @@
+// What a motor that turns frames does on modes, beside its moment along the joint.
+#pragma once
+
+#include "core/time_function/time_function.h"
+
+#include <Eigen/Dense>
+
+#include <cmath>
+
+namespace ffrobot::recursion {
+
+// On the modes p of one of its two bodies. The joint turns sections, whose angular velocity is that of the frame and
+// A J_l(phi) Phi_r p_dot, phi = Phi_r p; the motor turns the frame alone. What the section's part of the moment would
+// do is taken back: -m (J_l^T exp(phi) B z)^T Phi_r, and J_l(phi)^T exp(phi) = J_l(phi), the left Jacobian of SO(3).
+struct FrameMotor {
+  int q = 0, v = 0;       // of the first mode
+  Eigen::Matrix3Xd Phi_r; // (3, n) of the section
+  Eigen::Vector3d axis;   // B z: of the joint, in axes of the undeformed section
+  TimeFunction magnitude; // N m along the axis, on this body
+
+  // Adds the modal forces at time t and q to those along v.
+  void add(double t, const double *q_all, double *force) const {
+    const auto n = Phi_r.cols();
+    const Eigen::Vector3d phi = Phi_r * Eigen::Map<const Eigen::VectorXd>(q_all + q, n);
+    Eigen::Map<Eigen::VectorXd>(force + v, n) -= magnitude(t).value * (Phi_r.transpose() * turned(phi));
+  }
+
+private:
+  // J_l(phi) axis, by series where |phi| is small.
+  Eigen::Vector3d turned(const Eigen::Vector3d &phi) const {
+    const double y = phi.squaredNorm(), angle = std::sqrt(y);
+    const bool small = y < 1e-4;
+    const double a = small ? 0.5 - y / 24 * (1 - y / 30) : (1 - std::cos(angle)) / y;
+    const double b = small ? 1. / 6 - y / 120 * (1 - y / 42) : (angle - std::sin(angle)) / (y * angle);
+    const Eigen::Vector3d across = phi.cross(axis);
+    return axis + a * across + b * phi.cross(across);
+  }
+};
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,187 @@
+"""A path in space whose force enters through the joint motors alone: its internal dynamics, as `servo` in the plane.
+
+With p(t) given the joints follow from the path and loops, and r(t, p, ṗ, p̈) = F_p, the modal forces that motors leave,
+is what has to vanish (Blajer and Kolodziejczyk 2004; Seifried 2014, ch. 4). It is quadratic in ṗ and linear in p̈, so
+that differences are exact there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from ...common.errors import InputError
+from .._core import TimeFunction
+from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_inverse import required_forces
+from ..model.spatial_model import SpatialModel, SpatialRow, row_values
+from ..model.spatial_motors import SplitForces, split_forces
+from .internal_dynamics import Target
+from .spatial_posture import BoolArray, mobility, solve_posture, undeformed_posture
+from .spatial_prescribed import modal_places, motion_near
+
+POSTURES = 201  # along the path, from which others are looked for
+DIFFERENCE = 1e-6  # of √J, by which a mode bends its link by about its length
+MOST_STATES = 4000  # that are evaluated at once
+
+
+class Derivatives(NamedTuple):
+    """∂r/∂p̈, ∂r/∂ṗ and ∂r/∂p, each (N, n, n)."""
+
+    M: Array
+    D: Array
+    K: Array
+
+
+class ServoMotion(NamedTuple):
+    """States q (T, n_q), v and a (T, n_v) with p(t) given, and M v̇ − Q split into motors, modes and loops."""
+
+    q: Array
+    v: Array
+    a: Array
+    required: Array
+    split: SplitForces
+
+
+@dataclass(frozen=True)
+class SpatialServo:
+    """The robot under its path, held before 0 and after `end`; `factor` and `offset` as in `servo.Servo`.
+
+    `near` (N, n_q): postures along the path without deflections, at `near_times`.
+    """
+
+    model: SpatialModel
+    end: float
+    factor: float
+    near_times: Array
+    near: Array
+    offset: tuple[TimeFunction, ...] = ()
+
+    def core(self) -> SpatialServo:
+        """The evaluator of r(t, p, ṗ, p̈)."""
+        return self
+
+    @cached_property
+    def scale(self) -> Array:
+        """Frequencies ω of all modes (n,), rad/s."""
+        omega: Array = np.sqrt(np.concatenate([node.body.stiffness for node in self.model.tree.nodes]))
+        return omega
+
+    @property
+    def scene_path(self) -> Path:
+        """Of the scene, for messages."""
+        return self.model.scene.path
+
+    @property
+    def mode_counts(self) -> list[int]:
+        """By body of the tree."""
+        return [node.body.n_modes for node in self.model.tree.nodes]
+
+    def targets(self) -> Iterator[Target]:
+        """What the path follows."""
+        for path in self.model.scene.trajectory:
+            for component, function in path.components.items():
+                yield Target(path.name, component, function)
+            if path.orientation is not None:
+                for function in path.orientation.functions:
+                    yield Target(path.name, path.orientation.kind, function)
+
+    def with_factor(self, factor: float) -> SpatialServo:
+        """The same with another factor."""
+        return replace(self, factor=factor)
+
+    def with_offset(self, offset: tuple[TimeFunction, ...]) -> SpatialServo:
+        """The same with what is expected of the deflections that the output leaves out."""
+        return replace(self, offset=offset)
+
+    def motion(self, times: Array, modes: Array) -> tuple[ServoMotion, BoolArray]:
+        """With `modes` (3, T, n), p, ṗ and p̈, at `times` (T,); and where a posture was found (T,)."""
+        model, tree = self.model, self.model.tree
+        guess = self.near[np.abs(times[:, None] - self.near_times).argmin(axis=1)]
+        seen = self.factor * modes
+        if self.offset:
+            seen = seen + np.array([f.sample(times) for f in self.offset]).transpose(1, 2, 0)
+        q, v, a, is_met = motion_near(model, seen, times, guess)
+        q[:, modal_places(model)], v[:, ~tree.joint_columns], a[:, ~tree.joint_columns] = modes
+        frames = tree.frames(q)
+        required = required_forces(model, Accelerated(tree, q, v, a, frames), np.clip(times, 0.0, self.end))
+        split = split_forces(model, q, frames, row_values(model, q, times, frames)[1], required)
+        return ServoMotion(q, v, a, required, split), is_met
+
+    def residuals(self, times: list[float], p: Array, v: Array, a: Array) -> Array:
+        """Modal forces r (N, n) that motors do not supply; NaN where no posture is found."""
+        at, modes = np.array(times), np.array([p, v, a])
+        parts = range(0, len(at), MOST_STATES)
+        return np.concatenate([self._left(at[k : k + MOST_STATES], modes[:, k : k + MOST_STATES]) for k in parts])
+
+    def derivatives(self, times: list[float], p: Array, v: Array, a: Array) -> Derivatives:
+        """By central differences; of ṗ and p̈, which r is quadratic and linear in, these are exact."""
+        n = p.shape[1]
+        lengths = [np.full(node.body.n_modes, np.sqrt(np.linalg.eigvalsh(node.body.inertia)[-1]))
+                   for node in self.model.tree.nodes]  # fmt: skip
+        steps = (DIFFERENCE * np.concatenate(lengths), np.ones(n), np.ones(n))
+        modes, at = np.array([p, v, a]), np.repeat(np.array(times), 2 * n)
+        found = []
+        for k, step in enumerate(steps):
+            moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
+            moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
+            r = self.residuals(at.tolist(), *moved.reshape(3, -1, n)).reshape(-1, 2, n, n)
+            found.append(((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1))
+        K, D, M = found
+        return Derivatives(M, D, K)
+
+    def _left(self, times: Array, modes: Array) -> Array:
+        found, is_met = self.motion(times, modes)
+        left: Array = np.where(is_met[:, None], found.split.left[:, ~self.model.tree.joint_columns], np.nan)
+        return left
+
+
+def make_spatial_servo(model: SpatialModel, end: float, factor: float) -> SpatialServo:
+    """The equations for a path that is held before 0 and after `end`.
+
+    Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes, and
+    for a path that the undeformed robot cannot follow.
+    """
+    path = model.scene.path
+    held = replace(model, rows=tuple(_held(row, end) for row in model.rows))
+    start = undeformed_posture(held).q
+    freedom = mobility(held, start).freedom
+    motors = sum(len(columns) for columns in model.motors.values())
+    for found, what in ((motors, "motors"), (np.count_nonzero(~model.loop_rows), "trajectory components")):
+        if found != freedom:
+            raise InputError(
+                f'{path}: expected for kind = "motors-only" as many {what} as the mechanism has degrees of freedom'
+                f" ({freedom}), found {found}"
+            )
+    if not any(node.body.n_modes for node in model.tree.nodes):
+        raise InputError(
+            f'{path}: expected at least one flexible body for kind = "motors-only", found only rigid ones: kind ='
+            ' "pcid" gives their motors\' forces'
+        )
+    if factor != 1.0 and model.loop_rows.any():
+        raise InputError(
+            f'{path}: expected an open chain for output = "redefined" in space = "spatial", found a closed loop: use'
+            ' output = "tip"'
+        )
+    times = as_floats(np.linspace(0.0, end, POSTURES))
+    near = [start]
+    for t in times[1:]:
+        q = solve_posture(held, float(t), near[-1])
+        if q is None:
+            raise InputError(f"{path}: trajectory: expected a path within reach, found no posture at t = {t:.6g} s")
+        near.append(q)
+    return SpatialServo(held, end, factor, times, np.array(near))
+
+
+def _held(row: SpatialRow, end: float) -> SpatialRow:
+    target = None if row.target is None else row.target.held(0.0, end)
+    law = row.law
+    if law is not None:
+        law = replace(law, functions=tuple(function.held(0.0, end) for function in law.functions))
+    return replace(row, target=target, law=law)

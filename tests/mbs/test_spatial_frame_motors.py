@@ -1,0 +1,58 @@
+"""Motors that turn frames in space: what the core makes of them is the virtual work of two frames."""
+
+import numpy as np
+import pytest
+from spatial_scenes import as_scene, coordinates, tree_model
+from spatial_trees import random_tree
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.model.spatial_accelerations import Accelerated
+from ffrobot.mbs.model.spatial_drives import Drive, Drives, FrameDrive
+from ffrobot.mbs.model.spatial_inverse import required_forces
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+
+MOMENT = 0.7  # N·m
+
+
+def state_of(turned, drives):
+    """A chain of three solids and beams at random q and v under a motor in its second joint: model, and state."""
+    tree = random_tree(np.random.default_rng(8), ["revolute"] * 3, ("solid", "beam"), chain=True, size=0.02)
+    plain, tables = as_scene(tree, turned)
+    model = tree_model(plain, tables)
+    system = SpatialSystem(model, drives(model))
+    rng = np.random.default_rng(1)
+    q = model.tree.at_rest(coordinates(model, plain, turned))
+    for node in model.tree.nodes:
+        q[node.p_q] = 0.03 * rng.standard_normal(node.body.n_modes)
+    v = rng.standard_normal(model.tree.n_v)
+    a = _core.tree_outputs(system.core, system.scene, [0.1], np.concatenate([q, v])[None]).accelerations
+    return model, Accelerated(model.tree, q[None], v[None], a, model.tree.frames(q[None]))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_generalized_forces_are_the_virtual_work_of_the_frames(turned):
+    """M v̇ − Q of what the core finds is τ z·(∂ω_b − ∂ω_a), z of the joint, ω of the two frames."""
+    size = _core.TimeFunction.constant(MOMENT)
+    model, state = state_of(turned, lambda model: Drives(on_frames=(FrameDrive(1, 1.0, size),)))
+    node = model.tree.nodes[1]
+    axis = model.tree.motion(node.inner, state.q, state.frames).F[0, :, 2]
+    expected = MOMENT * axis @ (state.frames[1].L[0, 3:] - state.frames[node.inner.body].L[0, 3:])
+    (found,) = required_forces(model, state, np.array([0.1]))
+    np.testing.assert_allclose(found, expected, atol=1e-9 * MOMENT)
+    modal = ~model.tree.joint_columns
+    assert np.abs(expected[modal]).max() > 1e-3 * MOMENT
+
+
+def test_sections_have_no_part_of_it():
+    """The same moment on sections acts along the joint alone."""
+
+    def along(model):
+        direction = np.zeros(model.tree.n_v)
+        direction[model.tree.nodes[1].v] = 1.0
+        return Drives(along=(Drive(direction, _core.TimeFunction.constant(MOMENT)),))
+
+    model, state = state_of(False, along)
+    (found,) = required_forces(model, state, np.array([0.1]))
+    expected = np.zeros(model.tree.n_v)
+    expected[model.tree.nodes[1].v] = MOMENT
+    np.testing.assert_allclose(found, expected, atol=1e-9 * MOMENT)
