@@ -16,6 +16,7 @@ from scipy.signal import lsim
 from ffrobot import Results
 from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.exchange.fmu.linear_fmu import make_unit
+from ffrobot.exchange.fmu.variables import joint_units
 
 LINK = """
 name = "arm"
@@ -297,10 +298,46 @@ def test_names_that_are_no_identifiers(tmp_path):
         ("joint/Schlitten*/", "rate of joint/Schlitten*/"), ("joint/Schlitten*/",), ("joint/Schlitten*/",), 0.0,
         np.eye(1), np.eye(1),
     )  # fmt: skip
-    unit = make_unit("3 Größen", "α", model, frozenset({"Schlitten*/"}))
+    unit = make_unit("3 Größen", "α", model, {"Schlitten*/": "m"})
     assert unit.identifier == "robot_3_Gr__en__"
     assert [each.unit for each in (*unit.inputs, *unit.outputs, *unit.states)] == ["N", "m", "m", "m/s"]
     assert len({each.name for each in unit.variables}) == len(unit.variables)
+
+
+IN_SPACE = """
+name = "in space"
+space = "spatial"
+gravity = [0.0, 0.0, 0.0]
+body = [{ name = "arm", link = "arm.toml" }]
+joint = [{ name = "shaft", type = "cylindrical", between = ["ground", "arm.root"], axis = [0.0, 0.0, 1.0] }]
+payload = [{ point = "arm.tip", mass = 0.05 }]
+analysis = [{ name = "at_rest", kind = "linear" }]
+"""
+
+
+def test_a_linear_model_in_space(ffrobot, folder):
+    (folder / "space.toml").write_text(IN_SPACE)
+    for command in (("solve", "space.toml"), ("export", "space.results.h5", "--format", "fmu")):
+        done = ffrobot(*command, cwd=folder)
+        assert done.returncode == 0, done.stderr
+    assert validate_fmu(str(folder / "space.results.fmu")) == []
+    variables = read_model_description(str(folder / "space.results.fmu")).modelVariables
+    units = {each.name: each.unit for each in variables}
+    assert [units[name] for name in ("joint/shaft 1", "joint/shaft 2", "point/arm.tip/z")] == ["rad", "m", "m"]
+    assert units["force/arm.tip/z"] == "N"
+
+
+def test_units_of_every_type_of_joint():
+    """Joints with several coordinates have angles and ways among them."""
+    types = ("revolute", "prismatic", "screw", "cylindrical", "universal", "spherical", "planar", "weld", "free")
+    found = joint_units({"joint": [{"name": name[:2], "type": name} for name in types]})
+    ways = [name for name, unit in found.items() if unit == "m"]
+    assert ways == ["pr", "cy 2", "pl 1", "pl 2", "fr 1", "fr 2", "fr 3"]
+    angles = [name for name, unit in found.items() if unit == "rad"]
+    assert angles == [
+        *("re", "sc", "cy 1", "un 1", "un 2", "sp 1", "sp 2", "sp 3", "pl 3"),
+        *("fr 4", "fr 5", "fr 6"),
+    ]
 
 
 def test_what_is_refused(robot, ffrobot, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import zipfile
+from collections.abc import Mapping
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
@@ -16,7 +17,7 @@ from ...common.errors import InputError
 from ...results.file import Results
 from .description import Unit, model_description
 from .source import binary, numbers, sources
-from .variables import inputs_of, outputs_of, states_of
+from .variables import inputs_of, joint_units, outputs_of, states_of
 
 LONGEST = 60  # characters of a name in the identifier
 DATE = (1980, 1, 1, 0, 0, 0)  # of all files in it: the same model is the same FMU, byte for byte
@@ -39,8 +40,7 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
         )
     model = models[0]
     _check(path, name, model)
-    on_ways = frozenset(str(joint["name"]) for joint in scene.get("joint", ()) if joint["type"] == "prismatic")
-    unit = make_unit(str(scene["name"]), name, model, on_ways)
+    unit = make_unit(str(scene["name"]), name, model, joint_units(scene))
     files = sources(unit)
     compiled = binary(unit, files)
     content = {"modelDescription.xml": model_description(unit, f"ffrobot {version('ffrobot')}")}
@@ -54,10 +54,10 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
     return _zipped(content), what, tuple(remarks)
 
 
-def make_unit(scene: str, analysis: str, model: LinearModel, on_ways: frozenset[str]) -> Unit:
-    """Names and variables of the FMU of a model; `on_ways` are the joints that slide."""
+def make_unit(scene: str, analysis: str, model: LinearModel, units: Mapping[str, str]) -> Unit:
+    """Names and variables of the FMU of a model; `units` of the joints' coordinates."""
     plain = re.sub(r"[^A-Za-z0-9_]", "_", f"{scene}_{analysis}")[:LONGEST]
-    states, inputs, outputs = (of(model, on_ways) for of in (states_of, inputs_of, outputs_of))
+    states, inputs, outputs = (of(model, units) for of in (states_of, inputs_of, outputs_of))
     names = "\n".join(each.name for each in (*states, *inputs, *outputs))
     return Unit(
         identifier=plain if plain[0].isalpha() else f"robot_{plain}"[:LONGEST],

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ...actuation.control.linear_model import LinearModel
+from ...mbs.joints.spatial.free import SpatialFree
+from ...mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
 
 UNITS: Mapping[str, Mapping[str, int]] = {
     "rad": {"rad": 1},
@@ -35,25 +38,36 @@ class Variable:
     description: str
 
 
-def inputs_of(model: LinearModel, on_ways: frozenset[str]) -> tuple[Variable, ...]:
-    """Motors, voltages, forces at points; `on_ways` are the joints that slide.
+def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
+    """Unit of each coordinate of the joints of a scene, by "NAME", or "NAME 1", "NAME 2" of joints with several."""
+    found = {}
+    for joint in scene.get("joint", ()):
+        record = SPATIAL_JOINT_TYPES[joint["type"]]  # types that the plane has too have the same units there
+        units = record.units or record.guess_units
+        for number, unit in enumerate(units, 1):
+            found[f"{joint['name']} {number}" if len(units) > 1 else str(joint["name"])] = unit
+    return found
+
+
+def inputs_of(model: LinearModel, units: Mapping[str, str]) -> tuple[Variable, ...]:
+    """Motors, voltages, forces at points; `units` of the joints' coordinates, see `joint_units`.
 
     A motor is "joint/NAME/moment" here, as in results, since "joint/NAME" is an output; FMI wants names once.
     """
-    return tuple(_input(name, on_ways) for name in model.input_names)
+    return tuple(_input(name, units) for name in model.input_names)
 
 
-def outputs_of(model: LinearModel, on_ways: frozenset[str]) -> tuple[Variable, ...]:
+def outputs_of(model: LinearModel, units: Mapping[str, str]) -> tuple[Variable, ...]:
     """Joint coordinates, places of points, modal coordinates."""
-    return tuple(Variable(name, *_coordinate(name, on_ways)) for name in model.output_names)
+    return tuple(Variable(name, *_coordinate(name, units)) for name in model.output_names)
 
 
-def states_of(model: LinearModel, on_ways: frozenset[str]) -> tuple[Variable, ...]:
+def states_of(model: LinearModel, units: Mapping[str, str]) -> tuple[Variable, ...]:
     """Independent coordinates and their rates; "state " before a name which an output has too."""
     taken = set(model.output_names)
     found = []
     for name in model.state_names:
-        unit, description = _coordinate(name.removeprefix(RATE), on_ways)
+        unit, description = _coordinate(name.removeprefix(RATE), units)
         if name.startswith(RATE):
             unit, description = f"{unit}/s", f"rate of the {description}"
         found.append(Variable(f"state {name}" if name in taken else name, unit, description))
@@ -68,10 +82,10 @@ def derivatives_of(states: tuple[Variable, ...]) -> tuple[Variable, ...]:
     )
 
 
-def _input(name: str, on_ways: frozenset[str]) -> Variable:
+def _input(name: str, units: Mapping[str, str]) -> Variable:
     kind, _, rest = name.partition("/")
     if kind == "joint":
-        slides = rest in on_ways
+        slides = units[rest] == "m"
         words = f"{'force' if slides else 'moment'} of the motor of {rest}"
         return Variable(f"{name}/moment", "N" if slides else "N.m", words)
     if kind == "pzt":
@@ -81,7 +95,7 @@ def _input(name: str, on_ways: frozenset[str]) -> Variable:
     return Variable(name, "N", f"force on {point} along {axis}")
 
 
-def _coordinate(name: str, on_ways: frozenset[str]) -> tuple[str, str]:
+def _coordinate(name: str, units: Mapping[str, str]) -> tuple[str, str]:
     """Unit and description of a coordinate of the robot."""
     kind, _, rest = name.partition("/")
     place, _, last = rest.rpartition("/")
@@ -89,9 +103,10 @@ def _coordinate(name: str, on_ways: frozenset[str]) -> tuple[str, str]:
         return "kg0.5.m", f"modal coordinate {last} of {place}"
     if kind == "point":
         return "m", f"place of {place} along {last}"
-    if kind == "frame":
-        return (
-            ("rad", f"angle of the frame of {place}") if last == "angle" else ("m", f"{last} of the frame of {place}")
-        )
+    if kind == "frame" and place:  # in the plane
+        return "rad" if last == "angle" else "m", f"{last} of the frame of {place}"
+    if kind == "frame":  # in space
+        body, _, number = rest.rpartition(" ")
+        return SpatialFree.guess_units[int(number) - 1], f"coordinate {number} of the frame of {body}"
     of = "coordinate of the motor of" if kind == "motor" else "coordinate of joint"
-    return "m" if rest in on_ways else "rad", f"{of} {rest}"
+    return units[rest], f"{of} {rest}"
