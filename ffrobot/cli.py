@@ -149,14 +149,6 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
-def _planar(*paths: Path) -> None:
-    """Raise `InputError` for results in space, of which only `info` and `Results` can tell anything yet."""
-    from .results.file import refuse_spatial
-
-    for path in paths:
-        refuse_spatial(path)
-
-
 def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) -> None:
     """The same for a scene in space."""
     from .common.errors import InputError, SolveError, StoppedError
@@ -317,7 +309,6 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
     from .results.file import Results
 
     path = output or results_file.with_suffix(".npz")
-    _planar(results_file)
     with reading(results_file), Results(results_file) as results:
         name = results.export_linear(analysis, path)
     click.echo(f"{path}: linear model of {name}")

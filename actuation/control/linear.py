@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Literal
 
 from ...mbs.analysis.operating_points import InstantAnalysis, operating_points
@@ -52,7 +53,7 @@ class LinearModels(Details):
 
     `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
     (inputs, outputs): from each motor to its own joint and to each coordinate of a point, from all motors to their
-    joints (the frequencies with held joints), and to a point where there are two. `suggested`: gains of joint PD
+    joints (the frequencies with held joints), and to as many coordinates of a point. `suggested`: gains of joint PD
     controllers and the longest sample time (s) for them, of all models.
     """
 
@@ -113,9 +114,18 @@ def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
     places = [name for name in model.output_names if name.startswith("point/")]
     single = [(motor, output) for motor in motors for output in (motor, *places)]
     together = [(*motors, *motors)] if len(motors) > 1 else []
-    if len(motors) == 2:
-        together += [(*motors, *pair) for pair in zip(places[::2], places[1::2], strict=True)]
+    if len(motors) > 1:
+        for of_point in _by_point(places).values():
+            together += [(*motors, *chosen) for chosen in combinations(of_point, len(motors))]
     return [*single, *together]
+
+
+def _by_point(places: Sequence[str]) -> dict[str, list[str]]:
+    """The coordinates "point/BODY.POINT/x" of each point."""
+    found: dict[str, list[str]] = {}
+    for place in places:
+        found.setdefault(place.rpartition("/")[0], []).append(place)
+    return found
 
 
 def _split(pair: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -118,14 +118,20 @@ class LinearModel:
 def linear_model(mechanism: LinearMechanism, patches: Mapping[str, PatchArray]) -> LinearModel:
     """The state space of a linear mechanism, with the voltages of patches among its inputs."""
     f = len(mechanism.M)
-    motors = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
-    forces = {name: column for name, column in mechanism.inputs.items() if name not in motors}
     voltages = {
         f"pzt/{body}/{k}": _spread(f, [i for carrier in array.carriers for i in mechanism.modal(carrier)], column)
         for body, array in patches.items()
         for k, column in enumerate(array.Phi_V.T, 1)
     }
-    inputs = motors | voltages | forces
+    return state_space(mechanism, voltages)
+
+
+def state_space(mechanism: LinearMechanism, voltages: Mapping[str, Array]) -> LinearModel:
+    """The same, with what a unit of each voltage does along s (f,)."""
+    f = len(mechanism.M)
+    motors = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
+    forces = {name: column for name, column in mechanism.inputs.items() if name not in motors}
+    inputs = {**motors, **voltages, **forces}
     modal = {name: row for name, row in zip(mechanism.names, np.eye(f), strict=True) if name.startswith("modal/")}
     outputs = dict(mechanism.outputs) | modal
     columns = np.column_stack([mechanism.K, mechanism.D, *inputs.values()])

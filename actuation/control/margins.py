@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from .linear_model import LinearModel
 from .records import JointPid
 from .sampling import sampled
@@ -105,9 +105,10 @@ def margins(models: Sequence[LinearModel], gains: JointGains, T: float, delay: f
 
     now = radius(1.0, 0.0)
     if now > STABLE:
-        factors = np.geomspace(1.0, LEAST_GAIN, GRID)
+        factors = as_floats(np.geomspace(1.0, LEAST_GAIN, GRID))
         return Margins(now, _last_before(lambda c: radius(c, 0.0) <= STABLE, factors, missing=0.0), 0.0)
-    gain = _last_before(lambda c: radius(c, 0.0) > STABLE, np.geomspace(1.0, LARGEST_GAIN, GRID), missing=np.inf)
+    factors = as_floats(np.geomspace(1.0, LARGEST_GAIN, GRID))
+    gain = _last_before(lambda c: radius(c, 0.0) > STABLE, factors, missing=np.inf)
     waits = np.append(0.0, T * np.geomspace(0.01, LONGEST_DELAY, GRID))
     return Margins(now, gain, _last_before(lambda d: radius(1.0, d) > STABLE, waits, missing=np.inf))
 

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
 from ...mbs.quantities.stress import SectionLoads
 from .layers import LayerLoads, bending_row, felt_rows, layer_loads, own_row, straight_loads
@@ -211,4 +211,4 @@ def _strains(body: ModalBody, x: float) -> Array:
     """B (4, n): e of the modes at x: differences inside an element, exact for its quadratics."""
     stations = body.stations.position[:, 0]
     h = min(1e-3 * body.length, 0.5 * float(np.abs(stations - x).min()))
-    return (potentials(body.interpolate(x + h)) - potentials(body.interpolate(x - h))) / (2 * h)
+    return as_floats((potentials(body.interpolate(x + h)) - potentials(body.interpolate(x - h))) / (2 * h))

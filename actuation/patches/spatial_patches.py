@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.spatial_body import SpatialBody
@@ -52,8 +52,7 @@ class ReachedModes:
 
     def coordinates(self, p: Array) -> Array:
         """(T, m) p' from those of the modal body (T, n)."""
-        found: Array = np.linalg.solve(self.T, p[:, self.rows].T).T
-        return found
+        return as_floats(np.linalg.solve(self.T, p[:, self.rows].T).T)
 
     def seen(self, rows: Array) -> Array:
         """(k, m) what is linear in the modes of the modal body, (k, n), over p'."""

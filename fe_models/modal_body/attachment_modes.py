@@ -142,7 +142,7 @@ def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:
         of = shares.argmax(axis=0)
     else:
         squares, turn = np.zeros(of.size), np.zeros(K.shape)
-        for k in set(of.tolist()):
+        for k in np.unique(of):
             own = np.flatnonzero(of == k)
             squares[own], turn[np.ix_(own, own)] = np.linalg.eigh(K[np.ix_(own, own)])
     return squares, turn, of

@@ -121,7 +121,7 @@ def interface_loads(
     found = interface_coordinates(omega2, families, static, interfaces)
     W = found.fixed @ (found.fixed.T * omega2)
     c = found.constraint.T @ (np.diag(omega2) - W)
-    loads = {name: np.zeros((6, len(omega2))) for name in interfaces}
+    loads: dict[str, Array] = {name: np.zeros((6, len(omega2))) for name in interfaces}
     for name, row in zip(found.names, c, strict=True):
         place, component = name.split("/")
         loads[place][AXES.index(component)] = row

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..common.arrays import Array, Indices, Integers
+from ..common.arrays import Array, Indices, Integers, as_rows
 
 VERTICAL = 1e-3  # z of a unit normal below which a cell counts as seen from its side
 TESTED = 24  # edges of a loop beside which it is asked what is there
@@ -55,7 +55,7 @@ def _ends_of_front(points: Array, cells: Integers) -> Integers:
 def _loops(edges: Integers) -> Iterator[Indices]:
     """Directed edges (e, 2), as many into each point as out of it, put together to closed ways."""
     after: dict[int, list[int]] = {}
-    for start, end in edges.tolist():
+    for start, end in as_rows(edges):
         after.setdefault(start, []).append(end)
     while after:
         way = [next(iter(after))]

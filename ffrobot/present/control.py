@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from rich.table import Table
@@ -11,7 +11,7 @@ from ..actuation.control.closed_loop import LoopRecord
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.metrics import Metrics
 from ..actuation.control.placement import Placed
-from ..run.solution import Solution
+from ..mbs.analysis.outcome import Details
 from .tables import plain_table
 
 FREQUENCIES = 5  # that are listed, and damping ratios
@@ -35,9 +35,8 @@ def loop_row(name: str, metrics: Metrics) -> Iterator[str]:
     yield f"{100 * metrics.saturated:.2g} %"
 
 
-def control_tables(solution: Solution) -> Iterator[Table]:
-    """A table of each kind that was found."""
-    details = {name: outcome.details for name, outcome in solution.outcomes.items()}
+def control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
+    """A table of each kind that was found, from what analyses found by name."""
     loops = [loop_row(name, found.metrics) for name, found in details.items() if isinstance(found, LoopRecord)]
     linear = [row for name, found in details.items() if isinstance(found, LinearModels) for row in _linear(name, found)]
     placements = [_placement(name, found) for name, found in details.items() if isinstance(found, Placed)]
@@ -76,15 +75,15 @@ def _placement(name: str, placed: Placed) -> tuple[str, ...]:
     )
 
 
-def control_lines(solution: Solution) -> Iterator[str]:
-    """Damping ratios, zeros, modes that nothing moves or sees, and places of patches, a line each."""
-    for name, outcome in solution.outcomes.items():
-        if isinstance(outcome.details, LinearModels):
-            yield from _damping(name, outcome.details)
-            yield from _zeros_and_lost(name, outcome.details)
-    for name, outcome in solution.outcomes.items():
-        if isinstance(outcome.details, Placed):
-            yield f"{name}: centres at {', '.join(f'{x:.4g}' for x in outcome.details.best.centers)} m"
+def control_lines(details: Mapping[str, Details]) -> Iterator[str]:
+    """Damping ratios, zeros, modes that nothing moves or sees, and places of patches, each in a line."""
+    for name, found in details.items():
+        if isinstance(found, LinearModels):
+            yield from _damping(name, found)
+            yield from _zeros_and_lost(name, found)
+    for name, found in details.items():
+        if isinstance(found, Placed):
+            yield f"{name}: centres at {', '.join(f'{x:.4g}' for x in found.best.centers)} m"
 
 
 def _damping(name: str, linear: LinearModels) -> Iterator[str]:

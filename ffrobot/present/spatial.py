@@ -11,6 +11,7 @@ from rich.table import Table
 
 from ..results.verdict import Verdict
 from ..run.spatial import SpatialSolution
+from .control import control_lines, control_tables
 from .tables import plain_table
 from .voltages import voltage_table
 
@@ -34,6 +35,10 @@ def print_spatial_summary(
     if motors.row_count:
         console.print()
         console.print(motors)
+    details = {name: result.run.details for name, result in solution.analyses.items()}
+    for table in control_tables(details):
+        console.print()
+        console.print(table)
     voltages = voltage_table(
         (name, layout, array, result.actuation.voltages[layout])
         for name, result in solution.analyses.items()
@@ -51,6 +56,8 @@ def print_spatial_summary(
     for one in verdict.analyses:
         if one.answer:
             notes.add_row("verdict", f"{one.name}: {one.answer}")
+    for line in control_lines(details):
+        notes.add_row("linear", line)
     for note in solution.notes:
         notes.add_row("links", note)
     notes.add_row("time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))

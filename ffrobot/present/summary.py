@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.outcome import Details, Outcome
 from ..mbs.model.raised_mass import raised_in_words
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.validity import deflection_warning
@@ -44,7 +44,7 @@ def print_summary(
     console.print()
     for line in verdict.lines():
         console.print(line)
-    for line in control_lines(solution):
+    for line in control_lines(_details(solution)):
         console.print(line)
     notes = Table.grid(padding=(0, 2))
     for title, text in _notes(solution, seconds):
@@ -54,13 +54,18 @@ def print_summary(
     console.print(f"results    {path}", soft_wrap=True)
 
 
+def _details(solution: Solution) -> dict[str, Details]:
+    """What only kinds of analyses find, by analysis."""
+    return {name: outcome.details for name, outcome in solution.outcomes.items()}
+
+
 def _tables(solution: Solution) -> Iterator[Table]:
     """What was found of each kind, where there is any."""
     if any(result.voltages for result in solution.analyses.values()):
         yield _voltages(solution)
     if any(result.stresses for result in solution.analyses.values()):
         yield _stresses(solution)
-    yield from control_tables(solution)
+    yield from control_tables(_details(solution))
 
 
 def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:

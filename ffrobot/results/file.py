@@ -54,20 +54,6 @@ def status_in_words(attributes: Mapping[str, Any]) -> str:
     return f"{status}, {count} warning{'s' if count > 1 else ''}" if count else str(status)
 
 
-def refuse_spatial(path: Path) -> None:
-    """Raise `InputError` where the file at `path` holds results of a scene in space; others are judged elsewhere."""
-    try:
-        with open_checked(path) as file:
-            is_spatial = file.attrs.get("space") == "spatial"
-    except (OSError, InputError):
-        return
-    if is_spatial:
-        raise InputError(
-            f'{path}: expected results of a planar scene, found space = "spatial", for which this command is not'
-            " available yet: `ffrobot info` lists the datasets, `ffrobot.Results` reads them"
-        )
-
-
 class _Attributes(dict[str, Any]):
     """Attributes of a group, which messages call `where`; `InputError` for one that it does not have."""
 

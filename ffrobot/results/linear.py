@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import h5py
@@ -13,13 +13,43 @@ from ..actuation.control.linear_model import LinearModel, save_arrays
 from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.quantities.spatial_motion import SpatialMotion
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
 NAMES = ("state_names", "input_names", "output_names")
 
 
+Shapes = Mapping[str, Mapping[str, Array]]
+"""By body, what the robot's modes (T, f) do to it: displacement, turn, modal coordinates."""
+
+
 def write_linear(group: h5py.Group, outcome: Outcome, linear: LinearModels) -> None:
-    """Of an analysis: linear/, with models (T, …), poles, frequencies, shapes of all bodies, reach and zeros."""
+    """Of an analysis in the plane: linear/."""
+    motion, shapes = _motion(linear), {}
+    for body in outcome.assembly.model.links:
+        columns = motion[:, :, outcome.coordinates(body.name)]
+        modal = columns[:, :, 3:] @ body.modal_transform.T
+        shapes[body.name] = {"position": columns[:, :, :2], "angle": columns[:, :, 2], "modal": modal}
+    write_models(group, linear, shapes)
+
+
+def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: LinearModels) -> None:
+    """Of an analysis in space: linear/; `motion` is what it is about."""
+    along_v, shapes = _motion(linear), {}
+    for node, frame in zip(motion.model.tree.nodes, motion.frames, strict=True):
+        of_frame = np.einsum("tij,tfj->tfi", frame.L, along_v)
+        modal = along_v[:, :, node.p_v] @ node.body.modal_transform.T
+        shapes[node.body.name] = {"position": of_frame[:, :, :3], "rotation": of_frame[:, :, 3:], "modal": modal}
+    write_models(group, linear, shapes)
+
+
+def _motion(linear: LinearModels) -> Array:
+    """(T, f, coordinates) of the robot's modes."""
+    return np.array([modes.motion.real for modes in linear.modes])
+
+
+def write_models(group: h5py.Group, linear: LinearModels, shapes: Shapes) -> None:
+    """linear/, with models (T, …), poles, frequencies, shapes of all bodies, reach and zeros."""
     group = group.create_group("linear")
     for key in MATRICES:
         group[key] = np.array([getattr(model, key) for model in linear.models])
@@ -33,12 +63,9 @@ def write_linear(group: h5py.Group, outcome: Outcome, linear: LinearModels) -> N
     for kind, reaches in (("controllability", linear.controllable), ("observability", linear.observable)):
         group[kind] = np.array([reach.measure for reach in reaches])
         group[kind].attrs["lost"] = sorted({name for reach in reaches for name in reach.lost})
-    motion = np.array([modes.motion.real for modes in linear.modes])  # (T, f, coordinates)
-    for body in outcome.assembly.model.links:
-        columns = motion[:, :, outcome.coordinates(body.name)]
-        group[f"modes/{body.name}/position"] = columns[:, :, :2]
-        group[f"modes/{body.name}/angle"] = columns[:, :, 2]
-        group[f"modes/{body.name}/modal"] = columns[:, :, 3:] @ body.modal_transform.T
+    for body, parts in shapes.items():
+        for key, values in parts.items():
+            group[f"modes/{body}/{key}"] = values
     group.attrs["advice"] = linear.advice
     for k, (pair, found) in enumerate(linear.zeros.items(), 1):
         _write_zeros(group, f"zeros/{k}", pair, found)

@@ -7,10 +7,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from ..actuation.control.linear import LinearModels
 from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..run.spatial import SpatialResult, SpatialSolution
+from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
 from .write import write_head
 
@@ -28,6 +30,8 @@ def spatial_image(solution: SpatialSolution) -> bytes:
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
             _write_analysis(file.create_group(name), result)
+            if isinstance(result.run.details, LinearModels):
+                write_spatial_linear(file[name], result.motion, result.run.details)
             if result.actuation is not None:
                 write_actuation(file[name], solution, result.actuation)
         file.flush()

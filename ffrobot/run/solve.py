@@ -15,6 +15,7 @@ from ..actuation.context import ActuatedContext, WholeLinks
 from ..actuation.patches.patches import with_factors as patches_with
 from ..actuation.patches.voltages import Voltages, allocation, solve_voltages
 from ..actuation.points import with_factors as points_with
+from ..common.arrays import Array
 from ..common.errors import of_file
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import ActuatorSet
@@ -231,7 +232,7 @@ def _told(solution: Solution, outcome: Outcome) -> Outcome:
 
 def _actuator_set(solution: Solution, *, raised: bool) -> ActuatorSet:
     """The actuators of the scene, fresh for one run."""
-    factors = {body.name: np.ones(body.n_modes) for body in solution.model.bodies}
+    factors: dict[str, Array] = {body.name: np.ones(body.n_modes) for body in solution.model.bodies}
     factors |= by_body(solution.model) if raised else {}
     patches = {
         array.carriers[0]: patches_with(array, np.concatenate([factors[name] for name in array.carriers]))

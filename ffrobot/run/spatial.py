@@ -8,12 +8,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..actuation.control.spatial_linear import ActuatedSpatialContext
 from ..actuation.patches.spatial_patches import LinkPatches
+from ..actuation.spatial_kinds import IN_SPACE
 from ..common.errors import of_file
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
-from ..mbs.analysis.spatial_kinds import IN_SPACE
-from ..mbs.analysis.spatial_run import SpatialContext, SpatialRun
+from ..mbs.analysis.operating_points import InstantAnalysis
+from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ..mbs.quantities.spatial_energy import Energies, Momentum, energies, momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
@@ -149,13 +151,14 @@ def _context(
     results: Mapping[str, SpatialResult],
     watcher: Watcher,
     interruption: Interruption,
-) -> SpatialContext:
+) -> ActuatedSpatialContext:
     end = analysis.last_time
 
     def progress(t: float) -> bool:
         return watcher.advance(t, end) and not interruption.requested
 
-    return SpatialContext(solution.model, {name: result.run for name, result in results.items()}, progress)
+    runs = {name: result.run for name, result in results.items()}
+    return ActuatedSpatialContext(solution.model, runs, progress, solution.patches)
 
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
@@ -164,7 +167,8 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
         run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest
     )  # fmt: skip
     actuation = None
-    if motion.motor_forces is not None:  # else nothing is asked of motors and patches
+    is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
+    if is_judged:  # else nothing is asked of motors and patches
         actuation = actuated_in_space(solution.scene, motion, solution.bodies, solution.patches)
     return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion), actuation)
 

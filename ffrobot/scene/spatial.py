@@ -10,12 +10,12 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..actuation.patches.spatial_records import SpatialPztLayout
+from ..actuation.spatial_kinds import IN_SPACE
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import did_you_mean, quoted, validate
 from ..fe_models.link_file import LinkTable, read_link
-from ..mbs.analysis.spatial_kinds import IN_SPACE
 from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND, NotEmpty
 from ..mbs.fields.functions import check_domain

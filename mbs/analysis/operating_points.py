@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from pydantic import Field
@@ -19,6 +20,7 @@ from ..solve.initial_state import undeformed_state
 from ..solve.linearisation import held_by_motors
 from .elastic_joints import add_transmission, with_compliance, with_rotors
 from .outcome import Forces, Outcome
+from .spatial_run import SpatialRun
 from .static import run_static
 
 STATIC = "static"  # instead of an analysis' name: about the static equilibrium
@@ -83,16 +85,17 @@ def operating_points(model: Model, analysis: Analysis, source: Outcome | None) -
         outcome = with_rotors(add_transmission(run_static(held, analysis)), with_compliance(model))
         return replace(outcome, forces=Forces())
     moved = with_rotors(source, with_compliance(model))
-    rows = [_row(model, analysis, source, t) for t in analysis.times]
+    rows = [row_at(model.scene.path, analysis, source, t) for t in analysis.times]
     return Outcome(analysis, moved.assembly, moved.motion.at(rows), gears=moved.gears)
 
 
-def _row(model: Model, analysis: Analysis, source: Outcome, t: float) -> int:
+def row_at(path: Path, analysis: Analysis, source: Outcome | SpatialRun, t: float) -> int:
+    """The output of an earlier analysis at time t. Raises `InputError` where there is none."""
     row = int(np.abs(source.time - t).argmin())
     if abs(source.time[row] - t) > NEAR * max(1.0, source.analysis.last_time):
         every = f"every {source.analysis.output_step:g} s " if isinstance(source.analysis, TimedAnalysis) else ""
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": times: expected output times of "{source.analysis.name}",'
+            f'{path}: analysis "{analysis.name}": times: expected output times of "{source.analysis.name}",'
             f" {every}up to {source.time[-1]:g} s, found {t:g}"
         )
     return row

@@ -57,7 +57,7 @@ def spatial_drive(
         methods=[(METHODS[integrator], 1.0, 0.0)],
         spectral_radius=analysis.spectral_radius,
     )
-    system.scene.watch_posture((~model.loop_rows).tolist(), robot_size(model))
+    system.scene.watch_posture([row.is_trajectory for row in model.rows], robot_size(model))
     run = _core.tree_motion(system.core, system.scene, as_list(times), start.q, start.v, controls, progress)
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture)

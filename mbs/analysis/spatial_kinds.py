@@ -1,4 +1,4 @@
-"""THE list of kinds of analysis that scenes in space have, and what runs them."""
+"""The kinds of analysis in space that know nothing of patches; all: `actuation.spatial_kinds`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .spatial_pcid import run_spatial_pcid
 from .spatial_run import SpatialContext, SpatialRun
 from .spatial_static import run_spatial_static
 
-IN_SPACE: Mapping[str, Callable[[SpatialContext, Any], SpatialRun]] = {
+MECHANICAL_IN_SPACE: Mapping[str, Callable[[SpatialContext, Any], SpatialRun]] = {
     "pcid": run_spatial_pcid,
     "fcid": run_spatial_fcid,
     "forward": run_spatial_forward,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ...common.arrays import Array
@@ -10,7 +10,7 @@ from ...common.errors import SolveError
 from ..model.spatial_model import SpatialModel
 from ..scene.analysis import Analysis
 from .drive import Progress
-from .outcome import ADVICE
+from .outcome import ADVICE, Details
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,7 @@ class SpatialRun:
         steps, evaluations: how many.
         wall_seconds: of all.
         warnings: on what is left open.
+        details: what only its kind finds.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
     """
 
@@ -48,6 +49,7 @@ class SpatialRun:
     evaluations: int = 0
     wall_seconds: float = 0.0
     warnings: tuple[str, ...] = ()
+    details: Details = field(default=Details(), repr=False)
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
 
     @property
@@ -55,7 +57,7 @@ class SpatialRun:
         """Whether it ended before its last time."""
         return self.status != "completed"
 
-    def rows(self, chosen: slice) -> SpatialRun:
+    def rows(self, chosen: slice | Sequence[int]) -> SpatialRun:
         """These outputs alone."""
         names = ("time", "q", "v", "a", "multipliers", "required")
         of_time = {name: getattr(self, name) for name in names}

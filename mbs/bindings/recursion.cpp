@@ -1,4 +1,5 @@
 // The recursion in joint coordinates (docs/recursion.md), for tests and for what is built upon it.
+#include "core/recursion/derivatives.h"
 #include "core/recursion/independent_rows.h"
 #include "core/recursion/observe.h"
 
@@ -23,11 +24,8 @@ using Eigen::VectorXd;
 namespace {
 
 template <class Space>
-std::tuple<VectorXd, VectorXd> evaluate(Model<Space> &model, const VectorXd &q, const VectorXd &v,
-                                        const VectorXd &target, const std::optional<VectorXd> &force,
-                                        const std::optional<VectorXd> &wrench) {
-  model.check_state(q, v);
-  check_size("target", target.size(), model.rows());
+Forces<double> checked_forces(const Model<Space> &model, const std::optional<VectorXd> &force,
+                              const std::optional<VectorXd> &wrench) {
   Forces<double> forces;
   if (force) {
     check_size("force", force->size(), model.mechanism.n_v);
@@ -37,6 +35,16 @@ std::tuple<VectorXd, VectorXd> evaluate(Model<Space> &model, const VectorXd &q, 
     check_size("wrench", wrench->size(), Space::dim * static_cast<Index>(model.mechanism.wrenches.size()));
     forces.wrench = wrench->data();
   }
+  return forces;
+}
+
+template <class Space>
+std::tuple<VectorXd, VectorXd> evaluate(Model<Space> &model, const VectorXd &q, const VectorXd &v,
+                                        const VectorXd &target, const std::optional<VectorXd> &force,
+                                        const std::optional<VectorXd> &wrench) {
+  model.check_state(q, v);
+  check_size("target", target.size(), model.rows());
+  const Forces<double> forces = checked_forces(model, force, wrench);
   VectorXd a(model.mechanism.n_v);
   accelerations(model.mechanism, q.data(), v.data(), forces, target.data(), model.w, a.data());
   return {a, Eigen::Map<const VectorXd>(model.w.lambda.data(), model.rows())};
@@ -48,6 +56,14 @@ std::tuple<VectorXd, VectorXd> row_values(Model<Space> &model, const VectorXd &q
   VectorXd value(model.rows()), rate(model.rows());
   measure(model.mechanism, q.data(), v.data(), model.w, value.data(), rate.data());
   return {value, rate};
+}
+
+Derivatives derivatives_at(Model<Spatial> &model, const VectorXd &q, const VectorXd &v, const VectorXd &target,
+                           const std::optional<VectorXd> &force, const std::optional<VectorXd> &wrench) {
+  model.check_state(q, v);
+  check_size("target", target.size(), model.rows());
+  const Forces<double> forces = checked_forces(model, force, wrench);
+  return derivatives(model.mechanism, model.w, q.data(), v.data(), forces, target.data());
 }
 
 template <class Space> VectorXd answer_of(Model<Space> &model, const VectorXd &q, const VectorXd &residual) {
@@ -67,7 +83,7 @@ double time_of(Model<Space> &model, const VectorXd &q, const VectorXd &v, const 
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / repetitions;
 }
 
-template <class Space> void bind_model(nb::module_ &m, const char *name, const char *body_name, const char *text) {
+template <class Space> auto bind_model(nb::module_ &m, const char *name, const char *body_name, const char *text) {
   using Body = BodyModel<typename Space::Data>;
   nb::class_<Body>(m, body_name, "A body of a tree and the joint that it hangs on; see mbs/core/recursion/model.h.")
       .def(nb::init<>())
@@ -81,7 +97,7 @@ template <class Space> void bind_model(nb::module_ &m, const char *name, const c
       .def_rw("gear_ratio", &Body::gear_ratio)
       .def_rw("driven", &Body::driven)
       .def_rw("data", &Body::data);
-  nb::class_<Model<Space>>(m, name, text)
+  return nb::class_<Model<Space>>(m, name, text)
       .def(nb::init<const std::vector<Body> &, const std::vector<typename Space::Marker> &,
                     const std::vector<RowModel> &, const std::vector<MarkerAt> &, const VectorXd &>(),
            "bodies"_a, "ground"_a, "rows"_a, "wrenches"_a, "gravity"_a)
@@ -141,6 +157,14 @@ template <class Space> void bind_model(nb::module_ &m, const char *name, const c
 void bind_recursion(nb::module_ &m) {
   bind_tree_data(m);
   bind_model<Planar>(m, "PlanarModel", "PlanarBody", "A mechanism in the plane, in joint coordinates.");
-  bind_model<Spatial>(m, "SpatialModel", "SpatialBody", "A mechanism in space, in joint coordinates.");
+  nb::class_<Derivatives>(m, "Derivatives", "Of accelerations a and rows, by increments of q, by v and by forces f.")
+      .def_ro("a_q", &Derivatives::a_q)
+      .def_ro("a_v", &Derivatives::a_v)
+      .def_ro("a_f", &Derivatives::a_f)
+      .def_ro("value_q", &Derivatives::value_q)
+      .def_ro("rate_q", &Derivatives::rate_q);
+  bind_model<Spatial>(m, "SpatialModel", "SpatialBody", "A mechanism in space, in joint coordinates.")
+      .def("derivatives", &derivatives_at, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
+           "At a state under given forces, while rows follow `target` (rows): exact.");
   bind_tree_motion(m);
 }

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
 from ...common.errors import InputError
 from ...common.rotations import (
     about,
@@ -116,7 +116,7 @@ def orientation_of(table: Waypoints) -> tuple[Waypoints, tuple[float, float, flo
             f"row {far.argmax() + 1}: expected orientations within {np.degrees(WIDEST):.0f} degrees of their middle,"
             f" found {np.degrees(far.max()):.0f}: divide the motion, or give rotation_vector or rpy as expressions"
         )
-    x, y, z = logarithm(middle).tolist()
+    x, y, z = as_list(logarithm(middle))
     return Waypoints(("rx", "ry", "rz"), table.times, psi), (x, y, z)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
 from .planar_body import PlanarBody
 
@@ -56,7 +56,7 @@ def divided_link(link: ModalBody, planar: PlanarBody, pieces: Sequence[Piece]) -
 
 def _shape_in_piece(link: ModalBody, planar: PlanarBody, piece: Piece) -> Array:
     """P (m, n) of a piece, m its modes, for the modes of the link: least strain energy of the difference."""
-    x = np.linspace(0.0, piece.modal.length, INTERVALS + 1)
+    x = as_floats(np.linspace(0.0, piece.modal.length, INTERVALS + 1))
     of_link = _strains(link, planar, np.minimum(piece.start + x, link.length))
     of_piece = _strains(piece.modal, piece.planar, x)
     rigidity = piece.modal.stations.rigidity

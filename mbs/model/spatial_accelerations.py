@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.rotations import left_jacobian, left_jacobian_rate
 from .spatial_model import SpatialModel, SpatialRow
 from .spatial_tree import Motion, Node, Section, SpatialTree
@@ -144,8 +144,9 @@ def _row(row: SpatialRow, state: Accelerated, frames: Sequence[Acceleration], ti
         g, turning, change = b.F @ row.g, w_b, of_b.Omega
     else:
         g, (turning, change) = row.law.sample(times)[:, :, 2], row.law.rates(times)
-    g_dot = np.cross(turning, g)
-    return _product_rate(f, w_a, of_a.Omega, g, g_dot, np.cross(change, g) + np.cross(turning, g_dot))
+    g_dot = as_floats(np.cross(turning, g))
+    g_2dot = as_floats(np.cross(change, g) + np.cross(turning, g_dot))
+    return _product_rate(f, w_a, of_a.Omega, g, g_dot, g_2dot)
 
 
 def _product_rate(f: Array, omega: Array, alpha: Array, d: Array, d_dot: Array, d_2dot: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Booleans
 from ...common.errors import InputError
 from ...common.rotations import logarithm
 from ...common.validation import did_you_mean, quoted
@@ -64,7 +64,7 @@ class SpatialModel:
     rows: tuple[SpatialRow, ...]
 
     @property
-    def loop_rows(self) -> Array:
+    def loop_rows(self) -> Booleans:
         """(rows,) which rows close loops."""
         return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
 
@@ -78,11 +78,12 @@ class SpatialModel:
                     f"{self.scene.path}: {joint.label}: motor: expected a joint of the tree, found the one at which the"
                     " loop is cut; list it before the others of its loop"
                 )
-            node = self.driven(joint.name)
-            indices = np.arange(node.v.start, node.v.stop)
-            ordered = joint.coordinates(indices)
-            found[joint.name] = ordered[::-1] if node.backwards and joint.type == "universal" else ordered
+            found[joint.name] = _in_order(self.driven(joint.name))
         return found
+
+    def columns(self, joint: str) -> Array:
+        """Indices in v of the coordinates of a joint of the tree, in the scene's order; none of a spherical one."""
+        return _in_order(self.tree.nodes[self.tree.carried[joint]])
 
     def sign(self, joint: str) -> float:
         """−1 where the tree has a joint's coordinates the other way round."""
@@ -92,6 +93,11 @@ class SpatialModel:
         """What moments on a joint of the tree turn: the body that it carries, or its motor behind a gear that gives."""
         behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
+
+
+def _in_order(node: Node) -> Array:
+    ordered = node.joint.coordinates(np.arange(node.v.start, node.v.stop))[: len(node.joint.units)]
+    return ordered[::-1] if node.backwards and node.joint.type == "universal" else ordered
 
 
 def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBody]) -> SpatialModel:

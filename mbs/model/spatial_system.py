@@ -16,7 +16,7 @@ from ..fields.orientations import OrientationLaw
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
 from .spatial_body import SpatialBody
 from .spatial_model import SpatialModel, SpatialRow
-from .spatial_transmission import rotor
+from .spatial_transmission import resistance, resistance_slope, rotor
 from .spatial_tree import Node, Section
 
 ZERO = _core.TimeFunction.constant(0.0)
@@ -33,6 +33,22 @@ class Drive(NamedTuple):
 
     direction: Array
     size: TimeFunction
+
+
+class Derivatives(NamedTuple):
+    """By increments δ of q, by v and by generalized forces, all along v (n_v).
+
+    Attributes:
+        a_q, a_v, a_f: (n_v, n_v) of accelerations; joints with friction resist more the faster they are.
+        value_q: (rows, n_v) of the values of rows, and of their rates by v.
+        rate_q: (rows, n_v) of their rates.
+    """
+
+    a_q: Array
+    a_v: Array
+    a_f: Array
+    value_q: Array
+    rate_q: Array
 
 
 class SpatialSystem:
@@ -115,6 +131,24 @@ class SpatialSystem:
         if not self._along:
             return None
         return sum((function(t)[0] * direction for direction, function in self._along), np.zeros(self.model.tree.n_v))
+
+    def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> Derivatives:
+        """How accelerations and rows answer to small changes of q, v and forces, at time t under the scene's loads.
+
+        `supplied` (n_v,) acts beside loads and friction. Rows that depend on others at q, v are left out.
+        """
+        self.turn_markers(t)
+        self.core.keep_independent_rows(q, v)
+        rest = -resistance(self.model.tree, v[None])[0]
+        loads = self.force(t)
+        force = supplied + rest + (0.0 if loads is None else loads)
+        wrench = np.zeros((len(self._wrenches), len(OF_POINT)))
+        for number, components in self._at_points:
+            for name, magnitude in components.items():
+                wrench[number, OF_POINT.index(name)] += magnitude(t)[0]
+        found = self.core.derivatives(q, v, self.target(t), force, wrench.ravel())
+        slope = resistance_slope(self.model.tree, v[None])[0]
+        return Derivatives(found.a_q, found.a_v - found.a_f * slope, found.a_f, found.value_q, found.rate_q)
 
     def _follow(self) -> _core.TreeScene:
         """Targets of the rows, and given forces along joints."""

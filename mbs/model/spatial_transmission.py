@@ -89,6 +89,16 @@ def resistance(tree: SpatialTree, v: Array) -> Array:
     return found
 
 
+def resistance_slope(tree: SpatialTree, v: Array) -> Array:
+    """Its derivative (T, n_v) by v, coordinate by coordinate: c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s)."""
+    found = np.zeros_like(v)
+    for node in tree.nodes:
+        for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
+            steady = np.tanh(v[:, column] / friction.speed)
+            found[:, column] = friction.viscous + friction.coulomb / friction.speed * (1.0 - steady**2)
+    return found
+
+
 def gear_forces(tree: SpatialTree, q: Array, v: Array) -> Array:
     """Of gears that give (T, n_v): k δ + c δ̇ on the second side of the joint, the opposite on the motor."""
     found = np.zeros_like(v)

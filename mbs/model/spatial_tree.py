@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Booleans
 from ...common.rotations import exponential, left_jacobian, of_quaternion, quaternions, skew
 from ..fields.field_types import GROUND, split_point
 from ..joints.spatial.free import SpatialFree
@@ -122,7 +122,7 @@ class SpatialTree:
         return Section(self.index[body], point, triad, np.zeros(3))
 
     @property
-    def joint_columns(self) -> Array:
+    def joint_columns(self) -> Booleans:
         """(n_v,) which of v belong to joints, not to modes."""
         found = np.ones(self.n_v, dtype=bool)
         for node in self.nodes:

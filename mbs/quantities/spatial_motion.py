@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import gears_of_motion
@@ -125,7 +125,8 @@ class SpatialMotion:
         h = 1e-6  # of a linear map, but for planar joints
         ahead, behind = (node.joint.turned_around(x + s * x_dot) for s in (h, -h))
         linear = node.joint.type != "planar"
-        return node.joint.turned_around(x), node.joint.turned_around(x_dot) if linear else (ahead - behind) / (2 * h)
+        rate = node.joint.turned_around(x_dot) if linear else as_floats((ahead - behind) / (2 * h))
+        return node.joint.turned_around(x), rate
 
     def path_force(self, trajectory: str) -> Array:
         """−λ (T, m) of its rows: forces on the point, then moments on the section about global axes."""
@@ -143,13 +144,18 @@ class SpatialMotion:
         held = {row.owner for row in self.model.rows if row.is_trajectory}
         return [trajectory for trajectory in self.model.scene.trajectory if trajectory.name in held]
 
+    @property
+    def is_prescribed(self) -> bool:
+        """Whether trajectories hold in it, or motors their angles."""
+        return any(row.is_trajectory for row in self.model.rows)
+
     @cached_property
     def motor_forces(self) -> MotorForces | None:
-        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is followed.
+        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is prescribed.
 
         Moments behind gears that give are what motors must do there.
         """
-        if not self.followed:
+        if not self.is_prescribed:
             return None
         rigid = self._with_rigid_gears
         behind = {joint: gear.moment[:, None] for joint, gear in self.gears.items()}
@@ -162,7 +168,7 @@ class SpatialMotion:
     @cached_property
     def gears(self) -> dict[str, GearMotion]:
         """By joint, of inverse analyses and equilibria with gears that give."""
-        if not self.followed:
+        if not self.is_prescribed:
             return {}
         return gears_of_motion(self.model, self.accelerated, self.time, self._with_rigid_gears.moments)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
 from ..model.spatial_inverse import given_forces
 from ..model.spatial_model import SpatialModel, row_values
@@ -90,8 +90,7 @@ def _sizes(model: SpatialModel) -> Array:
 
 
 def _force_scale(size: float, row_scales: Array) -> Array:
-    scale: Array = max(size, 1e-300) / row_scales
-    return scale
+    return as_floats(max(size, 1e-300) / row_scales)
 
 
 def _residual(model: SpatialModel, q: Array, t: float, multipliers: Array, row_scales: Array) -> tuple[Array, float]:

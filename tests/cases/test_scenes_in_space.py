@@ -87,13 +87,6 @@ def test_bodies_and_points(solved):
         close(file[f"inverse/points/{name}/deflection"], [sample["points"][name]["deflection"] for sample in samples])
 
 
-@pytest.mark.parametrize("command", ["linear"])
-def test_readers_of_planar_results_say_so(solved, ffrobot, command):
-    done = ffrobot(command, solved[1].filename)
-    assert done.returncode == 2
-    assert 'expected results of a planar scene, found space = "spatial"' in done.stderr
-
-
 def test_info_and_python_read_them(solved, ffrobot):
     done = ffrobot("info", solved[1].filename)
     assert done.returncode == 0, done.stderr

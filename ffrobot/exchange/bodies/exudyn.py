@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...common.arrays import as_floats
 from ...common.rotations import skew
 from ...fe_models.modal_body import ModalBody
 from .integrals import ShapeIntegrals, integrals_of, nodes_of
@@ -44,7 +45,7 @@ def reduced_order(found: ShapeIntegrals) -> dict[str, Any]:
     """The constant matrices of ObjectFFRFreducedOrder."""
     n, S, one = found.n_modes, found.S_bar_kl, np.eye(3)
     total = S[0, 0] + S[1, 1] + S[2, 2]
-    center = found.first_moment / found.mass
+    center = as_floats(found.first_moment / found.mass)
     tilde_tilde = np.einsum("ab,lm->lamb", one, total) - np.einsum("balm->lamb", S)
     return {
         "massMatrixReduced": found.modal_mass,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...common.arrays import as_list, as_rows
 from .joints import RobotMotion
 
 NANO = 1_000_000_000
@@ -39,7 +40,7 @@ def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ..
             "time_from_start": _duration(time),
         }
         for position, velocity, effort, time in zip(
-            positions.tolist(), velocities.tolist(), efforts.tolist(), motion.time.tolist(), strict=True
+            as_rows(positions), as_rows(velocities), as_rows(efforts), as_list(motion.time), strict=True
         )
     ]
     message = {

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_rows
 from ...common.errors import InputError
 from ...common.validation import did_you_mean, quoted
 from ...results.file import Results
@@ -89,7 +89,7 @@ def csv_text(motion: RobotMotion) -> str:
         if joint.moment is not None:
             columns[f"{joint.name}.moment"] = joint.moment
     lines = [",".join(map(_quoted, columns))]
-    lines += [",".join(map(repr, row)) for row in np.stack(list(columns.values()), axis=1).tolist()]
+    lines += [",".join(map(repr, row)) for row in as_rows(np.stack(list(columns.values()), axis=1))]
     return "\n".join(lines) + "\n"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ...common.arrays import as_rows
 from ...common.errors import InputError
 from ...common.numbers import SMALLEST
 from ...common.tables import shown
@@ -145,7 +146,7 @@ def _check_inertias(bodies: list[Body]) -> None:
         if body.flexible:
             continue
         try:
-            xx, yy, zz = (tuple(row) for row in body.inertial.inertia.tolist())
+            xx, yy, zz = (tuple(row) for row in as_rows(body.inertial.inertia))
             check_inertia((xx, yy, zz), SMALLEST)
         except ValueError as error:
             found.append(f"{body.label}: <inertia>: {error}")

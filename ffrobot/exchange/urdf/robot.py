@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.rotations import of_rpy
 
 Numbers3 = tuple[float, float, float]
@@ -67,7 +67,7 @@ class Inertial:
         mass = self.mass + other.mass
         if mass == 0.0:
             return Inertial(0.0, self.center, self.inertia + other.inertia)
-        center = (self.mass * self.center + other.mass * other.center) / mass
+        center = as_floats((self.mass * self.center + other.mass * other.center) / mass)
         inertia = self.inertia + other.inertia
         for part in (self, other):
             r = part.center - center

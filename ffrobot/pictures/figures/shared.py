@@ -130,3 +130,21 @@ def file_name(*parts: str) -> str:
     plain = "".join(c if c.isascii() and (c.isalnum() or c in ".-") else "_" for c in joined)
     lost = any(c != p and c not in " /_" for c, p in zip(joined, plain, strict=True))
     return f"{plain}-{hashlib.sha256(joined.encode()).hexdigest()[:6]}" if lost else plain
+
+
+def response_figures(results: Results, analysis: str) -> Iterator[FigureRecord]:
+    """Of a linear analysis: how points and joints respond to each motor and to the first patch of each layout."""
+    attributes = results.attributes(f"{analysis}/linear")
+    inputs, outputs = ([str(name) for name in attributes[key]] for key in ("input_names", "output_names"))
+    for source in inputs:
+        is_first = source.startswith("joint/") or (source.startswith("pzt/") and source.endswith("/1"))
+        seen = [name for name in outputs if name.startswith("point/") or name == source]
+        if is_first and seen:
+            yield FigureRecord(
+                name=file_name("bode", analysis, source.replace("/", "_")),
+                title=f"response to {source}, {analysis}",
+                kind="bode",
+                analysis=analysis,
+                transfers=tuple((source, name) for name in seen),
+                y_label="magnitude (m, rad per N·m, V)",
+            )

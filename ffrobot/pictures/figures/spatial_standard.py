@@ -8,7 +8,15 @@ import numpy as np
 
 from ...results.file import Results
 from .figure_file import Curve, FigureRecord
-from .shared import energy_figures, file_name, joint_figures, members, moving_configurations, voltage_figures
+from .shared import (
+    energy_figures,
+    file_name,
+    joint_figures,
+    members,
+    moving_configurations,
+    response_figures,
+    voltage_figures,
+)
 
 AXES = "xyz"
 SEEN = 1e-3  # of the largest component of a deflection: smaller ones are the line at zero
@@ -27,8 +35,15 @@ def spatial_figures(results: Results) -> tuple[FigureRecord, ...]:
             *joint_figures(results),
             *energy_figures(results),
             *voltage_figures(results),
+            *_responses(results),
         ]
     )
+
+
+def _responses(results: Results) -> Iterator[FigureRecord]:
+    for analysis in results.analyses:
+        if results.has(f"{analysis}/linear"):
+            yield from response_figures(results, analysis)
 
 
 def _paths(results: Results) -> Iterator[FigureRecord]:

@@ -9,7 +9,15 @@ import numpy as np
 from ...results.file import Results
 from ...results.joints import joint_coordinates
 from .figure_file import Curve, FigureRecord
-from .shared import curves_of, file_name, joint_figures, members, moving_configurations, voltage_figures
+from .shared import (
+    curves_of,
+    file_name,
+    joint_figures,
+    members,
+    moving_configurations,
+    response_figures,
+    voltage_figures,
+)
 from .spatial_standard import spatial_figures
 
 
@@ -131,27 +139,14 @@ def _tip_errors(results: Results) -> Iterator[FigureRecord]:
 
 
 def _linear(results: Results) -> Iterator[FigureRecord]:
-    """Mode shapes of the robot, and the responses of points and joints to each motor and each body's first patch."""
+    """Places of patches, mode shapes of the robot, and responses."""
     for analysis in results.analyses:
         if results.has(f"{analysis}/placement"):
             name, title = file_name("placement", analysis), f"patches, {analysis}"
             yield FigureRecord(name=name, title=title, kind="placement", analysis=analysis)
         if not results.has(f"{analysis}/linear"):
             continue
-        attributes = results.attributes(f"{analysis}/linear")
-        inputs, outputs = ([str(name) for name in attributes[key]] for key in ("input_names", "output_names"))
         yield FigureRecord(
             name=file_name("modes", analysis), title=f"modes, {analysis}", kind="modes", analysis=analysis
         )
-        for source in inputs:
-            is_first = source.startswith("joint/") or (source.startswith("pzt/") and source.endswith("/1"))
-            seen = [name for name in outputs if name.startswith("point/") or name == source]
-            if is_first and seen:
-                yield FigureRecord(
-                    name=file_name("bode", analysis, source.replace("/", "_")),
-                    title=f"response to {source}, {analysis}",
-                    kind="bode",
-                    analysis=analysis,
-                    transfers=tuple((source, name) for name in seen),
-                    y_label="magnitude (m, rad per N·m, V)",
-                )
+        yield from response_figures(results, analysis)

@@ -81,7 +81,8 @@ def joint_places(results: Results, analysis: str, frames: Indices) -> tuple[Arra
     motions = [body_motion(results, analysis, name, frames) for name in ordered_bodies(results.scene)]
     shift = carried(motions, results.scene)
     ends = {joint["between"][1] for joint in results.scene.get("joint", []) if joint["type"] == "revolute"}
-    at, exaggeration = [np.zeros((len(frames), 0, 3))], [np.zeros((len(frames), 0, 3))]
+    at: list[Array] = [np.zeros((len(frames), 0, 3))]
+    exaggeration = at.copy()
     for motion in motions:
         here = [k for k, name in enumerate(motion.point_names) if name in ends]
         moved = rotated(motion.angle[:, None], motion.deflection[:, here])

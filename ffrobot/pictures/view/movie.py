@@ -41,7 +41,7 @@ def view_movie(results_path: Path, path: Path, options: MovieOptions | None = No
         file = Path(place) / "grid.vtkhdf"
         write_atomically(file, vtkhdf_image(grid), "grid", ours=True)
         draw_pictures([replace(picture, grid=str(file), path=place, movie=True)])
-        write_movie(path, _frames(Path(place), shown.tolist()))
+        write_movie(path, _frames(Path(place), [int(k) for k in shown]))
     return list(dict.fromkeys(notes))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Indices
+from ...common.arrays import Indices, as_rows
 from ...common.errors import InputError, SolveError
 from ...common.files import check_folder, write_atomically
 from ...common.validation import did_you_mean
@@ -164,7 +164,7 @@ def motion_picture(
     joints = at + (scale - 1.0) * exaggeration
     return replace(
         picture,
-        joints=tuple(tuple(map(tuple, places)) for places in joints.tolist()),
+        joints=tuple(tuple(map(tuple, as_rows(places))) for places in joints),
         ground=tuple((float(x), float(y), 0.0) for x, y in ground_points([results.scene])),
     )
 

@@ -71,23 +71,23 @@ inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<
 }
 
 // `call` with the number of columns as a constant
-template <class F> FFROBOT_INLINE void with_columns(int columns, const F &call) {
-  switch (columns) {
-  case 1:
-    return call(std::integral_constant<int, 1>());
-  case 3:
-    return call(std::integral_constant<int, 3>());
-  case 7:
-    return call(std::integral_constant<int, 7>());
-  default:
-    return call(std::integral_constant<int, 16>());
-  }
+template <class T, class F> FFROBOT_INLINE void with_columns(int columns, const F &call) {
+  if constexpr (std::is_same_v<T, double>)
+    switch (columns) {
+    case 1:
+      return call(std::integral_constant<int, 1>());
+    case 3:
+      return call(std::integral_constant<int, 3>());
+    case 7:
+      return call(std::integral_constant<int, 7>());
+    }
+  return call(std::integral_constant<int, most_columns>());
 }
 
 template <class Space, class T>
 void accelerations(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
                    Workspace<Space, T> &w, T *a) {
-  with_columns(w.columns, [&](auto W) { run<Space, T, W>(m, q, v, forces, target, w, a); });
+  with_columns<T>(w.columns, [&](auto W) { run<Space, T, W>(m, q, v, forces, target, w, a); });
 }
 
 template <class Space, class T>
@@ -98,7 +98,8 @@ void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspac
   for (std::size_t r = 0; r < w.active.size(); ++r)
     w.y[r + 1] = residual[w.active[r]];
   solve_again(w.factor.data(), count, w.y.data() + 1);
-  with_columns(w.columns, [&](auto W) { release_all<true, Space, T, W>(m, q, Pack<T, W>::read(w.y.data()), w, dq); });
+  with_columns<T>(w.columns,
+                  [&](auto W) { release_all<true, Space, T, W>(m, q, Pack<T, W>::read(w.y.data()), w, dq); });
 }
 
 template <class Space, class T>
@@ -120,11 +121,10 @@ void measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space,
 
 template <class Space, class T>
 Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size()), frames(m.nodes.size()) {
-  for (const int choice : column_counts) {
-    columns = choice;
-    if (choice > static_cast<int>(m.rows.size()))
-      break;
-  }
+  const int needed = static_cast<int>(m.rows.size()) + 1;
+  columns = most_columns;
+  if constexpr (std::is_same_v<T, double>)
+    columns = *std::find_if(std::begin(column_counts), std::end(column_counts) - 1, [&](int c) { return c >= needed; });
   if (m.rows.size() > static_cast<std::size_t>(most_rows))
     throw std::invalid_argument("rows: expected at most " + std::to_string(most_rows) + ", got " +
                                 std::to_string(m.rows.size()));

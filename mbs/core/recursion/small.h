@@ -43,7 +43,8 @@ template <class A, class B, class C> FFROBOT_INLINE void product(const A &a, con
 template <class M, class X> FFROBOT_INLINE void logarithm(const M &R, X *x) {
   for (int i = 0; i < 3; ++i)
     x[i] = 0.5 * (R[(i + 2) % 3][(i + 1) % 3] - R[(i + 1) % 3][(i + 2) % 3]);
-  const X factor = angle_by_sine(std::sqrt(dot(x, x)), 0.5 * (R[0][0] + R[1][1] + R[2][2] - 1.));
+  using std::sqrt;
+  const X factor = angle_by_sine(sqrt(dot(x, x)), 0.5 * (R[0][0] + R[1][1] + R[2][2] - 1.));
   for (int i = 0; i < 3; ++i)
     x[i] = factor * x[i];
 }

@@ -9,8 +9,9 @@
 namespace ffrobot::recursion {
 
 // Columns side by side: 0 is what acts without constraints, column r what a unit of multiplier r does. Sizes that are
-// compiled; where there are fewer rows the rest is zero.
+// compiled; where there are fewer rows the rest is zero. Of other scalars than doubles the largest alone.
 constexpr int column_counts[] = {1, 3, 7, 16};
+constexpr int most_columns = 16;
 constexpr int most_rows = 15;
 
 // A joint, in axes of the outer section
@@ -50,7 +51,7 @@ template <class Space, class T> struct Workspace {
   static constexpr int d = Space::dim;
   explicit Workspace(const Mechanism<Space> &m);
 
-  int columns; // entry of column_counts
+  int columns; // entry of column_counts; most_columns of other scalars than doubles
   std::vector<typename Space::template State<T>> bodies;
   std::vector<Hinge<Space, T>> hinges;
   Aligned<PortWork<Space, T>> ports;

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from pydantic import model_validator
 
+from ....common.arrays import as_rows
 from ....common.errors import InputError
 from ....common.rotations import smallest_turn
 from ....common.validation import Record, quoted
@@ -131,7 +132,7 @@ class SpatialTrajectory(Record):
     def tool_triad(self) -> tuple[tuple[float, ...], ...]:
         """Of a tool axis: rows of the triad of the section whose z is along it."""
         assert self.tool_axis is not None
-        return tuple(map(tuple, smallest_turn(np.array(self.tool_axis)).tolist()))
+        return tuple(map(tuple, as_rows(smallest_turn(np.array(self.tool_axis)))))
 
     @property
     def row_count(self) -> int:

@@ -1,0 +1,97 @@
+"""Linear models of robots in space: the analysis `kind = "linear"` there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...mbs._core import TimeFunction
+from ...mbs.analysis.operating_points import row_at
+from ...mbs.analysis.spatial_run import SpatialContext, SpatialRun, without_paths
+from ...mbs.analysis.spatial_static import run_spatial_static
+from ...mbs.model.spatial_model import SpatialModel, SpatialRow
+from ...mbs.scene.analysis import Analysis
+from ...mbs.solve.linearisation import LinearMechanism
+from ...mbs.solve.spatial_linearisation import SpatialLinearisation
+from ...mbs.solve.spatial_posture import undeformed_posture
+from ..patches.spatial_patches import LinkPatches
+from .linear import Linear, LinearModels, analyse
+from .linear_model import LinearModel, state_space
+
+
+@dataclass(frozen=True)
+class ActuatedSpatialContext(SpatialContext):
+    """With the `patches` of links by body."""
+
+    patches: Mapping[str, LinkPatches] = field(default_factory=dict)
+
+
+def run_spatial_linear(context: ActuatedSpatialContext, analysis: Linear) -> SpatialRun:
+    """The posture or instants that it is about, with `LinearModels`. Raises `SolveError` in singular postures."""
+    source = None if analysis.source is None else context.runs[analysis.source]
+    run = _equilibrium(context, analysis) if source is None else _instants(context.model, analysis, source)
+    return replace(run, details=linear_models_in_space(context, analysis, run))
+
+
+def linear_models_in_space(context: ActuatedSpatialContext, analysis: Linear, run: SpatialRun) -> LinearModels:
+    """About the outputs of `run`."""
+    free = without_paths(context.model)
+    linearisation = SpatialLinearisation(free, run.q[0], analysis.points or _default_points(free))
+    models: list[LinearModel] = []
+    for t, q, v, a in zip(run.time, run.q, run.v, run.a, strict=True):
+        mechanism = linearisation.at(float(t), q, v, a)
+        models.append(state_space(mechanism, dict(_voltages(free, mechanism, context.patches))))
+    return analyse(tuple(models))
+
+
+def _equilibrium(context: ActuatedSpatialContext, analysis: Analysis) -> SpatialRun:
+    """Static; where nothing is followed, motors keep the initial posture."""
+    model = context.model
+    if not any(row.is_trajectory for row in model.rows):
+        context = replace(context, model=replace(model, rows=(*model.rows, *_held_by_motors(model))))
+    return run_spatial_static(context, analysis)
+
+
+def _instants(model: SpatialModel, analysis: Linear, source: SpatialRun) -> SpatialRun:
+    rows = [row_at(model.scene.path, analysis, source, float(t)) for t in analysis.times]
+    return replace(source.rows(rows), analysis=analysis, steps=0, evaluations=0, warnings=(), again=None)
+
+
+def _held_by_motors(model: SpatialModel) -> list[SpatialRow]:
+    """Rows that keep the coordinates of motors where they are at the start."""
+    start, rows = undeformed_posture(model).q, []
+    for joint, columns in model.motors.items():
+        node = model.tree.nodes[model.tree.carried[joint]]
+        for k in columns:
+            q_index = node.q.start + int(k) - node.v.start
+            target, nothing = TimeFunction.constant(float(start[q_index])), np.zeros(3)
+            rows.append(
+                SpatialRow(
+                    joint, "coordinate", node.inner, node.outer, nothing, nothing, coordinate=int(k), q_index=q_index,
+                    target=target,
+                )
+            )  # fmt: skip
+    return rows
+
+
+def _voltages(model: SpatialModel, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> dict[str, Array]:
+    """By "pzt/LAYOUT/k", what a volt does along s: on the modes of its link."""
+    found: dict[str, Array] = {}
+    for name, of_link in patches.items():
+        body = model.tree.nodes[model.tree.index[name]].body
+        per_volt = np.zeros((of_link.Phi_V.shape[1], len(mechanism.M)))
+        per_volt[:, mechanism.modal(name)] = (body.modal_transform.T @ of_link.Phi_V).T
+        ends = np.cumsum([len(array.edges) for array in of_link.arrays.values()])
+        for layout, rows in zip(of_link.arrays, np.split(per_volt, ends[:-1]), strict=True):
+            found |= {f"pzt/{layout}/{k}": row for k, row in enumerate(rows, 1)}
+    return found
+
+
+def _default_points(model: SpatialModel) -> tuple[str, ...]:
+    """The points of trajectories; where there are none, the tips of all bodies that have one."""
+    points = [trajectory.point for trajectory in model.scene.trajectory if trajectory.point is not None]
+    tips = [f"{node.body.name}.tip" for node in model.tree.nodes if "tip" in node.body.points]
+    return tuple(dict.fromkeys(points or tips))

@@ -1,0 +1,88 @@
+#include "core/recursion/derivatives.h"
+
+#include "core/recursion/dual.h"
+#include "core/space/configuration_space.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace ffrobot::recursion {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr Index directions = Dual::directions;
+
+using Duals = std::vector<Dual>;
+
+Duals constants(const double *x, std::size_t size) {
+  Duals found(size, Dual(0.));
+  if (x)
+    std::copy_n(x, size, found.begin());
+  return found;
+}
+
+// Rate 1 in direction k
+void seed(Dual &x, Index k, double rate = 1) { x.rate.add(static_cast<int>(k), rate); }
+
+// q is incremented along v[i] in direction k; a quaternion e by e (0, dw)/2 for a rotation vector dw in body axes.
+void seed_increment(const ConfigurationSpace &space, const double *q, Index i, Index k, Duals &to) {
+  for (const auto &numbers : space.numbers())
+    if (i >= numbers.v && i < numbers.v + numbers.count)
+      seed(to[static_cast<std::size_t>(numbers.q + i - numbers.v)], k);
+  for (const auto &rotation : space.rotations()) {
+    if (i < rotation.v || i >= rotation.v + 3)
+      continue;
+    const double *e = q + rotation.q;
+    const double change[3][4] = {{-e[1], e[0], e[3], -e[2]}, {-e[2], -e[3], e[0], e[1]}, {-e[3], e[2], -e[1], e[0]}};
+    for (Index j = 0; j < 4; ++j)
+      seed(to[static_cast<std::size_t>(rotation.q + j)], k, 0.5 * change[i - rotation.v][j]);
+  }
+}
+
+// Rates of x, in up to eight directions, to columns of `to` from `first` on
+template <class Values> void take(const Values &x, Index first, Index count, MatrixXd &to) {
+  for (Index j = 0; j < to.rows(); ++j)
+    for (Index k = 0; k < count; ++k)
+      to(j, first + k) = x[static_cast<std::size_t>(j)].rate[static_cast<int>(k)];
+}
+
+} // namespace
+
+Derivatives derivatives(const Mechanism<Spatial> &m, const Workspace<Spatial, double> &kept, const double *q,
+                        const double *v, const Forces<double> &forces, const double *target) {
+  const ConfigurationSpace space(m.n_v, m.rotations);
+  const Index n = m.n_v, rows = static_cast<Index>(m.rows.size());
+  const auto n_v = static_cast<std::size_t>(n), n_rows = m.rows.size();
+  Workspace<Spatial, Dual> w(m);
+  w.keep(kept.active), w.turning = kept.turning;
+  const Duals q0 = constants(q, static_cast<std::size_t>(m.n_q)), v0 = constants(v, n_v);
+  const Duals force0 = constants(forces.generalized, n_v), held = constants(target, n_rows);
+  const Duals wrench = constants(forces.wrench, Spatial::dim * m.wrenches.size());
+  Duals a(n_v), value(n_rows), rate(n_rows);
+  const auto answer = [&](const Duals &at_q, const Duals &at_v, const Duals &force) {
+    Forces<Dual> acting;
+    acting.generalized = force.data();
+    acting.wrench = forces.wrench ? wrench.data() : nullptr;
+    accelerations(m, at_q.data(), at_v.data(), acting, held.data(), w, a.data());
+  };
+  Derivatives found{MatrixXd(n, n), MatrixXd(n, n), MatrixXd(n, n), MatrixXd(rows, n), MatrixXd(rows, n)};
+  for (Index first = 0; first < n; first += directions) {
+    const Index count = std::min(directions, n - first);
+    Duals q1 = q0, v1 = v0, force1 = force0;
+    for (Index k = 0; k < count; ++k) {
+      const auto i = static_cast<std::size_t>(first + k);
+      seed_increment(space, q, first + k, k, q1), seed(v1[i], k), seed(force1[i], k);
+    }
+    answer(q1, v0, force0), take(a, first, count, found.a_q);
+    answer(q0, v1, force0), take(a, first, count, found.a_v);
+    answer(q0, v0, force1), take(a, first, count, found.a_f);
+    measure(m, q1.data(), v0.data(), w, value.data(), rate.data());
+    take(value, first, count, found.value_q), take(rate, first, count, found.rate_q);
+  }
+  return found;
+}
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,23 @@
+// How accelerations and rows answer to small changes of a state, exact: dual numbers through the recursion, eight
+// directions at a time.
+#pragma once
+
+#include "core/recursion/workspace.h"
+
+#include <Eigen/Core>
+
+namespace ffrobot::recursion {
+
+// By increments of q (n_v; rotation vectors in body axes for quaternions), by v and by generalized forces; rows hold.
+struct Derivatives {
+  Eigen::MatrixXd a_q, a_v, a_f; // (n_v, n_v) of accelerations
+  Eigen::MatrixXd value_q;       // (rows, n_v) of values of rows, C_q: by v of their rates, too
+  Eigen::MatrixXd rate_q;        // (rows, n_v) of their rates
+};
+
+// At q, v under `forces` and second derivatives `target` (rows) of the rows that `kept` keeps; markers of the ground
+// stand and turn as there.
+Derivatives derivatives(const Mechanism<Spatial> &m, const Workspace<Spatial, double> &kept, const double *q,
+                        const double *v, const Forces<double> &forces, const double *target);
+
+} // namespace ffrobot::recursion

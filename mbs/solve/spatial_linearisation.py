@@ -1,0 +1,185 @@
+"""The equations of motion in space, linear about a posture or a motion, in independent coordinates.
+
+The core differentiates them exactly (core/recursion/derivatives.h). For increments δ of the coordinates of the tree,
+rotation vectors in body axes for orientations, δ̇ = δv + B δ with B = −ω~ at orientations, else 0. Loops leave
+δ = H δs and δv = H δv_s + N δs, where v_s are the rates of the independent coordinates s. So
+
+    δv = H δṡ + Ḣ δs,  Ḣ = N − H B_s H;    δs̈ = a_v,s (H δṡ + Ḣ δs) + a_q,s H δs + d/dt (B_s δ).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from ...common.arrays import Array, Indices
+from ...common.errors import InputError, SolveError
+from ...common.rotations import skew
+from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_inverse import required_forces
+from ..model.spatial_model import SpatialModel, row_values
+from ..model.spatial_system import SpatialSystem
+from ..model.spatial_transmission import compliance
+from ..model.spatial_tree import Node
+from .linearisation import DEPENDENT, LinearMechanism
+
+
+class SpatialLinearisation:
+    """What is the same at every posture: joints alone hold; given forces along s act, and loads.
+
+    `model` has no rows of trajectories. Independent are the motors' coordinates where loops leave them so, then other
+    joint coordinates, and modes, those first that the loops determine worst at `q` (QR with pivoting). `points`
+    ("BODY.POINT") are in- and outputs.
+    """
+
+    def __init__(self, model: SpatialModel, q: Array, points: Sequence[str] = ()) -> None:
+        _check(model)
+        self.model, self.points, self.system = model, tuple(points), SpatialSystem(model)
+        self.independent = _independent(model, q)
+        names, signs = _coordinates(model)
+        self.names = tuple(names[k] for k in self.independent)
+        self._signs = signs[self.independent]
+
+    def at(self, t: float, q: Array, v: Array, a: Array) -> LinearMechanism:
+        """The linear equations about a motion whose q (n_q,), v and a (n_v,) keep the loops closed.
+
+        Raises `SolveError` in a posture in which the independent coordinates do not determine the others.
+        """
+        tree, s = self.model.tree, self.independent
+        state = Accelerated(tree, q[None], v[None], a[None], tree.frames(q[None]))
+        H, determine = self._followers(state, t)
+        force = H.T @ required_forces(self.model, state, np.array([t]))[0]
+        along_s = np.zeros(tree.n_v)
+        along_s[s] = force
+        core, N = self.system.derivatives(t, q, v, along_s), np.zeros_like(H)
+        N[np.setdiff1d(np.arange(tree.n_v), s)] = -determine @ core.rate_q @ H
+        B, B_dot = _bracket(tree.nodes, v), _bracket(tree.nodes, a)[s]
+        H_dot = N - H @ B[s] @ H
+        by_rate = core.a_v[s] @ H + B[s] @ H
+        by_s = core.a_q[s] @ H + core.a_v[s] @ H_dot + B_dot @ H + B[s] @ (H_dot + B @ H)
+        M = np.linalg.inv(core.a_f[np.ix_(s, s)])
+        sides: Array = self._signs[:, None] * self._signs
+        H, H_dot = H * self._signs, H_dot * self._signs
+        return LinearMechanism(
+            t, q, v, a, sides * (M + M.T) / 2, -sides * (M @ by_rate), -sides * (M @ by_s),
+            self._inputs(state, H), self._outputs(state, H), H, H_dot, self._signs * force, np.zeros(0), self.names,
+        )  # fmt: skip
+
+    def _followers(self, state: Accelerated, t: float) -> tuple[Array, Array]:
+        """H (n_v, f), and what gives the coordinates that follow from the rates that rows would get (n_v − f, rows)."""
+        n_v, s = self.model.tree.n_v, self.independent
+        H = np.zeros((n_v, len(s)))
+        H[s, np.arange(len(s))] = 1.0
+        others = np.setdiff1d(np.arange(n_v), s)
+        C_v = row_values(self.model, state.q, np.array([t]), state.frames)[1][0]
+        if not len(others):
+            return H, np.zeros((0, len(C_v)))
+        sizes = np.linalg.svd(C_v[:, others], compute_uv=False)
+        if not sizes[-1] > DEPENDENT * sizes[0]:
+            joints = ", ".join(name for name in self.names if not name.startswith("modal/"))
+            raise SolveError(
+                f"{self.model.scene.path}: linear model at t = {t:g} s: {joints} do not determine the posture there (a"
+                " singular one)"
+            )
+        determine = np.linalg.pinv(C_v[:, others])
+        H[others] = -determine @ C_v[:, s]
+        return H, determine
+
+    def _inputs(self, state: Accelerated, H: Array) -> Mapping[str, Array]:
+        """By s: a unit of each motor, and of forces on points along x, y, z."""
+        motors = self._along(self.model.motors, H)
+        return MappingProxyType(motors | {f"force/{name}": row for name, row in self._places(state, H).items()})
+
+    def _outputs(self, state: Accelerated, H: Array) -> Mapping[str, Array]:
+        """By s: joint coordinates, and places of points."""
+        joints = self._along((joint.name for joint in self.model.scene.joint), H)
+        return MappingProxyType(joints | {f"point/{name}": row for name, row in self._places(state, H).items()})
+
+    def _along(self, joints: Iterable[str], H: Array) -> dict[str, Array]:
+        return {
+            name: self.model.sign(joint) * H[k]
+            for joint in joints
+            if joint in self.model.tree.carried
+            for name, k in _labelled(self.model, joint)
+        }
+
+    def _places(self, state: Accelerated, H: Array) -> dict[str, Array]:
+        found: dict[str, Array] = {}
+        for point in self.points:
+            L = self.model.tree.motion(self.model.tree.section(point, np.eye(3)), state.q, state.frames).L[0]
+            found |= {f"{point}/{axis}": L[k] @ H for k, axis in enumerate("xyz")}
+        return found
+
+
+def _check(model: SpatialModel) -> None:
+    path = model.scene.path
+    if model.scene.motors == "frame" and model.motors:
+        raise InputError(
+            f'{path}: motors: expected "section" for linear models in space, found "frame": not available yet'
+        )
+    for node in model.tree.nodes:
+        if compliance(node) is not None:
+            raise InputError(
+                f"{path}: {node.joint.label}: stiffness: expected gears that do not give for linear models in space,"
+                " found one that does: not available yet"
+            )
+        if node.backwards and node.joint.type == "planar":  # its coordinates are not linear in the tree's
+            raise InputError(
+                f"{path}: {node.joint.label}: between: expected the side nearer to the ground first for linear models,"
+                " found it second"
+            )
+
+
+def _labelled(model: SpatialModel, joint: str) -> Iterator[tuple[str, int]]:
+    """Coordinates of a joint, "joint/NAME", or "joint/NAME 1", "joint/NAME 2" of several, and where each is in v."""
+    columns = model.columns(joint)
+    for number, k in enumerate(columns, 1):
+        yield f"joint/{joint}" + (f" {number}" if len(columns) > 1 else ""), int(k)
+
+
+def _coordinates(model: SpatialModel) -> tuple[list[str], Array]:
+    """Names of the entries of v, and the sign with which a joint of the scene counts each."""
+    names, signs = [""] * model.tree.n_v, np.ones(model.tree.n_v)
+    joints = {joint.name for joint in model.scene.joint}
+    for node in model.tree.nodes:
+        kind = "joint" if node.joint.name in joints else "frame"
+        for number, k in enumerate(range(node.v.start, node.v.stop), 1):
+            names[k] = f"{kind}/{node.joint.name} {number}"  # of orientations: about axes of the body
+        for number, k in enumerate(range(node.p_v.start, node.p_v.stop), 1):
+            names[k] = f"modal/{node.body.name}/{number}"
+        if kind == "joint":
+            for name, k in _labelled(model, node.joint.name):
+                names[k], signs[k] = name, model.sign(node.joint.name)
+    return names, signs
+
+
+def _independent(model: SpatialModel, q: Array) -> Indices:
+    """Where s is in v: motors first, then other joints, then modes."""
+    from scipy.linalg import qr
+
+    modes = np.flatnonzero(~model.tree.joint_columns)
+    motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(np.intp)
+    others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
+    left = row_values(model, q[None], np.zeros(1))[1][0]
+    size, free = np.abs(left).max(initial=0.0), []
+    for group in (others, motors, modes):  # what loops determine best is dependent, motors and modes last
+        rank, order = 0, np.arange(len(group))
+        if len(left) and len(group):
+            Q, R, order = qr(left[:, group], pivoting=True)
+            rank = int(np.count_nonzero(np.abs(np.diag(R)) > DEPENDENT * size))
+            left = Q[:, rank:].T @ left
+        free.append(np.sort(group[order[rank:]]))
+    chosen: Indices = np.concatenate([free[1], free[0], free[2]]).astype(np.intp)
+    return chosen
+
+
+def _bracket(nodes: Sequence[Node], v: Array) -> Array:
+    """B (n_v, n_v) of velocities (or accelerations) v: −ω~ where three of v turn an orientation."""
+    found = np.zeros((len(v), len(v)))
+    for node in nodes:
+        if node.joint.q_count > node.joint.freedoms:
+            turning = slice(node.v.stop - 3, node.v.stop)
+            found[turning, turning] = -skew(v[turning])
+    return found
