@@ -84,16 +84,16 @@ def mpirun():
 
 @pytest.fixture(scope="session")
 def solved(ffrobot, tmp_path_factory):
-    """Copy a case, edit the text of its scene and of its link files, run it."""
+    """Copy a case, edit the text of its scene and of its link files, run it; within `timeout` (s)."""
 
-    def solve(name, edit=lambda text: text, edit_link=lambda text: text):
+    def solve(name, edit=lambda text: text, edit_link=lambda text: text, timeout=120):
         scene = _copy(name, tmp_path_factory.mktemp("solved"))
         scene.write_text(edit(scene.read_text(encoding="utf-8")), encoding="utf-8")
         for body in tomllib.loads(scene.read_text(encoding="utf-8"))["body"]:
             if "link" in body:
                 link = scene.parent / body["link"]
                 link.write_text(edit_link(link.read_text(encoding="utf-8")), encoding="utf-8")
-        done = ffrobot("solve", "scene.toml", cwd=scene.parent)
+        done = ffrobot("solve", "scene.toml", cwd=scene.parent, timeout=timeout)
         assert done.returncode == 0, done.stderr
         file = h5py.File(scene.with_suffix(".results.h5"), "r")
         return SolvedCase(scene.parent, done.stdout, done.stderr, file)

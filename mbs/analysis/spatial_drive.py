@@ -19,8 +19,18 @@ from ..solve.state import State
 from .drive import STATUS, Progress
 from .spatial_run import SpatialRun
 
-INTEGRATORS = {"auto": "dop853", **{name: name for name in METHODS}}
-"""The method that stands behind each name in scenes."""
+
+def integrator_of(model: SpatialModel, name: str) -> str:
+    """The method that stands behind a name in scenes.
+
+    "auto" is Radau where dry friction acts on links with modes: near rest it is a damper so stiff for the light ends of
+    links that explicit steps take nanoseconds; else DOP853.
+    """
+    if name != "auto":
+        return name
+    nodes = model.tree.nodes
+    sticks = any(friction.coulomb > 0 for node in nodes for friction in node.joint.frictions)
+    return "radau" if sticks and any(node.body.n_modes for node in nodes) else "dop853"
 
 
 def spatial_drive(
@@ -40,7 +50,7 @@ def spatial_drive(
     """
     times = analysis.times if times is None else times
     system, began = SpatialSystem(model, drives), time.perf_counter()
-    integrator = INTEGRATORS[analysis.integrator]
+    integrator = integrator_of(model, analysis.integrator)
     controls = _core.IntegrationControls(
         tolerance=analysis.tolerance,
         max_steps=analysis.max_steps,

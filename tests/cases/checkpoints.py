@@ -51,6 +51,8 @@ TABLES = {
     ("two_link_rest_to_rest", "run"): 0.02,
     ("two_link_rest_to_rest", "times less"): 0.03,  # quotients of the above
     ("arm_3r", "run"): 1e-3,
+    ("arm_6r", "motor"): 0.01,
+    ("arm_6r", "run"): 0.02,
     ("slider_crank_3d", "largest"): 1e-3,
     ("slewing_appendage", "largest"): 1e-3,
 }

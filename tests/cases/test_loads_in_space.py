@@ -1,7 +1,10 @@
 """Loads on points, friction and rotors in space through `ffrobot solve`, against forces written by hand."""
 
+import re
+
 import h5py
 import numpy as np
+from space import solved, write_scene
 
 SCENE = """
 name = "loads"
@@ -88,3 +91,21 @@ def test_motors_carry_loads_friction_and_rotors(tmp_path, ffrobot):
     np.testing.assert_allclose(dissipated, friction * rate + 0.2 * t**2, atol=1e-7)
     np.testing.assert_allclose(kinetic, 1.5 * rate**2 + 0.5 * (0.05 + 1e-3 * 20**2) * t**2, atol=1e-7)
     np.testing.assert_allclose(reaction[:, 0], -4 * np.cos(t), atol=1e-7)
+
+
+def test_links_whose_joints_stick(tmp_path, ffrobot):
+    """Dry friction near rest, a stiff damper at light ends of links: "auto" is implicit, and finds the same moments."""
+    scene = write_scene("arm6_static", tmp_path)
+    text = re.sub(r"end = .*\noutput_step = .*", "end = 0.004\noutput_step = 0.001", scene.read_text())
+    text = text.replace('type = "revolute"', 'type = "revolute"\ncoulomb_friction = 0.2')
+    found = {}
+    for integrator in ("auto", "dop853"):
+        scene.write_text(f'{text}\nintegrator = "{integrator}"\n')
+        with solved(ffrobot, scene) as file:
+            group = file["inverse"]
+            moments = np.array([group[f"joints/q{k}/moment"][()] for k in range(1, 7)])
+            found[integrator] = group.attrs["integrator"], group.attrs["evaluations"], moments
+    (implicit, few, radau), (_, many, dop853) = found["auto"], found["dop853"]
+    assert implicit == "radau"
+    assert 10 * few < many
+    np.testing.assert_allclose(radau, dop853, atol=1e-6 * np.abs(dop853).max())

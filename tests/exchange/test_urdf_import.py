@@ -80,7 +80,7 @@ def test_welds_are_merged_and_their_frames_stay_as_points(imported):
     np.testing.assert_allclose(body["rigid"]["center"], [0, 0, 0.2])
     np.testing.assert_allclose(body["rigid"]["inertia"], [0.04 + 4 * 0.2**2, 0.04 + 4 * 0.2**2, 0.02])
     np.testing.assert_allclose(body["rigid"]["points"]["tip"], [0.1, 0, 0.4])
-    assert '"base" (mass 2 kg) stand still on the ground' in out
+    assert '"base" (mass 2 kg) stands still on the ground' in out
 
 
 def test_mimic_limits_of_zero_and_masses_of_zero_are_told(imported):

@@ -1,9 +1,6 @@
 """Rigid robots from their URDF through `ffrobot import` and `ffrobot solve`: motor moments against other codes."""
 
-import os
 import re
-import subprocess
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -18,12 +15,14 @@ OTHERS = {
 }
 
 
-def solved_moments(ffrobot, urdf, folder, motion):
-    """{joint: moment} at t = 0."""
+def solved_moments(ffrobot, urdf, folder, motion, *, friction=False):
+    """{joint: moment} at t = 0, with the friction of the URDF or without."""
     done = ffrobot("import", urdf, "-o", folder)
     assert done.returncode == 0, done.stderr
     scene = folder / "scene.toml"
-    text = re.sub(r"^(viscous|coulomb)_friction = .*\n", "", scene.read_text(), flags=re.MULTILINE)
+    text = scene.read_text()
+    if not friction:
+        text = re.sub(r"^(viscous|coulomb)_friction = .*\n", "", text, flags=re.MULTILINE)
     scene.write_text(with_motion(text, *motion))
     done = ffrobot("solve", scene)
     assert done.returncode == 0, done.stderr
@@ -68,14 +67,28 @@ def test_random_trees(tree):
     np.testing.assert_allclose([found[name] for name in names], [expected[name] for name in names], atol=1e-11 * scale)
 
 
-def test_random_trees_against_pinocchio(tree):
-    """With FFROBOT_PINOCCHIO a Python that has the package `pin`."""
-    python = os.environ.get("FFROBOT_PINOCCHIO")
-    if python is None:
-        pytest.skip("FFROBOT_PINOCCHIO names no Python with Pinocchio")
+def test_random_trees_against_pinocchio(tree, pinocchio):
     urdf, names, motion, found = tree
-    numbers = [repr(values[name]) for values in motion for name in names]
-    script = Path(__file__).parent / "pinocchio_moments.py"
-    done = subprocess.run([python, script, urdf, *names, *numbers], capture_output=True, text=True, check=True)
-    expected = np.array(done.stdout.split(), dtype=float)
+    expected = pinocchio(urdf, names, motion)
     np.testing.assert_allclose([found[name] for name in names], expected, atol=1e-10 * np.abs(expected).max())
+
+
+def test_friction_of_joints(tmp_path, ffrobot):
+    """<dynamics> of the Z1, damping c and friction τ_c, at rest and beside v_s = 0.01 rad/s: c q̇ + τ_c tanh(q̇/v_s)."""
+    urdf = ROBOTS / "z1.urdf"
+    names = joint_names(urdf)
+    n = len(names)
+    motion = [dict.fromkeys(names, value) for value in (0.2, 0.0, 0.1)]
+    motion[1] = dict(zip(names, 0.004 * np.arange(n) - 0.012, strict=True))
+    without = solved_moments(ffrobot, urdf, tmp_path / "without", motion)
+    found = solved_moments(ffrobot, urdf, tmp_path / "with", motion, friction=True)
+    dynamics = {
+        name: [float(value) for value in re.findall(r'<dynamics damping="(.*?)" friction="(.*?)"', text)[0]]
+        for name, text in re.findall(r'<joint name="(\w+)"(.*?)</joint>', urdf.read_text(), flags=re.DOTALL)
+        if name in names
+    }
+    for name in names:
+        c, tau_c = dynamics[name]
+        assert c > 0 or tau_c > 0
+        rate = motion[1][name]
+        assert found[name] - without[name] == pytest.approx(c * rate + tau_c * np.tanh(rate / 0.01), abs=1e-12)

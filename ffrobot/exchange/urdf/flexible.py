@@ -71,10 +71,12 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path) -> Flexib
     remarks = list[str]()
     length = _set_length(geometry, tip, name, source, remarks)
     keys["name"] = str(keys.get("name", name))
-    _rebase_file(geometry, axes, source, folder, remarks)
+    part = _place_part(geometry, axes, source, remarks)
     point_of = _interfaces(keys, beyond, tip, place, length, f"{source}: link {shown(name)}")
     file_name = f"{Names()[name]}.toml"
     read_link(LinkTable(keys, folder / file_name))
+    if part is not None:  # only now: the check above cannot go up from a folder that is not there yet
+        geometry["file"] = os.path.relpath(part, folder.resolve())
     return FlexibleLink(name, file_name, place, keys, "root", point_of, tuple(remarks))
 
 
@@ -114,14 +116,16 @@ def _set_length(geometry: dict[str, Any], tip: UrdfJoint | None, name: str, sour
     return wanted
 
 
-def _rebase_file(geometry: dict[str, Any], axes: Array, source: Path, folder: Path, remarks: list[str]) -> None:
-    """The file of a solid, told from the scene's folder; its axes are the URDF link's unless the link file says."""
+def _place_part(geometry: dict[str, Any], axes: Array, source: Path, remarks: list[str]) -> Path | None:
+    """Where the file of a solid is, if there is one; its axes are the URDF link's unless the link file says."""
     if not isinstance(file := geometry.get("file"), str):
-        return
-    geometry["file"] = os.path.relpath(source.parent / file, folder)
+        return None
+    part = (source.parent / file).resolve()
+    geometry["file"] = str(part)
     if not {"origin", "x_axis", "y_axis"} & set(geometry):
         geometry["x_axis"], geometry["y_axis"] = axes[:, 0].tolist(), axes[:, 1].tolist()
         remarks.append(f"{file} is taken to be drawn in the axes of the URDF's link")
+    return part
 
 
 def _interfaces(

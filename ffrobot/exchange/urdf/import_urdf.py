@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
 from ...common.errors import InputError
 from ...common.files import check_folder, write_atomically
 from .bodies import mechanism
@@ -100,7 +98,7 @@ def _link_text(urdf: Path, link: FlexibleLink) -> str:
     head = (
         f'# Link "{link.name}" of {urdf.name}: x from the joint that carries it to the next, y in its plane of swing.'
     )
-    return f"{head}\n\n{tomli_w.dumps(dict(link.keys))}"
+    return f"{head}\n\n{toml_text(link.keys)}"
 
 
 def _write(folder: Path, files: Mapping[str, str], *, force: bool) -> tuple[Path, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,8 @@ class SceneOfRobot:
         mass = sum(inertial.mass for name in still if (inertial := self.robot.links[name].inertial) is not None)
         if still:
             names = ", ".join(f'"{shown(name)}"' for name in still)
-            self.remarks.append(f"{names} (mass {mass:g} kg) stand still on the ground and are no body of the scene")
+            said = "stand still on the ground and are" if len(still) > 1 else "stands still on the ground and is"
+            self.remarks.append(f"{names} (mass {mass:g} kg) {said} no body of the scene")
 
     # Bodies
 
@@ -165,10 +166,10 @@ def rpy_of(C: Array) -> list[float]:
     across = float(np.hypot(C[0, 0], C[1, 0]))
     yaw = float(np.arctan2(C[1, 0], C[0, 0])) if across > 1e-9 else 0.0  # else about the same axis as roll
     B = about(2, yaw).T @ C
-    return [float(np.arctan2(-B[1, 2], B[1, 1])), float(np.arctan2(-B[2, 0], B[0, 0])), yaw]
+    return _numbers([np.arctan2(-B[1, 2], B[1, 1]), np.arctan2(-B[2, 0], B[0, 0]), yaw])
 
 
-def _numbers(vector: Array) -> list[float]:
+def _numbers(vector: Iterable[float]) -> list[float]:
     return [float(value) + 0.0 for value in vector]  # no −0.0
 
 

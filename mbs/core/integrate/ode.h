@@ -57,9 +57,9 @@ private:
 
 // What implicit methods need besides: M v_dot + C_q^T lambda = Q under constraints, and its stiff terms.
 //
-// The stiff terms of Q are -K q - D v with constant diagonals K and D, zero on rotations. Newton's method on the
-// equations of a step meets the block-arrow matrix N = M + damping_factor D + stiffness_factor K, real or complex,
-// under C_q.
+// The stiff terms of Q are -K q - D v with diagonals K and D, zero on rotations; D is as at the last factorisation,
+// where friction is among them. Newton's method on the equations of a step meets the block-arrow matrix
+// N = M + damping_factor D + stiffness_factor K, real or complex, under C_q.
 class ImplicitSystem : public OdeSystem {
 public:
   using OdeSystem::OdeSystem;

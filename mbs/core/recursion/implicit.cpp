@@ -8,7 +8,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-// Diagonals (n_v): of elastic and damping forces of modes, of springs and dampers in joints.
+// Diagonals (n_v): of elastic and damping forces of modes, of springs in joints.
 template <class Space>
 void stiff_terms(const Mechanism<Space> &m, const Scene &scene, VectorXd &stiffness, VectorXd &damping) {
   stiffness = damping = VectorXd::Zero(m.n_v);
@@ -17,16 +17,24 @@ void stiff_terms(const Mechanism<Space> &m, const Scene &scene, VectorXd &stiffn
       stiffness[node.p_v() + i] = node.body.K[i];
       damping[node.p_v() + i] = node.body.D_full.size() ? node.body.D_full(i, i) : node.body.D[i];
     }
-  for (const JointForce &joint : scene.joint_forces) {
+  for (const JointForce &joint : scene.joint_forces)
     stiffness[joint.v] += joint.stiffness;
-    damping[joint.v] += joint.friction.viscous;
-  }
+}
+
+// Of friction in joints, at the rates v (n_v). Near rest dry friction is a stiff damper: a light link's end that sticks
+// to what it carries comes to rest within nanoseconds.
+void take_friction(const Scene &scene, const VectorXd &v, VectorXd &damping) {
+  for (const JointForce &joint : scene.joint_forces)
+    damping[joint.v] = 0;
+  for (const JointForce &joint : scene.joint_forces)
+    damping[joint.v] += joint.friction.slope(v[joint.v]);
 }
 
 } // namespace
 
 template <class Space> void RecursiveMotion<Space>::find_stiff_terms() {
   stiff_terms(mechanism_, scene_, stiffness_, damping_);
+  take_friction(scene_, VectorXd::Zero(n_v()), damping_); // at rest, where none that acts has a slope of zero
   for (Index i = 0; i < n_v(); ++i)
     if (stiffness_[i] != 0 || damping_[i] != 0)
       stiff_.push_back(i);
@@ -58,11 +66,13 @@ template <class Space> void RecursiveMotion<Space>::find_compliance() {
 
 template <class Space> void RecursiveMotion<Space>::factorise(double damping_factor, double stiffness_factor) {
   find_compliance();
+  take_friction(scene_, rates_, damping_);
   real_.factorise(compliance_, stiff_, (damping_factor * damping_ + stiffness_factor * stiffness_)(stiff_));
 }
 
 template <class Space> void RecursiveMotion<Space>::factorise(Complex damping_factor, Complex stiffness_factor) {
   find_compliance();
+  take_friction(scene_, rates_, damping_);
   complex_.factorise(compliance_, stiff_, (damping_factor * damping_ + stiffness_factor * stiffness_)(stiff_));
 }
 

@@ -88,6 +88,7 @@ template <class Space> void RecursiveMotion<Space>::slope(double t, const double
   const double *q = local().state(z);
   evaluate(t, q, z + n_v(), z_dot + n_v());
   evaluated_ = Eigen::Map<const VectorXd>(q, mechanism_.n_q);
+  rates_ = Eigen::Map<const VectorXd>(z + n_v(), n_v());
   compliance_is_old_ = true;
 }
 

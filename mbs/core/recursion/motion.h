@@ -137,10 +137,11 @@ private:
   unsigned long accepted_ = 0, steps_between_postures_ = 1; // many where steps follow vibrations
   double watched_at_ = 0, determinant_ = 0;                 // of the posture before
 
-  Eigen::VectorXd stiffness_, damping_; // diagonals (n_v)
+  Eigen::VectorXd stiffness_, damping_; // diagonals (n_v); of friction as at the last factorisation
   std::vector<Eigen::Index> stiff_;     // where they are not zero
   Eigen::MatrixXd compliance_;          // (n_v, stiff) what unit forces there do under the rows
   Eigen::VectorXd evaluated_, base_;    // q of the last slope(), of the compliance
+  Eigen::VectorXd rates_;               // v of the last slope()
   bool compliance_is_old_ = true;       // there was a slope since
   NewtonMatrix<double> real_;
   NewtonMatrix<Complex> complex_;
