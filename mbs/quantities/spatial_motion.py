@@ -148,7 +148,7 @@ class SpatialMotion:
 
     @property
     def is_prescribed(self) -> bool:
-        """Whether trajectories hold in it, or motors their angles, or it is all given, with the forces that it takes."""
+        """Whether trajectories hold in it, motors their angles, or all is given with the forces that it takes."""
         return any(row.is_trajectory for row in self.model.rows) or self.required is not None
 
     @cached_property
