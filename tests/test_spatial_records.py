@@ -204,8 +204,8 @@ MISTAKES = {
         'joint "waist": expected one joint of this name',
     ),
     "kind that is not there yet": (
-        put("analysis", kind="motors-only"),
-        'kind: expected "pcid", "fcid", "forward", "static" in space = "spatial", found "motors-only", which is not',
+        add("analysis", name="loop", kind="closed-loop", actuation="inverse", sample_time=1e-3),
+        'analysis "loop": kind: expected "pcid", .* "motors-only", "linear" in space = "spatial", found "closed-loop"',
     ),
     "what is applied by patches that are not there": (
         add("analysis", name="again", kind="forward", actuation="inverse", apply="joints+pzt"),
@@ -226,9 +226,9 @@ MISTAKES = {
         lambda data: data.update(actuation_points=[{"body": "hand"}]),
         'actuation_points: expected no such key in space = "spatial", found it: not available there yet',
     ),
-    "gear that gives": (
-        put("joint", stiffness=100.0, rotor_inertia=1e-4),
-        'joint "waist": stiffness: expected none in',
+    "gear that gives without a rotor": (
+        put("joint", stiffness=100.0),
+        "expected a rotor_inertia above 0 beside stiffness, found none",
     ),
     "load on a joint with two coordinates": (
         add("load", joint="wrist", moment="1.0"),
