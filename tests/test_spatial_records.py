@@ -205,7 +205,7 @@ MISTAKES = {
     ),
     "kind that is not there yet": (
         put("analysis", kind="motors-only"),
-        'kind: expected "pcid", "fcid", "forward", "static" in space = "spatial", found "motors-only", which is not',
+        'kind: expected "pcid", "fcid", "forward", "static", "linear" in space = "spatial", found "motors-only"',
     ),
     "what is applied and not there yet": (
         add("analysis", name="again", kind="forward", actuation="inverse", apply="trajectory"),
@@ -225,10 +225,6 @@ MISTAKES = {
     "key that is not there yet": (
         lambda data: data.update(actuation_points=[{"body": "hand"}]),
         'actuation_points: expected no such key in space = "spatial", found it: not available there yet',
-    ),
-    "gear that gives": (
-        put("joint", stiffness=100.0, rotor_inertia=1e-4),
-        'joint "waist": stiffness: expected none in',
     ),
     "load on a joint with two coordinates": (
         add("load", joint="wrist", moment="1.0"),

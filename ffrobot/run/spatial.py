@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.control.spatial_linear import ActuatedSpatialContext
 from ..actuation.patches.spatial_patches import LinkPatches
-from ..actuation.spatial_kinds import IN_SPACE
 from ..common.errors import of_file
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears

@@ -1,4 +1,4 @@
-"""The kinds of analysis in space that know nothing of patches; all: `actuation.spatial_kinds`."""
+"""The kinds of analysis in space that know nothing of patches; all: `actuation.control.spatial_kinds`."""
 
 from __future__ import annotations
 
