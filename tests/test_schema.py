@@ -14,11 +14,13 @@ from spatial_checkpoints import load as checkpoint
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.scene.load import load_scene, make_scene
+from ffrobot.scene.spatial import is_spatial, load_spatial_scene
 from ffrobot.schema import schema
 
 CASES = Path(__file__).parents[1] / "cases"
-SCENES = sorted(CASES.glob("*/scene.toml"))
-LINKS = sorted(path for path in CASES.glob("*/*.toml") if path.name not in ("scene.toml", "figures.toml"))
+FILES = {path: path.read_text(encoding="utf-8") for path in sorted(CASES.glob("*/*.toml"))}
+SCENES = [path for path, text in FILES.items() if "[[analysis]]" in text]
+LINKS = [path for path in FILES if path not in SCENES and path.name != "figures.toml"]
 
 
 @pytest.fixture(scope="module")
@@ -41,10 +43,11 @@ def parsed(path):
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.parent.name)
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_scenes_of_the_cases_pass(validator, path):
-    load_scene(path)
-    validator["scene"].validate(parsed(path))
+    in_space = is_spatial(path)
+    (load_spatial_scene if in_space else load_scene)(path)
+    validator["spatial" if in_space else "scene"].validate(parsed(path))
 
 
 @pytest.mark.parametrize("name", CHECKPOINTS)

@@ -41,8 +41,8 @@ def held(arm, ffrobot):
 
 def test_the_scene_is_what_import_makes(tmp_path, ffrobot):
     """Bodies, joints and link files: those of the command in the README, to the last letter."""
-    flexible = [f"--flexible={link}={CASE / file}" for link, file in (("upper_arm", "casting.toml"),
-                                                                     ("forearm", "tube.toml"))]  # fmt: skip
+    files = {"upper_arm": CASE / "links" / "casting.toml", "forearm": CASE / "links" / "tube.toml"}
+    flexible = [f"--flexible={link}={file}" for link, file in files.items()]
     done = ffrobot("import", CASE / "arm.urdf", "-o", tmp_path, *flexible)
     assert done.returncode == 0, done.stderr
     made, kept = ((folder / "scene.toml").read_text(encoding="utf-8") for folder in (tmp_path, CASE))

@@ -48,7 +48,7 @@ ARM_3R = f"""<robot name="arm_3r">
 {joint("elbow", "upper", "fore", "0.7 0 0", "0 -1 0")}
 </robot>"""
 ARM_6R = (CASE / "arm.urdf").read_text(encoding="utf-8")
-TUBE_6R = (CASE / "tube.toml").read_text(encoding="utf-8")
+TUBE_6R = (CASE / "links" / "tube.toml").read_text(encoding="utf-8")
 
 # Moments at q = 0.3(1 … n), q̇ = 0.2(n … 1), q̈ = 0.5 cos(0 … n − 1) by Pinocchio 2.6.20, without friction.
 EXPECTED = {
