@@ -7,11 +7,12 @@ from spatial_trees import TYPES, random_tree
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.spatial_accelerations import Accelerated, row_accelerations
+from ffrobot.mbs.model.spatial_drives import Drive, Drives
 from ffrobot.mbs.model.spatial_gears import with_compliance_in_space
 from ffrobot.mbs.model.spatial_inverse import required_forces
 from ffrobot.mbs.model.spatial_model import row_values
 from ffrobot.mbs.model.spatial_motors import path_forces
-from ffrobot.mbs.model.spatial_system import Drive, SpatialSystem
+from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.model.spatial_transmission import gear_forces
 from ffrobot.mbs.quantities.spatial_energy import energies, momentum
 from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
@@ -76,7 +77,7 @@ def test_gears_that_give_take_no_force(turned):
         controls = _core.IntegrationControls(
             tolerance=1e-6, max_steps=1, methods=[(METHODS["dop853"], 1.0, 0.0)], spectral_radius=0.8
         )
-        scene = SpatialSystem(model, [Drive(load, ONE)]).scene
+        scene = SpatialSystem(model, Drives(along=(Drive(load, ONE),))).scene
         run = _core.tree_motion(system.core, scene, [0.0], q, v, controls, lambda t: True)
         np.testing.assert_allclose(run.accelerations[0], a, atol=1e-12 * np.abs(a).max())
 
