@@ -97,12 +97,34 @@ template <class T> struct State {
   std::vector<PortMotion<T>> ports;
 };
 
-// (1 - cos)/x^2, (x - sin)/x^3 and their derivatives by x^2, of the angles of small deformations
+constexpr int series_terms = 9; // of the sums below: 1e-16 at 1.3 rad, 1e-13 at 2 rad, 4e-10 at half a turn
+
+// 1/(2 k + m)! with alternating signs, k = 0, 1, …
+template <int m> constexpr std::array<double, series_terms> alternating_factorials() {
+  std::array<double, series_terms> c{};
+  double factorial = 1;
+  for (int i = 2; i <= m; ++i)
+    factorial *= i;
+  for (int k = 0; k < series_terms; ++k) {
+    c[k] = (k % 2 ? -1 : 1) / factorial;
+    factorial *= (2. * k + m + 1) * (2. * k + m + 2);
+  }
+  return c;
+}
+
+// The sum of c_k y^k and its derivative
+template <class T>
+FFROBOT_INLINE void power_series(const std::array<double, series_terms> &c, const T &y, T &sum, T &slope) {
+  sum = T(c[series_terms - 1]), slope = T(0.);
+#pragma GCC unroll 8
+  for (int k = series_terms - 2; k >= 0; --k)
+    slope = slope * y + sum, sum = sum * y + c[k];
+}
+
+// (1 - cos)/x^2, (x - sin)/x^3 and their derivatives by y = x^2
 template <class T> inline void rotation_series(const T &y, T &a, T &b, T &a_rate, T &b_rate) {
-  a = 1. / 2 - y * (1. / 24 - y * (1. / 720 - y * (1. / 40320 - y * (1. / 3628800 - y * (1. / 479001600)))));
-  b = 1. / 6 - y * (1. / 120 - y * (1. / 5040 - y * (1. / 362880 - y * (1. / 39916800 - y * (1. / 6227020800.)))));
-  a_rate = -1. / 24 + y * (2. / 720 - y * (3. / 40320 - y * (4. / 3628800 - y * (5. / 479001600))));
-  b_rate = -1. / 120 + y * (2. / 5040 - y * (3. / 362880 - y * (4. / 39916800 - y * (5. / 6227020800.))));
+  constexpr auto of_a = alternating_factorials<2>(), of_b = alternating_factorials<3>();
+  power_series(of_a, y, a, a_rate), power_series(of_b, y, b, b_rate);
 }
 
 // exp(phi) = I + (1 - y b) phi~ + a phi~^2, J_l = I + a phi~ + b phi~^2, y = |phi|^2
