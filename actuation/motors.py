@@ -55,6 +55,11 @@ class MotorFeasibility:
         return max(self.moment / self.moment_limit, self.speed / self.speed_limit, self.power / self.power_limit)
 
     @property
+    def has_limits(self) -> bool:
+        """Whether there is anything that it may not exceed."""
+        return bool(np.isfinite((self.moment_limit, self.speed_limit, self.power_limit)).any())
+
+    @property
     def has_spike(self) -> bool:
         """Whether the largest moment is more than a tenth above what is needed for 99 % of the time."""
         return self.moment > APART * self.usual_moment

@@ -114,7 +114,8 @@ def judge_motors_in_space(motion: SpatialMotion) -> dict[str, MotorFeasibility]:
     for joint in motion.model.scene.motor_joints:
         of_joint = motion.joint(joint.name)
         assert of_joint is not None
-        moments, rates = forces.moments[joint.name], of_joint[1]
+        motor = motion.motor_motion(joint.name)  # behind a gear that gives
+        moments, rates = forces.moments[joint.name], of_joint[1] if motor is None else motor[1][:, None]
         for k, limits in enumerate(joint.motor_limits):
             name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
             found[name] = judge_motion(motion.time, moments[:, k], rates[:, k], limits)

@@ -15,6 +15,7 @@ EXTRAS: Mapping[str, str] = {
     "imageio_ffmpeg": "movie",
     "pandas": "pandas",
     "control": "control",
+    "rosbags": "ros",
 }
 """The extra of this package that installs a library."""
 

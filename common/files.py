@@ -101,5 +101,12 @@ def check_folder(folder: Path) -> None:
         raise InputError(f"{folder}: output: expected a folder, found a file")
 
 
+def check_new_folder(folder: Path) -> None:
+    """Refuse an output folder that has anything in it. Raises `InputError`."""
+    check_folder(folder)
+    if folder.exists() and any(folder.iterdir()):
+        raise InputError(f"{folder}: output: expected a new or empty folder, found one with files in it")
+
+
 def _is_of_format(path: Path, file_format: str) -> bool:
     return kind_of_file(path) in ("empty", "unreadable", f"HDF5 {file_format}", DAMAGED)

@@ -100,8 +100,9 @@ def plain(value: Any, functions: dict[str, object] | None = None) -> Any:  # noq
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """` (did you mean "…"?)`, or nothing when no known word is close."""
-    close = get_close_matches(word, list(known), n=1)
+    """` (did you mean "…"?)`, or nothing when no known word is close, or begins with this one and an underscore."""
+    words = list(known)
+    close = get_close_matches(word, words, n=1) or [one for one in words if one.startswith(f"{word}_")]
     return f' (did you mean "{close[0]}"?)' if close else ""
 
 

@@ -214,9 +214,9 @@ def write_movie(
     analysis: str | None = None,
     seconds: float | None = None,
     scale: float | None = None,
-    in_space: bool = False,
+    rendered: bool = False,
 ) -> None:
-    """Write a movie of the motion, .gif or .mp4: `ffrobot plot --movie`, `in_space` `ffrobot view --movie`.
+    """Write a movie of the motion, .gif or .mp4: `ffrobot plot --movie`; `rendered` by PyVista: `view --movie`.
 
     Of one `analysis`, the first that goes through time if None; it plays for 8 s or so many `seconds`, with deflections
     `scale` times as large, by default as large as can be seen.
@@ -228,7 +228,7 @@ def write_movie(
         from .pictures.movie_file import SECONDS, MovieOptions
         from .pictures.view import view_movie
 
-        (view_movie if in_space else write_motion)(
+        (view_movie if rendered else write_motion)(
             file, Path(path), MovieOptions(analysis, SECONDS if seconds is None else seconds, scale)
         )
 

@@ -227,7 +227,7 @@ def plot(
     """Draw the figures of a results file, or mesh and modes of a modal body file.
 
     Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn. With
-    --movie, the motion in the plane instead.
+    --movie, a movie of the motion instead.
     """
     from .common.hdf5 import reading
     from .pictures.figures.movie import write_motion
@@ -256,7 +256,7 @@ def view(
     seconds: float,
     **options: Any,  # noqa: ANN401 (the fields of Options)
 ) -> None:
-    """Write links and motions in space: VTKHDF and XDMF files for ParaView, pictures by PyVista.
+    """Write links and motions as solids: VTKHDF and XDMF files for ParaView, pictures by PyVista.
 
     Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies. With
     --movie, a movie by PyVista instead.

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.toml_files import load_toml
-from ffrobot.common.validation import InputFile, Record, validate
+from ffrobot.common.validation import InputFile, Record, did_you_mean, validate
 
 
 class Circle(Record):
@@ -118,3 +118,10 @@ def test_unreadable_toml(tmp_path):
     (tmp_path / FILE).write_text("a = \n")
     with pytest.raises(InputError, match=r"not a valid TOML drawing.*line 1"):
         load_toml(tmp_path / FILE, "drawing")
+
+
+def test_beginning_of_a_key_is_enough_for_a_suggestion():
+    known = ["name", "gear_ratio", "rotor_inertia"]
+    assert did_you_mean("gear", known) == ' (did you mean "gear_ratio"?)'
+    assert did_you_mean("gear_ratoi", known) == ' (did you mean "gear_ratio"?)'
+    assert did_you_mean("ger", known) == did_you_mean("spring", known) == ""

@@ -22,6 +22,7 @@ from .records import JointPid
 FRACTION = 1 / 3  # of the lowest frequency with held motors
 SAMPLES = 30  # a period of the bandwidth, at least
 SPARE = 2.0  # by which suggested gains may grow
+NARROW = 1.5  # gain margin below which a loop that is stable at some places of the path may well not be at others
 SMALLER, MOST_TIMES = 0.7, 20  # the bandwidth is made smaller by this factor, so often at most
 SAMPLE_TIMES = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s
 LIGHT = 0.02  # of the inertia with rigid links: what a joint feels at once, below which its root has no inertia
@@ -124,7 +125,12 @@ def advice(
     """Why a loop of joint PID controllers that is not stable is so, and gains to start with."""
     gains = joint_gains(models[0], records)
     texts = []
-    if found.is_stable:
+    if found.is_stable and found.gain < NARROW:
+        texts.append(
+            f"the linear model of the loop is hardly stable at start, middle and end of the path (gains may grow"
+            f" {found.gain:.3g}-fold), and may not be between: smaller gains, or a shorter sample_time or delay"
+        )
+    elif found.is_stable:
         texts.append(
             "the linear model of the loop is stable, so limits of motors, a disturbance or the size of the motion drive"
             " it away: smaller steps of the path, or motors with higher limits"

@@ -71,9 +71,13 @@ def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
     "file_format",
     metavar="FORMAT",
     required=True,
-    help="Of results csv, joint-trajectory; of bodies sid, mbdyn, craig-bampton, exudyn.",
+    help="Of results csv, joint-trajectory, rosbag2, fmu; of bodies sid, mbdyn, craig-bampton, exudyn.",
 )
-@click.option("--analysis", metavar="NAME", help="Of this analysis; the first with moving joints if absent.")
+@click.option(
+    "--analysis",
+    metavar="NAME",
+    help="Of this analysis; if absent the first with moving joints, of fmu the first linear one.",
+)
 @click.option("-o", "--output", metavar="FILE", type=FILE, help="Where to write [beside the input].")
 @logging_options
 def export(file: Path, file_format: str, analysis: str | None, output: Path | None) -> None:
@@ -82,6 +86,9 @@ def export(file: Path, file_format: str, analysis: str | None, output: Path | No
     \b
     csv               time, and coordinate, rate and moment of every joint, with all digits
     joint-trajectory  JSON in the layout of ROS 2's trajectory_msgs/JointTrajectory, with effort
+    rosbag2           a folder, the bag of ROS 2 with that message; needs rosbags (extra "ros")
+    fmu               FMI 2.0, model exchange and co-simulation, of a linear model; with C sources, compiled where
+                      there is a C compiler
     sid               SID_FEM, standard input data of flexible bodies (Wallrapp)
     mbdyn             .fem of MBDyn's modal joint
     craig-bampton     .npz with M, K, C in interface coordinates and fixed-interface modes

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..common.errors import InputError, of_file
-from ..common.files import check_output, write_atomically
+from ..common.files import check_new_folder, check_output, write_atomically
 from ..common.outputs import check_not_an_input
 from ..common.toml_files import read_text
 from ..common.validation import quoted
@@ -17,8 +17,13 @@ from .bodies.craig_bampton import craig_bampton_file
 from .bodies.exudyn import exudyn_file
 from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
+from .fmu.linear_fmu import linear_fmu
 from .motion.joint_trajectory import joint_trajectory_text
 from .motion.joints import csv_text, robot_motion
+from .motion.rosbag import joint_trajectory_bag
+
+Content = str | bytes | Mapping[str, bytes]
+"""Of a file, or the files of a folder by name."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +46,19 @@ def _joint_trajectory(path: Path, analysis: str | None) -> tuple[str, str, tuple
     return text, f"{len(motion.time)} points of {motion.analysis}", remarks
 
 
-OF_RESULTS: Mapping[str, tuple[str, Callable[[Path, str | None], tuple[str, str, tuple[str, ...]]]]] = {
+def _rosbag(path: Path, analysis: str | None) -> tuple[Mapping[str, bytes], str, tuple[str, ...]]:
+    motion = robot_motion(path, analysis)
+    files, remarks = joint_trajectory_bag(motion)
+    return files, f"a JointTrajectory with {len(motion.time)} points of {motion.analysis}", remarks
+
+
+OF_RESULTS: Mapping[str, tuple[str, Callable[[Path, str | None], tuple[Content, str, tuple[str, ...]]]]] = {
     "csv": (".csv", _csv),
     "joint-trajectory": (".joint-trajectory.json", _joint_trajectory),
+    "rosbag2": (".rosbag2", _rosbag),
+    "fmu": (".fmu", linear_fmu),
 }
-"""Formats of results: end of the file's name, and what makes the text, a few words on it, remarks."""
+"""Formats of results: end of the file's name, and what makes the content, a few words on it, remarks."""
 
 
 OF_BODIES: Mapping[str, tuple[str, Callable[[ModalBody], tuple[str | bytes, tuple[str, ...]]]]] = {
@@ -76,8 +89,8 @@ def export_file(path: Path, file_format: str, analysis: str | None, output: Path
     suffix, make = OF_RESULTS[file_format]
     target = output or path.with_suffix(suffix)
     check_not_an_input(target)
-    text, what, remarks = make(path, analysis)
-    write_atomically(target, text.encode(), "exported file")
+    content, what, remarks = make(path, analysis)
+    _write(target, content)
     return Exported(target, what, remarks)
 
 
@@ -87,8 +100,17 @@ def _export_body(path: Path, file_format: str, output: Path | None) -> Exported:
     check_not_an_input(target)
     body = read_modal_body(path)
     content, remarks = write(body)
-    write_atomically(target, content.encode() if isinstance(content, str) else content, "exported file")
+    _write(target, content)
     return Exported(target, f"{body.name}, {body.modes_in_words}", remarks)
+
+
+def _write(target: Path, content: Content) -> None:
+    if isinstance(content, str | bytes):
+        write_atomically(target, content.encode() if isinstance(content, str) else content, "exported file")
+        return
+    check_new_folder(target)
+    for name, data in content.items():
+        write_atomically(target / name, data, "exported file", make_folder=True)
 
 
 READERS: Mapping[str, Callable[[str, str], tuple[ModalBody, tuple[str, ...]]]] = {

@@ -66,6 +66,7 @@ def _motors(motors: Mapping[str, MotorFeasibility], units: Mapping[str, str]) ->
         force, speed = ("moment", "rad/s") if unit == "N·m" else ("force", "m/s")
         share = f"{_number(100 * motor.share_beyond)} %" if motor.share_beyond else ""
         since, can = _verdict(motor.factor, motor.saturation_time)[1:]
+        can = can if motor.has_limits else "no limits"
         rows = (
             (f"{force} ({unit})", motor.moment, motor.moment_limit, _number(motor.rms_moment)),
             (f"speed ({speed})", motor.speed, motor.speed_limit, ""),

@@ -236,14 +236,18 @@ class Results:
 
     def export_linear(self, analysis: str | None, path: Path) -> str:
         """Write the linear models of an analysis, the first that has any if not named, to .npz or .mat; its name."""
+        from .linear import save_models
+
+        name = self.linear_analysis(analysis)
+        save_models(self.linear(name), path)
+        return name
+
+    def linear_analysis(self, analysis: str | None) -> str:
+        """`analysis`, or the first that has linear models. Raises `InputError` where there is none."""
         known = self._with_models()
         if analysis is None and not known:
             raise InputError(f'{self.path}: expected an analysis of kind = "linear", found none')
-        from .linear import save_models
-
-        name = analysis or known[0]
-        save_models(self.linear(name), path)
-        return name
+        return analysis or known[0]
 
     def _with_models(self) -> list[str]:
         return [name for name in self.analyses if self.has(f"{name}/linear")]

@@ -11,6 +11,7 @@ from ..actuation.control.linear import LinearModels
 from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial import SpatialResult, SpatialSolution
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
@@ -48,6 +49,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     for key in ("integrator", "steps", "evaluations", "wall_seconds", "status"):
         group.attrs[key] = getattr(run, key)
     group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
+    if joints := resolving_joints(motion.model):
+        group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     group["time"] = run.time
     _write_bodies(group, result)
     _write_joints(group, result)
@@ -96,9 +99,8 @@ def _write_joints(group: h5py.Group, result: SpatialResult) -> None:
 
 def _write_gear(entry: h5py.Group, motion: SpatialMotion, joint: str) -> None:
     """What a gear that gives adds to a joint."""
-    angle = motion.motor_angle(joint)
-    if angle is not None:
-        entry["motor_angle"] = angle
+    if (motor := motion.motor_motion(joint)) is not None:
+        entry["motor_angle"], entry["motor_rate"] = motor
     if (gear := motion.gears.get(joint)) is not None:
         entry["gear_moment"] = gear.gear_moment
         entry.attrs["unresolved"] = gear.unresolved

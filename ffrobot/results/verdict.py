@@ -12,6 +12,7 @@ from ..actuation.motors import MotorFeasibility, judge_motion
 from ..common.arrays import Array
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
+from .off_path import off_path_in_words
 
 Place = tuple[float, str, float]
 """A largest value, where it is, and when (s)."""
@@ -32,7 +33,8 @@ class AnalysisVerdict:
 
     Attributes:
         name, kind, status: of the analysis; `cause` why it ended early.
-        answer: whether motors and patches can do it, or how a closed loop went, in words; empty where nothing is asked.
+        answer: whether motors and patches can do it, how a closed loop went, or how far a replay is off the path, in
+            words; empty where nothing is asked.
         feasible: whether they can; None where that is not asked.
         motors: by joint, in the order of the scene: peaks, RMS and limits at the joint.
         units: of the force along each of these joints, "N·m" or "N".
@@ -106,14 +108,15 @@ class Verdict:
 def judge(file: h5py.File, analyses: Sequence[str], scene: Scene) -> Verdict:
     """The verdict of the `analyses` of a results file of a `scene`."""
     coordinates = labelled_coordinates(scene)
-    return Verdict(tuple(_judge(name, file[name], coordinates) for name in analyses))
+    return Verdict(tuple(_judge(name, file[name], scene, coordinates) for name in analyses))
 
 
-def _judge(name: str, group: h5py.Group, coordinates: Coordinates) -> AnalysisVerdict:
+def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates) -> AnalysisVerdict:
     motors = _motors(group, coordinates)
     units = {label: coordinate.force_unit for label, (_, coordinate) in coordinates.items()}
     patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
     answer, feasible = _answer(group, motors, patches)
+    answer = answer or off_path_in_words(group, scene)
     about = group.attrs
     return AnalysisVerdict(
         name=name,
@@ -169,9 +172,9 @@ def _answer(
     if short:
         lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
         return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility", False
-    limited = [motor for motor in motors.values() if np.isfinite((motor.moment_limit, motor.speed_limit,
-                                                                  motor.power_limit)).any()]  # fmt: skip
-    has_limits = bool(limited) or any(np.isfinite(e["available_moment"]).any() for e in _of_patches(group))
+    has_limits = any(motor.has_limits for motor in motors.values()) or any(
+        np.isfinite(e["available_moment"]).any() for e in _of_patches(group)
+    )
     within = "within the limits that are given" if has_limits else "no limits are given"
     if (missed := read_unsupplied(group["feasibility"])) is not None:
         means = "motors and patches" if missed.with_patches else "motors alone"

@@ -69,7 +69,7 @@ def fastest(solution: Solution, solve: Solve) -> tuple[Scene, str]:
         raise InputError(
             f"{scene.path}: trajectory {_names(scene)}: fastest: expected actuators that can follow within"
             f' end = {search.analysis.end:g} s of "{search.analysis.name}", found {name}, which lacks a factor'
-            f" {factor:.3g} at stretch = {most:.4g}"
+            f" {factor:.3g} at stretch = {most:.4g}: a later end leaves more time, where moments are not those of rest"
         )
     factor, name = search.tried[found]
     at = f"{name} is at {100 * factor:.3g} % of its limit"

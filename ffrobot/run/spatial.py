@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.control.spatial_linear import ActuatedSpatialContext
 from ..actuation.patches.spatial_patches import LinkPatches
-from ..actuation.spatial_kinds import IN_SPACE
 from ..common.errors import of_file
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears

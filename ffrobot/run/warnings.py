@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from ..actuation.control.closed_loop import LoopRecord
 from ..mbs.analysis.elastic_joints import unresolved_gears
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.validity import deflection_warning
 from ..mbs.solve.reach import turned_guesses
 from ..scene.scene import Scene
@@ -18,8 +19,22 @@ def warnings_of(scene: Scene, result: AnalysisResult) -> Iterator[str]:
         yield text
     if result.feasibility is not None and result.feasibility.unsupplied is not None:
         yield result.feasibility.unsupplied.in_words
+    if text := _free_to_swing(result.outcome):
+        yield text
     if isinstance(result.outcome.details, LoopRecord):
         yield from result.outcome.details.warnings
     if result.outcome.analysis.name == scene.analysis[0].name:  # once
         yield from turned_guesses(scene)
     yield from unresolved_gears(result.outcome.gears)
+
+
+def _free_to_swing(outcome: Outcome) -> str:
+    """What to say where trajectories leave degrees of freedom of the robot open; else empty."""
+    model, held = outcome.assembly.model, sum(constraint.is_trajectory for constraint in outcome.assembly.constraints)
+    if not held or held >= model.degrees_of_freedom:
+        return ""
+    return (
+        f"trajectories hold {held} of {model.degrees_of_freedom} degrees of freedom of the robot, which swings in the"
+        " rest as its weight and inertia want, and motors let it: where that is not meant, a trajectory of a joint, or"
+        " of the angle of a body, holds one more"
+    )

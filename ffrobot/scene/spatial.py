@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.patches.spatial_records import SpatialPztLayout
-from ..actuation.spatial_kinds import IN_SPACE
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text

@@ -14,7 +14,7 @@ from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.integrators import METHODS
 from ..solve.spatial_limits import left_ranges
-from ..solve.spatial_posture import robot_size, told_posture
+from ..solve.spatial_posture import SINGULAR, robot_size, told_posture
 from ..solve.state import State
 from .drive import STATUS, Progress
 from .spatial_run import SpatialRun
@@ -51,6 +51,7 @@ def spatial_drive(
     run = _core.tree_motion(system.core, system.scene, as_list(times), start.q, start.v, controls, progress)
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture)
+    cause = f"{posture}: move the path, or start in another posture" if run.least_ratio < SINGULAR else ""
     told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q))
 
     def again(others: Array) -> SpatialRun:
@@ -59,5 +60,5 @@ def spatial_drive(
     return SpatialRun(
         analysis, model, times[: len(q)], q, v, run.accelerations, run.multipliers, applied=drives.at_points,
         status=STATUS[run.status], integrator=integrator, steps=run.steps, evaluations=run.evaluations,
-        wall_seconds=time.perf_counter() - began, warnings=told, again=again,
+        wall_seconds=time.perf_counter() - began, warnings=told, cause=cause, again=again,
     )  # fmt: skip

@@ -14,6 +14,7 @@ from ..model.model import ZERO
 from ..model.spatial_model import SpatialModel
 from ..solve.spatial_posture import check_path, mobility, undeformed_posture
 from ..solve.spatial_prescribed import prescribed_motion, quasi_static_shape
+from ..solve.spatial_redundancy import resolved
 from ..solve.state import State
 from .fcid import Fcid, Shape, given_shape, shape_nodes
 from .spatial_run import SpatialContext, SpatialRun
@@ -25,7 +26,8 @@ def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
     `SolveError` where no posture, or no static shape, is found.
     """
-    model, began = context.model, time.perf_counter()
+    began = time.perf_counter()
+    model = resolved(context.model, analysis.last_time)
     start = undeformed_posture(model)
     warnings = tuple(check_path(model, start.q))
     found, rows = mobility(model, start.q), int(np.count_nonzero(~model.loop_rows))

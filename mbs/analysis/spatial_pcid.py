@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.spatial_posture import check_path, undeformed_posture
+from ..solve.spatial_redundancy import resolved
 from ..solve.spatial_statics import initial_state
 from .spatial_drive import spatial_drive
 from .spatial_run import SpatialContext, SpatialRun
@@ -15,6 +16,6 @@ def run_spatial_pcid(context: SpatialContext, analysis: IntegratedAnalysis) -> S
     Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to start
     from.
     """
-    model = context.model
+    model = resolved(context.model, analysis.last_time)
     warnings = tuple(check_path(model, undeformed_posture(model).q))
     return spatial_drive(model, analysis, initial_state(model), context.progress, warnings=warnings)

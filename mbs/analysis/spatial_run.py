@@ -33,6 +33,7 @@ class SpatialRun:
         wall_seconds: of all.
         before, after: s, how long it acts before t = 0 and after the end of the analysis.
         warnings: on what is left open.
+        cause: why it ended early, where more is known than its status says.
         details: what only its kind finds.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
     """
@@ -55,6 +56,7 @@ class SpatialRun:
     before: float = 0.0
     after: float = 0.0
     warnings: tuple[str, ...] = ()
+    cause: str = ""
     details: Details = field(default=Details(), repr=False)
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
 
@@ -75,7 +77,7 @@ class SpatialRun:
             reached = self.time[-1] if len(self.time) else 0.0
             raise SolveError(
                 f'{self.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
-                f" ({self.status}): {ADVICE[self.status]}{how_to_go_on}"
+                f" ({self.status}): {self.cause or ADVICE[self.status]}{how_to_go_on}"
             )
 
 

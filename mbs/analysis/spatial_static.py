@@ -8,6 +8,7 @@ import numpy as np
 
 from ..scene.analysis import Analysis
 from ..solve.spatial_posture import undeformed_posture
+from ..solve.spatial_redundancy import resolved
 from ..solve.spatial_statics import holding_multipliers, static_equilibrium
 from .spatial_run import SpatialContext, SpatialRun
 
@@ -17,7 +18,8 @@ def run_spatial_static(context: SpatialContext, analysis: Analysis) -> SpatialRu
 
     Raises `SolveError` where there is none.
     """
-    model, began = context.model, time.perf_counter()
+    began = time.perf_counter()
+    model = resolved(context.model, analysis.last_time)
     q = static_equilibrium(model, undeformed_posture(model)).q[None]
     at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
     return SpatialRun(

@@ -76,7 +76,7 @@ def _waypoints(value: object, info: ValidationInfo) -> Waypoints:
     if isinstance(value, Waypoints):
         return value
     if not isinstance(value, str):
-        raise ValueError(f"expected the name of a CSV file in quotes, found {value!r}")
+        raise ValueError(f"expected the name of a CSV file in quotes, or places in via = [[…], …], found {value!r}")
     return load_waypoints(existing_file(Path(value), info))
 
 

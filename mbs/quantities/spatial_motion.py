@@ -174,12 +174,14 @@ class SpatialMotion:
             return {}
         return gears_of_motion(self.model, self.accelerated, self.time, self._with_rigid_gears.moments)
 
-    def motor_angle(self, joint: str) -> Array | None:
-        """(T,) rad of the motor behind a gear that gives, reduced to its joint; None without such a gear."""
+    def motor_motion(self, joint: str) -> tuple[Array, Array] | None:
+        """Angle and rate (T,), rad, rad/s, of the motor behind a gear that gives, reduced to its joint; else None."""
         if joint in self.gears:
-            return self.gears[joint].angle
-        behind = [gear.motor for gear in self.model.tree.gears if gear.joint.joint.name == joint]
-        return self.q[:, behind[0].q.start] if behind else None
+            return self.gears[joint].angle, self.gears[joint].rate
+        for gear in self.model.tree.gears:
+            if gear.joint.joint.name == joint:
+                return self.q[:, gear.motor.q.start], self.v[:, gear.motor.v.start]
+        return None
 
 
 def continuous(e: Array) -> Array:

@@ -2,22 +2,63 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.plane import perpendicular, rotated
 from ..fields.field_types import GROUND, split_point
 from ..model.system import MechanismSystem
+from .position import rank_ratio, solve_positions
 from .state import State
+
+TRIES = 60
+REGULAR = 1e-3  # ratio of singular values of the constraints: less is next to a singular configuration
 
 
 def initial_guess(assembly: MechanismSystem) -> State:
     """Frames with the guessed angles and rates, each where the joint that carries it puts it; loops stay open."""
+    initial = assembly.model.scene.initial
+    return _placed(assembly, initial.angles, initial.rates)
+
+
+def working_guess(assembly: MechanismSystem) -> dict[str, float] | None:
+    """Angles by body, whole degrees, from which the constraints can be met at t = 0; None where none are found.
+
+    Of random ones those nearest to the guess of the scene.
+    """
+    model, random = assembly.model, np.random.default_rng(0)
+    names = [body.name for body in model.links]
+    given = np.array([model.scene.initial.angles.get(name, 0.0) for name in names])
+    found = []
+    for _ in range(TRIES):
+        met = _met(assembly, dict(zip(names, random.uniform(-np.pi, np.pi, len(names)), strict=True)))
+        if met is None:
+            continue
+        theta = met[[assembly.first[assembly.index[name]] + 2 for name in names]]
+        degrees = np.round(np.degrees(np.angle(np.exp(1j * theta))))
+        if _met(assembly, dict(zip(names, np.radians(degrees), strict=True))) is not None:
+            found.append(degrees)
+    if not found:
+        return None
+    nearest = min(found, key=lambda degrees: float(np.abs(np.radians(degrees) - given).sum()))
+    return dict(zip(names, nearest.tolist(), strict=True))
+
+
+def _met(assembly: MechanismSystem, angles: Mapping[str, float]) -> Array | None:
+    """Coordinates that meet the constraints at t = 0, in a regular configuration, from these angles (rad)."""
+    q = solve_positions(assembly, 0.0, _placed(assembly, angles, {}).q)
+    return q if q is not None and rank_ratio(assembly, 0.0, q) > REGULAR else None
+
+
+def _placed(assembly: MechanismSystem, angles: Mapping[str, float], rates: Mapping[str, float]) -> State:
+    """Frames with these angles (rad) and rates (rad/s) by body, 0 where there is none."""
     model = assembly.model
     q, v = np.zeros(assembly.system.coordinates), np.zeros(assembly.system.coordinates)
     for name, i in assembly.index.items():
-        q[assembly.first[i] + 2] = model.scene.initial.angles.get(name, 0.0)
-        v[assembly.first[i] + 2] = model.scene.initial.rates.get(name, 0.0)
+        q[assembly.first[i] + 2] = angles.get(name, 0.0)
+        v[assembly.first[i] + 2] = rates.get(name, 0.0)
     for name, carrier in model.scene.topology.grounded.items():
         at, rate = _motion(assembly, q, v, carrier.other, model.scene.joint[carrier.joint].at)
         arm = _arm(assembly, q, carrier.own)

@@ -6,7 +6,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ..joints.transmission import ElasticGear
 from ..model.system import MechanismSystem
-from .initial_guess import initial_guess
+from .initial_guess import initial_guess, working_guess
 from .position import solve_positions, with_rates
 from .reach import unreachable
 from .redundancy import check_redundancy, check_regular
@@ -23,9 +23,18 @@ def undeformed_state(assembly: MechanismSystem) -> State:
     check_redundancy(assembly, guess.q)
     q = solve_positions(assembly, 0.0, guess.q)
     if q is None:
-        raise InputError(unreachable(assembly, 0.0, guess.q))
+        raise InputError(unreachable(assembly, 0.0, guess.q) + _suggestion(assembly))
     check_regular(assembly, q)
     return _with_relaxed_gears(assembly, with_rates(assembly, q, guess.v))
+
+
+def _suggestion(assembly: MechanismSystem) -> str:
+    """Which `initial.angles` would do; empty where none are found."""
+    angles = working_guess(assembly)
+    if angles is None:
+        return ""
+    table = ", ".join(f'{name} = "{degrees:g}*deg"' for name, degrees in angles.items())
+    return f"; from [initial] angles = {{ {table} }}, for one, it goes"
 
 
 def _with_relaxed_gears(assembly: MechanismSystem, state: State) -> State:

@@ -74,7 +74,7 @@ def solve_postures(model: SpatialModel, times: Array, q: Array) -> tuple[Array, 
     q, left = np.array(q), np.full(len(q), np.inf)
     if not model.rows:
         return q, np.ones(len(q), dtype=bool)
-    scales, length = _scales(model), robot_size(model)
+    scales, length = joint_scales(model), robot_size(model)
     row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
     going = np.arange(len(q))
     for _ in range(MOST_ITERATIONS):
@@ -96,13 +96,13 @@ def with_rates(model: SpatialModel, q: Array, v: Array, t: float = 0.0) -> State
     """The state at q with the joints' rates moved onto Ċ = 0 at time t by the least change, ṗ kept."""
     if not model.rows:
         return State(q, v)
-    scales, now = _scales(model), np.array([t])
+    scales, now = joint_scales(model), np.array([t])
     C_v = row_values(model, q[None], now)[1][0]
     left = target_rates(model, q[None], now)[0] - C_v @ v
     return State(q, v + scales * np.linalg.lstsq(C_v * scales, left, rcond=1e-10)[0])
 
 
-def _scales(model: SpatialModel) -> Array:
+def joint_scales(model: SpatialModel) -> Array:
     """(n_v,) natural size of the joints' coordinates: 1 rad, or the size of the robot; 0 of modes, which stay."""
     scales = np.zeros(model.tree.n_v)
     for node in model.tree.nodes:
@@ -165,7 +165,7 @@ class Mobility:
 def mobility(model: SpatialModel, q: Array) -> Mobility:
     """Of the mechanism with rigid links at q (n_q,)."""
     joints, length, is_loop = model.tree.joint_columns, robot_size(model), model.loop_rows
-    scales = _scales(model)[joints]
+    scales = joint_scales(model)[joints]
     row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows]).reshape(-1, 1)
     J = row_values(model, q[None], np.zeros(1))[1][0][:, joints] * scales / row_scales
     free, loop_rank = _null_space(J[is_loop])
@@ -183,7 +183,7 @@ def told_posture(model: SpatialModel, ratio: float, t: float, q: Array) -> str:
     if not ratio < NEARLY_SINGULAR:
         return ""
     joints, is_loop = model.tree.joint_columns, model.loop_rows
-    scales, length = _scales(model)[joints], robot_size(model)
+    scales, length = joint_scales(model)[joints], robot_size(model)
     row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows]).reshape(-1, 1)
     J = row_values(model, q[None], np.array([t]))[1][0][:, joints] * scales / row_scales
     free, _ = _null_space(J[is_loop])
@@ -226,7 +226,8 @@ def check_path(model: SpatialModel, q: Array) -> Iterator[str]:
     if rows and found.followed < found.freedom:
         yield (
             f"{found.freedom - found.followed} degrees of freedom are not prescribed: {', '.join(found.left)} move by"
-            " themselves"
+            " themselves, as links and gravity have it; prescribe a joint by a trajectory, or say redundancy ="
+            ' "least-motion" or "least-torque"'
         )
     if rows:
         yield from _check_motors(model, found)

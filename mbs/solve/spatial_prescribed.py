@@ -30,8 +30,12 @@ class Prescribed(NamedTuple):
     multipliers: Array
 
 
-def prescribed_motion(model: SpatialModel, modes: Array, times: Array, start: State) -> Prescribed:
+def prescribed_motion(
+    model: SpatialModel, modes: Array, times: Array, start: State, near: Array | None = None
+) -> Prescribed:
     """At `times` (T,), with `modes` (3, T, n): p, ṗ and p̈ of all bodies, from a posture near the first.
+
+    `near` (T, n_q): joints close to what is looked for, where they are known; all times are then solved at once.
 
     As many rows as joints have freedoms are independent. The multipliers are those that go with joints that move
     freely: what is left of the forces on the modes holds the shape.
@@ -41,7 +45,13 @@ def prescribed_motion(model: SpatialModel, modes: Array, times: Array, start: St
     tree, joints = model.tree, model.tree.joint_columns
     q = np.tile(start.q, (len(times), 1))
     q[:, modal_places(model)] = modes[0]
-    q, v, a, C_v = _moved(model, modes, times, _postures(model, times, q))
+    if near is None:
+        q = _postures(model, times, q)
+    else:
+        q[:, joint_places(model)] = near[:, joint_places(model)]
+        q, is_met = solve_postures(model, times, q)
+        _check_met(model, times, is_met)
+    q, v, a, C_v = _moved(model, modes, times, q)
     required = required_forces(model, Accelerated(tree, q, v, a, tree.frames(q)), times)
     multipliers = -np.einsum("tji,tj->ti", np.linalg.pinv(C_v[:, :, joints]), required[:, joints])
     return Prescribed(q, v, a, required, multipliers)
@@ -104,6 +114,20 @@ def modal_places(model: SpatialModel) -> Array:
     return np.concatenate([np.arange(node.p_q.start, node.p_q.stop) for node in model.tree.nodes])
 
 
+def joint_places(model: SpatialModel) -> Array:
+    """Where the joints of all bodies stand in q."""
+    return np.concatenate([np.arange(node.q.start, node.q.stop) for node in model.tree.nodes])
+
+
+def _check_met(model: SpatialModel, times: Array, is_met: BoolArray) -> None:
+    """Raise `SolveError` for the first of the times (T,) at which no posture was found."""
+    if not is_met.all():
+        raise SolveError(
+            f"{model.scene.path}: no posture was found at t = {times[int(is_met.argmin())]:g} s: the prescribed shape"
+            " takes the trajectories out of reach"
+        )
+
+
 def _postures(model: SpatialModel, times: Array, q: Array) -> Array:
     """Q (T, n_q) with joints that meet the rows, modes kept: some one after the other, those between from these."""
     modes = modal_places(model)
@@ -113,10 +137,6 @@ def _postures(model: SpatialModel, times: Array, q: Array) -> Array:
         guess[:] = at
         guess[:, modes] = q[k : k + stride, modes]
         some, is_met = solve_postures(model, times[k : k + stride], guess)
-        if not is_met.all():
-            raise SolveError(
-                f"{model.scene.path}: no posture was found at t = {times[k + int(is_met.argmin())]:g} s: the prescribed"
-                " shape takes the trajectories out of reach"
-            )
+        _check_met(model, times[k : k + stride], is_met)
         found[k : k + stride], at = some, some[-1]
     return found

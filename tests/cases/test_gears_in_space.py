@@ -114,13 +114,15 @@ def test_planar_arm_with_gears_that_give_in_space(tmp_path):
     spatial["initial"] = {"joints": {"O": 0.0, "A": 1.0471975511965976}}
     with solve(planar, tmp_path, "planar") as plane, solve(spatial, tmp_path, "spatial") as space:
         for joint in ("O", "A"):
-            for key in ("moment", "gear_moment", "motor_angle"):
-                for analysis, share in (("inverse", 1e-6 if key == "moment" else 1e-8), ("rest", 1e-8)):
+            for key in ("moment", "gear_moment", "motor_angle", "motor_rate"):
+                for analysis, share in (("inverse", 1e-6 if key in ("moment", "motor_rate") else 1e-8), ("rest", 1e-8)):
                     name = f"{analysis}/joints/{joint}/{key}"
                     least = 1e-6 * np.abs(plane[f"inverse/joints/O/{key}"]).max()
                     np.testing.assert_allclose(
                         space[name], plane[name], atol=share * max(np.abs(plane[name]).max(), least), rtol=0
                     )
+            judged = (one.attributes(f"inverse/feasibility/joints/{joint}")["speed"] for one in (space, plane))
+            np.testing.assert_allclose(*judged, rtol=1e-5)
             for key in ("coordinate", "motor_angle"):
                 name = f"run/joints/{joint}/{key}"
                 np.testing.assert_allclose(space[name], plane[name], atol=1e-7, rtol=0)

@@ -14,6 +14,7 @@ PAGES = [DOCS / "tutorial.md", *sorted((DOCS / "howto").glob("*.md"))]
 
 BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<content>.*?)^```$", re.DOTALL | re.MULTILINE)
 FILE = re.compile(r"`([\w.]+\.(?:toml|csv|py|urdf))`")  # the last one in the paragraph before a file
+PROGRESS = re.compile(r"ffrobot: .* \(\d+ s\)")  # a line every 30 s, where the machine is slow
 DOCTEST = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
@@ -52,7 +53,8 @@ class Reader:
         )  # fmt: skip
         assert done.returncode == 0, f"{self.page}:{line}: {command}\n{done.stdout}"
         if expected:
-            found = "\n".join(text.rstrip() for text in done.stdout.strip().splitlines())
+            lines = done.stdout.strip().splitlines()
+            found = "\n".join(text.rstrip() for text in lines if not PROGRESS.fullmatch(text))
             pattern = ".*".join(re.escape(part) for part in expected.strip().split("…"))
             assert re.fullmatch(pattern, found, re.DOTALL), f"{self.page}:{line}: {command}\n{done.stdout}"
         self.ran += 1

@@ -82,10 +82,34 @@ def test_joint_trajectory_is_the_message(kind, request, ffrobot, tmp_path):
     assert ("no joint has a motor: effort is left empty" in done.stdout) == (not driven)
 
 
+def test_a_rosbag2_has_the_message(ur5, ffrobot, tmp_path):
+    """Read again by rosbags: the message that the JSON has, to the last digit."""
+    from rosbags.highlevel import AnyReader
+
+    for file_format, name in (("rosbag2", "bag"), ("joint-trajectory", "out.json")):
+        done = ffrobot("export", ur5, "--format", file_format, "-o", tmp_path / name)
+        assert done.returncode == 0, done.stderr
+    expected = json.loads((tmp_path / "out.json").read_text())
+    with AnyReader([tmp_path / "bag"]) as bag:
+        ((connection, _, raw),) = bag.messages()
+        assert (connection.topic, connection.msgtype) == ("/joint_trajectory", "trajectory_msgs/msg/JointTrajectory")
+        message = bag.deserialize(raw, connection.msgtype)
+    assert message.joint_names == expected["joint_names"]
+    assert len(message.points) == len(expected["points"])
+    for found, point in zip(message.points, expected["points"], strict=True):
+        for key in ("positions", "velocities", "accelerations", "effort"):
+            np.testing.assert_array_equal(getattr(found, key), point[key])
+        duration = found.time_from_start
+        assert {"sec": duration.sec, "nanosec": duration.nanosec} == point["time_from_start"]
+    done = ffrobot("export", ur5, "--format", "rosbag2", "-o", tmp_path / "bag")
+    assert done.returncode == 2
+    assert "expected a new or empty folder, found one with files in it" in " ".join(done.stderr.split())
+
+
 def test_what_is_refused(ur5, ffrobot, tmp_path):
     done = ffrobot("export", ur5, "--format", "csv", "--analysis", "invers")
     assert done.returncode == 2
     assert 'expected one of "inverse", found "invers" (did you mean "inverse"?)' in done.stderr
     done = ffrobot("export", ur5, "--format", "xls")
     assert done.returncode == 2
-    assert '--format: expected one of "csv", "joint-trajectory"' in done.stderr
+    assert '--format: expected one of "csv", "joint-trajectory", "rosbag2", "fmu" of results' in done.stderr

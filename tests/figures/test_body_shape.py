@@ -10,7 +10,8 @@ from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import PictureMesh
 from ffrobot.fe_models.modal_body_file import write_modal_body
-from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes, round_below
+from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
+from ffrobot.pictures.figures.parallel import round_below
 from ffrobot.pictures.figures.plot import plot_file, plot_modal_body
 
 LINK = """
@@ -121,6 +122,22 @@ def test_fold_of_a_roof_and_border_of_an_open_surface():
     points[3, 2] = 5.0
     assert set(map(tuple, _outline(points, cells))) == edges | {(1, 2)}
     assert 0.8 < FOLD < 0.9
+
+
+def test_round_bodies_have_the_outline_that_the_viewer_sees():
+    """An open tube of 24 sides has no folds; from z it ends where y is least and largest."""
+    angle = 2 * np.pi * (np.arange(24) + 0.5) / 24
+    ring = np.stack([np.zeros(24), np.cos(angle), np.sin(angle)], axis=1)
+    points, k = np.concatenate([ring, ring + np.eye(3)[0]]), np.arange(24)
+    after = (k + 1) % 24
+    tube = np.stack([k, after, 24 + after, 24 + k], axis=1)
+    assert len(_outline(points, tube)) == 2 * 24  # its ends
+    edges = {tuple(edge) for edge in _outline(points, tube, np.array([0.0, 0.3, 1.0]))}
+    lines = edges - {tuple(edge) for edge in _outline(points, tube)}
+    assert len(lines) == 2
+    for first, last in lines:
+        assert last == first + 24
+        assert abs(points[first] @ [0.0, 0.3, 1.0]) < 0.2  # seen from there, on the rim
 
 
 def test_command_tells_modal_bodies_from_results(solid, tmp_path, capsys):

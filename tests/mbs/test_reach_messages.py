@@ -1,4 +1,6 @@
-"""What a path out of reach, and guesses in degrees, are told."""
+"""What a path out of reach, guesses in degrees, and paths that leave the robot free are told."""
+
+import tomllib
 
 import numpy as np
 import pytest
@@ -50,6 +52,21 @@ def test_a_reach_that_a_slide_leaves_open_is_not_told():
     assert "links reach" not in str(caught.value)
 
 
+def test_guesses_that_work_are_named():
+    """A straight arm in line with its target is at a dead centre; from what the message says it is reached."""
+    with pytest.raises(InputError, match=r"from \[initial\] angles = \{ a = .* \}, for one, it goes") as caught:
+        solve(arm({"x": "0.7", "y": "0.2"}, {}))
+    text = str(caught.value)
+    angles = tomllib.loads(text[text.index("angles = {") : text.index("}") + 1])["angles"]
+    tip = solve(arm({"x": "0.7", "y": "0.2"}, angles)).outcomes["inverse"]
+    theta = tip.q[0, [2, 5]]
+    np.testing.assert_allclose(0.7 * np.cos(theta).sum() + 0.1, 0.7, atol=1e-9)
+    np.testing.assert_allclose(0.7 * np.sin(theta).sum() + 0.2, 0.2, atol=1e-9)
+    with pytest.raises(InputError, match="within reach") as caught:
+        solve(arm({"x": "5", "y": "0"}, BENT))
+    assert "it goes" not in str(caught.value)
+
+
 def test_guesses_beyond_a_turn_are_warned_of_once():
     """60 and −20 for degrees: another branch is found, or none."""
     degrees = {"a": 60.0, "b": -20.0}
@@ -62,3 +79,11 @@ def test_guesses_beyond_a_turn_are_warned_of_once():
     assert not any("initial.angles" in text for text in right.analyses["inverse"].warnings)
     with pytest.raises(InputError, match=r"within reach.* a = 60 rad is more than a turn"):
         solve(arm({"x": "5", "y": "0"}, degrees))
+
+
+@pytest.mark.parametrize(("path", "held"), [({"y": "0.5 + 0.1*t"}, 1), ({"x": "0.9 + 0.1*t", "y": "0.5"}, 2)])
+def test_degrees_of_freedom_that_no_trajectory_holds_are_warned_of(path, held):
+    texts = solve(arm(path, BENT)).analyses["inverse"].warnings
+    said = [text for text in texts if "degrees of freedom" in text]
+    assert len(said) == 2 - held
+    assert all(text.startswith("trajectories hold 1 of 2 degrees of freedom") for text in said)

@@ -146,6 +146,14 @@ def test_waypoints_replace_expressions(folder):
     assert list(components) == ["x", "y"]
 
 
+def test_places_given_as_waypoints_are_told_of_via(folder):
+    text = SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', "waypoints = [[0.5, 0.5], [1.0, 0.5]]")
+    with pytest.raises(
+        InputError, match=r"waypoints: expected the name of a CSV file in quotes, or places in via = \["
+    ):
+        load(folder, text)
+
+
 def test_scene_is_immutable(folder):
     scene = load(folder, SCENE)
     with pytest.raises(ValueError, match="frozen"):

@@ -7,7 +7,8 @@ import pytest
 from PIL import Image
 
 from ffrobot.pictures.body_surface import AMPLITUDE, body_surface, drawn_mode
-from ffrobot.pictures.report.modes_3d import MAX_TRIANGLES, coarsened
+from ffrobot.pictures.coarse_surface import coarsened
+from ffrobot.pictures.report.modes_3d import MAX_TRIANGLES
 from ffrobot.results.file import Results
 
 
@@ -39,7 +40,7 @@ def bar(n, m):
 def test_large_surfaces_become_coarse_and_keep_their_section():
     points, triangles = bar(400, 20)
     assert len(triangles) > 8 * MAX_TRIANGLES
-    kept, coarse = coarsened(points, triangles)
+    kept, coarse = coarsened(points, triangles, MAX_TRIANGLES)
     assert MAX_TRIANGLES / 3 < len(coarse) <= MAX_TRIANGLES
     assert np.ptp(points[kept], axis=0) == pytest.approx([1.0, 0.02, 0.03], rel=0.05)
     assert coarse.max() == len(kept) - 1
@@ -50,7 +51,7 @@ def test_large_surfaces_become_coarse_and_keep_their_section():
 
 def test_small_surfaces_stay_as_they_are():
     points, triangles = bar(20, 2)
-    kept, same = coarsened(points, triangles)
+    kept, same = coarsened(points, triangles, MAX_TRIANGLES)
     np.testing.assert_array_equal(points[kept][same], points[triangles])
 
 
@@ -120,3 +121,15 @@ def test_page_of_a_solid_stays_small(page, solid_arm):
     begin = text.index('id="modes-3d-data"')
     assert text.index("</script>", begin) - begin < 0.5e6
     assert len(text) < 6e6
+
+
+def test_dark_pages_have_dark_pictures(shown):
+    """When the reader's system turns dark, a corner of the picture does."""
+    media = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
+    shown.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+    try:
+        shown.wait("modeStage.layout.paper_bgcolor === '#14181f'")
+        image = Image.open(io.BytesIO(shown.screenshot("#modes-3d"))).convert("RGB")
+        assert image.getpixel((4, image.height - 5)) == (0x14, 0x18, 0x1F)
+    finally:
+        shown.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})

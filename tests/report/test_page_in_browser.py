@@ -178,3 +178,21 @@ def test_on_paper_charts_stand_in_two_columns(paused):
     assert paused.value("[...document.querySelectorAll('details')].every((fold) => fold.open)")
     paused.run("window.dispatchEvent(new Event('afterprint'))")
     paused.wait(f"{widths}.every((w) => w > 340)")
+
+
+def test_phones_show_whole_titles_and_scroll_one_way_only(browser, two_link_page):
+    """390 pixels wide: no page beside the page, no buttons over titles, no title that is cut off."""
+    metrics = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    try:
+        browser.open(two_link_page)
+        browser.run("play(false)")
+        draw_all(browser)
+        assert browser.value("document.documentElement.scrollWidth") == 390
+        assert browser.value("document.querySelectorAll('.modebar-btn').length") == 0
+        right_ends = "[...document.querySelectorAll('.gtitle')].map((title) => title.getBoundingClientRect().right)"
+        ends = browser.value(right_ends)
+        assert len(ends) > 10
+        assert max(ends) <= 390
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

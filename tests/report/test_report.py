@@ -14,6 +14,8 @@ from ffrobot.cli import cli
 from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import program_version
+from ffrobot.pictures.figures.shared import bending_points
+from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.pictures.motion import topology
 from ffrobot.pictures.outline import body_outline, points_outline
 from ffrobot.pictures.path_targets import targets
@@ -242,3 +244,19 @@ def test_curves_keep_all_their_points(results):
     lines = [trace for chart in history_charts([results]) for trace in chart.traces if trace["mode"] == "lines"]
     assert lines
     assert all(trace["line"]["simplify"] is False for trace in lines)
+
+
+def test_points_that_the_reference_condition_holds_have_no_curve(two_link, tmp_path):
+    """Of a solid their deflection is rounding; that is written here to the tip of a simply supported link."""
+    path = tmp_path / "scene.results.h5"
+    path.write_bytes((two_link.folder / "scene.results.h5").read_bytes())
+    with h5py.File(path, "r+") as file:
+        file["inverse/points/link1.tip/deflection"][...] = 1e-17
+    seal(path)
+    with Results(path) as results:
+        bending = ["link1.mid", "link2.mid", "link2.tip"]
+        assert bending_points(results) == bending_points(results, "inverse") == bending
+        names = {record.name for record in standard_figures(results)}
+        assert {name for name in names if name.startswith("deflection_")} == {f"deflection_{one}" for one in bending}
+        told = {what for _, what, *_ in peaks_table(runs([results])).rows if what.startswith("deflection of")}
+        assert told == {f"deflection of {one}" for one in bending}

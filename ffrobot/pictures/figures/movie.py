@@ -1,4 +1,4 @@
-"""Movies of an analysis in the plane: the bodies in motion, as deformed as can be seen, with the paths of points."""
+"""Movies of an analysis by matplotlib: the bodies in motion, as deformed as can be seen, with the paths of points."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving
 from ..path_targets import Target, targets
 from .filled import closed_path
 from .palette import COLORS
+from .spatial_movie import SpatialPicture, moving_scene
 from .style import literal, style
 
 SIZE, DPI = (8.0, 4.8), 120  # inches; 960 x 576 pixels
@@ -38,12 +39,13 @@ def write_motion(results_path: Path, path: Path, options: MovieOptions | None = 
     check_movie(path)
     with Results(results_path) as results, style():
         analysis = moving_analysis(results, options.analysis)
-        write_movie(path, motion_frames(results, analysis, options, notes))
+        frames_of = spatial_frames if results.is_spatial else motion_frames
+        write_movie(path, frames_of(results, analysis, options, notes))
     return list(dict.fromkeys(notes))
 
 
 def motion_frames(results: Results, analysis: str, options: MovieOptions, notes: list[str]) -> Iterator[Frame]:
-    """The frames, one after the other."""
+    """The frames of a scene in the plane, one after the other."""
     outputs = movie_outputs(results.time(analysis), options.seconds)
     frames, shown = np.unique(outputs, return_inverse=True)
     bodies = drawn_bodies(results, analysis, frames, notes)
@@ -56,6 +58,25 @@ def motion_frames(results: Results, analysis: str, options: MovieOptions, notes:
         yield picture.at(int(k))
 
 
+def spatial_frames(results: Results, analysis: str, options: MovieOptions, notes: list[str]) -> Iterator[Frame]:
+    """The frames of a scene in space, seen from a corner."""
+    time = results.time(analysis)
+    frames, shown = np.unique(movie_outputs(time, options.seconds), return_inverse=True)
+    scene = moving_scene(results, analysis, frames, options.scale, notes)
+    title = _title(results, analysis, scene.scale)
+    picture = SpatialPicture(results, title, time[frames], scene, _figure())
+    for k in shown:
+        yield picture.at(int(k))
+
+
+def _figure() -> Figure:
+    return Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+
+
+def _title(results: Results, analysis: str, scale: float) -> str:
+    return f"{results.name}: {analysis}" + ("" if scale == 1.0 else f", deformation × {scale:g}")
+
+
 class _Picture:
     """Axes on which bodies are moved from frame to frame, over a background that is drawn once."""
 
@@ -63,10 +84,9 @@ class _Picture:
         self, results: Results, analysis: str, bodies: Sequence[DrawnBody], frames: Indices, scale: float
     ) -> None:
         self.bodies, self.scale, self.time = bodies, scale, results.time(analysis)[frames]
-        figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+        figure = _figure()
         self.canvas, self.axes = FigureCanvasAgg(figure), figure.subplots()
-        exaggerated = "" if scale == 1.0 else f", deformation × {scale:g}"
-        self.axes.set_title(f"{results.name}: {analysis}{exaggerated}", loc="left")
+        self.axes.set_title(_title(results, analysis, scale), loc="left")
         self._draw_still(results, targets(results, analysis))
         literal(figure)
         self.canvas.draw()  # also lays the figure out, once

@@ -12,6 +12,7 @@ from ...results.joints import Coordinate, joint_coordinates
 from .figure_file import Curve, FigureRecord
 
 SNAPSHOTS = 5
+NO_DEFLECTION = 1e-6  # of the largest: points that the reference condition holds are there but for rounding
 ENERGIES = ("kinetic", "strain", "gravitational")
 
 
@@ -114,6 +115,17 @@ def members(results: Results, group: str) -> list[str]:
     order = [keys["name"] for table in ("body", "joint") for keys in results.scene.get(table, [])]
     names = dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/{group}"))
     return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
+
+
+def bending_points(results: Results, analysis: str | None = None) -> list[str]:
+    """Points whose deflection can be told from zero beside that of the others, in one analysis or in any."""
+    largest: dict[str, float] = {}
+    for each in results.analyses if analysis is None else [analysis]:
+        for point in results.names(f"{each}/points"):
+            deflection = np.linalg.norm(results[f"{each}/points/{point}/deflection"], axis=1)
+            largest[point] = max(largest.get(point, 0.0), float(deflection.max(initial=0.0)))
+    visible = NO_DEFLECTION * max(largest.values(), default=0.0)
+    return [point for point, value in largest.items() if value > visible]
 
 
 def both_ways(limit: float | list[float]) -> tuple[float, ...]:

@@ -9,10 +9,10 @@ import numpy as np
 from ...results.file import Results
 from .figure_file import Curve, FigureRecord
 from .shared import (
+    bending_points,
     energy_figures,
     file_name,
     joint_figures,
-    members,
     moving_configurations,
     response_figures,
     voltage_figures,
@@ -65,7 +65,7 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
 
 def _deflections(results: Results) -> Iterator[FigureRecord]:
     """By axes of the body; components that cannot be told from zero are left out."""
-    for point in members(results, "points"):
+    for point in bending_points(results):
         datasets = [f"{a}/points/{point}/deflection" for a in results.analyses if results.has(f"{a}/points/{point}")]
         largest = np.max([np.abs(results[name]).max(axis=0) for name in datasets], axis=0)
         shown = [k for k in range(3) if largest[k] > SEEN * largest.max()]

@@ -10,6 +10,7 @@ from ...results.file import Results
 from ...results.joints import joint_coordinates
 from .figure_file import Curve, FigureRecord
 from .shared import (
+    bending_points,
     curves_of,
     file_name,
     joint_figures,
@@ -74,7 +75,7 @@ def _angles(results: Results) -> Iterator[FigureRecord]:
 
 
 def _deflections(results: Results) -> Iterator[FigureRecord]:
-    for point in members(results, "points"):
+    for point in bending_points(results):
         datasets = [f"{a}/points/{point}/deflection[1]" for a in results.analyses if results.has(f"{a}/points/{point}")]
         if any(results.data(name).any() for name in datasets):
             curves = tuple(Curve(data=name, label=name.split("/")[0]) for name in datasets)

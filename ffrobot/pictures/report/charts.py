@@ -17,8 +17,8 @@ from ..figures.palette import COLORS
 MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen
 
 DASHES = ("solid", "dash", "dashdot", "dot")
-# Dark violet to green (viridis), for series with an order: patches along a link, modes.
-SHADES = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98]], dtype=float)
+# Violet to green (viridis, its dark end brighter: dark pages), for series with an order: patches along a link, modes.
+SHADES = np.array([[110, 80, 170], [65, 115, 175], [33, 145, 140], [94, 201, 98]], dtype=float)
 
 
 @dataclass

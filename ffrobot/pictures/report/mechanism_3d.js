@@ -3,8 +3,6 @@
 
 const TYPED = { f4: Float32Array, i4: Int32Array };
 const typedArray = (entry) => new TYPED[entry.dtype](Uint8Array.from(atob(entry.bdata), (c) => c.charCodeAt(0)).buffer);
-const AXIS_LENGTH = 0.07 * MECHANISM.size, TOOL_LENGTH = 0.09 * MECHANISM.size;
-const TOOL_COLORS = ["#D55E00", "#009E73", "#0072B2"]; // of x, y, z
 
 for (const run of MECHANISM.runs) {
   for (const body of run.bodies) {
@@ -65,13 +63,12 @@ function traces(run, t, s) {
   const k = outputAt(run, t);
   return [
     ...run.bodies.map((body) => surface(body, k, s)),
-    arms(run.joints, null, k, s, -AXIS_LENGTH, AXIS_LENGTH),
+    arms(run.joints, null, k, s, -MECHANISM.axis_length, MECHANISM.axis_length),
     coordinates(run.joints.map((joint) => markerAt(joint, k, s))),
-    ...[0, 1, 2].map((j) => arms(run.tools, j, k, s, 0, TOOL_LENGTH)),
+    ...[0, 1, 2].map((j) => arms(run.tools, j, k, s, 0, MECHANISM.tool_length)),
     ...run.tools.map((tool) => coordinates(Array.from({ length: k + 1 }, (_, output) => markerAt(tool, output, 1)))),
   ];
 }
-
 
 function styles(run) {
   const group = { legendgroup: run.label, showlegend: false }, line = { type: "scatter3d", mode: "lines", ...group };
@@ -86,7 +83,7 @@ function styles(run) {
     ...bodies,
     { ...line, name: "axes of joints", line: { color: pageColor("--axis"), width: 4 }, hoverinfo: "skip" },
     { ...line, mode: "markers", text: names, marker: { color: pageColor("--ink"), size: 3 }, hovertemplate: "%{text}<extra></extra>" },
-    ...["x", "y", "z"].map((axis, j) => ({ ...line, line: { color: TOOL_COLORS[j], width: 6 }, name: axis, hoverinfo: "name" })),
+    ...["x", "y", "z"].map((axis, j) => ({ ...line, line: { color: MECHANISM.tool_colors[j], width: 6 }, name: axis, hoverinfo: "name" })),
     ...run.tools.map((tool) => ({ ...line, name: tool.name, line: { color: run.color, width: 3 }, hoverinfo: "name" })),
   ].map((trace) => ({ ...trace, visible: run.visible ? true : "legendonly" }));
 }
@@ -109,19 +106,29 @@ function scenery() {
   return [ground, ...Object.values(wanted)];
 }
 
+const FILLED = 1.55, WIDEST = 1.5; // what is seen of the height, in Plotly's unit, beside the labels; width to height, on paper too
 const still = scenery();
 const first = []; // number of the first trace of each run
+
+// How long a metre is, in Plotly's unit: the box of the axes fills the picture, as the viewer sees it, on paper too.
+function metre() {
+  const [x, y, z] = MECHANISM.viewer, across = Math.hypot(x, y), sides = MECHANISM.range.map(([a, b]) => b - a);
+  const seen = (...along) => sides.reduce((sum, side, c) => sum + side * Math.abs(along[c]), 0);
+  const width = seen(y / across, x / across, 0), height = seen((z * x) / across, (z * y) / across, across);
+  return FILLED / Math.max(height, width / Math.min(stage.clientWidth / stage.clientHeight, WIDEST));
+}
 
 // Axes of the scene in the colours of the page; one metre is as long on each.
 function sceneAxes() {
   const longest = Math.max(...MECHANISM.range.map(([a, b]) => b - a)), found = { aspectmode: "manual", aspectratio: {} };
+  const unit = metre();
   ["x", "y", "z"].forEach((name, c) => {
     const [a, b] = MECHANISM.range[c];
     found[`${name}axis`] = {
-      range: [a, b], title: { text: `${name} (m)` }, color: pageColor("--ink"), gridcolor: pageColor("--grid"),
-      zerolinecolor: pageColor("--line"), showbackground: false, showspikes: false, nticks: 2 + Math.round((6 * (b - a)) / longest),
+      ...axisInSpace(), range: [a, b], title: { text: `${name} (m)` }, showbackground: false, showspikes: false,
+      nticks: 2 + Math.round((6 * (b - a)) / longest),
     };
-    found.aspectratio[name] = (1.3 * (b - a)) / longest;
+    found.aspectratio[name] = unit * (b - a);
   });
   return found;
 }

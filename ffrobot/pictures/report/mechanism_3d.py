@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array, Indices
-from ...mbs.fields.field_types import GROUND
+from ..coarse_surface import coarsened, triangles_of
 from ..figures.palette import COLORS
 from ..motion import visible_exaggeration
 from ..path_targets import Target, targets
 from ..projection import SPACE
-from ..spatial.joints import Marker, joint_markers, tool_marker
+from ..spatial.joints import Marker, ground_places, joint_markers, tool_marker
+from ..spatial.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
 from ..spatial.motion import SpatialBodyMotion, spatial_motions
 from ..spatial.shapes import surface_shape, thickened
 from .charts import encoded, plain
 from .mechanism import PLAYING_SECONDS, SLOWEST, Mechanism
-from .modes_3d import coarsened, triangles_of
 from .runs import Run
 
 MAX_FRAMES = 1000
@@ -55,7 +55,10 @@ def spatial_mechanism(runs: Sequence[Run]) -> Mechanism:
         "range": [[float(low[i] - margin[i]), float(high[i] + margin[i])] for i in range(3)],
         "size": size,
         "viewer": SPACE.viewer.tolist(),
-        "ground": _ground_points(runs),
+        "axis_length": AXIS_LENGTH * size,
+        "tool_length": TOOL_LENGTH * size,
+        "tool_colors": TOOL_COLORS,
+        "ground": ground_places(run.results.scene for run in runs).tolist(),
     }
     return Mechanism(data, list(dict.fromkeys(notes)))
 
@@ -113,9 +116,3 @@ def _path_data(target: Target, frames: Indices) -> dict[str, Any]:
     if target.columns == (0, 1, 2):
         data["target"] = encoded(target.wanted[frames[frames < len(target.wanted)]])
     return data
-
-
-def _ground_points(runs: Sequence[Run]) -> list[tuple[float, ...]]:
-    """Where joints sit on the ground, in m."""
-    joints = [joint for run in runs for joint in run.results.scene.get("joint", []) if GROUND in joint["between"]]
-    return list(dict.fromkeys(tuple(map(float, joint.get("at", (0.0, 0.0, 0.0)))) for joint in joints))

@@ -38,7 +38,7 @@ function modeAxes(link) {
     return [Math.min(...values) - reach, Math.max(...values) + reach];
   });
   const longest = Math.max(...ranges.map(([a, b]) => b - a));
-  const axis = (c, name) => ({ range: ranges[c], title: { text: `${name} (m)` }, showbackground: false });
+  const axis = (c, name) => ({ ...axisInSpace(), range: ranges[c], title: { text: `${name} (m)` }, showbackground: false });
   const ratio = (c) => (2.6 * (ranges[c][1] - ranges[c][0])) / longest;
   return {
     xaxis: axis(0, "x"), yaxis: axis(1, "y"), zaxis: axis(2, "z"),
@@ -65,7 +65,7 @@ function drawModes() {
     hoverinfo: "x+y+z",
     colorbar: { title: { text: "size" }, thickness: 12, len: 0.7 },
   };
-  const layout = { margin: { l: 0, r: 0, t: 10, b: 0 }, font: { size: 11 }, scene: modeAxes(link) };
+  const layout = { ...paint(), margin: { l: 0, r: 0, t: 10, b: 0 }, scene: modeAxes(link) };
   return Plotly.react(modeStage, [rest, shape], layout, CONFIG);
 }
 

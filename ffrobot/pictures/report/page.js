@@ -2,6 +2,7 @@
 
 // Colours of the page, light or dark, as its style sheet has them; paper is always light.
 const SCREEN = matchMedia("(prefers-color-scheme: dark)");
+const NARROW = matchMedia("(max-width: 40rem)").matches;
 const pageColor = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // What all charts have in common, over the layout that each brings along.
@@ -13,10 +14,12 @@ const COMMON_LAYOUT = {
 };
 const paint = () => ({ font: { size: 12, color: pageColor("--ink") }, plot_bgcolor: pageColor("--paper"), paper_bgcolor: pageColor("--paper") });
 const axis = () => ({ gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line"), linecolor: pageColor("--axis"), ticks: "outside" });
+// In space; of the axes themselves, which keep their ranges.
+const axisInSpace = () => ({ color: pageColor("--ink"), gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line") });
 const CONFIG = {
   responsive: true,
   displaylogo: false,
-  displayModeBar: matchMedia("(pointer: coarse)").matches ? false : "hover",
+  displayModeBar: NARROW || matchMedia("(pointer: coarse)").matches ? false : "hover",
   // Results stay where they are: Plotly's button that uploads a chart is left out.
   showSendToCloud: false,
   plotlyServerURL: "",
@@ -28,7 +31,10 @@ function chartLayout(layout) {
     ...COMMON_LAYOUT,
     ...paint(),
     ...layout,
-    title: { ...layout.title, font: { size: 14 }, x: 0, xanchor: "left", xref: "paper", y: 1, yanchor: "top", pad: { t: 8 } },
+    title: {
+      ...layout.title, font: { size: NARROW ? 13 : 14 }, x: 0, xanchor: "left", xref: NARROW ? "container" : "paper", y: 1, yanchor: "top",
+      pad: { t: 8 },
+    },
     xaxis: { ...axis(), ...layout.xaxis },
     yaxis: { ...axis(), ...layout.yaxis },
   };
@@ -36,9 +42,10 @@ function chartLayout(layout) {
 
 // A chart that is drawn takes the colours of the page anew.
 function repaint(element) {
-  const colors = { ...paint() };
-  for (const name of ["xaxis", "yaxis"])
-    for (const [key, value] of Object.entries(axis())) if (key !== "ticks") colors[`${name}.${key}`] = value;
+  const colors = { ...paint() }, inSpace = element.layout.scene !== undefined;
+  const names = inSpace ? ["scene.xaxis", "scene.yaxis", "scene.zaxis"] : ["xaxis", "yaxis"];
+  for (const name of names)
+    for (const [key, value] of Object.entries(inSpace ? axisInSpace() : axis())) if (key !== "ticks") colors[`${name}.${key}`] = value;
   return Plotly.relayout(element, { "font.color": colors.font.color, ...Object.fromEntries(Object.entries(colors).filter(([key]) => key !== "font")) });
 }
 
@@ -67,12 +74,24 @@ SCREEN.addEventListener("change", () => drawn().forEach(repaint));
 
 // On paper: every chart, two side by side on A4 or letter, and everything that is folded. A chart keeps the size that it
 // is drawn with, and the width of the paper is not known before the page is laid out.
+const ROW = 14; // of a legend, in pixels
 const SIZES = {
-  paper: { mechanism: { width: 690, height: 400, "legend.y": -0.2 }, chart: { width: 340, height: 265, "legend.y": -0.4 } },
-  screen: { mechanism: { width: null, height: null, "legend.y": -0.13 }, chart: { width: null, height: null, "legend.y": -0.27 } },
+  paper: {
+    mechanism: { width: 690, height: 400, "legend.y": -0.2 },
+    chart: { width: 340, height: 265, "legend.y": -0.4, "legend.font.size": 8, "title.font.size": 11 },
+  },
+  screen: {
+    mechanism: { width: null, height: null, "legend.y": -0.13 },
+    chart: { width: null, height: null, "legend.y": -0.27, "legend.font.size": 11, "title.font.size": NARROW ? 13 : 14 },
+  },
 };
 function resize(place) {
-  for (const chart of drawn()) if (chart.id !== "modes-3d") Plotly.relayout(chart, SIZES[place][chart.id] ?? SIZES[place].chart);
+  for (const chart of drawn()) {
+    if (chart.id === "modes-3d") continue;
+    const size = { ...(SIZES[place][chart.id] ?? SIZES[place].chart) };
+    if (size.height) size.height += ROW * Math.max(0, Math.ceil(chart.data.length / 3) - 2);
+    Plotly.relayout(chart, size);
+  }
 }
 window.addEventListener("beforeprint", () => {
   document.querySelectorAll("details").forEach((fold) => (fold.open = true));

@@ -11,6 +11,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...results.file import Results, status_in_words
 from ...results.joints import joint_coordinates
+from ..figures.shared import bending_points
 from ..path_targets import targets
 from .histories import path_error
 from .runs import Run, sources
@@ -82,10 +83,9 @@ def _peaks(run: Run) -> Iterator[tuple[str, str, Array]]:
             if results.has(moment := f"{analysis}/joints/{joint}/moment"):
                 name = f"motor of joint {joint}{coordinate.label}"
                 yield name, coordinate.force_unit, results.data(moment + coordinate.column)
-    for point in results.names(f"{analysis}/points"):
+    for point in bending_points(results, analysis):
         deflection = np.linalg.norm(results[f"{analysis}/points/{point}/deflection"], axis=1)
-        if deflection.any():
-            yield f"deflection of {point}", "mm", 1e3 * deflection
+        yield f"deflection of {point}", "mm", 1e3 * deflection
 
 
 def voltages_table(runs: Sequence[Run]) -> Table:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +28,11 @@ class Marker:
     position: Array
     exaggeration: Array
     directions: Array
+
+    def exaggerated(self, s: float) -> Array:
+        """Where it is (T, 3), m, with deflections s times as large."""
+        found: Array = self.position + (s - 1.0) * self.exaggeration
+        return found
 
 
 def joint_markers(
@@ -62,3 +67,10 @@ def _place(side: str, bodies: Sequence[SpatialBodyMotion], shift: Sequence[Array
             k = body.point_names.index(side)
             return body.global_points[:, k], body.global_deflection(side) + carried
     raise KeyError(side)
+
+
+def ground_places(scenes: Iterable[Mapping[str, Any]]) -> Array:
+    """(g, 3) where joints of any of the scenes sit on the ground, each place once, in m."""
+    joints = [joint for scene in scenes for joint in scene.get("joint", []) if GROUND in joint["between"]]
+    places = dict.fromkeys(tuple(map(float, joint.get("at", (0.0, 0.0, 0.0)))) for joint in joints)
+    return np.array(list(places)).reshape(-1, 3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from ...common.arrays import Array
 from ..body_surface import drawn_mode
 from ..projection import LINK, SPACE, View
+from ..spatial.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
 
 SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels
 PANEL = (700, 360)  # pixels, of a mode
@@ -22,6 +24,7 @@ COLORS = "viridis"
 GHOST, METAL, BARE = "#9a9a9a", "#4a5563", "#c9ced6"
 FOLD = 30.0  # degrees: an edge at which a surface bends by more is shown
 ROD, PIN, STAND = 0.006, 0.009, 0.06  # of the size of the robot: radius of lines and of pins, height of the ground
+AXIS = 0.003  # of the size of the robot: radius of axes in space
 ROUND = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])  # ends of colour bars, times a power of ten
 SHOWN = {"deflection": ("deflection (mm)", 1e3), "von_mises": ("von Mises stress (MPa)", 1e-6)}
 BAR = {
@@ -56,7 +59,10 @@ def _draw_motion(job: dict[str, Any]) -> None:
         if job["scale"] != 1.0 and not job["movie"]:
             _add_ghost(plotter, grid)
         _add(plotter, shown, name, limit, ROD * size, BAR)
-        _add_joints(plotter, job["joints"][k], job["ground"], size, float(np.ptp(everything[:, 2])))
+        if job["in_space"]:
+            _add_axes(plotter, job, k, size)
+        else:
+            _add_joints(plotter, job["joints"][k], job["ground"], size, float(np.ptp(everything[:, 2])))
         _finish(plotter, job["title"].format(time=f"{job['times'][k]:.4g}"), everything, view, BAR_ROOM)
         plotter.screenshot(str(Path(job["path"]) / f"{k:05d}.png") if job["movie"] else job["path"])
         plotter.close()
@@ -141,16 +147,42 @@ def _add_ghost(plotter: Any, grid: Any) -> None:  # noqa: ANN401
 
 
 def _add_joints(plotter: Any, joints: list[list[float]], ground: list[list[float]], size: float, depth: float) -> None:  # noqa: ANN401
-    """Pins through the robot, which is `depth` thick, where it turns, and what stands on the ground below it."""
+    """In the plane: pins through the robot, which is `depth` thick, where it turns, and what stands on the ground."""
+    for at in joints:
+        _add_bar(plotter, at, (0.0, 0.0, 1.0), PIN * size, 1.2 * depth + 3.0 * PIN * size, METAL)
+    for at in ground:
+        _add_stand(plotter, at, (0.0, 1.0, 0.0), size)
+
+
+def _add_axes(plotter: Any, job: dict[str, Any], k: int, size: float) -> None:  # noqa: ANN401
+    """In space: joints as balls with their axes, the axes x, y, z of what follows paths, what stands on the ground."""
     import pyvista
 
-    for at in joints:
-        pin = pyvista.Cylinder(at, (0.0, 0.0, 1.0), radius=PIN * size, height=1.2 * depth + 3.0 * PIN * size)
-        plotter.add_mesh(pin, color=METAL, smooth_shading=True, split_sharp_edges=True, ambient=0.3)
-    for at in ground:
-        foot = [at[0], at[1] - 0.5 * STAND * size, at[2]]
-        stand = pyvista.Cone(foot, (0.0, 1.0, 0.0), height=STAND * size, radius=0.5 * STAND * size, resolution=4)
-        plotter.add_mesh(stand, color=METAL, ambient=0.3)
+    for at in job["joints"][k]:
+        plotter.add_mesh(pyvista.Sphere(PIN * size, at), color=METAL, smooth_shading=True, ambient=0.3)
+    for at, axis in job["axes"][k]:
+        _add_bar(plotter, at, axis, AXIS * size, 2.0 * AXIS_LENGTH * size, METAL)
+    for at, *axes in job["tools"][k]:
+        for axis, color in zip(np.array(axes), TOOL_COLORS, strict=True):
+            middle = np.array(at) + 0.5 * TOOL_LENGTH * size * axis
+            _add_bar(plotter, middle.tolist(), axis.tolist(), AXIS * size, TOOL_LENGTH * size, color)
+    for at in job["ground"]:
+        _add_stand(plotter, at, (0.0, 0.0, 1.0), size)
+
+
+def _add_bar(plotter: Any, at: list[float], along: Sequence[float], radius: float, length: float, color: str) -> None:  # noqa: ANN401
+    import pyvista
+
+    bar = pyvista.Cylinder(at, along, radius=radius, height=length)
+    plotter.add_mesh(bar, color=color, smooth_shading=True, split_sharp_edges=True, ambient=0.3)
+
+
+def _add_stand(plotter: Any, at: list[float], up: Sequence[float], size: float) -> None:  # noqa: ANN401
+    import pyvista
+
+    foot = (np.array(at) - 0.5 * STAND * size * np.array(up)).tolist()
+    stand = pyvista.Cone(foot, up, height=STAND * size, radius=0.5 * STAND * size, resolution=4)
+    plotter.add_mesh(stand, color=METAL, ambient=0.3)
 
 
 def _finish(plotter: Any, title: str, points: Array, view: View, room: float = 0.0) -> None:  # noqa: ANN401

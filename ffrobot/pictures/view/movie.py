@@ -1,4 +1,4 @@
-"""From a results file to a movie of its bodies in space, by PyVista."""
+"""From a results file to a movie of its bodies as solids, by PyVista."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ...results.file import Results
 from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
 from .grids import results_grid
 from .pictures import draw_pictures
+from .spatial_grids import spatial_results_grid
 from .view import motion_picture, visible_scale
 from .vtkhdf import vtkhdf_image
 
@@ -34,7 +35,8 @@ def view_movie(results_path: Path, path: Path, options: MovieOptions | None = No
     with Results(results_path) as results, tempfile.TemporaryDirectory() as place:
         analysis = moving_analysis(results, options.analysis)
         outputs, shown = np.unique(movie_outputs(results.time(analysis), options.seconds), return_inverse=True)
-        grid = results_grid(results, analysis, outputs, notes)
+        grid_of = spatial_results_grid if results.is_spatial else results_grid
+        grid = grid_of(results, analysis, outputs, notes)
         steps = tuple(range(len(outputs)))
         scale = visible_scale(grid, steps) if options.scale is None else options.scale
         picture = motion_picture(results, analysis, outputs, grid, steps, scale, "deflection")

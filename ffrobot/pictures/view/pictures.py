@@ -15,7 +15,7 @@ from . import drawing
 SECONDS = 300.0  # after which a machine that cannot draw is given up …
 SECONDS_A_FRAME = 5.0  # … and so many more for each picture of a movie
 
-Place = tuple[float, float, float]
+Place = Sequence[float]  # three
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,9 @@ class Picture:
         length: of a modal body, in m.
         in_space: whether z goes up, as in scenes in space.
         color: "deflection" or "von_mises".
-        joints: for each of the steps where joints turn, exaggerated, in m.
+        joints: for each of the steps where joints are, exaggerated, in m.
+        axes: likewise the axes of joints in space: a place and a unit vector.
+        tools: likewise sections that follow paths in space: a place and the unit vectors x, y, z.
         ground: where joints sit on the ground, in m.
         movie: whether it is one.
     """
@@ -46,8 +48,10 @@ class Picture:
     length: float = 0.0
     in_space: bool = False
     color: str = "deflection"
-    joints: tuple[tuple[Place, ...], ...] = ((),)
-    ground: tuple[Place, ...] = ()
+    joints: Sequence[Sequence[Place]] = ((),)
+    axes: Sequence[Sequence[Sequence[Place]]] = ((),)
+    tools: Sequence[Sequence[Sequence[Place]]] = ((),)
+    ground: Sequence[Place] = ()
     movie: bool = False
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ...common.arrays import Indices
+from ...common.arrays import Indices, as_rows
 from ...results.file import Results
+from ..path_targets import targets
+from ..spatial.joints import Marker, ground_places, joint_markers, tool_marker
 from ..spatial.motion import spatial_motions
 from ..spatial.shapes import surface_shape
 from .vtkhdf import Grid
@@ -38,3 +42,26 @@ def spatial_results_grid(results: Results, analysis: str, frames: Indices, notes
             )
         },
     )
+
+
+def spatial_marks(results: Results, analysis: str, frames: Indices, scale: float) -> dict[str, Any]:
+    """What a picture of a scene in space (`pictures.Picture`) shows besides bodies, at the outputs `frames`."""
+    bodies, shift = spatial_motions(results, analysis, frames)
+    joints = joint_markers(results.scene, bodies, shift)
+    points = dict.fromkeys(target.point for target in targets(results, analysis))
+    tools = [tool_marker(point, bodies, shift) for point in points]
+    outputs = range(len(frames))
+
+    def directed(marker: Marker, k: int) -> list[list[float]]:
+        """Its place, and its directions."""
+        return as_rows(np.stack([marker.exaggerated(scale)[k], *marker.directions[k]]))
+
+    return {
+        "in_space": True,
+        "joints": [[directed(joint, k)[0] for joint in joints] for k in outputs],
+        "axes": [
+            [[at, axis] for at, *axes in (directed(joint, k) for joint in joints) for axis in axes] for k in outputs
+        ],
+        "tools": [[directed(tool, k) for tool in tools] for k in outputs],
+        "ground": as_rows(ground_places([results.scene])),
+    }

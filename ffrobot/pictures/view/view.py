@@ -20,7 +20,7 @@ from ..figures.shared import file_name
 from ..motion import visible_exaggeration
 from .grids import joint_places, modes_grid, results_grid
 from .pictures import Picture, draw_pictures
-from .spatial_grids import spatial_results_grid
+from .spatial_grids import spatial_marks, spatial_results_grid
 from .vtkhdf import Grid, vtkhdf_image
 from .xdmf import xdmf_text
 
@@ -159,13 +159,16 @@ def motion_picture(
         color=color,
     )
     if results.is_spatial:
-        return replace(picture, in_space=True, joints=((),) * len(steps))
+        return replace(picture, **spatial_marks(results, analysis, frames[list(steps)], scale))
     at, exaggeration = joint_places(results, analysis, frames[list(steps)])
     joints = at + (scale - 1.0) * exaggeration
+    nothing: list[list[list[list[float]]]] = [[] for _ in steps]
     return replace(
         picture,
-        joints=tuple(tuple(map(tuple, as_rows(places))) for places in joints),
-        ground=tuple((float(x), float(y), 0.0) for x, y in ground_points([results.scene])),
+        joints=[as_rows(places) for places in joints],
+        axes=nothing,
+        tools=nothing,
+        ground=[(x, y, 0.0) for x, y in ground_points([results.scene])],
     )
 
 

@@ -27,6 +27,16 @@ void RecordedMotion::find_interval(double t) {
     --hint_;
 }
 
+// The run's own iteration began at what the step before extrapolates to; this one begins at the start of the step, with
+// the geometry of a step that it made for another time. Where it does not get to a thousandth of the tolerance,
+// geometry is taken anew, then what the run was content with has to do.
+bool RecordedMotion::step_again(Method &method, double t0, double h) {
+  for (const double share : {1e-3, 1e-3, 1e-2, 1.})
+    if (method.step(t0, z_.data(), h, share * recording_.tolerance))
+      return true;
+  return false;
+}
+
 void RecordedMotion::make_again(Interval &interval) {
   const MethodChoice &choice = recording_.method_of(hint_);
   if (!interval.method || interval.kind != choice.kind)
@@ -38,10 +48,23 @@ void RecordedMotion::make_again(Interval &interval) {
   motion_.local().from_state(recorded(hint_), z_.data());
   motion_.slope(t0, z_.data(), method.first_slope());
   motion_.accepted(t0, z_.data(), method.first_slope()); // peaks, which iterations measure themselves by
-  method.step(t0, z_.data(), h, 1e-3 * recording_.tolerance);
+  interval.is_step = step_again(method, t0, h);
+  interval.begin = t0;
+  interval.length = h;
+  interval.start = z_;
   motion_.local().from_state(recorded(hint_ + 1), method.end());
   motion_.slope(t0 + h, method.end(), method.last_slope());
   method.prepare_dense(t0, z_.data(), h);
+}
+
+// Hermite's cubic through the recorded ends and their slopes, where the step cannot be made again.
+void RecordedMotion::between_ends(const Interval &interval, double t) {
+  using Values = Eigen::Map<const Eigen::VectorXd>;
+  Method &method = *interval.method;
+  const Index n = z_.size();
+  const double x = (t - interval.begin) / interval.length, left = 1 - x;
+  z_ = left * left * (1 + 2 * x) * interval.start + x * x * (3 - 2 * x) * Values(method.end(), n) +
+       interval.length * x * left * (left * Values(method.first_slope(), n) - x * Values(method.last_slope(), n));
 }
 
 const double *RecordedMotion::state(double t) {
@@ -53,7 +76,10 @@ const double *RecordedMotion::state(double t) {
     next_ = (next_ + 1) % cache_.size();
     make_again(*found);
   }
-  found->method->interpolate(t, z_.data());
+  if (found->is_step)
+    found->method->interpolate(t, z_.data());
+  else
+    between_ends(*found, t);
   return motion_.local().state(z_.data());
 }
 

@@ -24,11 +24,16 @@ private:
     std::size_t index = static_cast<std::size_t>(-1);
     MethodKind kind = MethodKind::dop853;
     std::unique_ptr<Method> method;
+    bool is_step = true; // else iterations did not converge
+    double begin = 0, length = 0;
+    Eigen::VectorXd start;
   };
 
   const double *recorded(std::size_t i) const; // state i
   void find_interval(double t);                // that of hint_
   void make_again(Interval &interval);         // the step of the interval, by the method that made it
+  bool step_again(Method &method, double t0, double h);
+  void between_ends(const Interval &interval, double t); // into z_
 
   ConstrainedMotion motion_;
   const Recording &recording_;

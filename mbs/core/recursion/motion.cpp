@@ -168,11 +168,14 @@ template <class Space> void RecursiveMotion<Space>::accepted(double t, const dou
 template <class Space> void RecursiveMotion<Space>::watch_posture(double t, const double *q) {
   update_targets(t);
   Posture posture = posture_at(mechanism_, *scene_.watch, q, measured_);
-  if (posture.side * side_ < 0)
-    posture.ratio = 0; // between this posture and the last
-  side_ = posture.side;
+  double at = t;
+  if (posture.determinant * determinant_ < 0) { // between this posture and the last
+    posture.ratio = 0;
+    at -= (t - watched_at_) * posture.determinant / (posture.determinant - determinant_);
+  }
+  determinant_ = posture.determinant, watched_at_ = t;
   if (posture.ratio < least_ratio_) {
-    least_ratio_ = posture.ratio, singular_at_ = t;
+    least_ratio_ = posture.ratio, singular_at_ = at;
     singular_posture_ = Eigen::Map<const VectorXd>(q, mechanism_.n_q);
   }
 }

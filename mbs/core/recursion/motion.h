@@ -135,7 +135,7 @@ private:
   double least_ratio_ = 1, singular_at_ = 0;
   Eigen::VectorXd singular_posture_;
   unsigned long accepted_ = 0, steps_between_postures_ = 1; // many where steps follow vibrations
-  int side_ = 0;
+  double watched_at_ = 0, determinant_ = 0;                 // of the posture before
 
   Eigen::VectorXd stiffness_, damping_; // diagonals (n_v)
   std::vector<Eigen::Index> stiff_;     // where they are not zero

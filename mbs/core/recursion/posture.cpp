@@ -77,8 +77,8 @@ Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch, const d
   const VectorXd values = followed.jacobiSvd().singularValues();
   Posture found;
   found.ratio = values[0] > 0 ? values[values.size() - 1] / values[0] : 0;
-  if (loops.rows() == 0 && followed.rows() == followed.cols()) // else the basis of freedoms has no side
-    found.side = followed.determinant() > 0 ? 1 : -1;
+  if (loops.rows() == 0 && followed.rows() == followed.cols()) // else the basis of freedoms has no sign
+    found.determinant = followed.determinant();
   return found;
 }
 

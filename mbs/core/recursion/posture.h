@@ -17,8 +17,8 @@ struct Posture {
   // Smallest of largest singular value of the path's rows in the freedoms that
   // joints and loops have with rigid links; 1 without such rows
   double ratio = 1;
-  int side = 0; // sign of the determinant, where it has one that means
-                // something: it changes in a singular posture
+  double determinant = 0; // where its sign means something: it changes in a
+                          // singular posture
 };
 
 // At q; leaves the kinematics of `w` there, at rest.

@@ -30,6 +30,10 @@ class SpatialMechanismKeys(Record):
     """Acceleration of gravity, m/s², global axes."""
     motors: Literal["section", "frame"] = "section"
     """What motors turn: the sections at the joint, or the frames of the bodies."""
+    redundancy: Literal["least-torque", "least-motion"] | None = None
+    """What settles the freedom that trajectories leave to joints, found with undeformed links: from the state at t = 0
+    on the least integral of the squares of motor moments over the whole motion, or at every time the least sum of
+    squares of joint rates (ways in sizes of the robot). Left out: it moves by itself."""
     body: Annotated[tuple[BodyInSpace, ...], NotEmpty]
     """Links and rigid bodies."""
     joint: tuple[AnySpatialJoint, ...] = ()

@@ -1,8 +1,7 @@
 // Pinocchio's articulated-body algorithm of a rigid chain of 6 revolute joints: `REPETITIONS` prints microseconds of
 // the fastest of 20 rounds, in axes of the world and of the bodies.
 #include <pinocchio/algorithm/aba.hpp>
-#include <pinocchio/multibody/data.hpp>
-#include <pinocchio/multibody/model.hpp>
+#include <pinocchio/multibody.hpp>
 
 #include <chrono>
 #include <cstdio>

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..mbs.analysis.spatial_kinds import MECHANICAL_IN_SPACE
-from ..mbs.analysis.spatial_run import SpatialRun
-from .control.spatial_linear import run_spatial_linear
+from ...mbs.analysis.spatial_kinds import MECHANICAL_IN_SPACE
+from ...mbs.analysis.spatial_run import SpatialRun
+from .spatial_linear import run_spatial_linear
 
 IN_SPACE: Mapping[str, Callable[[Any, Any], SpatialRun]] = {**MECHANICAL_IN_SPACE, "linear": run_spatial_linear}
 """By `kind`; each takes an `ActuatedSpatialContext` and the record of its kind, which is that of planar scenes."""

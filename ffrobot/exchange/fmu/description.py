@@ -1,0 +1,130 @@
+"""modelDescription.xml of FMI 2.0 for a linear model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ...actuation.control.linear_model import LinearModel
+from ...common.arrays import Array
+from .variables import UNITS, Variable, derivatives_of
+
+SOURCE = "linear.c"
+VIBRATION = 1e-6  # imaginary part of a pole over its size, from which it counts as one
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What an FMU says of itself.
+
+    Attributes:
+        identifier: of C, in the name of the binary.
+        name: for people, with `description`.
+        guid: of the model's numbers; the binary has the same.
+        states, inputs, outputs: in the order of the rows and columns of `model`.
+    """
+
+    identifier: str
+    name: str
+    description: str
+    guid: str
+    model: LinearModel
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+
+    @cached_property
+    def derivatives(self) -> tuple[Variable, ...]:
+        """Of the states."""
+        return derivatives_of(self.states)
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """All, in the order of their value references: states, derivatives, inputs, outputs."""
+        return (*self.states, *self.derivatives, *self.inputs, *self.outputs)
+
+
+def model_description(unit: Unit, generator: str) -> bytes:
+    """The file, in UTF-8."""
+    root = ElementTree.Element(
+        "fmiModelDescription", fmiVersion="2.0", modelName=unit.name, guid=unit.guid, description=unit.description,
+        generationTool=generator, variableNamingConvention="flat", numberOfEventIndicators="0",
+    )  # fmt: skip
+    abilities = {
+        "modelIdentifier": unit.identifier, "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true", "providesDirectionalDerivative": "true",
+    }  # fmt: skip
+    stepping = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
+    for kind, more in (("ModelExchange", {"completedIntegratorStepNotNeeded": "true"}), ("CoSimulation", stepping)):
+        files = ElementTree.SubElement(ElementTree.SubElement(root, kind, abilities | more), "SourceFiles")
+        ElementTree.SubElement(files, "File", name=SOURCE)
+    _units(ElementTree.SubElement(root, "UnitDefinitions"), unit)
+    ElementTree.SubElement(ElementTree.SubElement(root, "LogCategories"), "Category", name="logStatusError")
+    ElementTree.SubElement(root, "DefaultExperiment", _experiment(unit.model.A))
+    _variables(ElementTree.SubElement(root, "ModelVariables"), unit)
+    _structure(ElementTree.SubElement(root, "ModelStructure"), unit)
+    ElementTree.indent(root)
+    text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def _units(parent: ElementTree.Element, unit: Unit) -> None:
+    used = {each.unit for each in unit.variables}
+    for name, exponents in UNITS.items():
+        if name in used:
+            definition = ElementTree.SubElement(parent, "Unit", name=name)
+            if exponents:
+                ElementTree.SubElement(definition, "BaseUnit", {key: str(n) for key, n in exponents.items()})
+
+
+def _experiment(A: Array) -> dict[str, str]:
+    """Ten periods of the slowest vibration in a thousand steps; a second where there is none."""
+    poles = np.linalg.eigvals(A)
+    angular = np.abs(poles.imag)
+    vibrations = angular[angular > VIBRATION * max(np.abs(poles).max(), 1.0)]
+    stop = float(f"{10 * 2 * np.pi / vibrations.min():.1g}") if len(vibrations) else 1.0
+    return {"startTime": "0", "stopTime": f"{stop:g}", "stepSize": f"{stop / 1000:g}"}
+
+
+def _variables(parent: ElementTree.Element, unit: Unit) -> None:
+    attributes: Mapping[str, Mapping[str, str]] = {
+        "states": {"causality": "local", "initial": "exact"},
+        "derivatives": {"causality": "local", "initial": "calculated"},
+        "inputs": {"causality": "input"},
+        "outputs": {"causality": "output", "initial": "calculated"},
+    }
+    reference = 0
+    for group, fixed in attributes.items():
+        for k, each in enumerate(getattr(unit, group), 1):
+            words = {"description": each.description} if each.description else {}
+            named = {"name": each.name, "valueReference": str(reference), **words, "variability": "continuous", **fixed}
+            variable = ElementTree.SubElement(parent, "ScalarVariable", named)
+            real = ElementTree.SubElement(variable, "Real", unit=each.unit)
+            if group in ("states", "inputs"):
+                real.set("start", "0")
+            if group == "derivatives":
+                real.set("derivative", str(k))  # states are the first variables
+            reference += 1
+
+
+def _structure(parent: ElementTree.Element, unit: Unit) -> None:
+    model, f = unit.model, len(unit.states)
+    # FMI counts variables from 1; columns of [A B] and [C D] are states, then inputs.
+    columns = np.array([*range(1, f + 1), *range(2 * f + 1, 2 * f + 1 + len(unit.inputs))])
+    outputs = _unknowns(2 * f + 1 + len(unit.inputs), np.hstack([model.C, model.D]), columns)
+    derivatives = _unknowns(f + 1, np.hstack([model.A, model.B]), columns)
+    groups = {"Outputs": outputs, "Derivatives": derivatives, "InitialUnknowns": sorted([*derivatives, *outputs])}
+    for group, unknowns in groups.items():
+        element = ElementTree.SubElement(parent, group)
+        for index, dependencies in unknowns:
+            on = " ".join(map(str, dependencies))
+            ElementTree.SubElement(element, "Unknown", index=str(index), dependencies=on)
+
+
+def _unknowns(first: int, matrix: Array, columns: Array) -> list[tuple[int, Iterable[int]]]:
+    """Index of each row's variable, and of those that it depends on."""
+    return [(first + k, columns[row != 0].tolist()) for k, row in enumerate(matrix)]

@@ -1,0 +1,28 @@
+"""What the verdict says of replays: how far they leave the path."""
+
+import re
+
+import numpy as np
+import pytest
+
+import ffrobot
+
+
+@pytest.mark.parametrize("replay", ["forward", "joints_only"])
+def test_replays_are_told_by_their_distance_from_the_path(two_link, replay):
+    """The inverse analysis is on the path, so that the distance is the one from its tip."""
+    results = ffrobot.Results(two_link.folder / "scene.results.h5")
+    tips = (results[f"{name}/points/link2.tip/position"] for name in (replay, "inverse"))
+    off = 1e3 * np.linalg.norm(np.subtract(*tips), axis=1)
+    said = re.fullmatch(r"link2\.tip off its path by (\S+) mm at most, (\S+) mm RMS", results.verdict[replay].answer)
+    np.testing.assert_allclose(
+        [float(value) for value in said.groups()], [off.max(), np.sqrt(np.mean(off**2))], rtol=1e-3, atol=1e-6
+    )
+    assert f"{replay}: {said.group()}" in re.sub(r"\s+", " ", two_link.stdout)
+
+
+def test_linear_and_static_analyses_are_not(solved):
+    results = ffrobot.Results(solved("two_link_linear").folder / "scene.results.h5")
+    for name in results.analyses:
+        if results.attributes(name)["kind"] != "forward":
+            assert "off its path" not in results.verdict[name].answer
