@@ -7,7 +7,7 @@ import numpy as np
 import planar_in_space
 import pytest
 import tomli_w
-from conftest import CASES
+from checkpoints import CASES
 from test_actuators_in_space import ARM, LINK
 
 import ffrobot
