@@ -334,7 +334,7 @@ class Campaign:
         if not ready.exists():
             shutil.copytree(CASES, ready, ignore=shutil.ignore_patterns("*.h5", "figures", "README.md"))
             for name in IN_SPACE:
-                write_scene_in_space(name, ready / name)
+                write_scene_in_space(name, ready / f"checkpoint_{name}")  # cases may have the same name
         names = sorted(path.parent.name for path in ready.glob("*/scene.toml"))
         self.cases = [self.prepared(ready / name) for name in names if cases is None or name in cases]
         keys = {
