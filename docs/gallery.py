@@ -101,7 +101,7 @@ def read_on_site(name: str, text: str) -> str:
     if name == "cases":
         pages = "\n".join(f"cases/{case.name}" for case in cases())
         return f"{on_site(text)}\n```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{pages}\n```\n"
-    return on_site(text)
+    return on_site(text, "../" * name.count("/") + "cases/")
 
 
 if __name__ == "__main__":
