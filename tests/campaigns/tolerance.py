@@ -1,6 +1,6 @@
 """What `tolerance` promises, tried on random robots: every integrator, every output of every reported history.
 
-    python tests/campaigns/tolerance.py found.jsonl [--count 200] [--seeds 1 2] [--record]
+    python tests/campaigns/tolerance.py found.jsonl [--space] [--count 200] [--seeds 1 2] [--record]
 
 Robots that are in the file already are not run again. Each is run by every integrator at random tolerances. Errors are
 differences to a run at 3e-11, in parts of the history's peak and in tolerances. Histories smaller than a thousandth of
@@ -17,6 +17,9 @@ from pathlib import Path
 import numpy as np
 from random_robots import random_scene
 from record import record
+from spatial_tolerance import EXACT as EXACT_IN_SPACE
+from spatial_tolerance import RUNS as RUNS_IN_SPACE
+from spatial_tolerance import try_spatial_robot
 
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import FfrobotError
@@ -191,11 +194,15 @@ def counts(records):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", type=Path, help="a JSON record per robot; those in it are not run again")
+    parser.add_argument("--space", action="store_true", help="robots in space")
     parser.add_argument("--count", type=int, default=200, help="robots of each seed")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
-    parser.add_argument("--integrators", choices=list(RUNS), nargs="+", default=list(RUNS))
+    parser.add_argument("--integrators", choices=list(RUNS), nargs="+")
     parser.add_argument("--record", action="store_true", help="write the counts, for docs/stability.md")
     asked = parser.parse_args()
+    of_all, exact, attempt = (
+        (RUNS_IN_SPACE, EXACT_IN_SPACE, try_spatial_robot) if asked.space else (RUNS, EXACT, try_robot)
+    )
     text = asked.file.read_text() if asked.file.exists() else ""
     wanted = [(seed, number) for seed in asked.seeds for number in range(asked.count)]
     records = {(one["seed"], one["number"]): one for one in map(json.loads, text.splitlines())}
@@ -203,19 +210,20 @@ def main():
     with asked.file.open("a") as file:
         for key in wanted:
             if key not in records:
-                records[key] = try_robot(*key, asked.integrators)
+                records[key] = attempt(*key, asked.integrators or tuple(of_all))
                 file.write(json.dumps(records[key]) + "\n")
                 file.flush()
     for integrator, robots, done, too_long, outside, worst, kind in counts(records.values()):
         found = f"{outside} outside, {100 * (1 - outside / done):.1f} % kept, worst {worst:.2f} times ({kind})"
         print(f"{integrator}: {done} runs of {robots} robots, {too_long} too long; {found}")
         if asked.record:
-            low, high, *_ = RUNS[integrator]
+            low, high, *_ = of_all[integrator]
+            where = " in space" if asked.space else ""
             tried = (
-                f'`integrator = "{integrator}"`: {done} runs of {robots} random arms, chains and loops,'
-                f" tolerances 1e{low:g} … 1e{high:g}, every output of every history against 3e-11"
+                f'`integrator = "{integrator}"`: {done} runs of {robots} random arms, chains and loops{where},'
+                f" tolerances 1e{low:g} … 1e{high:g}, every output of every history against {exact:g}"
             )
-            record(f"tolerance-{integrator}", tried=tried, found=found)
+            record(f"tolerance{'-space' if asked.space else ''}-{integrator}", tried=tried, found=found)
 
 
 if __name__ == "__main__":

@@ -56,6 +56,7 @@ def arm(*analyses, **keys):
     angle = np.arccos((np.trace(A) - 1) / 2)
     turn = (np.array(turn) / (2 * np.sin(angle)) * angle).tolist()
     way = "(1-cos(2*pi*t))"
+    tip = tip.tolist()
     path = {
         "name": "tool", "point": "l6.tip", "reference_rotation_vector": turn,
         "x": f"{tip[0]!r} - 0.03*{way}", "y": f"{tip[1]!r} + 0.06*{way}", "z": f"{tip[2]!r} + 0.04*{way}",

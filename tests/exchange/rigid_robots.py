@@ -104,7 +104,7 @@ def random_urdf(rng, count=12):
         parent = "base" if k == 0 else f"link{rng.integers(max(0, k - 4), k)}"
         kind = "revolute" if k == 0 else rng.choice(["revolute", "continuous", "prismatic", "fixed"])
         half = rng.uniform(0.05, 0.2, 3)
-        ixx, iyy, izz = half[[1, 2, 0]] ** 2 + half[[2, 0, 1]] ** 2
+        ixx, iyy, izz = (half[[1, 2, 0]] ** 2 + half[[2, 0, 1]] ** 2).tolist()
         parts.append(
             f'<link name="link{k}"><inertial><origin xyz="{row(rng, 0.1)}" rpy="{row(rng, 3)}"/>'
             f'<mass value="{rng.uniform(0.5, 3.0)!r}"/>'

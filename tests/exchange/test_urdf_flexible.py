@@ -33,7 +33,7 @@ count = 6
 # The bar lies along (0, 0.6, 0.8) of its link: its inertia in the axes of the link, its center half way.
 ALONG = np.array([0.0, 0.6, 0.8])
 J_BAR = J_X * np.outer(ALONG, ALONG) + MASS * LENGTH**2 / 12 * (np.eye(3) - np.outer(ALONG, ALONG))
-ENTRIES = " ".join(f'i{"xyz"[k]}{"xyz"[j]}="{J_BAR[k, j]!r}"' for k in range(3) for j in range(k, 3))
+ENTRIES = " ".join(f'i{"xyz"[k]}{"xyz"[j]}="{float(J_BAR[k, j])!r}"' for k in range(3) for j in range(k, 3))
 SMALL = """<inertial><origin xyz="0.02 0.1 0.03"/><mass value="1.5"/>
 <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.012" iyz="0" izz="0.008"/></inertial>"""
 

@@ -13,6 +13,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double small_force = 1e-3; // of the largest: forces below count like this one
+constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
 constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
 constexpr double nothing = 1e-12;
 
@@ -64,11 +65,19 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism) : mechanism_(me
     const auto key = std::pair(row.model.name, is_moment(mechanism, row));
     const auto [at, is_new] = known.emplace(key, static_cast<int>(known.size()));
     if (is_new)
-      per_force_.push_back(key.second ? length_ : 1);
-    multiplier_group_.push_back(at->second);
+      is_moment_.push_back(key.second);
+    force_group_.push_back(at->second);
   }
-  force_now_ = force_error_ = force_peak_ = std::vector<double>(per_force_.size(), 0.0);
-  observed_ = change_ = VectorXd::Zero(static_cast<Index>(mechanism.rows.size()));
+  for (std::size_t port = 0; port < mechanism.children.size(); ++port)
+    if (mechanism.children[port] >= 0) {
+      const int force = static_cast<int>(is_moment_.size());
+      carriers_.push_back(port);
+      is_moment_.insert(is_moment_.end(), {false, true});
+      for (int i = 0; i < Space::dim; ++i)
+        force_group_.push_back(i < Space::linear ? force : force + 1);
+    }
+  force_now_ = force_error_ = force_peak_ = std::vector<double>(is_moment_.size(), 0.0);
+  observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
 }
 
 template <class Space> double MotionNorm<Space>::of_state(const double *e) const {
@@ -82,27 +91,35 @@ template <class Space> double MotionNorm<Space>::of_state(const double *e) const
   return worst;
 }
 
+template <class Space> void MotionNorm<Space>::forces(const Workspace<Space, double> &w, VectorXd &values) const {
+  const auto rows = static_cast<Index>(mechanism_.rows.size());
+  values.head(rows) = Eigen::Map<const VectorXd>(w.lambda.data(), rows);
+  for (std::size_t i = 0; i < carriers_.size(); ++i)
+    values.segment<Space::dim>(rows + static_cast<Index>(i) * Space::dim) =
+        Eigen::Map<const Eigen::Matrix<double, Space::dim, 1>>(w.ports[carriers_[i]].f);
+}
+
 template <class Space>
-void MotionNorm<Space>::sizes_of_multipliers(const VectorXd &values, std::vector<double> &size) const {
+void MotionNorm<Space>::sizes_of_forces(const VectorXd &values, std::vector<double> &size) const {
   std::fill(size.begin(), size.end(), 0.0);
-  for (std::size_t r = 0; r < multiplier_group_.size(); ++r)
-    size[static_cast<std::size_t>(multiplier_group_[r])] += std::pow(values[static_cast<Index>(r)], 2);
+  for (std::size_t r = 0; r < force_group_.size(); ++r)
+    size[static_cast<std::size_t>(force_group_[r])] += std::pow(values[static_cast<Index>(r)], 2);
   for (double &x : size)
     x = std::sqrt(x);
 }
 
-template <class Space> void MotionNorm<Space>::observe(const Workspace<Space, double> &w) {
-  observed_ = Eigen::Map<const VectorXd>(w.lambda.data(), observed_.size());
-}
+template <class Space> void MotionNorm<Space>::observe(const Workspace<Space, double> &w) { forces(w, observed_); }
 
 template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Space, double> &w) {
-  change_ = Eigen::Map<const VectorXd>(w.lambda.data(), observed_.size()) - observed_;
-  sizes_of_multipliers(observed_, force_now_), sizes_of_multipliers(change_, force_error_);
-  double largest = inertial_, worst = 0;
-  for (std::size_t g = 0; g < per_force_.size(); ++g)
-    largest = std::max(largest, force_peak_[g] / per_force_[g]);
-  for (std::size_t g = 0; g < per_force_.size(); ++g) {
-    const double scale = std::max({force_peak_[g], force_now_[g], small_force * largest * per_force_[g], nothing});
+  forces(w, change_), change_ -= observed_;
+  sizes_of_forces(observed_, force_now_), sizes_of_forces(change_, force_error_);
+  double force = inertial_, moment = 0, worst = 0; // the largest of all
+  for (std::size_t g = 0; g < is_moment_.size(); ++g)
+    (is_moment_[g] ? moment : force) = std::max(is_moment_[g] ? moment : force, force_peak_[g]);
+  force = std::max(force, moment / length_), moment = std::max(moment, small_arm * length_ * force);
+  for (std::size_t g = 0; g < is_moment_.size(); ++g) {
+    const double least = small_force * (is_moment_[g] ? moment : force);
+    const double scale = std::max({force_peak_[g], force_now_[g], least, nothing});
     if (const double size = force_error_[g] / scale; !(size <= worst))
       worst = size; // keeps NaN
   }
@@ -129,7 +146,7 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const Workspa
   // At rest, as in equilibrium, all rates are zero: their errors are then compared with rates that would be slow.
   for (std::size_t g = 0; g < pace_.size(); ++g)
     peak_[pace_.size() + g] = std::max(peak_[pace_.size() + g], pace_[g] * peak_[g]);
-  sizes_of_multipliers(observed_, force_now_);
+  sizes_of_forces(observed_, force_now_);
   for (std::size_t g = 0; g < force_peak_.size(); ++g)
     force_peak_[g] = std::max(force_peak_[g], force_now_[g]);
   double inertial = 0;

@@ -5,26 +5,27 @@
 
 namespace ffrobot::recursion {
 
-// Alike are all ways of joints, all their angles, each body's modes, the rates of each of these, and the multipliers of
-// one joint or path that are forces, or moments. Errors e and states z are local coordinates
-// (space/local_coordinates.h).
+// Alike are all ways of joints, all their angles, each body's modes, the rates of each of these, the multipliers of one
+// joint or path that are forces, or moments, and so what one joint of the tree hands to the body that carries it.
+// Errors e and states z are local coordinates (space/local_coordinates.h).
 template <class Space> class MotionNorm {
 public:
   explicit MotionNorm(const Mechanism<Space> &mechanism);
 
   double of_state(const double *e) const;
 
-  // Keeps the multipliers of the last evaluation; then, of another at a state that an error has shifted, by how much
-  // these differ.
+  // Keeps the forces of the last evaluation: multipliers, then those at ports; then, of another at a state that an
+  // error has shifted, by how much these differ.
   void observe(const Workspace<Space, double> &w);
   double of_observed(const Workspace<Space, double> &w);
-  bool observes() const { return !multiplier_group_.empty(); }
+  bool observes() const { return !force_group_.empty(); }
 
-  // Peaks grow by the state z, its rate and the multipliers observed there; w: as at the last evaluation.
+  // Peaks grow by the state z, its rate and the forces observed there; w: as at the last evaluation.
   void take(const double *z, const double *z_dot, const Workspace<Space, double> &w);
 
 private:
-  void sizes_of_multipliers(const Eigen::VectorXd &values, std::vector<double> &size) const;
+  void forces(const Workspace<Space, double> &w, Eigen::VectorXd &values) const;
+  void sizes_of_forces(const Eigen::VectorXd &values, std::vector<double> &size) const;
 
   const Mechanism<Space> &mechanism_;
   double length_ = 0;      // m, of a body
@@ -33,8 +34,9 @@ private:
       frequency_; // 1/s: of each group, below which rates are small; of each entry of v, of modes
   std::vector<double> peak_;
   mutable std::vector<double> size_;
-  std::vector<int> multiplier_group_; // of each row
-  std::vector<double> per_force_;     // of each group of these: 1, or the length of moments
+  std::vector<std::size_t> carriers_; // of all ports: on which a joint of the tree hangs
+  std::vector<int> force_group_;      // of each row, then of each component at these ports
+  std::vector<bool> is_moment_;       // of each group of these
   std::vector<double> force_peak_, force_now_, force_error_;
   Eigen::VectorXd observed_, change_;
   double inertial_ = 0; // N, largest sum of mass times acceleration
