@@ -97,7 +97,10 @@ def _residual(model: SpatialModel, q: Array, t: float, multipliers: Array, row_s
     """(T, n_v + rows): forces left, and C over its natural sizes; and the size of the largest force term."""
     C, C_v = row_values(model, q, np.full(len(q), t))
     Q, held, sizes = forces_at_rest(model, q, t), np.einsum("tij,i->tj", C_v, multipliers), _sizes(model)
-    size = max(float(np.abs(Q * sizes).max()), float(np.abs(held * sizes).max(initial=0.0)))
+    elastic = np.zeros_like(Q)  # in equilibrium Q is nothing but rounding where no row holds anything
+    for node in model.tree.nodes:
+        elastic[:, node.p_v] = node.body.stiffness * q[:, node.p_q]
+    size = max(float(np.abs(force * sizes).max(initial=0.0)) for force in (Q + elastic, elastic, held))
     return np.concatenate([Q - held, C / row_scales], axis=1), size
 
 

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from space import close, solved, write_scene
 from spatial_checkpoints import load
+from spatial_robots import random_spatial_scene
+
+import ffrobot
 
 FCID = ('kind = "pcid"', 'kind = "fcid"\nshape = "zero"')
 STATIC = '\n[[analysis]]\nname = "rest"\nkind = "static"\n'
@@ -195,3 +198,14 @@ def test_fcid_needs_a_path_for_every_freedom(tmp_path, ffrobot):
     assert 'expected as many trajectory components as the mechanism has degrees of freedom (3) for "fcid", found 2' in (
         done.stderr.replace("\n", " ")
     )
+
+
+@pytest.mark.parametrize(("seed", "number"), [(301, 1), (303, 17)])
+def test_equilibrium_whose_forces_are_all_of_the_links(seed, number):
+    """Upright axes hold nothing: what is left of gravity and elasticity together is rounding, the same as all of it."""
+    _, scene = random_spatial_scene(seed, number, [("rest", 1e-3, "dop853")], 60_000)
+    results = ffrobot.solve(scene)
+    assert scene.initial.state == "static"
+    modal = np.abs(results["rest/bodies/b1/modal"][0]).max()
+    assert modal > 0.0
+    assert np.abs(results["rest/bodies/b1/modal_velocity"][0]).max() < 1e-9 * modal
