@@ -65,13 +65,13 @@ def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
 
 
 @click.command()
-@click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
+@click.argument("file", metavar="RESULTS.h5|BODY.h5|SCENE.toml", type=FILE)
 @click.option(
     "--format",
     "file_format",
     metavar="FORMAT",
     required=True,
-    help="Of results csv, joint-trajectory, rosbag2, fmu; of bodies sid, mbdyn, craig-bampton, exudyn.",
+    help="Of results csv, joint-trajectory, rosbag2, fmu; of bodies sid, mbdyn, craig-bampton, exudyn; of scenes urdf.",
 )
 @click.option(
     "--analysis",
@@ -81,7 +81,7 @@ def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
 @click.option("-o", "--output", metavar="FILE", type=FILE, help="Where to write [beside the input].")
 @logging_options
 def export(file: Path, file_format: str, analysis: str | None, output: Path | None) -> None:
-    """Write results or a modal body in a format of other programs.
+    """Write results, a modal body or a scene in a format of other programs.
 
     \b
     csv               time, and coordinate, rate and moment of every joint, with all digits
@@ -93,6 +93,7 @@ def export(file: Path, file_format: str, analysis: str | None, output: Path | No
     mbdyn             .fem of MBDyn's modal joint
     craig-bampton     .npz with M, K, C in interface coordinates and fixed-interface modes
     exudyn            .npz of EXUDYN's ObjectFFRFreducedOrderInterface
+    urdf              of a scene in space, for viewers: links rigid, shapes simple
     """  # noqa: D301 (click wants the backspace itself)
     from ..common.hdf5 import reading
     from ..present.summary import summary_console

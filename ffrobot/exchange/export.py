@@ -21,6 +21,7 @@ from .fmu.linear_fmu import linear_fmu
 from .motion.joint_trajectory import joint_trajectory_text
 from .motion.joints import csv_text, robot_motion
 from .motion.rosbag import joint_trajectory_bag
+from .urdf.export_urdf import scene_as_urdf
 
 Content = str | bytes | Mapping[str, bytes]
 """Of a file, or the files of a folder by name."""
@@ -61,6 +62,12 @@ OF_RESULTS: Mapping[str, tuple[str, Callable[[Path, str | None], tuple[Content, 
 """Formats of results: end of the file's name, and what makes the content, a few words on it, remarks."""
 
 
+OF_SCENES: Mapping[str, tuple[str, Callable[[Path, str | None], tuple[Content, str, tuple[str, ...]]]]] = {
+    "urdf": (".urdf", lambda path, _: scene_as_urdf(path)),
+}
+"""Formats of scenes, likewise."""
+
+
 OF_BODIES: Mapping[str, tuple[str, Callable[[ModalBody], tuple[str | bytes, tuple[str, ...]]]]] = {
     "sid": (".SID_FEM", sid_text),
     "mbdyn": (".fem", fem_text),
@@ -71,22 +78,23 @@ OF_BODIES: Mapping[str, tuple[str, Callable[[ModalBody], tuple[str | bytes, tupl
 
 
 def export_file(path: Path, file_format: str, analysis: str | None, output: Path | None) -> Exported:
-    """Write a modal body or a results file in another format.
+    """Write a scene, a modal body or a results file in another format.
 
     Raises:
         InputError: the file is of another kind, or has nothing to export.
         SolveError: it cannot be written.
     """
-    is_body = is_modal_body_file(path)
-    known: Collection[str] = OF_BODIES if is_body else OF_RESULTS
+    is_scene = path.suffix.lower() == ".toml"
+    is_body = not is_scene and is_modal_body_file(path)
+    known: Collection[str] = OF_SCENES if is_scene else OF_BODIES if is_body else OF_RESULTS
+    kind = "a scene" if is_scene else "a modal body" if is_body else "results"
     if file_format not in known:
-        kind = "a modal body" if is_body else "results"
         raise InputError(f'{path}: --format: expected one of {quoted(known)} of {kind}, found "{file_format}"')
+    if analysis is not None and (is_scene or is_body):
+        raise InputError(f"{path}: --analysis: expected it with results only, found {kind}")
     if is_body:
-        if analysis is not None:
-            raise InputError(f"{path}: --analysis: expected it with results only, found a modal body")
         return _export_body(path, file_format, output)
-    suffix, make = OF_RESULTS[file_format]
+    suffix, make = (OF_SCENES if is_scene else OF_RESULTS)[file_format]
     target = output or path.with_suffix(suffix)
     check_not_an_input(target)
     content, what, remarks = make(path, analysis)

@@ -60,6 +60,7 @@ def spatial_drive(
     system.scene.watch_posture([row.is_trajectory for row in model.rows], robot_size(model))
     run = _core.tree_motion(system.core, system.scene, as_list(times), start.q, start.v, controls, progress)
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
+    multipliers = run.multipliers * np.array([row.sign for row in model.rows])
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture)
     cause = f"{posture}: move the path, or start in another posture" if run.least_ratio < SINGULAR else ""
     told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q))
@@ -68,7 +69,7 @@ def spatial_drive(
         return spatial_drive(model, analysis, start, progress, drives=drives, times=others)
 
     return SpatialRun(
-        analysis, model, times[: len(q)], q, v, run.accelerations, run.multipliers, applied=drives.at_points,
+        analysis, model, times[: len(q)], q, v, run.accelerations, multipliers, applied=drives.at_points,
         status=STATUS[run.status], integrator=integrator, steps=run.steps, evaluations=run.evaluations,
         wall_seconds=time.perf_counter() - began, warnings=told, cause=cause, again=again,
     )  # fmt: skip

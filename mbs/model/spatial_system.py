@@ -48,6 +48,9 @@ class Derivatives(NamedTuple):
 class SpatialSystem:
     """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
 
+    Rows of coordinates are those of the tree in the core, `sign` times the scene's: they follow `sign` times the
+    target, and their multipliers are `sign` times those of `SpatialModel.rows`.
+
     Attributes:
         model: what it was made from.
         core: `_core.SpatialModel`.
@@ -120,8 +123,8 @@ class SpatialSystem:
             self.core.turn_marker(number, law.sample(at)[0], omega[0], alpha[0])
 
     def target(self, t: float) -> Array:
-        """Second derivatives that the rows follow at time t (rows,)."""
-        return np.array([0.0 if row.target is None else row.target(t)[2] for row in self.model.rows])
+        """Second derivatives that the rows of the core follow at time t (rows,)."""
+        return np.array([0.0 if row.target is None else row.sign * row.target(t)[2] for row in self.model.rows])
 
     def force(self, t: float) -> Array | None:
         """Given forces along v (n_v,) at time t; None where there are none."""
@@ -151,7 +154,7 @@ class SpatialSystem:
         """Targets of the rows, and given forces along joints."""
         scene = _core.TreeScene()
         for row in self.model.rows:
-            scene.add_target(ZERO if row.target is None else row.target)
+            scene.add_target(ZERO if row.target is None else row.target, row.sign)
         for direction, magnitude in self._along:
             scene.add_load(direction, magnitude)
         for wrench, components in self._at_points:

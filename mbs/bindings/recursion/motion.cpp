@@ -203,8 +203,8 @@ void bind_tree_motion(nb::module_ &m) {
   nb::class_<Scene>(m, "TreeScene", "What a mechanism in joint coordinates follows and what acts on it.")
       .def(nb::init<>())
       .def(
-          "add_target", [](Scene &s, const TimeFunction &target) { s.targets.push_back(target); }, "target"_a,
-          "Of the next row.")
+          "add_target", [](Scene &s, const TimeFunction &law, double sign) { s.targets.push_back({law, sign}); },
+          "target"_a, "sign"_a = 1.0, "Of the next row: sign target(t).")
       .def(
           "add_load",
           [](Scene &s, const VectorXd &direction, const TimeFunction &magnitude) {

@@ -59,8 +59,19 @@ struct GearSpring {
   double stiffness = 0, damping = 0; // N m/rad, N m s/rad
 };
 
+// What a row follows: sign * law(t), with rate and acceleration.
+struct Target {
+  TimeFunction law;
+  double sign = 1;
+
+  Jet operator()(double t) const {
+    const Jet jet = law(t);
+    return {sign * jet.value, sign * jet.rate, sign * jet.acceleration};
+  }
+};
+
 struct Scene {
-  std::vector<TimeFunction> targets; // of rows: value, rate and acceleration
+  std::vector<Target> targets; // of rows
   std::vector<Load> loads;
   std::vector<PointLoad> point_loads;
   std::vector<JointForce> joint_forces;

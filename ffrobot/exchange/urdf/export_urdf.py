@@ -1,0 +1,187 @@
+"""`ffrobot export SCENE.toml --format urdf`: a scene in space as a URDF, its links rigid, for viewers."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ...mbs.fields.field_types import GROUND
+from ...mbs.joints.spatial.joint import SpatialJoint
+from ...mbs.model.spatial_body import SpatialBody
+from ...mbs.model.spatial_model import build_spatial_model
+from ...mbs.model.spatial_tree import Node
+from ...mbs.solve.spatial_posture import robot_size
+from ...run.spatial_bodies import LoadedSpatialBody, load_spatial_bodies
+from ...scene.any_space import load_any_scene
+from ...scene.spatial import SpatialScene
+from .names import Names
+from .not_carried import not_carried
+from .robot import Inertial, Mimic, Numbers3, Origin, Robot, UrdfJoint, UrdfLink
+from .scene import rpy_of
+from .steps import Step, follows, steps_outward
+from .visuals import SLENDER, Visual, bars, beam_visuals
+from .write import urdf_text
+
+logger = logging.getLogger(__name__)
+
+ORIGIN = np.zeros(3)
+
+
+def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
+    """Text of the URDF, a few words on it, and what it does not carry.
+
+    Raises:
+        InputError: the scene is wrong, or planar.
+    """
+    scene = load_any_scene(path)
+    if not isinstance(scene, SpatialScene):
+        raise InputError(
+            f'{path}: --format urdf: expected a scene with space = "spatial", found a planar one, which has no'
+            " moments of inertia about x and y"
+        )
+    bodies = load_spatial_bodies(scene, lambda stage: logger.info("%s", stage))
+    loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
+    made = UrdfOfScene(scene, loaded)
+    counts = f"{len(scene.body)} bodies and {len(scene.joint) - len(made.tree.loops)} joints of {scene.name}"
+    return urdf_text(made.robot, made.visuals), counts, tuple(not_carried(scene, loaded, made.tree, made.size))
+
+
+class UrdfOfScene:
+    """A scene as a URDF: the frame of a link has the axes of its body, its origin at the joint that carries it.
+
+    Attributes:
+        tree: of the scene.
+        robot: links and joints, with the coordinates of the scene where URDF has them.
+        visuals: by link.
+        size: of the robot, m.
+    """
+
+    def __init__(self, scene: SpatialScene, loaded: Mapping[str, LoadedSpatialBody]) -> None:
+        self._scene, self._loaded = scene, loaded
+        model = build_spatial_model(scene, [loaded[body.name].spatial for body in scene.body])
+        self.tree, self.size = model.tree, robot_size(model)
+        self._link_names = Names((GROUND, *(body.name for body in scene.body)))
+        self._joint_names = Names(joint.name for joint in scene.joint)
+        self._links = {GROUND: UrdfLink(GROUND, None)}
+        self._joints = dict[str, UrdfJoint]()
+        self.visuals = dict[str, list[Visual]]()
+        for node in self.tree.nodes:
+            self._add_body(node)
+        for node in self.tree.nodes:
+            self._add_joint(node)
+            self._add_frames(node)
+        self.robot = Robot(scene.name, self._links, self._joints, GROUND)
+
+    # Bodies
+
+    def _add_body(self, node: Node) -> None:
+        body, at = node.body, _anchor(node)
+        self._links[body.name] = UrdfLink(body.name, inertial_of(body, at))
+        modal = self._loaded[body.name].modal
+        if modal is not None and modal.kind == "beam":
+            self.visuals[body.name] = list(beam_visuals(modal, at))
+        else:
+            places = [place - at for place in _own_points(self._loaded[body.name]).values()]
+            self.visuals[body.name] = list(bars(places, self.size / SLENDER))
+
+    def _add_frames(self, node: Node) -> None:
+        """Points at which nothing hangs, such as tools: links without mass."""
+        body, at = node.body, _anchor(node)
+        taken = {other.inner.point for other in self.tree.nodes if other.inner.body == self.tree.index[body.name]}
+        for point, place in _own_points(self._loaded[body.name]).items():
+            if point not in taken and np.any(place - at):
+                name = self._link_names[f"{body.name}.{point}"]
+                self._links[name] = UrdfLink(name, None)
+                joint = self._joint_names[f"{name}.fixed"]
+                origin = Origin(_three(place - at))
+                self._joints[joint] = UrdfJoint(joint, "fixed", body.name, name, origin, (1.0, 0.0, 0.0), {}, {}, None)
+
+    # Joints
+
+    def _add_joint(self, node: Node) -> None:
+        """The steps of a joint one after the other, with links without mass in between."""
+        joint, parent, origin = node.joint, self._parent(node), self._origin(node)
+        steps = steps_outward(joint, node.backwards)
+        for number, (step, axis) in enumerate(steps, 1):
+            name = self._joint_names[f"{joint.name}.{step.label}"] if step.label else self._name(node)
+            child = node.body.name if number == len(steps) else self._link_names[f"{name}.link"]
+            self._links.setdefault(child, UrdfLink(child, None))
+            rise = follows(joint, step)
+            self._joints[name] = UrdfJoint(
+                name, self._type(joint, step), parent, child, origin, _three(axis), self._limits(joint, step),
+                _dynamics(joint, step), None if rise is None else Mimic(joint.name, rise, 0.0),
+            )  # fmt: skip
+            parent, origin = child, Origin()
+
+    def _name(self, node: Node) -> str:
+        """That of the scene; a body without any joint gets one."""
+        return node.joint.name if node.joint in self._scene.joint else self._joint_names[f"{node.body.name}.free"]
+
+    def _parent(self, node: Node) -> str:
+        return GROUND if node.inner.body < 0 else self.tree.nodes[node.inner.body].body.name
+
+    def _origin(self, node: Node) -> Origin:
+        """The child's link in the parent's where the coordinates are zero."""
+        at = node.inner.position
+        if node.inner.body >= 0:
+            carrier = self.tree.nodes[node.inner.body]
+            at = carrier.body.points[node.inner.point].position - _anchor(carrier)
+        rpy = rpy_of(node.joint.orientation.T) if node.backwards else node.joint.rpy
+        return Origin(_three(at), _three(rpy))
+
+    def _type(self, joint: SpatialJoint, step: Step) -> str:
+        has_end = step.coordinate >= 0 and np.all(np.isfinite(joint.position_limits[step.coordinate]))
+        return "continuous" if step.type == "revolute" and not has_end else step.type
+
+    def _limits(self, joint: SpatialJoint, step: Step) -> dict[str, float]:
+        """URDF wants them of all joints but continuous ones: 0 stands for no limit of effort and velocity."""
+        if step.type not in ("revolute", "prismatic"):
+            return {}
+        low, high = joint.position_limits[step.coordinate] if step.coordinate >= 0 else (-np.inf, np.inf)
+        limits = dict[str, float]()
+        if np.isfinite([low, high]).all():
+            limits = {"lower": low, "upper": high}
+        elif step.type == "prismatic":
+            limits = {"lower": -self.size, "upper": self.size}
+        motor = joint.motor_limits[step.coordinate] if joint.motor_limits and step.coordinate >= 0 else None
+        found = (np.inf, np.inf) if motor is None else (motor.moment, motor.speed)
+        effort, velocity = (value if np.isfinite(value) else 0.0 for value in found)
+        return {**limits, "effort": effort, "velocity": velocity} if limits or effort or velocity else {}
+
+
+def inertial_of(body: SpatialBody, anchor: Array) -> Inertial:
+    """Of the undeformed body with what is attached to it; `anchor` (3,) is the link's frame in body axes, m.
+
+    J_c = J0 − m (c·c I − c cᵀ) about the center c = s0/m (parallel axes).
+    """
+    m, c = body.mass, body.first_moment / body.mass
+    J: Array = body.inertia - m * (c @ c * np.eye(3) - np.outer(c, c))
+    return Inertial(m, c - anchor, (J + J.T) / 2)
+
+
+def _dynamics(joint: SpatialJoint, step: Step) -> dict[str, float]:
+    if not joint.frictions or step.coordinate < 0:
+        return {}
+    friction = joint.frictions[step.coordinate]
+    return {"damping": friction.viscous, "friction": friction.coulomb}
+
+
+def _anchor(node: Node) -> Array:
+    """Where the joint that carries a body sits on it (3,), m: the origin of its link."""
+    return node.body.points[node.outer.point].position if node.outer.point else ORIGIN
+
+
+def _own_points(loaded: LoadedSpatialBody) -> dict[str, Array]:
+    """Points that the file of a body names, by name: (3,) m, body axes."""
+    names = loaded.spatial.points if loaded.modal is None else loaded.modal.interfaces
+    return {name: loaded.spatial.points[name].position for name in names}
+
+
+def _three(values: Sequence[float] | Array) -> Numbers3:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,235 @@
+"""Scenes in space as URDF: motor moments there and back, and where links stand by another reader of URDF (yourdfpy)."""
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import yourdfpy
+from rigid_robots import moments, random_urdf, with_motion
+
+from ffrobot import InputError, Results
+from ffrobot.exchange.export import export_file
+
+ARM = """
+name = "anyhow"
+space = "spatial"
+gravity = [0.0, 0.0, -9.81]
+
+[[body]]
+name = "turret"
+rigid = { mass = 4.0, center = [0.02, -0.03, 0.1], inertia = [[0.03, 0.002, -0.001], [0.002, 0.02, 0.003], [-0.001, 0.003, 0.015]], points = { foot = [0.01, 0.02, -0.1], top = [0.0, 0.05, 0.2] } }
+
+[[body]]
+name = "slide"
+rigid = { mass = 2.0, center = [0.1, 0.0, 0.0], inertia = [0.004, 0.02, 0.02], points = { back = [-0.1, 0.02, 0.0], front = [0.3, 0.0, 0.04] } }
+
+[[body]]
+name = "cover"
+rigid = { mass = 0.5, center = [0.0, 0.01, 0.0], inertia = [0.001, 0.002, 0.002], points = { rim = [0.05, 0.0, 0.0] } }
+
+[[body]]
+name = "hand"
+rigid = { mass = 1.0, center = [0.0, 0.0, 0.06], inertia = [0.002, 0.003, 0.001], points = { wrist = [0.02, -0.01, 0.0], tool = [0.0, 0.03, 0.15] } }
+
+[[payload]]
+point = "hand.tool"
+mass = 0.7
+center = [0.0, 0.01, 0.04]
+inertia = [0.001, 0.001, 0.0005]
+
+[[joint]]
+name = "waist"
+type = "revolute"
+between = ["ground", "turret.foot"]
+at = [0.3, -0.2, 0.5]
+axis = [0.1, -0.2, 2.0]
+rpy = [0.3, -0.4, 1.1]
+position_limit = [-2.0, 2.5]
+moment_limit = 90.0
+
+[[joint]]
+name = "lift"
+type = "prismatic"
+between = ["slide.back", "turret.top"]                # the second side carries the first
+axis = [1.0, 0.5, -0.2]
+rpy = [1.2, 0.2, -0.7]
+
+[[joint]]
+name = "lid"
+type = "weld"
+between = ["turret.top", "cover.rim"]
+rpy = [0.0, 1.5707963267948966, 0.5]
+
+[[joint]]
+name = "wrist"
+type = "revolute"
+between = ["hand.wrist", "slide.front"]               # likewise
+axis = [0.0, 1.0, 0.3]
+rpy = [-0.6, 0.1, 0.2]
+viscous_friction = 0.2
+"""  # noqa: E501 (a table of TOML is one line)
+NAMES = ("waist", "lift", "wrist")
+MOTION = [dict(zip(NAMES, row, strict=True)) for row in ((0.4, 0.15, -0.8), (1.1, -0.6, 2.0), (-3.0, 2.0, 5.0))]
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory, ffrobot):
+    """The URDF of the arm, and results of the scene and of the scene that comes back."""
+    folder = tmp_path_factory.mktemp("anyhow")
+    scene, urdf = folder / "scene.toml", folder / "arm.urdf"
+    scene.write_text(with_motion(ARM, *MOTION))
+    for command in (("export", scene, "--format", "urdf", "-o", urdf), ("import", urdf, "-o", folder / "back")):
+        done = ffrobot(*command)
+        assert done.returncode == 0, done.stderr
+    back = folder / "back" / "scene.toml"
+    back.write_text(with_motion(back.read_text(), *MOTION))
+    for file in (scene, back):
+        done = ffrobot("solve", file)
+        assert done.returncode == 0, done.stderr
+    return urdf, *(Results(file.with_suffix(".results.h5")) for file in (scene, back))
+
+
+def test_moments_there_and_back(solved):
+    """Moments of the scene, of the scene that comes back, and by Newton and Euler from the URDF, without friction."""
+    urdf, here, back = solved
+    of_urdf = moments(urdf.read_text(), *MOTION)
+    scale = max(map(abs, of_urdf.values()))
+    for name in NAMES:
+        first, again = (results[f"inverse/joints/{name}/moment"] for results in (here, back))
+        np.testing.assert_allclose(again, first, rtol=0, atol=1e-10 * scale)
+        friction = 0.2 * MOTION[1][name] if name == "wrist" else 0.0
+        assert first[0] - friction == pytest.approx(of_urdf[name], abs=1e-10 * scale)
+
+
+def test_places_by_yourdfpy(solved):
+    """Points of bodies and their axes over the motion."""
+    urdf, here, _ = solved
+    robot = yourdfpy.URDF.load(str(urdf))
+    for k in range(2):
+        robot.update_cfg({name: float(here[f"inverse/joints/{name}/coordinate"][k]) for name in NAMES})
+        for link, point in (("hand_tool", "hand.tool"), ("turret", "turret.foot"), ("cover", "cover.rim")):
+            T = robot.get_transform(link, "ground")
+            np.testing.assert_allclose(T[:3, 3], here[f"inverse/points/{point}/position"][k], rtol=0, atol=1e-12)
+            e = here[f"inverse/points/{point}/quaternion"][k]
+            np.testing.assert_allclose(T[:3, :3], rotation(e), rtol=0, atol=1e-12)
+
+
+def rotation(e):
+    """Of a unit quaternion, w first."""
+    w, u = e[0], e[1:]
+    S = np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
+    return np.eye(3) + 2 * w * S + 2 * S @ S
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_random_trees(seed, tmp_path, ffrobot):
+    """URDF → scene → URDF: the same moments, by Newton and Euler from either text."""
+    rng = np.random.default_rng(seed)
+    first, scene, again = tmp_path / "first.urdf", tmp_path / "scene" / "scene.toml", tmp_path / "again.urdf"
+    first.write_text(random_urdf(rng))
+    names = re.findall(r'<joint name="(\w+)" type="(?!fixed)', first.read_text())
+    motion = [{name: float(rng.uniform(-1, 1)) for name in names} for _ in range(3)]
+    assert ffrobot("import", first, "-o", scene.parent).returncode == 0
+    scene.write_text(with_motion(scene.read_text(), *motion))
+    done = ffrobot("export", scene, "--format", "urdf", "-o", again)
+    assert done.returncode == 0, done.stderr
+    expected = moments(first.read_text(), *motion)
+    found = moments(again.read_text(), *motion)
+    scale = max(map(abs, expected.values()))
+    np.testing.assert_allclose([found[name] for name in names], [expected[name] for name in names], atol=1e-12 * scale)
+
+
+CHAIN = """
+name = "chain"
+space = "spatial"
+gravity = [0.0, 0.0, -9.81]
+initial = {{ joint_rates = {{ nut = 3.0 }} }}
+analysis = [{{ name = "fall", kind = "forward", end = 0.2, output_step = 0.05, tolerance = 1e-8 }}]
+{bodies}
+joint = [
+    {{ name = "nut", type = "screw", between = ["ground", "one.a"], axis = [0.3, 1.0, 0.2], lead = 0.3, rpy = [0.2, 0.0, 0.4] }},
+    {{ name = "tube", type = "cylindrical", between = {tube}, axis = [1.0, 0.2, 0.0], rpy = [0.0, 0.5, 0.0] }},
+    {{ name = "cross", type = "universal", between = {cross}, axis = [0.0, 1.0, 0.0], second_axis = [1.0, 0.0, 0.0] }},
+    {{ name = "ball", type = "spherical", between = ["three.b", "four.a"] }},
+    {{ name = "table", type = "planar", between = ["four.b", "five.a"], axis = [0.0, 1.0, 1.0] }},
+]
+"""  # noqa: E501
+BODIES = "body = [" + ", ".join(
+    f'{{ name = "{name}", rigid = {{ mass = 1.0, center = [0.1, 0.0, 0.0], inertia = [0.002, 0.01, 0.01],'
+    " points = { a = [-0.1, 0.0, 0.02], b = [0.2, 0.01, 0.0], c = [0.0, 0.1, 0.2] } } }"
+    for name in ("one", "two", "three", "four", "five", "free")
+) + "]"  # fmt: skip
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_joints_in_steps(backwards, tmp_path, ffrobot):
+    """Screw, cylindrical and universal joints in several steps: places by yourdfpy from the scene's coordinates."""
+    order = slice(None, None, -1 if backwards else 1)
+    tube, cross = (str(list(sides[order])).replace("'", '"') for sides in (("one.b", "two.a"), ("two.b", "three.a")))
+    scene, urdf = tmp_path / "scene.toml", tmp_path / "chain.urdf"
+    scene.write_text(CHAIN.format(bodies=BODIES, tube=tube, cross=cross))
+    for command in (("solve", scene), ("export", scene, "--format", "urdf", "-o", urdf)):
+        done = ffrobot(*command)
+        assert done.returncode == 0, done.stderr
+    for text in ('"ball": 3 joints in place of a spherical one', "angles about x, y, z", '"tube": 2 joints in place'):
+        assert text in done.stderr + done.stdout
+    results, robot = Results(tmp_path / "scene.results.h5"), yourdfpy.URDF.load(str(urdf))
+    types = {joint.get("name"): joint.get("type") for joint in ElementTree.parse(urdf).getroot().findall("joint")}
+    assert (types["table"], types["free_free"]) == ("planar", "floating")
+    nut, tube, cross = (results[f"fall/joints/{name}/coordinate"] for name in ("nut", "tube", "cross"))
+    assert min(np.abs(np.diff(x, axis=0)).min() for x in (nut, tube, cross)) > 1e-4  # all of them move
+    for k in range(len(nut)):
+        values = {"nut": nut[k], "tube_angle": tube[k, 0], "tube_way": tube[k, 1],
+                  "cross_first": cross[k, 0], "cross_second": cross[k, 1]}  # fmt: skip
+        robot.update_cfg({name: float(value) for name, value in values.items()})
+        T = robot.get_transform("three_c", "ground")
+        np.testing.assert_allclose(T[:3, 3], results["fall/points/three.c/position"][k], rtol=0, atol=1e-10)
+        np.testing.assert_allclose(T[:3, :3], rotation(results["fall/points/three.c/quaternion"][k]), atol=1e-10)
+
+
+LINK = {
+    "name": "rod", "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
+    "mesh": {"elements": 20}, "reference": {"condition": "cantilever"}, "modes": {"count": 4},
+    "damping": {"ratio": 0.01},
+}  # fmt: skip
+
+
+def test_a_flexible_link_is_its_undeformed_self(tmp_path):
+    """Mass, center and inertia of a tube: m L²/12 across, ρ I_p L along its axis; drawn as a cylinder."""
+    import tomli_w
+
+    rod = {"name": "rod", "link": LINK}
+    joint = {"name": "a", "type": "revolute", "between": ["ground", "rod.root"], "axis": [0.0, 0.0, 1.0],
+             "rotor_inertia": 0.1}  # fmt: skip
+    analysis = {"name": "rest", "kind": "static"}
+    scene = tmp_path / "rod.toml"
+    keys = {"name": "rod", "space": "spatial", "gravity": [0.0, 0.0, 9.81], "body": [rod], "joint": [joint]}
+    scene.write_text(tomli_w.dumps(keys | {"analysis": [analysis]}))
+    told = export_file(scene, "urdf", None, None)
+    assert told.path == tmp_path / "rod.urdf"
+    for part in ('"rod": rigid in the URDF', "rotor_inertia", "gravity [0.0, 0.0, 9.81] left out"):
+        assert any(part in remark for remark in told.remarks)
+    link = ElementTree.parse(told.path).getroot().find("link[@name='rod']")
+    inertia = {key: float(value) for key, value in link.find("inertial/inertia").attrib.items()}
+    mass = 2700.0 * np.pi / 4 * (0.02**2 - 0.016**2) * 0.6
+    polar = np.pi / 32 * (0.02**4 - 0.016**4)
+    assert float(link.find("inertial/mass").get("value")) == pytest.approx(mass, rel=1e-12)
+    assert inertia["ixx"] == pytest.approx(2700.0 * polar * 0.6, rel=1e-9)
+    assert inertia["iyy"] == pytest.approx(mass * 0.6**2 / 12, rel=1e-9)
+    assert inertia["izz"] == pytest.approx(mass * 0.6**2 / 12, rel=1e-9)
+    cylinder = link.find("visual/geometry/cylinder")
+    assert (float(cylinder.get("radius")), float(cylinder.get("length"))) == pytest.approx((0.01, 0.6))
+
+
+def test_what_cannot_be_exported(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(ARM.replace('space = "spatial"', 'space = "planar"'))
+    with pytest.raises(InputError, match="gravity"):  # a planar scene is read as one
+        export_file(scene, "urdf", None, None)
+    scene.write_text(with_motion(ARM, *MOTION))
+    with pytest.raises(InputError, match='expected one of "urdf" of a scene, found "fmu"'):
+        export_file(scene, "fmu", None, None)
+    with pytest.raises(InputError, match="--analysis: expected it with results only, found a scene"):
+        export_file(scene, "urdf", "inverse", None)
