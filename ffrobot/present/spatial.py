@@ -58,6 +58,8 @@ def print_spatial_summary(
             notes.add_row("verdict", f"{one.name}: {one.answer}")
     for line in control_lines(details):
         notes.add_row("linear", line)
+    for note in solution.path_notes:
+        notes.add_row("path", note)
     for note in solution.notes:
         notes.add_row("links", note)
     notes.add_row("time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))

@@ -9,6 +9,7 @@ from ..mbs.analysis.motors_only import InvertedPath, is_minimum_phase, path_erro
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.joint_motion import joint_motions, motor_motion
 from ..mbs.quantities.observation import joint_forces, trajectory_force, trajectory_target
+from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from ..mbs.scene.trajectories import Trajectory
 
 
@@ -21,7 +22,7 @@ def write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry["force"] = trajectory_force(outcome, trajectory.name)
             entry["target"] = trajectory_target(outcome, trajectory.name)
             entry.attrs["components"] = list(trajectory.components)
-            _write_path(entry, trajectory)
+            write_path(entry, trajectory)
     motions = joint_motions(outcome)
     for joint in outcome.assembly.model.scene.joint:
         forces = joint_forces(outcome, joint.name)
@@ -52,7 +53,7 @@ def write_inversion(group: h5py.Group, outcome: Outcome, found: InvertedPath) ->
         entry["target"] = trajectory_target(outcome, trajectory.name)
         entry["error"] = error[:, column : column + count]
         entry.attrs["components"] = list(trajectory.components)
-        _write_path(entry, trajectory)
+        write_path(entry, trajectory)
         column += count
     entry = group.create_group("zero_dynamics")
     entry["time"] = inversion.linearisation.times
@@ -64,7 +65,7 @@ def write_inversion(group: h5py.Group, outcome: Outcome, found: InvertedPath) ->
     entry.attrs["off_rest"] = inversion.off_rest
 
 
-def _write_path(entry: h5py.Group, trajectory: Trajectory) -> None:
+def write_path(entry: h5py.Group, trajectory: Trajectory | SpatialTrajectory) -> None:
     """When a path made of legs begins and is over, and what was found for it."""
     if trajectory.path is None:
         return

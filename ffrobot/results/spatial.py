@@ -13,6 +13,7 @@ from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial import SpatialResult, SpatialSolution
+from .forces import write_path
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
 from .write import write_head
@@ -60,6 +61,7 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
         entry.attrs["components"] = list(trajectory.components)
         if functions := list(trajectory.components.values()):
             entry["target"] = np.stack([function.sample(run.time)[0] for function in functions], axis=1)
+        write_path(entry, trajectory)
     for part in ("energies", "momentum"):
         for key, values in vars(getattr(result, part)).items():
             group[f"{'energy' if part == 'energies' else part}/{key}"] = values

@@ -10,17 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, sqrt
+from typing import Generic, TypeVar
 
-from ..common.errors import InputError, SolveError
+from ..actuation.feasibility import Feasibility
+from ..common.errors import InputError
 from ..common.validation import quoted
 from ..mbs.joints.transmission import MotorLimits
 from ..mbs.scene.analysis import TimedAnalysis
 from ..scene.scene import Scene
-from .prepare import with_scene
-from .solution import Solution
+from ..scene.spatial import SpatialScene
 
-Solve = Callable[[Solution], Solution]
-"""Runs the analyses of a scene, with all that follows from them."""
+AnyScene = TypeVar("AnyScene", Scene, SpatialScene)
+Judge = Callable[[AnyScene], Feasibility | None]
+"""Solves a scene with the one analysis that it has; None where there is no motion along the path."""
 
 GROWTH = 1.5  # of the stretch, until one is found that is too fast and one that is not
 NEAR = 1.005  # ratio of these two at which the search ends
@@ -29,12 +31,12 @@ KEPT = 1.0 + 1e-9  # times a limit
 
 
 @dataclass
-class Search:
+class Search(Generic[AnyScene]):
     """Motions that were tried, by their stretch: the largest ratio of what is required to a limit, and of what."""
 
-    solution: Solution
+    scene: AnyScene
     analysis: TimedAnalysis
-    solve: Solve
+    judge: Judge[AnyScene]
     tried: dict[float, tuple[float, str]] = field(default_factory=dict)
 
     def keeps_limits(self, stretch: float) -> bool:
@@ -44,24 +46,18 @@ class Search:
         return self.tried[stretch][0] <= KEPT
 
     def _try(self, stretch: float) -> tuple[float, str]:
-        trial = stretched(self.solution.scene, stretch).model_copy(update={"analysis": (self.analysis,)})
-        nothing = (inf, "no motion along the path")
-        try:
-            result = self.solve(with_scene(self.solution, trial)).analyses[self.analysis.name]
-        except SolveError:
-            return nothing
-        if result.outcome.failed or result.feasibility is None:
-            return nothing
-        return max((factor, name) for name, factor in result.feasibility.factors.items())
+        found = self.judge(stretched(self.scene, stretch).model_copy(update={"analysis": (self.analysis,)}))
+        if found is None:
+            return inf, "no motion along the path"
+        return max((factor, name) for name, factor in found.factors.items())
 
 
-def fastest(solution: Solution, solve: Solve) -> tuple[Scene, str]:
+def fastest(scene: AnyScene, judge: Judge[AnyScene]) -> tuple[AnyScene, str]:
     """The scene with its paths stretched by the least factor that keeps all limits, to 0.5 %, and what was found.
 
     Raises `InputError` where nothing has a limit, no analysis can judge, or the run is too short for any such motion.
     """
-    scene = solution.scene
-    search = Search(solution, _judging(scene), solve)
+    search = Search(scene, judging(scene), judge)
     least, most = _bounds(scene, search.analysis)
     found = least_stretch(search.keeps_limits, least, most)
     if found is None:
@@ -98,22 +94,23 @@ def least_stretch(keeps_limits: Callable[[float], bool], least: float, most: flo
     return good
 
 
-def stretched(scene: Scene, stretch: float) -> Scene:
+def stretched(scene: AnyScene, stretch: float) -> AnyScene:
     """The scene with the paths that are to be fastest slowed down by a factor."""
     paths = [one.changed(stretch=stretch, fastest=False) if one.fastest else one for one in scene.trajectory]
     return scene.model_copy(update={"trajectory": tuple(paths)})
 
 
-def _judging(scene: Scene) -> TimedAnalysis:
+def judging(scene: Scene | SpatialScene) -> TimedAnalysis:
     """The first inverse analysis. Raises `InputError` where there is none, or nothing to judge by."""
     where = f"{scene.path}: trajectory {_names(scene)}: fastest"
     inverse = [one for one in scene.analysis if one.applicable and isinstance(one, TimedAnalysis)]
     if not inverse:
         raise InputError(f"{where}: expected an inverse analysis (pcid, fcid, motors-only) that can judge, found none")
-    limited = [joint.name for joint in scene.motor_joints if joint.motor_limits != MotorLimits()]
+    limits = [joint.motor_limits for joint in scene.motor_joints]  # in space one for each coordinate
+    limited = any(of != MotorLimits() for each in limits for of in ([each] if isinstance(each, MotorLimits) else each))
     if not limited and not any(layout.limit for layout in scene.pzt):
         raise InputError(f"{where}: expected limits of motors (moment_limit, speed_limit, …) or of patches, found none")
-    if any(body.modes == "auto" for body in scene.body):
+    if any(getattr(body, "modes", None) == "auto" for body in scene.body):
         raise InputError(
             f'{where}: expected bodies with a number of modes, found modes = "auto": solve once without fastest, whose'
             " summary says how many are enough, and write these"
@@ -121,7 +118,7 @@ def _judging(scene: Scene) -> TimedAnalysis:
     return inverse[0]
 
 
-def _bounds(scene: Scene, analysis: TimedAnalysis) -> tuple[float, float]:
+def _bounds(scene: Scene | SpatialScene, analysis: TimedAnalysis) -> tuple[float, float]:
     """Stretches at which the path keeps its own limits, and is over before the run is."""
     one, two = (_end(scene, stretch) for stretch in (1.0, 2.0))
     least = 1.0 if any(path.fastest and path.duration is None for path in scene.trajectory) else 1.0 / MOST
@@ -134,11 +131,11 @@ def _bounds(scene: Scene, analysis: TimedAnalysis) -> tuple[float, float]:
     return least, most
 
 
-def _end(scene: Scene, stretch: float) -> float:
+def _end(scene: Scene | SpatialScene, stretch: float) -> float:
     """When the last of the paths that are to be fastest is over, s."""
     slower = (one.changed(stretch=stretch, fastest=False).path for one in scene.trajectory if one.fastest)
     return max(path.end for path in slower if path is not None)
 
 
-def _names(scene: Scene) -> str:
+def _names(scene: Scene | SpatialScene) -> str:
     return quoted(one.name for one in scene.trajectory if one.fastest)

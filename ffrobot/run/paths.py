@@ -2,41 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 
+from ..actuation.feasibility import Feasibility
+from ..common.errors import SolveError
+from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.scene.motion_keys import Shaper
-from ..mbs.scene.trajectories import Trajectory
 from ..mbs.solve.path_frequencies import PathFrequencies, path_frequencies
+from ..mbs.solve.spatial_frequencies import spatial_path_frequencies
 from ..scene.scene import Scene
-from .fastest import Solve, fastest
+from ..scene.spatial import SpatialScene
+from .fastest import AnyScene, Judge, fastest
 from .prepare import with_scene
 from .solution import Solution
 
+Solve = Callable[[Solution], Solution]
+"""Runs the analyses of a scene, with all that follows from them."""
+Frequencies = Callable[[float, float, int], PathFrequencies]
+"""Of so many of the lowest vibrations from one time to another, s."""
+Notes = tuple[str, ...]
 
-def with_paths(solution: Solution, solve: Solve, stage: Callable[[str], None]) -> tuple[Solution, tuple[str, ...]]:
+
+def with_paths(solution: Solution, solve: Solve, stage: Callable[[str], None]) -> tuple[Solution, Notes]:
     """The scene with shapers for the robot's own frequencies, stretched as far as `fastest` asks for; what was found.
 
     `solve` runs analyses. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
     """
-    solution, notes = _with_shapers(solution)
-    if any(trajectory.fastest for trajectory in solution.scene.trajectory):
+    scene, notes = _shaped(solution.scene, partial(path_frequencies, solution.model))
+    if any(trajectory.fastest for trajectory in scene.trajectory):
         stage("fastest motion")
-        scene, note = fastest(solution, solve)
-        solution, notes = _with_trajectories(solution, scene.trajectory), (*notes, note)
-    return solution, notes
+        scene, note = fastest(scene, partial(_judged, solution, solve))
+        notes = (*notes, note)
+    return (_with_scene(solution, scene) if notes else solution), notes
 
 
-def _with_shapers(solution: Solution) -> tuple[Solution, tuple[str, ...]]:
-    asking = {one.name: one.shaper for one in solution.scene.trajectory if one.shaper and one.shaper.asks_robot}
+def with_paths_in_space(
+    scene: SpatialScene, model: SpatialModel, judge: Judge[SpatialScene], stage: Callable[[str], None]
+) -> tuple[SpatialScene, Notes]:
+    """The same of a scene in space, whose `model` is what vibrates."""
+    scene, notes = _shaped(scene, partial(spatial_path_frequencies, model))
+    if any(trajectory.fastest for trajectory in scene.trajectory):
+        stage("fastest motion")
+        scene, note = fastest(scene, judge)
+        notes = (*notes, note)
+    return scene, notes
+
+
+def _shaped(scene: AnyScene, frequencies: Frequencies) -> tuple[AnyScene, Notes]:
+    """The scene with shapers for frequencies of the robot where they ask for these."""
+    asking = {one.name: one.shaper for one in scene.trajectory if one.shaper and one.shaper.asks_robot}
     if not asking:
-        return solution, ()
-    begin, end = _span(solution.scene)
-    found = path_frequencies(solution.model, begin, end, max(shaper.modes for shaper in asking.values()))
-    shapers = {name: _for_robot(shaper, found) for name, shaper in asking.items()}
-    changed = [one.changed(shaper=shapers.get(one.name, one.shaper)) for one in solution.scene.trajectory]
+        return scene, ()
+    begin, end = _span(scene)
+    found = frequencies(begin, end, max(shaper.modes for shaper in asking.values()))
+    shapers: Mapping[str, Shaper] = {name: _for_robot(shaper, found) for name, shaper in asking.items()}
+    changed = [one.changed(shaper=shapers.get(one.name, one.shaper)) for one in scene.trajectory]
     notes = tuple(f"{name}: {_in_words(shaper, found)}" for name, shaper in asking.items())
-    return _with_trajectories(solution, changed), notes
+    return scene.model_copy(update={"trajectory": tuple(changed)}), notes
 
 
 def _for_robot(shaper: Shaper, found: PathFrequencies) -> Shaper:
@@ -52,7 +76,7 @@ def _in_words(shaper: Shaper, found: PathFrequencies) -> str:
     return f"{shaper.kind} shaper for {', '.join(list(ranges)[: shaper.modes])}"
 
 
-def _span(scene: Scene) -> tuple[float, float]:
+def _span(scene: Scene | SpatialScene) -> tuple[float, float]:
     """When the first path begins and the last one is over, s."""
     paths = [one.path for one in scene.trajectory]
     ends = [path.end for path in paths if path is not None]
@@ -60,6 +84,14 @@ def _span(scene: Scene) -> tuple[float, float]:
     return min(begins), max(ends)
 
 
-def _with_trajectories(solution: Solution, trajectories: Iterable[Trajectory]) -> Solution:
-    scene = solution.scene.model_copy(update={"trajectory": tuple(trajectories)})
+def _with_scene(solution: Solution, scene: Scene) -> Solution:
     return replace(with_scene(solution, scene), earlier=solution.earlier)
+
+
+def _judged(solution: Solution, solve: Solve, trial: Scene) -> Feasibility | None:
+    """What its one analysis asks of motors and patches; None where it fails."""
+    try:
+        (result,) = solve(with_scene(solution, trial)).analyses.values()
+    except SolveError:
+        return None
+    return None if result.outcome.failed else result.feasibility

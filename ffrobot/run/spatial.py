@@ -11,8 +11,9 @@ from pathlib import Path
 
 from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.control.spatial_linear import ActuatedSpatialContext
+from ..actuation.feasibility import Feasibility
 from ..actuation.patches.spatial_patches import LinkPatches
-from ..common.errors import of_file
+from ..common.errors import SolveError, of_file
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.operating_points import InstantAnalysis
@@ -24,6 +25,7 @@ from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
+from .paths import with_paths_in_space
 from .spatial_actuation import (
     SpatialActuation,
     actuated_in_space,
@@ -75,6 +77,7 @@ class SpatialSolution:
         analyses: by name, in the order of the scene.
         seconds: wall time by stage.
         failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
+        path_notes: what was found of paths before the analyses, one line each.
     """
 
     scene: SpatialScene
@@ -84,6 +87,7 @@ class SpatialSolution:
     analyses: Mapping[str, SpatialResult]
     seconds: Mapping[str, float]
     failure: Exception | None = None
+    path_notes: tuple[str, ...] = ()
 
     @property
     def links(self) -> dict[str, ModalBody]:
@@ -107,6 +111,8 @@ Keep = Callable[[SpatialSolution], None]
 def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | None = None) -> SpatialSolution:
     """Run every analysis of a scene, or of a scene file, in space; stage 1 runs first for links that are out of date.
 
+    Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
+
     An analysis that does not reach its end is kept as far as it got, and ends the run (`SpatialRun.check_completed`).
     So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
@@ -116,18 +122,43 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     began = time.perf_counter()
     loaded = load_spatial_bodies(scene, watcher.stage)
     seconds = {"bodies": time.perf_counter() - began}
-    model = build_spatial_model(scene, [body.spatial for body in loaded])
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
     patches = patches_in_space(scene, bodies)
-    model = replace(model, modal_loads=tuple(given_voltages(model, patches)))
-    solution = SpatialSolution(scene, model, bodies, patches, {}, seconds)
+    solution = SpatialSolution(scene, _model(scene, bodies, patches), bodies, patches, {}, seconds)
     with Interruption(watcher.stopping) as interruption:
+        judge = partial(_judged, solution, watcher, interruption)
+        scene, notes = with_paths_in_space(scene, solution.model, judge, watcher.stage)
+        solution = replace(_with_scene(solution, scene) if notes else solution, path_notes=notes)
         solution = _run_all(solution, watcher, interruption)
         if keep is not None and solution.analyses:
             keep(solution)
     if solution.failure is not None:
         raise solution.failure
     return solution
+
+
+def _model(
+    scene: SpatialScene, bodies: Mapping[str, LoadedSpatialBody], patches: Mapping[str, LinkPatches]
+) -> SpatialModel:
+    """The equations, with the voltages that the scene gives to patches."""
+    model = build_spatial_model(scene, [body.spatial for body in bodies.values()])
+    return replace(model, modal_loads=tuple(given_voltages(model, patches)))
+
+
+def _with_scene(solution: SpatialSolution, scene: SpatialScene) -> SpatialSolution:
+    """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
+    return replace(solution, scene=scene, model=_model(scene, solution.bodies, solution.patches))
+
+
+def _judged(
+    solution: SpatialSolution, watcher: Watcher, interruption: Interruption, trial: SpatialScene
+) -> Feasibility | None:
+    """What the one analysis of a scene asks of motors and patches; None where it fails."""
+    try:
+        (result,) = _run_all(_with_scene(solution, trial), watcher, interruption).analyses.values()
+    except SolveError:
+        return None
+    return None if result.run.failed or result.actuation is None else result.actuation.feasibility
 
 
 def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:

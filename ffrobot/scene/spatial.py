@@ -32,7 +32,6 @@ APPLICABLE = ("joints", "joints+pzt", "trajectory")  # values of `apply`
 UNAVAILABLE = {
     "": ("geometric_stiffening", "actuation_points"),
     "body": ("modes", "pieces"),
-    "trajectory": ("via", "profile", "shaper"),
     "load": ("force",),
 }
 
@@ -215,7 +214,8 @@ def _check_functions(scene: SpatialSceneKeys, path: Path) -> None:
 
 def _check_path(trajectory: SpatialTrajectory, times: Array, label: str) -> None:
     """Of one trajectory at `times` (T,), with its derivatives."""
-    functions = [(f"{label}: {component}", function) for component, function in trajectory.components.items()]
+    places = None if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
+    functions = [(f"{label}: {places or name}", function) for name, function in trajectory.components.items()]
     law = trajectory.orientation
     functions += [] if law is None else [(f"{label}: {law.kind}", function) for function in law.functions]
     for key, function in functions:

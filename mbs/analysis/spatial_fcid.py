@@ -11,6 +11,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ..fields.waypoints import spline
 from ..model.model import ZERO
+from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel
 from ..solve.spatial_posture import check_path, mobility, undeformed_posture
 from ..solve.spatial_prescribed import prescribed_motion, quasi_static_shape
@@ -27,6 +28,7 @@ def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
     `SolveError` where no posture, or no static shape, is found.
     """
     began = time.perf_counter()
+    refuse_held_motors(context.model, analysis)
     model = resolved(context.model, analysis.last_time)
     start = undeformed_posture(model)
     warnings = tuple(check_path(model, start.q))

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from ...common.arrays import Array
+from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel, row_values
 from ..scene.analysis import output_times
 from ..solve.servo import is_unstable
@@ -26,6 +27,7 @@ def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> Sp
     Raises `InputError` and `SolveError` as `motors_only.run_motors_only`.
     """
     model, began = context.model, time.perf_counter()
+    refuse_held_motors(model, analysis)
     servo, linear = choose_output(partial(make_spatial_servo, model, analysis.end), analysis)
     needs_future = bool(is_unstable(linear.zeros[0]).any())
     check_rest(servo, analysis, needs_future)

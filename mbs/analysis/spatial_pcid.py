@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..model.spatial_gears import with_held_motors
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.spatial_posture import check_path, undeformed_posture
 from ..solve.spatial_redundancy import resolved
@@ -11,11 +12,12 @@ from .spatial_run import SpatialContext, SpatialRun
 
 
 def run_spatial_pcid(context: SpatialContext, analysis: IntegratedAnalysis) -> SpatialRun:
-    """C_m and C_s hold, p is free.
+    """C_m and C_s hold, p is free; and gears that give, where motors follow the trajectories.
 
     Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to start
     from.
     """
-    model = resolved(context.model, analysis.last_time)
-    warnings = tuple(check_path(model, undeformed_posture(model).q))
+    firm = resolved(context.model, analysis.last_time)
+    warnings = tuple(check_path(firm, undeformed_posture(firm).q))
+    model = with_held_motors(firm)
     return spatial_drive(model, analysis, initial_state(model), context.progress, warnings=warnings)

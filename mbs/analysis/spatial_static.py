@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 
+from ..model.spatial_gears import with_held_motors
 from ..scene.analysis import Analysis
 from ..solve.spatial_posture import undeformed_posture
 from ..solve.spatial_redundancy import resolved
@@ -19,7 +20,7 @@ def run_spatial_static(context: SpatialContext, analysis: Analysis) -> SpatialRu
     Raises `SolveError` where there is none.
     """
     began = time.perf_counter()
-    model = resolved(context.model, analysis.last_time)
+    model = with_held_motors(resolved(context.model, analysis.last_time))
     q = static_equilibrium(model, undeformed_posture(model)).q[None]
     at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
     return SpatialRun(

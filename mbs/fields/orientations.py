@@ -23,6 +23,8 @@ from .waypoints import Waypoints
 
 QUATERNION = ("qw", "qx", "qy", "qz")
 UNIT = 1e-3  # how far from 1 the length of a quaternion in a table may be
+Reference = tuple[float, float, float]
+"""A rotation vector, rad."""
 WIDEST = 2.8  # rad from the middle of all orientations of a table: a rotation vector is smooth well below π
 
 
@@ -39,7 +41,7 @@ class OrientationLaw:
 
     kind: Literal["rotation_vector", "rpy", "direction"]
     functions: tuple[TimeFunction, ...]
-    reference: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    reference: Reference = (0.0, 0.0, 0.0)
 
     def sample(self, times: Array) -> Array:
         """A (T, 3, 3), columns its axes; of a direction z is along it, by the smallest turn."""
@@ -94,7 +96,7 @@ def _rates_of_rpy(x: Array, x_dot: Array, x_2dot: Array) -> tuple[Array, Array]:
     return omega, alpha + turning
 
 
-def orientation_of(table: Waypoints) -> tuple[Waypoints, tuple[float, float, float]]:
+def orientation_of(table: Waypoints) -> tuple[Waypoints, Reference]:
     """The columns qw, qx, qy, qz of a table as those of a rotation vector, and the reference that it turns.
 
     It is log(A A_refᵀ) about the middle of all orientations: splines of it have all the derivatives that they have of
@@ -108,16 +110,25 @@ def orientation_of(table: Waypoints) -> tuple[Waypoints, tuple[float, float, flo
     length = np.linalg.norm(e, axis=1)
     if (bad := np.flatnonzero(np.abs(length - 1) > UNIT)).size:
         raise InputError(f"row {bad[0] + 1}: expected qw, qx, qy, qz of length 1, found {length[bad[0]]:.6g}")
-    A = of_quaternion(e / length[:, None])
+    psi, reference = about_their_middle(of_quaternion(e / length[:, None]), "row")
+    return Waypoints(("rx", "ry", "rz"), table.times, psi), reference
+
+
+def about_their_middle(A: Array, each: str) -> tuple[Array, Reference]:
+    """Rotation vectors (T, 3) of triads A (T, 3, 3) against their middle, and its own: see `orientation_of`.
+
+    A straight line between two of them is a turn about a fixed axis where these are all there are.
+    Raises `InputError` where orientations are too far apart, which calls them `each` and a number.
+    """
     middle = _middle(A)
     psi = logarithm(A @ middle.T)
     if (far := np.linalg.norm(psi, axis=1)).max() > WIDEST:
         raise InputError(
-            f"row {far.argmax() + 1}: expected orientations within {np.degrees(WIDEST):.0f} degrees of their middle,"
+            f"{each} {far.argmax() + 1}: expected orientations within {np.degrees(WIDEST):.0f} degrees of their middle,"
             f" found {np.degrees(far.max()):.0f}: divide the motion, or give rotation_vector or rpy as expressions"
         )
     x, y, z = as_list(logarithm(middle))
-    return Waypoints(("rx", "ry", "rz"), table.times, psi), (x, y, z)
+    return psi, (x, y, z)
 
 
 def _middle(A: Array) -> Array:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from ...common.errors import InputError
+from ..scene.analysis import Analysis
 from .spatial_body import rigid_body
 from .spatial_drives import Drive
-from .spatial_model import SpatialModel
+from .spatial_model import SpatialModel, SpatialRow
 from .spatial_transmission import compliance
 from .spatial_tree import ElasticGearInSpace, Node, Section, SpatialTree
 
@@ -50,9 +52,50 @@ def with_compliance_in_space(model: SpatialModel) -> SpatialModel:
         for output, node in zip(outputs, elastic, strict=True)
     )
     more = np.zeros(len(outputs))
-    return replace(
-        model, tree=tree, modal_loads=tuple(Drive(np.append(at, more), size) for at, size in model.modal_loads)
-    )
+    loads = tuple(Drive(np.append(at, more), size) for at, size in model.modal_loads)
+    return replace(model, tree=tree, rows=tuple(_rows_at_motors(model, tree)), modal_loads=loads)
+
+
+def with_held_motors(model: SpatialModel) -> SpatialModel:
+    """The robot with its gears where trajectories of motors are followed; the same where all gears are firm.
+
+    Raises `InputError` for trajectories of something else beside them: no motor could do both.
+    """
+    if not any(path.motor for path in model.scene.trajectory):
+        return model
+    found = with_compliance_in_space(model)
+    outputs = {gear.motor.v.start for gear in found.tree.gears}
+    behind = {gear.joint.v.start for gear in found.tree.gears}
+    for row in found.rows if outputs else ():
+        if row.is_trajectory and (row.kind != "coordinate" or row.coordinate in behind):
+            raise InputError(
+                f'{model.scene.path}: trajectory: expected motors ("motor") in all of them, or in none, where gears'
+                f' give, found "{row.owner}" beside trajectories of motors'
+            )
+    return found
+
+
+def refuse_held_motors(model: SpatialModel, analysis: Analysis) -> None:
+    """Raise `InputError` where gears that give leave an analysis nothing to do with trajectories of motors."""
+    if any(path.motor for path in model.scene.trajectory) and elastic_joints(model):
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": kind: expected "pcid" or "static" beside trajectories of'
+            f' motors whose gears give, found "{analysis.kind}": the robot behind them is not prescribed'
+        )
+
+
+def _rows_at_motors(model: SpatialModel, tree: SpatialTree) -> Iterator[SpatialRow]:
+    """The rows of the robot, those of trajectories of motors at the outputs of gears that give."""
+    motors = {path.name: path.motor for path in model.scene.trajectory if path.motor is not None}
+    outputs = {gear.joint.joint.name: gear.motor for gear in tree.gears}
+    for row in model.rows:
+        output = outputs.get(motors.get(row.owner, "")) if row.is_trajectory else None
+        if output is None:
+            yield row
+        else:  # the coordinate of an output counts as the joint of the scene does
+            yield replace(
+                row, a=output.inner, b=output.outer, coordinate=output.v.start, q_index=output.q.start, sign=1.0
+            )
 
 
 def _output(tree: SpatialTree, node: Node, number: int) -> Node:

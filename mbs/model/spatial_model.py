@@ -136,8 +136,8 @@ def _loop_rows(scene: SpatialMechanismScene, tree: SpatialTree, joint: SpatialJo
 
 def _path_rows(scene: SpatialMechanismScene, tree: SpatialTree, path: SpatialTrajectory) -> Iterator[SpatialRow]:
     unit, ground = np.eye(3), Section(-1, "", np.eye(3), np.zeros(3))
-    if path.joint is not None:
-        yield _coordinate_row(scene, tree, path)
+    if path.coordinate_of is not None:
+        yield _coordinate_row(scene, tree, path, path.coordinate_of)
         return
     assert path.point is not None
     section = tree.section(path.point, np.eye(3))
@@ -154,15 +154,14 @@ def _path_rows(scene: SpatialMechanismScene, tree: SpatialTree, path: SpatialTra
             yield SpatialRow(path.name, "dot", tool, ground, f, unit[2], law=path.orientation)
 
 
-def _coordinate_row(scene: SpatialMechanismScene, tree: SpatialTree, path: SpatialTrajectory) -> SpatialRow:
-    assert path.joint is not None
-    joint = next(each for each in scene.joint if each.name == path.joint)
+def _coordinate_row(scene: SpatialMechanismScene, tree: SpatialTree, path: SpatialTrajectory, name: str) -> SpatialRow:
+    joint = next(each for each in scene.joint if each.name == name)
+    label = f'{scene.path}: trajectory "{path.name}": {"joint" if path.motor is None else "motor"}'
     if len(joint.units) != 1 or joint.name not in tree.carried:
         why = f"{len(joint.units)} coordinates" if joint.name in tree.carried else "the joint at which a loop is cut"
-        raise InputError(
-            f'{scene.path}: trajectory "{path.name}": joint: expected a joint with one coordinate, found'
-            f' "{joint.name}", {why}'
-        )
+        raise InputError(f'{label}: expected a joint with one coordinate, found "{joint.name}", {why}')
+    if path.motor is not None and joint not in scene.motor_joints:
+        raise InputError(f'{label}: expected a joint with a motor, found "{joint.name}", which has none')
     node = tree.nodes[tree.carried[joint.name]]
     return SpatialRow(
         path.name, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), coordinate=node.v.start,

@@ -66,7 +66,7 @@ class SpatialSystem:
         sides = [(self._place(node.inner), self._place(node.outer)) for node in tree.nodes]
         rows = [self._row(row) for row in model.rows]
         driven = {name for name in model.motors} | {load.joint for load in model.scene.load}
-        driven |= {trajectory.joint for trajectory in model.scene.trajectory}
+        driven |= {trajectory.coordinate_of for trajectory in model.scene.trajectory}
         driven |= {node.joint.name for node in tree.nodes if node.joint.frictions}
         driven |= {gear.joint.joint.name for gear in tree.gears}
         self._wrenches: list[tuple[int, int]] = []

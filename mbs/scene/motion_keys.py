@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from math import inf
 from typing import Annotated, Literal
@@ -9,6 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from ...common.arrays import Array
 from ...common.validation import Record, quoted
 from ..fields.field_types import NotNegative, Positive, Quantity
 from ..fields.motion_laws import SMOOTHNESS, Limits
@@ -17,8 +19,9 @@ from ..fields.piecewise import Piecewise
 from ..fields.shapers import impulses, shaped
 from ..fields.waypoints import Waypoints
 
-Place = Quantity | tuple[Quantity, Quantity]
+Place = Quantity | tuple[Quantity, ...]
 MOST_PLACES = 1000
+OfPlaces = Field(min_length=2, max_length=MOST_PLACES)
 LIMITS = ("speed", "acceleration", "jerk")
 OF_LEGS = ("hold", "blend", "duration", *LIMITS, "start", "stretch", "fastest")  # a table of waypoints has its times
 
@@ -61,8 +64,8 @@ class Shaper(Record):
 class MotionKeys(Record):
     """What a trajectory has beside what follows it."""
 
-    via: Annotated[tuple[Place, ...], Field(min_length=2, max_length=MOST_PLACES)] | None = None
-    """Places to go through from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle."""
+    via: Annotated[tuple[Place, ...], OfPlaces] | None = None
+    """Places to go through from rest to rest, the first at t = 0: of points (m), or values of what turns or slides."""
     profile: Literal["rest-to-rest", "s-curve", "trapezoid", "spline"] | None = None
     """Law of motion between places: a polynomial (default of `via`), limited jerk, limited acceleration, or a spline
     through the rows of `waypoints` (their default)."""
@@ -89,15 +92,18 @@ class MotionKeys(Record):
     shaper: Shaper | None = None
     """Shapes the motion so that it leaves vibrations of certain frequencies at rest."""
 
-    def check_motion(self, components: int, waypoints: Waypoints | None) -> None:
-        """Raise `ValueError` for keys that do not fit each other, or a path of so many components."""
+    def check_motion(self, places: Mapping[int, str], waypoints: Waypoints | None) -> None:
+        """Raise `ValueError` for keys that do not fit each other, or places that are none of these.
+
+        `places` says by their number of components how they are written.
+        """
         given = [key for key in (*OF_LEGS, "profile", "smoothness", "shaper") if key in self.model_fields_set]
         if self.via is None and waypoints is None and given:
             raise ValueError(f'expected {quoted(given)} only beside "via" or "waypoints", found neither')
         if waypoints is not None:
             self._check_table(given)
         if self.via is not None:
-            self._check_via(self.via, components)
+            self._check_via(self.via, places)
 
     def _check_table(self, given: list[str]) -> None:
         refused = [key for key in given if key in OF_LEGS]
@@ -106,9 +112,10 @@ class MotionKeys(Record):
         if self.profile in (None, "spline") and self.smoothness is not None:
             raise ValueError('expected no key "smoothness" beside profile = "spline", found it there')
 
-    def _check_via(self, via: tuple[Place, ...], components: int) -> None:
-        wanted = "places [x, y]" if components == 2 else "numbers"
-        if any(np.size(place) != components for place in via):
+    def _check_via(self, via: tuple[Place, ...], places: Mapping[int, str]) -> None:
+        sizes = {int(np.size(place)) for place in via}
+        if not sizes <= set(places) or len(sizes) > 1:
+            wanted = " or ".join(places.values()) + (", all alike," if len(places) > 1 else "")
             raise ValueError(f"expected {wanted} in via, found {[list(p) if isinstance(p, tuple) else p for p in via]}")
         if self.profile == "spline":
             raise ValueError('expected profile = "spline" only beside "waypoints", found it beside "via"')
@@ -135,24 +142,30 @@ class MotionKeys(Record):
 
     def motion(self, waypoints: Waypoints | None) -> Piecewise | None:
         """The motion of all components; None where it is given by expressions."""
-        if waypoints is not None and self.profile in (None, "spline"):
-            motion = waypoints.spline()
-        elif waypoints is not None:
-            motion = path_of(self._legs_of_table(waypoints))
-        elif self.via is not None:
-            motion = path_of(self._legs(self.via))
-        else:
-            return None
+        if waypoints is not None:
+            return self.along_table(waypoints)
+        return None if self.via is None else self.through(np.array(self.via, dtype=float).reshape(len(self.via), -1))
+
+    def along_table(self, waypoints: Waypoints) -> Piecewise:
+        """The motion of all columns of a table."""
+        if self.profile in (None, "spline"):
+            return self._shaped(waypoints.spline())
+        return self._shaped(path_of(self._legs_of_table(waypoints)))
+
+    def through(self, places: Array) -> Piecewise:
+        """The motion through the places of `via` (k + 1, n), m or rad, or some of their components."""
+        return self._shaped(path_of(self._legs(places)))
+
+    def _shaped(self, motion: Piecewise) -> Piecewise:
         return motion if self.shaper is None else self.shaper.shape(motion)
 
-    def _legs(self, via: tuple[Place, ...]) -> Legs:
-        profile, count = self.profile or "rest-to-rest", len(via) - 1
+    def _legs(self, places: Array) -> Legs:
+        profile, count = self.profile or "rest-to-rest", len(places) - 1
         assert profile != "spline"
         limits = Limits(*(inf if value is None else value for value in (self.speed, self.acceleration, self.jerk)))
         durations = None if self.duration is None else tuple(np.broadcast_to(self.duration, count).tolist())
         holds = tuple(np.broadcast_to(self.hold, count - 1).tolist())
         smoothness = self.smoothness or SMOOTHNESS[profile]
-        places = np.array(via, dtype=float).reshape(count + 1, -1)
         return Legs(places, self.start, profile, smoothness, limits, durations, holds, self.blend, self.stretch)
 
     def _legs_of_table(self, waypoints: Waypoints) -> Legs:

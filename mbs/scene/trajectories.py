@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from pydantic import model_validator
@@ -12,11 +13,11 @@ from pydantic import model_validator
 from ...common.validation import quoted
 from .. import _core
 from .._core import TimeFunction
-from ..fields.field_types import Expression, Name, PointReference, WaypointTable, one_of, only, present
+from ..fields.field_types import Expression, Name, PointReference, Quantity, WaypointTable, one_of, only, present
 from ..fields.piecewise import Piecewise
 from ..fields.references import Reference, marker_reference
 from ..joints.measure import GROUND_FRAME, Marker, Measure, coincident, marker_at
-from .motion_keys import MotionKeys
+from .motion_keys import MotionKeys, OfPlaces
 
 
 class Trajectory(MotionKeys):
@@ -25,6 +26,8 @@ class Trajectory(MotionKeys):
     `angle` is a body (its frame) or BODY.POINT (the section there).
     """
 
+    via: Annotated[tuple[Quantity | tuple[Quantity, Quantity], ...], OfPlaces] | None = None
+    """Places to go through from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle."""
     name: Name
     """Of the trajectory, unique in the scene."""
     point: PointReference | None = None
@@ -52,7 +55,7 @@ class Trajectory(MotionKeys):
         if self.waypoints is not None and not set(self.waypoints.columns) <= set(allowed):
             columns = ",".join(("t", *self.waypoints.columns))
             raise ValueError(f'expected waypoints with the header t,{",".join(allowed)}, found "{columns}"')
-        self.check_motion(len(allowed), self.waypoints)
+        self.check_motion({2: "places [x, y]"} if subject == "point" else {1: "numbers"}, self.waypoints)
         with np.errstate(all="ignore"):
             path = self.path
         if path is not None and not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()):

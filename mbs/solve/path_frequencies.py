@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -40,12 +42,18 @@ def path_frequencies(model: Model, begin: float, end: float, modes: int) -> Path
         if following is None:
             raise InputError(unreachable(assembly, float(t), q))
         q = following
-        found.append(vibrations(assembly, State(q, np.zeros_like(state.v))))
-    most = min(len(each.frequency) for each in found)
+        each = vibrations(assembly, State(q, np.zeros_like(state.v)))
+        found.append((each.frequency, each.damping_ratio))
+    return common_modes(model.scene.path, found, modes)
+
+
+def common_modes(path: Path, found: Sequence[tuple[Array, Array]], modes: int) -> PathFrequencies:
+    """The `modes` lowest of ω (rad/s) and damping ratios by instant. Raises `InputError` where one has fewer."""
+    most = min(len(omega) for omega, _ in found)
     if most < modes:
         raise InputError(
-            f"{model.scene.path}: trajectory: shaper.modes: expected at most {most}, as many as there are vibrations"
-            f" while the path is held, found {modes}"
+            f"{path}: trajectory: shaper.modes: expected at most {most}, as many as there are vibrations while the path"
+            f" is held, found {modes}"
         )
-    frequency = np.array([each.frequency[:modes] for each in found]) / (2 * np.pi)
-    return PathFrequencies(as_floats(frequency), np.array([each.damping_ratio[:modes] for each in found]))
+    frequency = np.array([omega[:modes] for omega, _ in found]) / (2 * np.pi)
+    return PathFrequencies(as_floats(frequency), np.array([ratio[:modes] for _, ratio in found]))

@@ -54,12 +54,17 @@ def undeformed_posture(model: SpatialModel) -> State:
 
 
 def relaxed_gears(model: SpatialModel, state: State) -> State:
-    """The state with motors where their gears are not strained."""
+    """The state with motors where their gears are not strained; joints where motors follow a trajectory."""
     q, v = state.q.copy(), state.v.copy()
+    held = {row.coordinate for row in model.rows if row.kind == "coordinate"}
     for gear in model.tree.gears:
         way, rate = gear.twist(q, v)
-        q[gear.motor.q.start] -= way
-        v[gear.motor.v.start] -= rate
+        if gear.motor.v.start in held:
+            q[gear.joint.q.start] += gear.sign * way
+            v[gear.joint.v.start] += gear.sign * rate
+        else:
+            q[gear.motor.q.start] -= way
+            v[gear.motor.v.start] -= rate
     return State(q, v)
 
 

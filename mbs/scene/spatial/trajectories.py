@@ -4,37 +4,51 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from pydantic import model_validator
 
-from ....common.arrays import as_rows
+from ....common.arrays import Array, as_rows
 from ....common.errors import InputError
-from ....common.rotations import smallest_turn
-from ....common.validation import Record, quoted
+from ....common.rotations import of_rpy, smallest_turn
+from ....common.validation import quoted
 from ..._core import TimeFunction
 from ...fields.field_types import Expression, Name, PointReference, Vector3, WaypointTable, one_of, present
-from ...fields.orientations import QUATERNION, OrientationLaw, orientation_of
-from ...fields.references import Reference, marker_reference
+from ...fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
+from ...fields.piecewise import Piecewise
+from ...fields.references import Reference as RecordReference
+from ...fields.references import marker_reference
+from ...fields.waypoints import Waypoints
+from ..motion_keys import LIMITS, MotionKeys, OfPlaces, Place
 
 PLACES = ("x", "y", "z")
 ORIENTATIONS = ("rotation_vector", "rpy", "direction")
+POSE = 6
+OF_POINT = {2: "places [x, y]", 3: "[x, y, z]", POSE: "[x, y, z, roll, pitch, yaw]"}
+"""How `via` of a point is written, by the number of components."""
 Triple = tuple[Expression, Expression, Expression]
 
 
-class SpatialTrajectory(Record):
-    """Motion that is specified: of a point (m, global axes), of the section there, or a joint coordinate.
+class SpatialTrajectory(MotionKeys):
+    """Motion that is specified: of a point (m, global axes), of the section there, a joint coordinate, or a motor.
 
     The section's orientation is that of its axes in global axes: by a rotation vector, by roll, pitch and yaw about
     fixed axes, or by one direction of the section, about which it then turns as it likes.
     """
 
+    via: Annotated[tuple[Place, ...], OfPlaces] | None = None
+    """Places to go through from rest to rest, the first at t = 0: [x, y] (z is left open) or [x, y, z] (m), [x, y, z,
+    roll, pitch, yaw] (m, rad), or values of the joint (rad, m)."""
     name: Name
     """Of the trajectory, unique in the scene."""
     point: PointReference | None = None
     """What moves along it, "BODY.POINT"."""
     joint: str | None = None
     """The joint whose coordinate follows it: relative, of the second side on the first."""
+    motor: str | None = None
+    """The joint whose motor follows it, as its controller holds it; in the joint's coordinate, which differs from that
+    of the motor where the gear gives (`stiffness`)."""
     x: Expression | None = None
     """Along the ground's x axis, m; expression in t (s)."""
     y: Expression | None = None
@@ -58,22 +72,27 @@ class SpatialTrajectory(Record):
 
     @model_validator(mode="after")
     def _consistent(self) -> SpatialTrajectory:
-        subject = one_of(self, ("point", "joint"))
+        subject = one_of(self, ("point", "joint", "motor"))
         allowed = (*PLACES, *ORIENTATIONS) if subject == "point" else ("value",)
-        given = [key for key in (*PLACES, *ORIENTATIONS, "value", "waypoints") if getattr(self, key) is not None]
-        if not given or not set(given) <= {*allowed, "waypoints"}:
+        given = [key for key in (*PLACES, *ORIENTATIONS, "value", "waypoints", "via") if getattr(self, key) is not None]
+        if not given or not set(given) <= {*allowed, "waypoints", "via"}:
             raise ValueError(
-                f'expected the keys {quoted((*allowed, "waypoints"))} beside "{subject}", found {quoted(given)}'
+                f'expected the keys {quoted((*allowed, "waypoints", "via"))} beside "{subject}", found {quoted(given)}'
             )
         if self.waypoints is not None:
-            self._check_table(given, allowed)
+            self._check_columns(given, allowed)
+        if self.via is not None and set(given) & {*PLACES, "value"}:
+            raise ValueError(f"expected either waypoints, via or expressions, found {quoted(given)}")
+        self.check_motion(OF_POINT if subject == "point" else {1: "numbers"}, self.waypoints)
         self._check_orientation()
+        self._check_poses()
+        self._check_size()
         return self
 
-    def _check_table(self, given: list[str], allowed: tuple[str, ...]) -> None:
+    def _check_columns(self, given: list[str], allowed: tuple[str, ...]) -> None:
         assert self.waypoints is not None
         if given != ["waypoints"]:
-            raise ValueError(f"expected either waypoints or expressions, found {quoted(given)}")
+            raise ValueError(f"expected either waypoints, via or expressions, found {quoted(given)}")
         columns = self.waypoints.columns
         wanted = ("value",) if allowed == ("value",) else (*PLACES, *QUATERNION)
         turned = set(columns) & set(QUATERNION)
@@ -100,26 +119,73 @@ class SpatialTrajectory(Record):
         if self.tool_axis is not None and not any(self.tool_axis):
             raise ValueError(f"expected tool_axis with a direction, found {list(self.tool_axis)}")
 
-    def references(self) -> Iterator[Reference]:
+    def _check_poses(self) -> None:
+        """Of places with an orientation."""
+        if not self._has_poses:
+            return
+        if found := [key for key in ORIENTATIONS if getattr(self, key) is not None]:
+            raise ValueError(f"expected an orientation either in via or by {quoted(found)}, found both")
+        if self.duration is None:
+            limits = [key for key in LIMITS if getattr(self, key) is not None]
+            raise ValueError(
+                f'expected a "duration" beside poses in via (limits in m/s say nothing of turning), found'
+                f" {quoted(limits)}"
+            )
+        try:
+            self._turns  # noqa: B018 (looked at for what it raises)
+        except InputError as error:
+            raise ValueError(f"via: {error}") from None
+
+    def _check_size(self) -> None:
+        with np.errstate(all="ignore"):
+            paths = [path for path in (self.path, self._turning) if path is not None]
+        if any(not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()) for path in paths):
+            raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
+
+    def references(self) -> Iterator[RecordReference]:
         """What follows it."""
         yield from marker_reference("point", self.point, loaded=True)
-        if self.joint is not None:
-            yield Reference("joint", self.joint, "joint")
+        for key in ("joint", "motor"):
+            if (name := getattr(self, key)) is not None:
+                yield RecordReference(key, name, "joint")
+
+    def changed(self, **keys: object) -> SpatialTrajectory:
+        """The same with some keys replaced."""
+        return SpatialTrajectory(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
+
+    @property
+    def coordinate_of(self) -> str | None:
+        """The joint whose coordinate, or whose motor's, follows it."""
+        return self.joint if self.motor is None else self.motor
+
+    @cached_property
+    def path(self) -> Piecewise | None:
+        """The motion of the place, or of the joint, where it is made of polynomials; None where expressions give it."""
+        if self.via is not None:
+            return self.through(self._places[:, :3])
+        if self.waypoints is None:
+            return None
+        places = [k for k, name in enumerate(self.waypoints.columns) if name not in QUATERNION]
+        whole = self.along_table(self.waypoints)
+        return Piecewise(whole.breaks, whole.coefficients[:, :, places])
 
     @cached_property
     def components(self) -> dict[str, TimeFunction]:
         """The specified functions of time by component: "x", "y", "z", or "value"."""
-        if self.waypoints is None:
+        if self.path is None:
             return present(x=self.x, y=self.y, z=self.z, value=self.value)
-        functions = dict(zip(self.waypoints.columns, self.waypoints.spline().functions(), strict=True))
-        return {name: function for name, function in functions.items() if name not in QUATERNION}
+        if self.waypoints is not None:
+            names = tuple(name for name in self.waypoints.columns if name not in QUATERNION)
+        else:
+            names = ("value",) if self.point is None else PLACES[: self._places.shape[1]]
+        return dict(zip(names, self.path.functions(), strict=True)) if names else {}
 
     @cached_property
     def orientation(self) -> OrientationLaw | None:
         """How the section turns; None where that is left open."""
-        if self.waypoints is not None and QUATERNION[0] in self.waypoints.columns:
-            table, reference = orientation_of(self.waypoints)
-            return OrientationLaw("rotation_vector", tuple(table.spline().functions()), reference)
+        if self._turning is not None:
+            assert self._turns is not None
+            return OrientationLaw("rotation_vector", tuple(self._turning.functions()), self._turns[1])
         if self.rotation_vector is not None:
             return OrientationLaw(
                 "rotation_vector", self.rotation_vector, self.reference_rotation_vector or (0.0, 0.0, 0.0)
@@ -139,3 +205,33 @@ class SpatialTrajectory(Record):
         """How many constraints it is: three of a full orientation, two of a direction."""
         turning = 0 if self.orientation is None else 2 if self.direction is not None else 3
         return len(self.components) + turning
+
+    @property
+    def _has_poses(self) -> bool:
+        return self.via is not None and self._places.shape[1] == POSE
+
+    @property
+    def _places(self) -> Array:
+        """(k + 1, n) of `via`."""
+        assert self.via is not None
+        return np.array(self.via, dtype=float).reshape(len(self.via), -1)
+
+    @cached_property
+    def _turns(self) -> tuple[Array, Reference] | None:
+        """Orientations of a table or of poses, rotation vectors (k, 3) about their middle; and it."""
+        if self.waypoints is not None and QUATERNION[0] in self.waypoints.columns:
+            table, reference = orientation_of(self.waypoints)
+            return table.values, reference
+        if not self._has_poses:
+            return None
+        return about_their_middle(np.array([of_rpy(*place[3:]) for place in self._places]), "place no.")
+
+    @cached_property
+    def _turning(self) -> Piecewise | None:
+        """Their motion, with the times of the places."""
+        if self._turns is None:
+            return None
+        vectors = self._turns[0]
+        if self.waypoints is not None:
+            return self.along_table(Waypoints(("rx", "ry", "rz"), self.waypoints.times, vectors))
+        return self.through(vectors)

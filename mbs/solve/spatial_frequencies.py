@@ -1,0 +1,86 @@
+"""Frequencies of a robot in space along a path that is held, about which input shapers are designed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from ...common.errors import InputError
+from ...common.validation import quoted
+from ..model.spatial_gears import with_held_motors
+from ..model.spatial_model import SpatialModel, row_values
+from ..model.spatial_system import SpatialSystem
+from ..model.spatial_tree import ElasticGearInSpace
+from .path_frequencies import INSTANTS, PathFrequencies, common_modes
+from .spatial_posture import relaxed_gears, solve_posture, undeformed_posture
+from .spatial_redundancy import resolved
+from .state import State
+
+STIFF = 1e-9  # of the largest ω²: below it motion is rigid
+
+
+def spatial_path_frequencies(model: SpatialModel, begin: float, end: float, modes: int) -> PathFrequencies:
+    """Of the `modes` lowest vibrations of the undeformed robot with its trajectories held, from `begin` to `end`, s.
+
+    Where motors follow them, gears that give are among its springs. Joints that the paths leave free are free.
+    Raises `InputError` where the path is out of reach, or there are fewer vibrations.
+    """
+    model = with_held_motors(resolved(model, end))
+    unheld = SpatialSystem(_without_rows(model))
+    state, found = undeformed_posture(model), []
+    for t in np.linspace(begin, end, INSTANTS):
+        q = solve_posture(model, float(t), state.q)
+        if q is None:
+            raise InputError(
+                f"{model.scene.path}: trajectory: expected paths within reach, found no posture of the undeformed robot"
+                f" at t = {t:.6g} s that meets {quoted(dict.fromkeys(row.owner for row in model.rows))}"
+            )
+        state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
+        found.append(vibrations_in_space(model, unheld, float(t), state.q))
+    return common_modes(model.scene.path, found, modes)
+
+
+def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q: Array) -> tuple[Array, Array]:
+    """ω (n,) rad/s, ascending, and damping ratios (n,) of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest at q (n_q,).
+
+    M⁻¹ is what the core says that forces do to accelerations where `unheld`. K are the stiffnesses of links and gears,
+    D their damping and viscous friction; neither gravity nor dry friction. Rigid motion is left out.
+    """
+    M = np.linalg.inv(unheld.derivatives(t, q, np.zeros(model.tree.n_v), np.zeros(model.tree.n_v)).a_f)
+    C_v = row_values(model, q[None], np.array([t]))[1][0]
+    _, sizes, V = np.linalg.svd(C_v) if len(C_v) else (None, np.zeros(0), np.eye(len(M)))
+    free = V[int(np.count_nonzero(sizes > STIFF * sizes.max(initial=0.0))) :].T
+    K, D = _springs(model)
+    L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ ((M + M.T) / 2) @ free))
+    squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)
+    stiff = squares > STIFF * squares.max(initial=0.0)
+    omega, shape = np.sqrt(squares[stiff]), free @ L_inverse.T @ vectors[:, stiff]
+    return as_floats(omega), as_floats(np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega))
+
+
+def _springs(model: SpatialModel) -> tuple[Array, Array]:
+    """K and D (n_v, n_v) of modes, gears and viscous friction."""
+    K, D = np.zeros((2, model.tree.n_v, model.tree.n_v))
+    for node in model.tree.nodes:
+        K[node.p_v, node.p_v] = np.diag(node.body.stiffness)
+        D[node.p_v, node.p_v] = node.body.damping
+        for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
+            D[column, column] += friction.viscous
+    for gear in model.tree.gears:
+        twist = _twist(gear, model.tree.n_v)
+        K += gear.stiffness * np.outer(twist, twist)
+        D += gear.damping * np.outer(twist, twist)
+    return K, D
+
+
+def _twist(gear: ElasticGearInSpace, n_v: int) -> Array:
+    """By v (n_v,)."""
+    found = np.zeros(n_v)
+    found[gear.motor.v.start], found[gear.joint.v.start] = 1.0, -gear.sign
+    return found
+
+
+def _without_rows(model: SpatialModel) -> SpatialModel:
+    return replace(model, rows=())
