@@ -40,7 +40,12 @@ from .signals import Signal, merged, rows_first, sensing, signals
 
 
 class ClosedLoop(SampledAnalysis):
-    """See `SampledAnalysis`, in the plane."""
+    """Motion under sampled control; the earlier inverse analysis `actuation` gives reference, feed-forward and start.
+
+    Samples are at 0, sample_time, …; the command of each acts `delay` later and is held. Moments and voltages keep
+    within the limits of the scene unless `unlimited`. The run starts as the inverse analysis does, or as [initial] of
+    the scene says, on the trajectories. `seed` starts the noise. `tip` is the point whose error is reported.
+    """
 
     disturbance: tuple[Load, ...] = ()
     """Loads at points that `actuation` does not know."""

@@ -16,12 +16,7 @@ from .records import Controller, Sensor
 
 
 class SampledAnalysis(ActuatedAnalysis):
-    """Motion under sampled control; the earlier inverse analysis `actuation` gives reference, feed-forward and start.
-
-    Samples are at 0, sample_time, …; the command of each acts `delay` later and is held. Moments and voltages keep
-    within the limits of the scene unless `unlimited`. The run starts as the inverse analysis does, or as [initial] of
-    the scene says, on the trajectories. `seed` starts the noise. `tip` is the point whose error is reported.
-    """
+    """Keys of closed loops in the plane and in space: see `closed_loop.ClosedLoop`."""
 
     kind: Literal["closed-loop"]
     sample_time: Positive

@@ -40,7 +40,11 @@ from .spatial_signals import SpatialSensing, SpatialSignal, spatial_signals
 
 
 class SpatialClosedLoop(SampledAnalysis):
-    """See `SampledAnalysis`, in space."""
+    """Motion under sampled control as in the plane; disturbances and readings of points have components x, y, z.
+
+    Sensors name patches by their layout. Joints with several coordinates are read and driven coordinate by coordinate,
+    "joint/NAME 1", "joint/NAME 2", with the same gains.
+    """
 
     disturbance: tuple[SpatialLoad, ...] = ()
     """Loads at points that `actuation` does not know."""

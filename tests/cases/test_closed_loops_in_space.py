@@ -119,7 +119,7 @@ def test_gears_that_give(tmp_path):
     ]
     planar, spatial = both(tmp_path, analyses, body=rods["body"], joint=joints, pzt=[])
     with planar, spatial:
-        assert list(spatial.attributes("motors/control")["outputs"])[0] == "motor/O"
+        assert spatial.attributes("motors/control")["outputs"][0] == "motor/O"
         for name in ("motors", "joints"):
             for dataset in ("control/commands", "control/readings", "joints/A/motor_angle", "tip_error"):
                 expected, found = (results[f"{name}/{dataset}"] for results in (planar, spatial))
@@ -200,7 +200,7 @@ def predicted(model, times, begins):
 def test_arm_at_rest_is_pushed_away_as_its_linear_model_says(tmp_path):
     """Of second order in the force is what the linear model leaves out."""
     linear = {"name": "linear", "kind": "linear", "about": "hold", "times": [0.0]}
-    sizes = {"large": 2.0, "small": 0.5}
+    sizes = {"large": 0.4, "small": 0.1}
     loops = [held(name, HOLDS, disturbance=push(size)) for name, size in sizes.items()]
     sags = HOLD | {"kind": "fcid", "shape": "static"}  # at rest by its motors
     with solve(arm(sags, linear, held("quiet", HOLDS), *loops, still=True), tmp_path) as found:
