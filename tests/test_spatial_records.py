@@ -204,8 +204,8 @@ MISTAKES = {
         'joint "waist": expected one joint of this name',
     ),
     "kind that is not there yet": (
-        add("analysis", name="loop", kind="closed-loop", actuation="inverse", sample_time=1e-3),
-        'analysis "loop": kind: expected "pcid", .* "motors-only", "linear" in space = "spatial", found "closed-loop"',
+        add("analysis", name="where", kind="placement", placement={"body": "upper"}),
+        'analysis "where": kind: expected "pcid", .* "linear", "closed-loop" in space = "spatial", found "placement"',
     ),
     "what is applied by patches that are not there": (
         add("analysis", name="again", kind="forward", actuation="inverse", apply="joints+pzt"),

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ...common.arrays import Array
-from ...mbs.model.model import Model
-from ..patches.patches import PatchArray
+from .computed_torque import ComputedTorqueControl
 from .controllers import Controller, Setup, joint_pid, modal_velocity
 from .python_controller import PythonControl, load_function
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
 from .records import Controller as Record
-from .rigid_arm import ComputedTorqueControl, RigidArm
+from .robot import Robot
 
 
-def needed_sensors(model: Model, controllers: Sequence[Record], patches: Mapping[str, PatchArray]) -> Iterator[Sensor]:
+def needed_sensors(robot: Robot, controllers: Sequence[Record]) -> Iterator[Sensor]:
     """Sensors without which the `controllers` of an analysis could not act; ideal unless the scene gives them."""
     for record in controllers:
         if isinstance(record, JointPid):
@@ -25,21 +24,21 @@ def needed_sensors(model: Model, controllers: Sequence[Record], patches: Mapping
                 if joint in record.derivative and record.rate == "measured":
                     yield Sensor.model_validate({record.side: joint, "measure": "rate"})
         elif not isinstance(record, PythonController | ModalVelocity):
-            for joint in model.motors:
+            for joint in robot.motor_joints:
                 yield Sensor(joint=joint)
                 yield Sensor(joint=joint, measure="rate")
         if isinstance(record, ModalVelocity | Lqr):
-            bodies = record.bodies if isinstance(record, ModalVelocity) else _bending(model, record.sensor, patches)
+            bodies = record.bodies if isinstance(record, ModalVelocity) else _bending(robot, record.sensor)
             for body in bodies:
                 if record.sensor == "pzt":
-                    yield Sensor(pzt=body)
+                    yield from (Sensor(pzt=layout) for layout in robot.patches[body].layouts)
                 else:
                     yield Sensor(modal=body)
                     yield Sensor(modal=body, measure="rate")
 
 
-def _bending(model: Model, sensor: str, patches: Mapping[str, PatchArray]) -> list[str]:
-    return list(patches) if sensor == "pzt" else [body.name for body in model.bodies if body.n_modes]
+def _bending(robot: Robot, sensor: str) -> list[str]:
+    return list(robot.patches if sensor == "pzt" else robot.links)
 
 
 def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> Controller:
@@ -52,22 +51,22 @@ def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> C
     if isinstance(record, ModalVelocity):
         return modal_velocity(record, setup)
     if isinstance(record, ComputedTorque):
-        return ComputedTorqueControl(record, setup, RigidArm(setup.model))
+        return ComputedTorqueControl(record, setup, setup.robot.rigid())
     if isinstance(record, Lqr):
         from .lqr import LqrControl
 
         return LqrControl(record, setup, [other for other in beside if isinstance(other, JointPid)])
-    label = f"{setup.model.scene.path}: controller: {record.python}"
+    label = f"{setup.robot.path}: controller: {record.python}"
     function = load_function(record.python) if isinstance(record.python, str) else record.python
     return PythonControl(function, setup, label)
 
 
 def joint_mobility(setup: Setup) -> Array:
     """(motors,) acceleration of each joint per moment on it at the start, links rigid, the other joints free."""
-    model = setup.model
-    if len(model.motors) != model.degrees_of_freedom:
-        return np.zeros(len(model.motors))
-    arm = RigidArm(model)
-    M, _ = arm.terms(arm.angles(setup.source), np.zeros(len(model.motors)))
+    rest = np.zeros(len(setup.robot.motors))
+    if not setup.robot.motors_fit:
+        return rest
+    arm = setup.robot.rigid()
+    M, _ = arm.terms(arm.angles(), rest)
     mobility: Array = np.diag(np.linalg.inv(M))
     return mobility

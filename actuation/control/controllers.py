@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.validation import quoted
-from ...mbs.analysis.outcome import Outcome
-from ...mbs.model.model import Model
-from ..patches.patches import PatchArray
-from ..patches.voltages import voltage_gain
 from .records import JointPid, ModalVelocity
-from .signals import volts_per_modal_coordinate
+from .robot import Robot, estimate
 
 
 class Controller(Protocol):
@@ -36,15 +32,17 @@ class Setup:
     """What a controller may know when it is made.
 
     Attributes:
-        model: the robot; `patches` of its bodies.
+        robot: what is known of it; see `robot.Robot`.
+        model: its equations of motion; `patches` by body.
         inputs, outputs: names of commands (moments N·m, voltages V) and readings, as `signals` names them.
         times: (K,) of the samples, s; `sample_time`, and the `delay` after which a command acts.
         reference: (K, outputs) what the sensors would read on the motion of the inverse analysis `source`.
         feed_forward: (K, inputs) what is commanded anyhow.
     """
 
-    model: Model
-    patches: Mapping[str, PatchArray]
+    robot: Robot
+    model: Any
+    patches: Mapping[str, Any]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     times: Array
@@ -52,7 +50,12 @@ class Setup:
     delay: float
     reference: Array
     feed_forward: Array
-    source: Outcome
+    source: Any
+
+    def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
+        """Joints with the names of their coordinates, one after the other."""
+        for joint in joints:
+            yield from ((joint, name) for name in self.robot.coordinates(joint))
 
     def columns(self, *names: str) -> Indices:
         """Where these readings are in y."""
@@ -63,14 +66,14 @@ class Setup:
         missing = [name for name in names if name not in self.inputs]
         if missing:
             raise InputError(
-                f"{self.model.scene.path}: controller: expected joints with motors, {quoted(self.model.motors)}, found"
+                f"{self.robot.path}: controller: expected joints with motors, {quoted(self.robot.motors)}, found"
                 f" {quoted(name.partition('/')[2] for name in missing)}"
             )
         return np.array([self.inputs.index(name) for name in names], dtype=int)
 
     def patch_places(self, body: str) -> Indices:
         """Where the voltages of a body's patches are in u."""
-        return self.places(*(f"pzt/{body}/{k}" for k in range(1, len(self.patches[body].edges) + 1)))
+        return self.places(*self.robot.patches[body].inputs)
 
 
 class LinearFeedback:
@@ -108,13 +111,13 @@ def joint_pid(record: JointPid, setup: Setup, mobility: Array) -> LinearFeedback
     shape = (len(setup.inputs), len(setup.outputs))
     P, D, integral = (np.zeros(shape) for _ in range(3))
     bandwidth = 0.0
-    for joint in record.joints:
-        (u,), (y,) = setup.places(f"joint/{joint}"), setup.columns(f"{record.side}/{joint}")
+    for joint, name in setup.robot_coordinates(record.joints):
+        (u,), (y,) = setup.places(f"joint/{name}"), setup.columns(f"{record.side}/{name}")
         P[u, y] = record.proportional.get(joint, 0.0)
         integral[u, y] = record.integral.get(joint, 0.0)
         gain = record.derivative.get(joint, 0.0)
         if gain and record.rate == "measured":
-            P[u, setup.columns(f"{record.side}/{joint}/rate")] = gain
+            P[u, setup.columns(f"{record.side}/{name}/rate")] = gain
         D[u, y] = gain
         bandwidth = max(bandwidth, float(np.sqrt(P[u, y] * mobility[u])), gain * float(mobility[u]))
     differences = D if record.rate == "difference" and D.any() else None
@@ -126,14 +129,15 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
     G = np.zeros((len(setup.inputs), len(setup.outputs)))
     bandwidth = 0.0
     for name in record.bodies:
-        body, array = setup.model.body(name), setup.patches[name]
-        m = min(record.modes, body.n_eigenmodes)
-        omega = np.sqrt(body.stiffness[:m])
-        damping = voltage_gain(array)[:, :m] * (2 * record.damping_ratio * omega)
-        G[np.ix_(setup.patch_places(name), modal_columns(record.sensor, setup, name, m))] = damping @ modal_estimate(
-            record.sensor, setup, name, m
-        )
-        bandwidth = max(bandwidth, float(omega[-1]))
+        link = setup.robot.patches[name]
+        m = min(record.modes, len(link.omega))
+        damping = link.gain[:, :m] * (2 * record.damping_ratio * link.omega[:m])
+        if record.sensor == "pzt":
+            columns, modes = setup.columns(*link.inputs), estimate(link.volts, m)
+        else:
+            columns, modes = modal_columns(setup, name, link.own.shape[1]), link.own[:m]
+        G[np.ix_(setup.patch_places(name), columns)] = damping @ modes
+        bandwidth = max(bandwidth, float(link.omega[m - 1]))
     return (
         LinearFeedback(setup, None, G, bandwidth=bandwidth)
         if record.sensor == "pzt"
@@ -141,17 +145,6 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
     )
 
 
-def modal_columns(sensor: str, setup: Setup, body: str, m: int, ending: str = "/rate") -> Indices:
-    """The readings from which the lowest m modes of a body are known."""
-    if sensor == "pzt":
-        return setup.columns(*(f"pzt/{body}/{k}" for k in range(1, len(setup.patches[body].edges) + 1)))
+def modal_columns(setup: Setup, body: str, m: int, ending: str = "/rate") -> Indices:
+    """The readings of the lowest m modal coordinates of a body, or of their rates."""
     return setup.columns(*(f"modal/{body}/{k}{ending}" for k in range(1, m + 1)))
-
-
-def modal_estimate(sensor: str, setup: Setup, body: str, m: int) -> Array:
-    """(m, readings) p of the lowest modes from these readings: as many modes as there are patches are told apart."""
-    if sensor != "pzt":
-        return np.eye(m)
-    volts = volts_per_modal_coordinate(setup.patches[body])
-    estimate = as_floats(np.linalg.pinv(volts[:, : min(volts.shape)]))[:m]
-    return estimate

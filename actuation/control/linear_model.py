@@ -117,13 +117,17 @@ class LinearModel:
 
 def linear_model(mechanism: LinearMechanism, patches: Mapping[str, PatchArray]) -> LinearModel:
     """The state space of a linear mechanism, with the voltages of patches among its inputs."""
+    return state_space(mechanism, patch_voltages(mechanism, patches))
+
+
+def patch_voltages(mechanism: LinearMechanism, patches: Mapping[str, PatchArray]) -> dict[str, Array]:
+    """By "pzt/BODY/k", what a volt does along s (f,)."""
     f = len(mechanism.M)
-    voltages = {
+    return {
         f"pzt/{body}/{k}": _spread(f, [i for carrier in array.carriers for i in mechanism.modal(carrier)], column)
         for body, array in patches.items()
         for k, column in enumerate(array.Phi_V.T, 1)
     }
-    return state_space(mechanism, voltages)
 
 
 def state_space(mechanism: LinearMechanism, voltages: Mapping[str, Array]) -> LinearModel:

@@ -9,11 +9,12 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...mbs.solve.linearisation import LinearMechanism, linearise
-from .controllers import Setup, modal_columns, modal_estimate
-from .linear_model import LinearModel, linear_model
+from ...mbs.solve.linearisation import LinearMechanism
+from .controllers import Setup, modal_columns
+from .linear_model import LinearModel, state_space
 from .modes import controllability, observability
 from .records import JointPid, Lqr
+from .robot import estimate
 from .sampling import SampledModel, sampled
 
 MOST_STATES = 500  # with which the Riccati equation takes seconds, not minutes
@@ -47,8 +48,8 @@ class LqrControl:
 
     def __init__(self, record: Lqr, setup: Setup, beside: Sequence[JointPid] = ()) -> None:
         model = design_model(record, setup, beside if record.inputs == "patches" else ())
-        motors = [] if record.inputs == "patches" else [f"joint/{name}" for name in setup.model.motors]
-        patches = {} if record.inputs == "motors" else setup.patches
+        motors = [] if record.inputs == "patches" else [f"joint/{name}" for name in setup.robot.motors]
+        patches = {} if record.inputs == "motors" else setup.robot.patches
         self.inputs = [*setup.places(*motors), *(i for body in patches for i in setup.patch_places(body))]
         names = [setup.inputs[i] for i in self.inputs]
         self.warnings = _out_of_reach(record, setup, model, names)
@@ -56,7 +57,7 @@ class LqrControl:
         waiting = int(np.ceil(setup.delay / setup.sample_time)) * len(names)
         if len(model.A) + waiting > MOST_STATES:
             raise InputError(
-                f"{setup.model.scene.path}: controller lqr: expected at most {MOST_STATES} states, found {len(model.A)}"
+                f"{setup.robot.path}: controller lqr: expected at most {MOST_STATES} states, found {len(model.A)}"
                 f" of the model and {waiting} commands on their way: a shorter delay or fewer inputs"
             )
         discrete = sampled(model.A, model.B[:, model.inputs(names)], setup.sample_time, setup.delay)
@@ -64,7 +65,7 @@ class LqrControl:
             self.K = gains(discrete, Q, R)
         except ValueError as error:
             raise InputError(
-                f"{setup.model.scene.path}: controller lqr: expected a model that motors and patches can stabilise,"
+                f"{setup.robot.path}: controller lqr: expected a model that motors and patches can stabilise,"
                 f" found none ({error}): {'; '.join(self.warnings) or 'more modes or other weights?'}"
             ) from None
         self.bandwidth = _bandwidth(model.A, discrete.A - discrete.B @ self.K, setup.sample_time)
@@ -104,22 +105,19 @@ def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> Linea
 
     Joints that other controllers hold are held by springs and dampers, as if these neither sampled nor waited.
     """
-    source = setup.source
-    i = int(np.argmin(np.abs(source.time - record.time)))
-    mechanism = linearise(setup.model, float(source.time[i]), source.q[i], source.v[i], source.a[i])
+    mechanism, voltages = setup.robot.linear(int(np.argmin(np.abs(setup.source.time - record.time))))
     keep = [j for j, name in enumerate(mechanism.names) if _is_kept(name, record.modes)]
-    patches = {name: replace(a, Phi_V=a.Phi_V[: record.modes]) for name, a in setup.patches.items()}
     mechanism = _restricted(mechanism, keep)
     for pid in beside:
-        for joint in pid.joints:
-            along = mechanism.inputs[f"joint/{joint}"]
+        for joint, name in setup.robot_coordinates(pid.joints):
+            along = mechanism.inputs[f"joint/{name}"]
             spring, damper = pid.proportional.get(joint, 0.0), pid.derivative.get(joint, 0.0)
             mechanism = replace(
                 mechanism,
                 K=mechanism.K + spring * np.outer(along, along),
                 D=mechanism.D + damper * np.outer(along, along),
             )
-    return linear_model(mechanism, patches)
+    return state_space(mechanism, {name: column[keep] for name, column in voltages.items()})
 
 
 def _is_kept(name: str, modes: int) -> bool:
@@ -153,8 +151,8 @@ def _weights(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequence[str
             values.append(record.angle**-2)
             rates.append(record.rate**-2)
             continue
-        link = setup.model.body(body)
-        weight = 1 / (link.mass * (record.deflection * (link.length or 1.0)) ** 2)
+        link = setup.robot.links[body]
+        weight = 1 / (link.mass * (record.deflection * link.length) ** 2)
         values.append(weight)
         rates.append(weight / link.stiffness[int(rest[0]) - 1])
     cost = [record.moment if name.startswith("joint/") else record.voltage for name in inputs]
@@ -165,21 +163,20 @@ def _estimates(record: Lqr, setup: Setup, model: LinearModel) -> tuple[Array, Ar
     """(f, outputs) that give coordinates, measured rates, and rates by differences (times T)."""
     values, rates, differences = np.zeros((3, model.freedom, len(setup.outputs)))
     names = list(model.state_names[: model.freedom])
-    for joint in setup.model.motors:
+    for joint in setup.robot.motors:
         i = names.index(f"joint/{joint}")
         values[i, setup.columns(f"joint/{joint}")] = 1.0
         rates[i, setup.columns(f"joint/{joint}/rate")] = 1.0
-    for body in setup.model.bodies:
-        rows = np.array([i for i, name in enumerate(names) if name.startswith(f"modal/{body.name}/")], dtype=int)
-        if not rows.size or (record.sensor == "pzt" and body.name not in setup.patches):
-            continue
+    for body in setup.robot.links:
+        rows = np.array([i for i, name in enumerate(names) if name.startswith(f"modal/{body}/")], dtype=int)
         m = len(rows)
-        estimate = modal_estimate(record.sensor, setup, body.name, m)
-        values[np.ix_(rows, modal_columns(record.sensor, setup, body.name, m, ""))] = estimate
-        if record.sensor == "pzt":
-            differences[np.ix_(rows, modal_columns(record.sensor, setup, body.name, m))] = estimate
-        else:
-            rates[np.ix_(rows, modal_columns(record.sensor, setup, body.name, m))] = estimate
+        if record.sensor == "ideal":
+            values[np.ix_(rows, modal_columns(setup, body, m, ""))] = np.eye(m)
+            rates[np.ix_(rows, modal_columns(setup, body, m))] = np.eye(m)
+        elif m and (link := setup.robot.patches.get(body)) is not None:
+            known = estimate(link.volts @ link.own, m)
+            at = np.ix_(rows[: len(known)], setup.columns(*link.inputs))
+            values[at] = differences[at] = known
     return values, rates, differences
 
 
@@ -187,11 +184,11 @@ def _out_of_reach(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequenc
     """Modes that no input of the design reaches, or no sensor sees."""
     lost = controllability(model, list(inputs)).lost
     lines = [f"LQR: uncontrollable: {', '.join(lost)}"] if lost else []
-    seen = [f"joint/{name}" for name in setup.model.motors]
+    seen = [f"joint/{name}" for name in setup.robot.motors]
     seen += [name for name in model.output_names if name.startswith("modal/") and _is_read(record, setup, name)]
     hidden = observability(model, seen).lost
     return (*lines, *([f"LQR: unobservable: {', '.join(hidden)}"] if hidden else []))
 
 
 def _is_read(record: Lqr, setup: Setup, name: str) -> bool:
-    return record.sensor == "ideal" or name.split("/")[1] in setup.patches
+    return record.sensor == "ideal" or name.split("/")[1] in setup.robot.patches

@@ -63,12 +63,19 @@ def joint_gains(model: LinearModel, records: Sequence[JointPid]) -> JointGains:
     P, D, difference, integral = (np.zeros(shape) for _ in range(4))
     motors = [model.input_names[k] for k in motor_inputs(model)]
     for record in records:
-        for joint in record.joints:
-            at = motors.index(f"joint/{joint}"), model.outputs(f"{record.side}/{joint}")[0]
+        for joint, motor in [(name, motor) for name in record.joints for motor in _motors_of(name, motors)]:
+            output = motor.replace("joint/", f"{record.side}/", 1)
+            at = motors.index(motor), model.outputs(output)[0]
             P[at] += record.proportional.get(joint, 0.0)
             (D if record.rate == "measured" else difference)[at] += record.derivative.get(joint, 0.0)
             integral[at] += record.integral.get(joint, 0.0)
     return JointGains(P, D, difference, integral)
+
+
+def _motors_of(joint: str, motors: Sequence[str]) -> list[str]:
+    """Inputs "joint/NAME", or "joint/NAME 1", "joint/NAME 2" of joints with several coordinates."""
+    single = f"joint/{joint}"
+    return [single] if single in motors else [name for name in motors if name.startswith(f"{single} ")]
 
 
 def motor_inputs(model: LinearModel) -> list[int]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...common.arrays import Array
-from ...mbs.analysis.outcome import Outcome
-from ...mbs.quantities.joint_space import motor_rates
-from ...mbs.quantities.observation import point_motion
 from .controllers import Setup
 from .loop import Loop
 
@@ -47,23 +46,38 @@ class Metrics:
     saturated: float
 
 
-def measure(
-    outcome: Outcome, source: Outcome, tip: str | None, setup: Setup, loop: Loop, held: Array, is_disturbed: bool
-) -> tuple[Array, Metrics]:
-    """Distance of the tip from its place (T,), and the metrics.
+@dataclass(frozen=True)
+class Followed:
+    """What a loop did, at the outputs of its run.
 
-    `tip` is the point that the scene names, if any; `held` (T, inputs) are the commands at the outputs.
+    Attributes:
+        time: (T,) s.
+        error: (T, d) m, of the tip from its place.
+        rates: (T, motors) rad/s, m/s.
+        held: (T, inputs) commands.
+        completed: whether it came to its end.
+        is_disturbed: by loads that the reference does not know.
     """
-    error = _tip_error(outcome, source, tip or default_tip(outcome))
-    distance = np.linalg.norm(error, axis=1)
-    t, motors = outcome.time, len(setup.model.motors)
-    shaking = np.linalg.norm(error - _slow(t, error), axis=1)
+
+    time: Array
+    error: Array
+    rates: Array
+    held: Array
+    completed: bool
+    is_disturbed: bool
+
+
+def measure(run: Followed, setup: Setup, loop: Loop) -> tuple[Array, Metrics]:
+    """Distance of the tip from its place (T,), and the metrics."""
+    t, motors = run.time, len(setup.robot.motors)
+    distance = np.linalg.norm(run.error, axis=1)
+    shaking = np.linalg.norm(run.error - _slow(t, run.error), axis=1)
     taken = slice(loop.taken)
     moments, volts = loop.commands[taken, :motors], loop.commands[taken, motors:]
-    work = np.abs(held[:, :motors] * motor_rates(outcome)).sum(axis=1)
+    work = np.abs(run.held[:, :motors] * run.rates).sum(axis=1)
     cut = (loop.commands[taken] != loop.wanted[taken]).any(axis=1)
     return distance, Metrics(
-        _verdict(outcome, shaking, is_disturbed),
+        _verdict(run, shaking),
         float(np.sqrt(np.mean(distance**2))),
         float(distance.max()),
         _settling(t, distance),
@@ -77,26 +91,17 @@ def measure(
     )
 
 
-def default_tip(outcome: Outcome) -> str:
-    """The point whose error is reported: that of the first trajectory of a point, or the last tip."""
-    scene = outcome.assembly.model.scene
-    driven = [trajectory.point for trajectory in scene.trajectory if trajectory.point is not None]
-    if driven:
-        return driven[0]
-    body = outcome.assembly.model.links[-1]
-    return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"
+def place_of_tip(time: Array, end: float, known: tuple[Array, Array], paths: Sequence[Mapping[str, Any]]) -> Array:
+    """(T, d) m: where its `paths`, functions of time by component, say, which are held before 0 and after `end` (s).
 
-
-def _tip_error(outcome: Outcome, source: Outcome, point: str) -> Array:
-    """(T, 2) m; where the tip should be is where its trajectory says, or where it is in the inverse analysis."""
-    place = _interpolated(outcome.time, source.time, point_motion(source, point).position)
-    on_path = np.clip(outcome.time, 0.0, outcome.analysis.last_time)
-    for trajectory in outcome.assembly.model.scene.trajectory:
-        if trajectory.point == point:  # held where it is before the path and after it
-            for component, target in trajectory.components.items():
-                place[:, "xy".index(component)] = target.sample(on_path)[0]
-    error: Array = point_motion(outcome, point).position - place
-    return error
+    Else where it is in the inverse analysis, `known` as its times (K,) and positions (K, d).
+    """
+    place = _interpolated(time, *known)
+    on_path = np.clip(time, 0.0, end)
+    for components in paths:
+        for component, target in components.items():
+            place[:, "xyz".index(component)] = target.sample(on_path)[0]
+    return place
 
 
 def _interpolated(times: Array, known: Array, values: Array) -> Array:
@@ -126,9 +131,9 @@ def _settling(t: Array, distance: Array) -> float:
     return float(t[outside[-1] + 1]) if outside[-1] + 1 < len(t) else float("nan")
 
 
-def _verdict(outcome: Outcome, shaking: Array, is_disturbed: bool) -> str:
-    if outcome.status != "completed":
+def _verdict(run: Followed, shaking: Array) -> str:
+    if not run.completed:
         return "diverges"
     quarters = [part.max(initial=0.0) for part in np.array_split(shaking, 4)]
     growing = quarters[1] < quarters[2] < quarters[3] and quarters[3] > GROWTH * quarters[1]
-    return "grows" if growing and not is_disturbed else "stable"
+    return "grows" if growing and not run.is_disturbed else "stable"

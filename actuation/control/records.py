@@ -26,7 +26,7 @@ PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
 
 
 class Sensor(Record):
-    """What is measured, and how well: of a joint its coordinate, of a point x and y, of patches their voltages.
+    """What is measured, and how well: of a joint its coordinate, of a point x, y (z), of patches their voltages.
 
     `motor` names a joint with stiffness, of which the motor's angle behind its gear is read, on the first body.
     `measure` is the value, its rate, or (points) its acceleration. Readings are whole numbers of `resolution`, after
@@ -40,9 +40,9 @@ class Sensor(Record):
     motor: str | None = None
     """Joint with stiffness whose motor's angle behind its gear is read, rad."""
     point: PointReference | None = None
-    """Point "BODY.POINT" whose x and y are read, m, global axes."""
+    """Point "BODY.POINT" whose x and y (in space z) are read, m, global axes."""
     pzt: str | None = None
-    """Body whose patches are read, V."""
+    """Body whose patches are read, V; in space the layout, by its name."""
     modal: str | None = None
     """Body whose modal coordinates are read as they are, which no sensor can (m·√kg)."""
     measure: Literal["value", "rate", "acceleration"] = "value"
@@ -70,7 +70,9 @@ class Sensor(Record):
         """What is measured."""
         if self.point is not None:
             yield Reference("", self.point, needs_marker=True)
-        yield from (Reference("", body) for body in (self.pzt, self.modal) if body is not None)
+        if self.modal is not None:
+            yield Reference("modal", self.modal)
+            yield Reference("modal", self.modal, "flexible body")
         if self.pzt is not None:
             yield Reference("pzt", self.pzt, "patches")
         if self.joint is not None:
@@ -148,7 +150,7 @@ class ModalVelocity(ControllerRecord):
         """The links."""
         for body in self.bodies:
             yield Reference("bodies", body)
-            yield Reference("bodies", body, "patches")
+            yield Reference("bodies", body, "patched body")
 
 
 class Lqr(ControllerRecord):
@@ -234,4 +236,4 @@ class Placement(Record):
     def references(self) -> Iterator[Reference]:
         """The link and its patches."""
         yield Reference("placement.body", self.body)
-        yield Reference("placement.body", self.body, "patches")
+        yield Reference("placement.body", self.body, "patched body")

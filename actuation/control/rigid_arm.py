@@ -15,8 +15,6 @@ from ...mbs.model.model import ZERO, Constraint, Model
 from ...mbs.model.planar_body import PlanarBody, PlanarPoint
 from ...mbs.model.system import MechanismSystem
 from ...mbs.solve.initial_state import undeformed_state
-from .controllers import Setup
-from .records import ComputedTorque
 
 TOLERANCE, MOST_ITERATIONS = 1e-10, 20
 
@@ -28,7 +26,8 @@ class RigidArm:
     Raises `InputError` where the motors do not fit the mechanism.
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, source: Outcome | None = None) -> None:
+        """`source` is the motion at whose start its `angles` are."""
         if len(model.motors) != model.degrees_of_freedom:
             raise InputError(
                 f"{model.scene.path}: controller: expected motors that fit the mechanism ({model.degrees_of_freedom} of"
@@ -39,7 +38,7 @@ class RigidArm:
         self._moved = [self._assembly(rigid, name).system for name in model.motors]
         names = [c.owner if c.component == "motor" else "" for c in self._at_rest.constraints]
         self._motors = np.array([names.index(name) for name in model.motors])
-        self._q = undeformed_state(self._at_rest).q
+        self._q, self._source = undeformed_state(self._at_rest).q, source
 
     @staticmethod
     def _assembly(model: Model, accelerated: str | None) -> MechanismSystem:
@@ -64,8 +63,10 @@ class RigidArm:
         self._q = q
         return q, C_q
 
-    def angles(self, source: Outcome) -> Array:
-        """Joint angles (motors,) at the start of an analysis, its links taken as straight."""
+    def angles(self) -> Array:
+        """Joint angles (motors,) at the start of its motion, links taken as straight."""
+        source = self._source
+        assert source is not None
         frames = source.q[0][source.assembly.frame_coordinates]
         q = np.zeros_like(self._q)
         q[self._at_rest.frame_coordinates] = frames
@@ -99,28 +100,3 @@ def _rigid(body: PlanarBody) -> PlanarBody:
         body, stiffness=none, damping=empty, S_bar=np.zeros((2, 0)), h=none, j=none, S_tilde=empty, m_xy=empty,
         points=MappingProxyType(points), modal_transform=empty, stiffening=None,
     )  # fmt: skip
-
-
-class ComputedTorqueControl:
-    """Moments for γ̈_ref + 2 ζ ω ė + ω² e with rigid links (Craig, Introduction to Robotics, sec. 10.4).
-
-    They replace the moments of the feed-forward, which are taken off.
-    """
-
-    def __init__(self, record: ComputedTorque, setup: Setup, arm: RigidArm) -> None:
-        motors = list(setup.model.motors)
-        self.arm, self.bandwidth = arm, record.bandwidth
-        self.gains = record.bandwidth**2, 2 * record.damping_ratio * record.bandwidth
-        self.values = setup.columns(*(f"joint/{name}" for name in motors))
-        self.rates = setup.columns(*(f"joint/{name}/rate" for name in motors))
-        self.reference, self.feed_forward = setup.reference, setup.feed_forward
-        self.accelerations = np.gradient(self.reference[:, self.rates], setup.times, axis=0, edge_order=2)
-
-    def __call__(self, k: int, y: Array) -> Array:
-        """Commands at sample k."""
-        r, m = self.reference[k], len(self.values)
-        e, e_dot = r[self.values] - y[self.values], r[self.rates] - y[self.rates]
-        wanted = self.accelerations[k] + self.gains[0] * e + self.gains[1] * e_dot
-        u: Array = np.zeros_like(self.feed_forward[k])
-        u[:m] = self.arm.moments(y[self.values], y[self.rates], wanted) - self.feed_forward[k, :m]
-        return u

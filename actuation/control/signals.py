@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,31 +17,32 @@ from ..context import WholeLinks, place_of
 from ..patches.patches import PatchArray
 from .records import PERMITTIVITY, Sensor
 
+AnyReading = TypeVar("AnyReading", bound="Reading")
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 
 
 @dataclass(frozen=True)
-class Signal:
+class Reading:
     """One reading.
 
     `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y, "pzt/BODY/k", "modal/BODY/k" (k from 1), with
-    "/rate" or "/acceleration" behind it where that is read. Either `row` is read, or `vector` . p of the `bodies`, p of
-    one beside that of the next; `order` counts derivatives, `resolution` and `noise` are those of `Sensor`.
+    "/rate" or "/acceleration" behind it where that is read. `order` counts derivatives, `resolution` and `noise` are
+    those of `Sensor`.
     """
 
     name: str
     order: int
     resolution: float
     noise: float
+
+
+@dataclass(frozen=True)
+class Signal(Reading):
+    """In the plane: either `row` is read, or `vector` . p of the `bodies`, p of one beside that of the next."""
+
     row: Measure | None = None
     bodies: tuple[str, ...] = ()
     vector: Array = field(default_factory=lambda: np.zeros(0))
-
-
-def input_names(model: Model, patches: Mapping[str, PatchArray]) -> tuple[str, ...]:
-    """Names of all commands: motor moments "joint/NAME", then patch voltages "pzt/BODY/k"."""
-    voltages = [f"pzt/{body}/{k}" for body, array in patches.items() for k in range(1, len(array.edges) + 1)]
-    return tuple([f"joint/{name}" for name in model.motors] + voltages)
 
 
 def signals(
@@ -90,10 +92,15 @@ def volts_per_modal_coordinate(patches: PatchArray, capacitance: float | None = 
     return as_floats((patches.moment_per_volt * patches.turn).T / (own if capacitance is None else capacitance))
 
 
-def merged(given: Sequence[Signal], needed: Sequence[Signal]) -> tuple[Signal, ...]:
-    """The sensors of the scene, and ideal ones for what controllers need besides; rows first, as the core has them."""
+def merged(given: Iterable[AnyReading], needed: Iterable[AnyReading]) -> tuple[AnyReading, ...]:
+    """The sensors of the scene, and ideal ones for what controllers need besides."""
     by_name = {signal.name: signal for signal in needed} | {signal.name: signal for signal in given}
-    return tuple(sorted(by_name.values(), key=lambda signal: signal.row is None))
+    return tuple(by_name.values())
+
+
+def rows_first(read: Iterable[Signal]) -> tuple[Signal, ...]:
+    """As the core has them."""
+    return tuple(sorted(read, key=lambda signal: signal.row is None))
 
 
 def sensing(assembly: MechanismSystem, read: Sequence[Signal]) -> _core.Sensing:

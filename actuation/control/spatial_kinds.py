@@ -7,7 +7,12 @@ from typing import Any
 
 from ...mbs.analysis.spatial_kinds import MECHANICAL_IN_SPACE
 from ...mbs.analysis.spatial_run import SpatialRun
+from .spatial_closed_loop import run_spatial_closed_loop
 from .spatial_linear import run_spatial_linear
 
-IN_SPACE: Mapping[str, Callable[[Any, Any], SpatialRun]] = {**MECHANICAL_IN_SPACE, "linear": run_spatial_linear}
-"""By `kind`; each takes an `ActuatedSpatialContext` and the record of its kind, which is that of planar scenes."""
+IN_SPACE: Mapping[str, Callable[[Any, Any], SpatialRun]] = {
+    **MECHANICAL_IN_SPACE,
+    "linear": run_spatial_linear,
+    "closed-loop": run_spatial_closed_loop,
+}
+"""By `kind`; each takes an `ActuatedSpatialContext` and the record of its kind: that of planar scenes, or its like."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...mbs._core import TimeFunction
 from ...mbs.analysis.operating_points import row_at
-from ...mbs.analysis.spatial_run import SpatialContext, SpatialRun, without_paths
+from ...mbs.analysis.spatial_run import SpatialRun, without_paths
 from ...mbs.analysis.spatial_static import run_spatial_static
 from ...mbs.model.spatial_model import SpatialModel, SpatialRow
 from ...mbs.scene.analysis import Analysis
@@ -18,15 +18,9 @@ from ...mbs.solve.linearisation import LinearMechanism
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_posture import undeformed_posture
 from ..patches.spatial_patches import LinkPatches
+from ..spatial_context import ActuatedSpatialContext
 from .linear import Linear, LinearModels, analyse
 from .linear_model import LinearModel, state_space
-
-
-@dataclass(frozen=True)
-class ActuatedSpatialContext(SpatialContext):
-    """With the `patches` of links by body."""
-
-    patches: Mapping[str, LinkPatches] = field(default_factory=dict)
 
 
 def run_spatial_linear(context: ActuatedSpatialContext, analysis: Linear) -> SpatialRun:
@@ -43,7 +37,7 @@ def linear_models_in_space(context: ActuatedSpatialContext, analysis: Linear, ru
     models: list[LinearModel] = []
     for t, q, v, a in zip(run.time, run.q, run.v, run.a, strict=True):
         mechanism = linearisation.at(float(t), q, v, a)
-        models.append(state_space(mechanism, dict(_voltages(free, mechanism, context.patches))))
+        models.append(state_space(mechanism, patch_voltages_in_space(free, mechanism, context.patches)))
     return analyse(tuple(models))
 
 
@@ -77,7 +71,9 @@ def _held_by_motors(model: SpatialModel) -> list[SpatialRow]:
     return rows
 
 
-def _voltages(model: SpatialModel, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> dict[str, Array]:
+def patch_voltages_in_space(
+    model: SpatialModel, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]
+) -> dict[str, Array]:
     """By "pzt/LAYOUT/k", what a volt does along s: on the modes of its link."""
     found: dict[str, Array] = {}
     for name, of_link in patches.items():

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from rich.table import Table
 
-from ..actuation.control.closed_loop import LoopRecord
 from ..actuation.control.linear import LinearModels
+from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.metrics import Metrics
 from ..actuation.control.placement import Placed
 from ..mbs.analysis.outcome import Details

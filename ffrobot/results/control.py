@@ -7,12 +7,11 @@ from typing import Any
 
 import h5py
 
-from ..actuation.control.closed_loop import LoopRecord
+from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.metrics import Metrics
-from ..mbs.analysis.outcome import Outcome
 
 
-def write_loop(group: h5py.Group, outcome: Outcome, record: LoopRecord) -> None:
+def write_loop(group: h5py.Group, record: LoopRecord) -> None:
     """Of an analysis: tip_error at its outputs; in control/, samples, with metrics and names as attributes."""
     group["tip_error"] = record.tip_error
     group = group.create_group("control")

@@ -8,12 +8,14 @@ import h5py
 import numpy as np
 
 from ..actuation.control.linear import LinearModels
+from ..actuation.control.loop_record import LoopRecord
 from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial import SpatialResult, SpatialSolution
 from .forces import write_path
+from .control import write_loop
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
 from .write import write_head
@@ -55,6 +57,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     group["time"] = run.time
     _write_bodies(group, result)
     _write_joints(group, result)
+    if isinstance(run.details, LoopRecord):
+        write_loop(group, run.details)
     for trajectory in motion.followed:
         entry = group.create_group(f"trajectories/{trajectory.name}")
         entry["force"] = motion.path_force(trajectory.name)
@@ -93,7 +97,8 @@ def _write_joints(group: h5py.Group, result: SpatialResult) -> None:
             entry["coordinate"], entry["rate"] = (
                 np.squeeze(values, 1) if len(joint.units) == 1 else values for values in found
             )
-        moment = None if motion.motor_forces is None else motion.motor_forces.moments.get(joint.name)
+        supplied = result.run.commanded if motion.motor_forces is None else motion.motor_forces.moments
+        moment = supplied.get(joint.name)
         if moment is not None:
             entry["moment"] = np.squeeze(moment, 1) if len(joint.units) == 1 else moment
         _write_gear(entry, motion, joint.name)

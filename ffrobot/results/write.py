@@ -9,8 +9,8 @@ from typing import Any
 
 import h5py
 
-from ..actuation.control.closed_loop import LoopRecord
 from ..actuation.control.linear import LinearModels
+from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placement import Placed
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.files import write_atomically
@@ -32,7 +32,7 @@ FORMAT_VERSION = 1
 DETAILS: dict[type[Details], Callable[[h5py.Group, Outcome, Any], None]] = {
     InvertedPath: write_inversion,
     LinearModels: write_linear,
-    LoopRecord: write_loop,
+    LoopRecord: lambda group, _outcome, record: write_loop(group, record),
     Placed: write_placement,
 }
 """What writes to the group of an analysis that which only its kind finds."""

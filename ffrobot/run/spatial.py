@@ -9,11 +9,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.control.spatial_linear import ActuatedSpatialContext
 from ..actuation.feasibility import Feasibility
 from ..actuation.patches.spatial_patches import LinkPatches
 from ..common.errors import SolveError, of_file
+from ..actuation.spatial_context import ActuatedSpatialContext
+from ..common.errors import of_file
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.operating_points import InstantAnalysis
@@ -63,6 +66,8 @@ class SpatialResult:
         """Why results may be wrong, or not mean what they seem to, a text each."""
         missed = None if self.actuation is None else self.actuation.unsupplied
         told = (*self.run.warnings, *unresolved_gears(self.motion.gears))
+        if isinstance(self.run.details, LoopRecord):
+            told = (*told, *self.run.details.warnings)
         return told if missed is None else (*told, missed.in_words)
 
 

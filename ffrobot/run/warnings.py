@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..actuation.control.closed_loop import LoopRecord
+from ..actuation.control.loop_record import LoopRecord
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.validity import deflection_warning

@@ -18,6 +18,8 @@ from ..mbs.scene.analysis import Surroundings
 from .kinds import KINDS, AnyKind
 from .scene import SceneKeys
 
+PATCHED = ("patches", "patched body")  # in the plane a body has one layout, which has its name
+
 
 def problems(scene: SceneKeys) -> Iterator[str]:
     """Everything in the scene that refers to something that does not exist or does not fit, a line each."""
@@ -117,7 +119,7 @@ def _flexible_body_problems(scene: SceneKeys) -> Iterator[str]:
 
 def _patch_problems(scene: SceneKeys) -> Iterator[str]:
     layouts = {layout.body: layout for layout in scene.pzt}
-    uses = [(reference.key, reference.name) for reference in scene.references() if reference.kind == "patches"]
+    uses = [(reference.key, reference.name) for reference in scene.references() if reference.kind in PATCHED]
     uses += [(f"load no. {k}: pzt", load.pzt) for k, load in enumerate(scene.load, 1) if load.pzt is not None]
     for key, body in uses:
         if body not in layouts:

@@ -9,6 +9,7 @@ from pydantic import Field
 from ..actuation.control.closed_loop import ClosedLoop
 from ..actuation.control.linear import Linear
 from ..actuation.control.placement import PatchPlacement
+from ..actuation.control.spatial_closed_loop import SpatialClosedLoop
 from ..mbs.analysis.fcid import Fcid
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.motors_only import MotorsOnly
@@ -19,5 +20,10 @@ AnyKind = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly 
 
 Analysis = Annotated[AnyKind, Field(discriminator="kind")]
 """One table [[analysis]] of a scene, of the kind that it says."""
+
+AnyKindInSpace = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | SpatialClosedLoop
+
+AnalysisInSpace = Annotated[AnyKindInSpace, Field(discriminator="kind")]
+"""The same of scenes in space: disturbances have components there that the plane has not."""
 
 KINDS: tuple[type[AnyKind], ...] = get_args(AnyKind)

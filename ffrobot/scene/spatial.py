@@ -24,7 +24,7 @@ from ..mbs.scene.analysis import Surroundings
 from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys, SpatialMechanismScene
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from .actuation_times import with_times_of_actuation
-from .kinds import KINDS, Analysis
+from .kinds import KINDS, AnalysisInSpace, AnyKindInSpace
 
 APPLICABLE = ("joints", "joints+pzt", "trajectory")  # values of `apply`
 
@@ -41,7 +41,7 @@ class SpatialSceneKeys(SpatialMechanismKeys):
 
     pzt: tuple[SpatialPztLayout, ...] = ()
     """Layouts of piezoelectric patches; several on a body are told apart by their names."""
-    analysis: Annotated[tuple[Analysis, ...], NotEmpty]
+    analysis: Annotated[tuple[AnalysisInSpace, ...], NotEmpty]
     """What is computed, in this order."""
 
     def references(self) -> Iterator[Reference]:
@@ -158,6 +158,16 @@ def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
                 )
             elif not (joints[name].units or joints[name].guess_units):
                 yield f'{reference.key}: expected a joint that moves, found "{name}", a {joints[name].type}'
+        elif reference.kind == "elastic joint":
+            elastic = [each for each, joint in joints.items() if getattr(joint, "stiffness", None) is not None]
+            if name not in elastic:
+                yield f'{reference.key}: expected a joint with stiffness ({quoted(elastic)}), found "{name}"'
+        elif reference.kind == "patched body":
+            patched = [layout.body for layout in scene.pzt]
+            if name not in patched:
+                known = quoted(dict.fromkeys(patched)) or "none"
+                hint = did_you_mean(name, patched)
+                yield f'{reference.key}: expected a body with patches, {known}, found "{name}"{hint}'
         elif reference.kind == "patches":
             if name not in layouts:
                 known = f"one of the layouts {quoted(layouts)}" if layouts else "a layout of patches ([[pzt]])"
@@ -187,7 +197,7 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f'load no. {k}: joint: expected one with a single coordinate, found "{loaded.name}", a {loaded.type}'
 
 
-def _not_available_of(analysis: Analysis, scene: SpatialSceneKeys) -> Iterator[tuple[str, str]]:
+def _not_available_of(analysis: AnyKindInSpace, scene: SpatialSceneKeys) -> Iterator[tuple[str, str]]:
     """Keys of an analysis that ask for what is not there yet, and what was expected and found."""
     apply = getattr(analysis, "apply", None)
     not_yet = "which is not available there yet"

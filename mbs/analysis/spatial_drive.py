@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...common.arrays import Array, as_list
 from .. import _core
-from ..model.spatial_drives import NO_DRIVES, Drives
+from ..model.spatial_drives import NO_DRIVES, Command, Drives
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
@@ -18,6 +20,24 @@ from ..solve.spatial_posture import SINGULAR, robot_size, told_posture
 from ..solve.state import State
 from .drive import STATUS, Progress
 from .spatial_run import SpatialRun
+
+
+@dataclass(frozen=True)
+class SpatialControl:
+    """What acts on motors and patches from sample to sample.
+
+    Attributes:
+        commands: what a unit of each does.
+        first: (inputs,) before those of the first sample act.
+        times: (K,) s, of the samples; the commands of each act `delay` (s) later.
+        controller: commands (inputs,) from sample number, time and what was read: q (n_q,), v (n_v,), a (n_v,) in one.
+    """
+
+    commands: tuple[Command, ...]
+    first: Array
+    times: Array
+    delay: float
+    controller: Callable[[int, float, Array], Array]
 
 
 def integrator_of(model: SpatialModel, name: str) -> str:
@@ -42,11 +62,12 @@ def spatial_drive(
     drives: Drives = NO_DRIVES,
     warnings: tuple[str, ...] = (),
     times: Array | None = None,
+    control: SpatialControl | None = None,
 ) -> SpatialRun:
     """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
 
-    `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where `progress` says so, and in
-    a posture in which the joints cannot follow the path, with a warning.
+    Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
+    `progress` says so, and in a posture in which the joints cannot follow the path, with a warning.
     """
     times = analysis.times if times is None else times
     system, began = SpatialSystem(model, drives), time.perf_counter()
@@ -58,7 +79,7 @@ def spatial_drive(
         spectral_radius=analysis.spectral_radius,
     )
     system.scene.watch_posture([row.is_trajectory for row in model.rows], robot_size(model))
-    run = _core.tree_motion(system.core, system.scene, as_list(times), start.q, start.v, controls, progress)
+    run = _integrated(system, times, start, controls, control, progress)
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
     multipliers = run.multipliers * np.array([row.sign for row in model.rows])
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture)
@@ -71,5 +92,23 @@ def spatial_drive(
     return SpatialRun(
         analysis, model, times[: len(q)], q, v, run.accelerations, multipliers, applied=drives.at_points,
         status=STATUS[run.status], integrator=integrator, steps=run.steps, evaluations=run.evaluations,
-        wall_seconds=time.perf_counter() - began, warnings=told, cause=cause, again=again,
+        wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
+        again=again if control is None else None,
+    )  # fmt: skip
+
+
+def _integrated(
+    system: SpatialSystem,
+    times: Array,
+    start: State,
+    controls: _core.IntegrationControls,
+    control: SpatialControl | None,
+    progress: Progress,
+) -> _core.TreeRun:
+    if control is None:
+        return _core.tree_motion(system.core, system.scene, as_list(times), start.q, start.v, controls, progress)
+    return _core.tree_sampled(
+        model=system.core, scene=system.scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
+        carry_on=progress, held=system.held(control.commands), first_command=control.first,
+        samples=as_list(control.times), delay=control.delay, controller=control.controller,
     )  # fmt: skip

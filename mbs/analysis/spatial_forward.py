@@ -78,7 +78,7 @@ def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, co
     moments = motor_forces_of(source).moments
     gears = gears_of_motion(source.model, state, source.time, moments)
     supplied = {**moments, **{joint: gear.moment[:, None] for joint, gear in gears.items()}}
-    most = _largest_moments(source.model, limits=analysis.limits)
+    most = largest_moments(source.model, limits=analysis.limits)
     wanted = np.hstack([supplied[joint] for joint in model.motors])
     given = np.clip(wanted, -most, most)
     sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
@@ -92,7 +92,7 @@ def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, co
     return spatial_drive(model, analysis, first, context.progress, drives=Drives(tuple(along)), times=times)
 
 
-def _largest_moments(model: SpatialModel, *, limits: bool) -> Array:
+def largest_moments(model: SpatialModel, *, limits: bool) -> Array:
     """(motors,) N·m or N, infinite where limits do not count."""
     joints = {joint.name: joint for joint in model.scene.joint}
     most = np.array([of.moment for name in model.motors for of in joints[name].motor_limits])
@@ -128,7 +128,7 @@ def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -
     """Moments of all motors along their coordinates, and what voltages of patches do on modes."""
     model = source.model
     _check_motors(model, analysis)
-    most = _largest_moments(model, limits=analysis.limits)
+    most = largest_moments(model, limits=analysis.limits)
 
     def forces(run: SpatialRun) -> Array:
         found = motor_forces_of(run)

@@ -49,7 +49,7 @@ def replayed(source: SpatialRun, read: Callable[[SpatialRun], Array], times: Arr
     count = 2 * max(FEWEST_NODES // 2, source.steps) + 1
     while True:
         nodes = as_floats(np.linspace(times[0], times[-1], count))
-        values = _in_parts(source.again(nodes), read)
+        values = in_parts(source.again(nodes), read)
         peak = float(np.abs(values).max(initial=0.0))
         rough = np.array([f.sample(nodes[1::2])[0] for f in spline(nodes[::2], values[::2])]).T
         off = float(np.abs(rough - values[1::2]).mean(axis=0).max(initial=0.0)) if values.size else 0.0
@@ -84,6 +84,6 @@ def path_wrenches(run: SpatialRun) -> dict[str, Array]:
     return found
 
 
-def _in_parts(run: SpatialRun, read: Callable[[SpatialRun], Array]) -> Array:
+def in_parts(run: SpatialRun, read: Callable[[SpatialRun], Array]) -> Array:
     """`read` of a long run, part by part: Jacobians of all states at once would not fit into memory."""
     return np.concatenate([read(run.rows(slice(k, k + CHUNK))) for k in range(0, len(run.time), CHUNK)])

@@ -34,6 +34,7 @@ class SpatialRun:
         before, after: s, how long it acts before t = 0 and after the end of the analysis.
         warnings: on what is left open.
         cause: why it ended early, where more is known than its status says.
+        commanded: (T, k) moments of motors by joint, N·m or N, where a controller commands them.
         details: what only its kind finds.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
     """
@@ -57,13 +58,14 @@ class SpatialRun:
     after: float = 0.0
     warnings: tuple[str, ...] = ()
     cause: str = ""
+    commanded: Mapping[str, Array] = field(default_factory=dict)
     details: Details = field(default=Details(), repr=False)
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
 
     @property
     def failed(self) -> bool:
-        """Whether it ended before its last time."""
-        return self.status != "completed"
+        """Whether it did not do what it was for; of some kinds an early end is a finding."""
+        return self.status not in ("completed", *self.analysis.findings)
 
     def rows(self, chosen: slice | Sequence[int]) -> SpatialRun:
         """These outputs alone."""

@@ -13,7 +13,8 @@ from .field_types import GROUND, split_point
 class Reference:
     """One reference: `key` of the record where it stands, `name` "BODY", "BODY.POINT" or the joint's.
 
-    "patches" are a body with patches, an "elastic joint" one with stiffness.
+    "patches" are a layout of them (in the plane the body with it), a "patched body" has some, an "elastic joint" has
+    stiffness.
 
     The equations of motion have a marker at a point that `needs_marker`; forces of the mechanism act there where it
     is `loaded`.
@@ -21,7 +22,7 @@ class Reference:
 
     key: str
     name: str
-    kind: Literal["body", "flexible body", "patches", "joint", "elastic joint"] = "body"
+    kind: Literal["body", "flexible body", "patches", "patched body", "joint", "elastic joint"] = "body"
     needs_marker: bool = False
     loaded: bool = False
 

@@ -31,6 +31,16 @@ class FrameDrive(NamedTuple):
     size: TimeFunction
 
 
+class Command(NamedTuple):
+    """What a unit of a held command does: generalized forces `direction` (n_v,).
+
+    Of motors on frames `frame` is as in `FrameDrive`: the number of the body that the joint carries, and the sign.
+    """
+
+    direction: Array
+    frame: tuple[int, float] | None = None
+
+
 class Drives(NamedTuple):
     """All that acts in a run beside the loads of the scene."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
 from .spatial_body import SpatialBody
-from .spatial_drives import NO_DRIVES, Drive, Drives, FrameDrive, PointDrive
+from .spatial_drives import NO_DRIVES, Command, Drive, Drives, FrameDrive, PointDrive
 from .spatial_model import SpatialModel, SpatialRow
 from .spatial_transmission import resistance, resistance_slope, rotor
 from .spatial_tree import Node, Section
@@ -178,10 +178,27 @@ class SpatialSystem:
         node, direction = self.model.tree.nodes[drive.body], np.zeros(self.model.tree.n_v)
         direction[node.v] = drive.sign
         scene.add_load(direction, drive.size)
-        for section, sign in ((node.outer, 1.0), (node.inner, -1.0)):
+        for share in self._frame_shares(drive.body, drive.sign):
+            scene.add_frame_motor(*share, drive.size)
+
+    def _frame_shares(self, body: int, sign: float) -> Iterator[tuple[int, int, Array, Array]]:
+        """Of the motor on frames along the joint that carries a body, for each side with modes.
+
+        Where the modes are in q and in v, Φ_r (3, n) of the section and the joint's axis there.
+        """
+        node = self.model.tree.nodes[body]
+        for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
             if section.body >= 0 and (of := self.model.tree.nodes[section.body]).body.n_modes:
-                Phi_r, axis = _rows_of(of.body, section)[0][3:], drive.sign * sign * section.triad[:, 2]
-                scene.add_frame_motor(of.p_q.start, of.p_v.start, Phi_r, axis, drive.size)
+                axis = sign * side * section.triad[:, 2]
+                yield of.p_q.start, of.p_v.start, _rows_of(of.body, section)[0][3:], axis
+
+    def held(self, commands: Sequence[Command]) -> _core.HeldForces:
+        """Forces of commands that are held, in their order."""
+        found = _core.HeldForces(np.reshape([c.direction for c in commands], (len(commands), self.model.tree.n_v)).T)
+        for number, command in enumerate(commands):
+            for share in self._frame_shares(*command.frame) if command.frame is not None else ():
+                found.add_frame_motor(number, *share)
+        return found
 
     def _load(self, load: SpatialLoad) -> Drive:
         """Direction (n_v,) and size of the moment of a joint."""

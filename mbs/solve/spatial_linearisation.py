@@ -102,7 +102,7 @@ class SpatialLinearisation:
             name: self.model.sign(joint) * H[k]
             for joint in joints
             if joint in self.model.tree.carried
-            for name, k in _labelled(self.model, joint)
+            for name, k in labelled(self.model, joint)
         }
 
     def _places(self, state: Accelerated, H: Array) -> dict[str, Array]:
@@ -132,7 +132,7 @@ def _check(model: SpatialModel) -> None:
             )
 
 
-def _labelled(model: SpatialModel, joint: str) -> Iterator[tuple[str, int]]:
+def labelled(model: SpatialModel, joint: str) -> Iterator[tuple[str, int]]:
     """Coordinates of a joint, "joint/NAME", or "joint/NAME 1", "joint/NAME 2" of several, and where each is in v."""
     columns = model.columns(joint)
     for number, k in enumerate(columns, 1):
@@ -150,7 +150,7 @@ def _coordinates(model: SpatialModel) -> tuple[list[str], Array]:
         for number, k in enumerate(range(node.p_v.start, node.p_v.stop), 1):
             names[k] = f"modal/{node.body.name}/{number}"
         if kind == "joint":
-            for name, k in _labelled(model, node.joint.name):
+            for name, k in labelled(model, node.joint.name):
                 names[k], signs[k] = name, model.sign(node.joint.name)
     return names, signs
 

@@ -31,6 +31,15 @@ def moving_configurations(results: Results) -> Iterator[FigureRecord]:
         )
 
 
+def tip_error_figures(results: Results) -> Iterator[FigureRecord]:
+    """Of all closed loops in one figure."""
+    curves = tuple(Curve(data=f"{a}/tip_error", label=a) for a in results.analyses if results.has(f"{a}/tip_error"))
+    if curves:
+        yield FigureRecord(
+            name="tip_error", title="tip, distance from its place", curves=curves, y_label="error (mm)", scale=1e3
+        )
+
+
 def joint_figures(results: Results) -> Iterator[FigureRecord]:
     """Coordinates, moments, moments over speed, and size of the reaction, of every joint."""
     for joint in members(results, "joints"):

@@ -15,6 +15,7 @@ from .shared import (
     joint_figures,
     moving_configurations,
     response_figures,
+    tip_error_figures,
     voltage_figures,
 )
 
@@ -29,6 +30,7 @@ def spatial_figures(results: Results) -> tuple[FigureRecord, ...]:
         [
             *moving_configurations(results),
             *_paths(results),
+            *tip_error_figures(results),
             *_deflections(results),
             *_modes(results),
             *_trajectory_forces(results),

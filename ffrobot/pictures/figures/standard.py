@@ -17,6 +17,7 @@ from .shared import (
     members,
     moving_configurations,
     response_figures,
+    tip_error_figures,
     voltage_figures,
 )
 from .spatial_standard import spatial_figures
@@ -36,7 +37,7 @@ def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
             *joint_figures(results),
             *_stresses(results),
             *voltage_figures(results),
-            *_tip_errors(results),
+            *tip_error_figures(results),
             *_linear(results),
         ]
     )
@@ -128,15 +129,6 @@ def _stresses(results: Results) -> Iterator[FigureRecord]:
 
 def _stress_points(results: Results, body: str) -> list[str]:
     return list(dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/stress/{body}/points")))
-
-
-def _tip_errors(results: Results) -> Iterator[FigureRecord]:
-    """Of all closed loops in one figure."""
-    curves = tuple(Curve(data=f"{a}/tip_error", label=a) for a in results.analyses if results.has(f"{a}/tip_error"))
-    if curves:
-        yield FigureRecord(
-            name="tip_error", title="tip, distance from its place", curves=curves, y_label="error (mm)", scale=1e3
-        )
 
 
 def _linear(results: Results) -> Iterator[FigureRecord]:

@@ -8,84 +8,16 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include "bindings/recursion/recursion.h"
+#include "bindings/recursion/tree_run.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace ffrobot;
 using namespace ffrobot::recursion;
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 namespace {
-
-template <class Space> void check_scene(const Model<Space> &model, const Scene &scene) {
-  check_size("targets", static_cast<Index>(scene.targets.size()), model.rows());
-  const auto check_index = [](const char *name, int got, std::size_t count) {
-    if (got < 0 || got >= static_cast<int>(count))
-      throw nb::value_error(
-          (std::string(name) + ": expected 0 to " + std::to_string(count) + " - 1, got " + std::to_string(got))
-              .c_str());
-  };
-  const auto n_q = static_cast<std::size_t>(model.mechanism.n_q), n_v = static_cast<std::size_t>(model.mechanism.n_v);
-  for (const Load &load : scene.loads)
-    for (const auto &[i, share] : load.along)
-      check_index("coordinate of a load", i, n_v);
-  for (const PointLoad &load : scene.point_loads) {
-    check_index("wrench of a load", load.wrench, model.mechanism.wrenches.size());
-    check_index("component of a load", load.component, Space::dim);
-  }
-  for (const JointForce &force : scene.joint_forces)
-    check_index("q of a joint's force", force.q, n_q), check_index("v of a joint's force", force.v, n_v);
-  for (const FrameMotor &motor : scene.frame_motors) {
-    const auto last = static_cast<int>(motor.Phi_r.cols()) - 1;
-    check_index("q of a motor on frames", motor.q, n_q), check_index("v of a motor on frames", motor.v, n_v);
-    check_index("q of a motor on frames", motor.q + last, n_q);
-    check_index("v of a motor on frames", motor.v + last, n_v);
-  }
-  for (const GearSpring &gear : scene.gears)
-    for (const GearSpring::Side &side : {gear.a, gear.b})
-      check_index("q of a gear", side.q, n_q), check_index("v of a gear", side.v, n_v);
-  if (scene.watch)
-    check_size("is_path", static_cast<Index>(scene.watch->is_path.size()), model.rows());
-  for (const DrivenMarker &driven : scene.driven)
-    check_index("marker of the ground", driven.marker, model.mechanism.ground.size());
-}
-
-// What a motion is at outputs, as far as it got.
-struct TreeRun {
-  IntegrationReport report;
-  VectorXd last;                                // (q, v) of the last accepted step
-  RowMajorMatrix states, accelerations, lambda; // (T, n_q + n_v), (T, n_v), (T, rows)
-  RowMajorMatrix frames;                        // (T, 6 bodies) of each body: R_ddot of its origin, alpha
-  RowMajorMatrix energy;                        // (T, 3) kinetic, strain, gravitational
-  double least_ratio = 1, singular_at = 0;      // of the scene's watch
-  VectorXd singular_posture;
-};
-
-// All that is read off the states of a run at the first `reached` of `times`
-template <class Space>
-void evaluate_outputs(RecursiveMotion<Space> &motion, const Mechanism<Space> &mechanism,
-                      const std::vector<double> &times, TreeRun &run) {
-  const Index reached = run.states.rows(), n_q = mechanism.n_q;
-  run.accelerations.resize(reached, mechanism.n_v), run.lambda.resize(reached, run.lambda.cols());
-  run.frames.resize(reached, 6 * static_cast<Index>(mechanism.nodes.size())), run.energy.resize(reached, 3);
-  for (Index i = 0; i < reached; ++i) {
-    const double *q = run.states.row(i).data(), *v = q + n_q;
-    motion.evaluate(times[static_cast<std::size_t>(i)], q, v, run.accelerations.row(i).data());
-    run.lambda.row(i) = Eigen::Map<const Eigen::RowVectorXd>(motion.workspace().lambda.data(), run.lambda.cols());
-    Index column = 0;
-    for (const FrameMotion &frame : frame_motions(mechanism, q, v, motion.workspace())) {
-      run.frames.row(i).segment<3>(column) = frame.a_origin.transpose();
-      run.frames.row(i).segment<3>(column + 3) = frame.alpha.transpose();
-      column += 6;
-    }
-    const Totals sum = totals(mechanism, q, v, motion.workspace());
-    run.energy.row(i) << sum.kinetic, sum.strain, sum.gravitational;
-  }
-}
 
 template <class Space>
 TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times, const VectorXd &q,
@@ -94,25 +26,18 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
   check_scene(model, scene);
   const nb::gil_scoped_release unlocked;
   RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data());
-  TreeRun run;
-  run.states.resize(static_cast<Index>(times.size()), q.size() + v.size()), run.lambda.resize(0, model.rows());
-  run.last.resize(q.size() + v.size());
+  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data());
+  TreeRun run(model, times.size());
   run.last << q, v;
   run.report = integrate(
       motion, times, run.last, controls,
-      [&](std::size_t i, double, const double *at) {
-        run.states.row(static_cast<Index>(i)) = Eigen::Map<const Eigen::RowVectorXd>(at, run.states.cols());
-      },
+      [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
       [&](double t) {
         const nb::gil_scoped_acquire locked;
         return carry_on(t);
       },
       nullptr);
-  run.least_ratio = motion.least_ratio(), run.singular_at = motion.singular_at();
-  run.singular_posture = motion.singular_posture();
-  run.states.conservativeResize(static_cast<Index>(run.report.outputs), Eigen::NoChange);
-  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data());
-  evaluate_outputs(reader, model.mechanism, times, run);
+  run.finish(motion);
   return run;
 }
 
@@ -123,13 +48,13 @@ TreeRun outputs_of(const Model<Space> &model, const Scene &scene, const std::vec
   check_scene(model, scene);
   check_size("states", states.cols(), model.mechanism.n_q + model.mechanism.n_v);
   check_size("times", static_cast<Index>(times.size()), states.rows());
-  TreeRun run;
-  run.states = states, run.lambda.resize(0, model.rows());
+  TreeRun run(model, times.size());
   if (times.empty())
     return run;
-  const double *first = run.states.row(0).data();
+  const double *first = states.row(0).data();
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), first, first + model.mechanism.n_q);
-  evaluate_outputs(reader, model.mechanism, times, run);
+  for (std::size_t i = 0; i < times.size(); ++i)
+    run.evaluate(i, times[i], states.row(static_cast<Index>(i)).data(), reader, model.mechanism);
   return run;
 }
 
@@ -230,7 +155,7 @@ void bind_tree_motion(nb::module_ &m) {
           [](Scene &s, int q, int v, const Eigen::MatrixXd &rotation, const Eigen::Vector3d &axis,
              const TimeFunction &magnitude) {
             check_size("rotation", rotation.rows(), 3);
-            s.frame_motors.push_back({q, v, rotation, axis, magnitude});
+            s.frame_motors.push_back({{q, v, rotation, axis}, magnitude});
           },
           "q"_a, "v"_a, "rotation"_a, "axis"_a, "magnitude"_a,
           "What a motor that turns the frame of a body takes back on its modes: see core/recursion/frame_motor.h.")

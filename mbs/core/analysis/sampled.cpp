@@ -66,33 +66,30 @@ void HeldCommands::apply(double, Workspace &workspace) {
 
 namespace {
 
-struct Event {
-  double time;
-  std::size_t sample;
-  bool acts; // the command of the sample, which is taken otherwise
-};
+// The system under held commands, as a sampled loop sees it
+class Plant final : public SampledPlant {
+public:
+  Plant(ConstrainedMotion &motion, HeldCommands &commands, Sensing &sensing)
+      : motion_(motion), commands_(commands), sensing_(sensing), a_(VectorXd::Zero(motion.system().n_v())) {}
 
-// Samples, and the actions of their commands, in order; what lies closer together than a clock tells is at one time.
-std::vector<Event> schedule(const Sampling &sampling, double end) {
-  std::vector<Event> events;
-  const auto &times = sampling.times;
-  const double same = 1e-9 * (times.size() > 1 ? times[1] - times[0] : end);
-  std::size_t acted = 0;
-  const auto act_until = [&](double t, std::size_t taken) {
-    for (; acted < taken && times[acted] + sampling.delay <= t + same; ++acted) {
-      const double then = times[acted] + sampling.delay;
-      events.push_back({then < t - same ? then : t, acted, true});
+  void hold(const VectorXd &u) override { commands_.set(u); }
+
+  VectorXd read(double t, const double *y) override {
+    const System &system = motion_.system();
+    const double *rates = y + system.n_q();
+    if (sensing_.needs_accelerations()) {
+      commands_.apply(t, motion_.workspace());
+      accelerations(system, t, y, rates, motion_.workspace(), a_.data());
     }
-  };
-  for (std::size_t k = 0; k < times.size(); ++k) {
-    act_until(times[k], k);
-    events.push_back({times[k], k, false});
-    if (sampling.delay == 0)
-      act_until(times[k], k + 1);
+    return sensing_.read(y, rates, a_.data());
   }
-  act_until(end, times.size());
-  return events;
-}
+
+private:
+  ConstrainedMotion &motion_;
+  HeldCommands &commands_;
+  Sensing &sensing_;
+  VectorXd a_;
+};
 
 } // namespace
 
@@ -101,30 +98,14 @@ Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, con
                 const std::function<bool(double)> &carry_on) {
   const System &system = motion.system();
   OutputEvaluator evaluate(system, times.size(), &commands, nullptr);
-  VectorXd y(q.size() + v.size()), a = VectorXd::Zero(v.size());
+  VectorXd y(q.size() + v.size());
   y << q, v;
-  std::vector<VectorXd> taken(sampling.times.size());
-  const std::vector<Event> events = schedule(sampling, times.back());
-  Breaks breaks;
-  for (const Event &event : events)
-    breaks.times.push_back(event.time);
-  breaks.at = [&](std::size_t i, double t, const double *state) {
-    const Event &event = events[i];
-    if (event.acts) {
-      commands.set(taken[event.sample]);
-      return;
-    }
-    const double *rates = state + system.n_q();
-    if (sensing.needs_accelerations()) {
-      commands.apply(t, motion.workspace());
-      accelerations(system, t, state, rates, motion.workspace(), a.data());
-    }
-    taken[event.sample] = sampling.controller(event.sample, t, sensing.read(state, rates, a.data()));
-  };
+  Plant plant(motion, commands, sensing);
+  const SampledLoop loop(plant, sampling, times.back());
   Run result;
   result.report = integrate(
       motion, times, y, controls, [&](std::size_t i, double t, const double *state) { evaluate(i, t, state); },
-      carry_on, nullptr, &breaks);
+      carry_on, nullptr, &loop.breaks());
   result.outputs = evaluate.take(result.report.outputs);
   result.last = y;
   return result;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/analysis/run.h"
+#include "core/integrate/sampled_loop.h"
 
 #include <functional>
 #include <utility>
@@ -55,13 +56,6 @@ private:
   std::vector<double> drive_;
   std::vector<Patches> patches_;
   std::vector<Eigen::VectorXd> modal_; // of each entry of patches_
-};
-
-struct Sampling {
-  std::vector<double> times;
-  double delay = 0; // from a sample to when its command acts
-  // u for readings y at sample k; never asked about time beyond the run
-  std::function<Eigen::VectorXd(std::size_t, double, const Eigen::VectorXd &)> controller;
 };
 
 // As run(); `commands` are the external loads of `motion`, and hold what they were set to until the first command acts.

@@ -12,17 +12,16 @@ namespace ffrobot::recursion {
 // On the modes p of one of its two bodies. The joint turns sections, whose angular velocity is that of the frame and
 // A J_l(phi) Phi_r p_dot, phi = Phi_r p; the motor turns the frame alone. What the section's part of the moment would
 // do is taken back: -m (J_l^T exp(phi) B z)^T Phi_r, and J_l(phi)^T exp(phi) = J_l(phi), the left Jacobian of SO(3).
-struct FrameMotor {
+struct FrameShare {
   int q = 0, v = 0;       // of the first mode
   Eigen::Matrix3Xd Phi_r; // (3, n) of the section
   Eigen::Vector3d axis;   // B z: of the joint, in axes of the undeformed section
-  TimeFunction magnitude; // N m along the axis, on this body
 
-  // Adds the modal forces at time t and q to those along v.
-  void add(double t, const double *q_all, double *force) const {
+  // Adds the modal forces of a moment m (N m along the axis, on this body) at q to those along v.
+  void add(double moment, const double *q_all, double *force) const {
     const auto n = Phi_r.cols();
     const Eigen::Vector3d phi = Phi_r * Eigen::Map<const Eigen::VectorXd>(q_all + q, n);
-    Eigen::Map<Eigen::VectorXd>(force + v, n) -= magnitude(t).value * (Phi_r.transpose() * turned(phi));
+    Eigen::Map<Eigen::VectorXd>(force + v, n) -= moment * (Phi_r.transpose() * turned(phi));
   }
 
 private:
@@ -35,6 +34,11 @@ private:
     const Eigen::Vector3d across = phi.cross(axis);
     return axis + a * across + b * phi.cross(across);
   }
+};
+
+struct FrameMotor {
+  FrameShare share;
+  TimeFunction magnitude; // N m
 };
 
 } // namespace ffrobot::recursion

@@ -25,9 +25,10 @@ Load::Load(const VectorXd &direction, TimeFunction magnitude_) : magnitude(std::
 
 template <class Space>
 RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
-                                        const double *q, const double *v)
+                                        const double *q, const double *v, const HeldForces *held)
     : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
-      workspace_(mechanism), measured_(mechanism), newton_(mechanism), force_(VectorXd::Zero(mechanism.n_v)),
+      held_(held), workspace_(mechanism), measured_(mechanism), newton_(mechanism),
+      force_(VectorXd::Zero(mechanism.n_v)),
       wrench_(VectorXd::Zero(Space::dim * static_cast<Index>(mechanism.wrenches.size()))),
       target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
       correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
@@ -57,7 +58,8 @@ template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
 template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
   update_targets(t);
   Forces<double> forces;
-  if (!scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.frame_motors.empty() || !scene_.gears.empty()) {
+  if (held_ || !scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.frame_motors.empty() ||
+      !scene_.gears.empty()) {
     force_.setZero();
     for (const Load &load : scene_.loads) {
       const double magnitude = load.magnitude(t).value;
@@ -67,11 +69,13 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
     for (const JointForce &joint : scene_.joint_forces)
       force_[joint.v] -= joint.stiffness * (q[joint.q] - joint.rest) + joint.friction.resistance(v[joint.v]);
     for (const FrameMotor &motor : scene_.frame_motors)
-      motor.add(t, q, force_.data());
+      motor.share.add(motor.magnitude(t).value, q, force_.data());
     for (const auto &[a, b, ratio, stiffness, damping] : scene_.gears) {
       const double moment = stiffness * (q[a.q] - ratio * q[b.q]) + damping * (v[a.v] - ratio * v[b.v]);
       force_[a.v] -= moment, force_[b.v] += ratio * moment;
     }
+    if (held_)
+      held_->add(q, force_.data());
     forces.generalized = force_.data();
   }
   if (!scene_.point_loads.empty()) {

@@ -7,6 +7,7 @@
 #include "core/constraint/constraint.h"
 #include "core/integrate/ode.h"
 #include "core/recursion/frame_motor.h"
+#include "core/recursion/held_forces.h"
 #include "core/recursion/motion_norm.h"
 #include "core/recursion/newton.h"
 #include "core/recursion/posture.h"
@@ -85,8 +86,9 @@ template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
   // The mechanism and the scene must outlive this. Rows that depend on others
   // at time t and (q, v) are left out of the equations from there on; they are
-  // to be consistent.
-  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v);
+  // to be consistent. `held` may be null: what acts beside the scene's loads, and may change between steps.
+  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
+                  const HeldForces *held = nullptr);
 
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
@@ -133,6 +135,7 @@ private:
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
+  const HeldForces *held_;
   // of accelerations; of rows and of Newton's method, which must not disturb
   // these
   Workspace<Space, double> workspace_, measured_, newton_;

@@ -1,0 +1,120 @@
+"""What a closed loop leaves, and the parts of its run that are the same in the plane and in space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...mbs.analysis.outcome import Details
+from .controllers import Controller, Setup
+from .linear_model import LinearModel
+from .loop import Loop
+from .loop_keys import SampledAnalysis
+from .margins import Margins, joint_gains, margins
+from .metrics import Followed, Metrics, measure
+from .records import ComputedTorque, JointPid, Lqr
+from .suggestion import advice
+
+SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
+
+
+@dataclass(frozen=True)
+class LoopRecord(Details):
+    """What happened at the samples of a closed loop.
+
+    Attributes:
+        inputs, outputs: names of commands and readings.
+        time: (K,) s; the last sample is the last that was taken.
+        readings: (K, outputs); reference: (K, outputs) what they would be on the reference motion.
+        commands: (K, inputs) within limits; wanted: before.
+        metrics: how well it went; `tip_error` (T,) m at the outputs of the run.
+        warnings: one line each.
+        margins: by the linear model, of loops of joint PID controllers alone; else None.
+        advice: what to try, a text each, where the loop is not stable.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    time: Array
+    readings: Array
+    reference: Array
+    commands: Array
+    wanted: Array
+    tip_error: Array
+    metrics: Metrics
+    warnings: tuple[str, ...]
+    margins: Margins | None = None
+    advice: tuple[str, ...] = ()
+
+
+def sample_times(outputs: Array, T: float) -> Array:
+    """(K,) s: every T, from the first output to before the last."""
+    times: Array = outputs[0] + np.arange(int(np.ceil(np.ptp(outputs) / T * (1 - 1e-12)))) * T
+    return times
+
+
+def held_until(times: Array, analysis: SampledAnalysis, end: float) -> Array:
+    """The middle of the time for which the command of each sample is held, up to `end`, s."""
+    middle: Array = np.minimum(times + analysis.delay + analysis.sample_time / 2, end)
+    return middle
+
+
+def between(times: Array, known: Array, values: Array) -> Array:
+    """Values (T, columns), known at some times, at others (K,)."""
+    if not values.size:
+        return np.zeros((len(times), values.shape[1]))
+    from scipy.interpolate import CubicSpline
+
+    result: Array = CubicSpline(known, values)(times)
+    return result
+
+
+def held_commands(times: Array, setup: Setup, loop: Loop) -> Array:
+    """Commands (T, inputs) that act at `times`."""
+    taken = slice(loop.taken)
+    which = np.searchsorted(setup.times[taken] + setup.delay, times + 1e-9, side="right")
+    return np.vstack([loop.first, loop.commands[taken]])[which]
+
+
+def loop_record(
+    analysis: SampledAnalysis, setup: Setup, loop: Loop, acting: Sequence[Controller], run: Followed, gears: bool
+) -> LoopRecord:
+    """Of a run; `gears`: some give."""
+    taken = slice(loop.taken)
+    tip_error, metrics = measure(run, setup, loop)
+    warnings = tuple(_warnings(analysis, acting, metrics, gears))
+    return LoopRecord(
+        setup.inputs, setup.outputs, setup.times[taken], loop.readings[taken], setup.reference[taken],
+        loop.commands[taken], loop.wanted[taken], tip_error, metrics, warnings,
+    )  # fmt: skip
+
+
+def judged(record: LoopRecord, analysis: SampledAnalysis, models: Sequence[LinearModel]) -> LoopRecord:
+    """With margins of the loop, and advice where it is not stable, by linear models on the reference."""
+    pids = [controller for controller in analysis.controller if isinstance(controller, JointPid)]
+    if not models or not pids or len(pids) < len(analysis.controller):
+        return record
+    T, delay = analysis.sample_time, analysis.delay
+    found = margins(models, joint_gains(models[0], pids), T, delay)
+    is_stable = record.metrics.verdict == "stable" and found.is_stable
+    texts = () if is_stable else tuple(advice(models, pids, T, delay, found))
+    return replace(record, margins=found, advice=texts)
+
+
+def _warnings(analysis: SampledAnalysis, controllers: Sequence[Controller], metrics: Metrics, gears: bool) -> list[str]:
+    lines = [line for controller in controllers for line in getattr(controller, "warnings", ())]
+    fastest = max((controller.bandwidth for controller in controllers), default=0.0)
+    sampling = 2 * np.pi / analysis.sample_time
+    if sampling < SAMPLES_PER_PERIOD * fastest:
+        lines.append(
+            f"sampling at {sampling / (2 * np.pi):.4g} Hz is slow for a controller that acts up to"
+            f" {fastest / (2 * np.pi):.4g} Hz: expected at least {SAMPLES_PER_PERIOD} samples a period"
+        )
+    if gears and any(isinstance(record, Lqr | ComputedTorque) for record in analysis.controller):
+        lines.append("the controller is designed for rigid gears, and some give")
+    if metrics.verdict != "stable":
+        lines.append(f"the loop {metrics.verdict}: gains too high for sampling and delay, or for the links?")
+    return lines

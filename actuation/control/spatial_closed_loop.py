@@ -1,0 +1,248 @@
+"""Forward dynamics in space under a sampled controller: sensors, delay, saturation, feed-forward, disturbances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError, SolveError
+from ...mbs.analysis.outcome import GearMotion
+from ...mbs.analysis.spatial_drive import SpatialControl, spatial_drive
+from ...mbs.analysis.spatial_forward import largest_moments
+from ...mbs.analysis.spatial_gears import gears_of_motion
+from ...mbs.analysis.spatial_replay import in_parts, motor_forces_of, replay_times
+from ...mbs.analysis.spatial_run import SpatialRun, without_paths
+from ...mbs.model.spatial_accelerations import Accelerated
+from ...mbs.model.spatial_drives import Command, Drives, PointDrive
+from ...mbs.model.spatial_gears import with_compliance_in_space
+from ...mbs.model.spatial_model import SpatialModel, modal_direction
+from ...mbs.scene.spatial.loads import SpatialLoad
+from ...mbs.solve.spatial_linearisation import SpatialLinearisation
+from ...mbs.solve.spatial_statics import initial_state
+from ...mbs.solve.state import State
+from ..spatial_context import ActuatedSpatialContext
+from .choice import make_controller, needed_sensors
+from .controllers import Setup
+from .linear_model import LinearModel, state_space
+from .loop import Loop
+from .loop_keys import SampledAnalysis
+from .loop_record import between, held_commands, held_until, judged, loop_record, sample_times
+from .metrics import Followed, place_of_tip
+from .robot import input_names
+from .signals import merged
+from .spatial_robot import SpatialRobot
+from .spatial_signals import SpatialSensing, SpatialSignal, spatial_signals
+
+
+class SpatialClosedLoop(SampledAnalysis):
+    """Motion under sampled control as in the plane; disturbances and readings of points have components x, y, z.
+
+    Sensors name patches by their layout. Joints with several coordinates are read and driven coordinate by coordinate,
+    "joint/NAME 1", "joint/NAME 2", with the same gains.
+    """
+
+    disturbance: tuple[SpatialLoad, ...] = ()
+    """Loads at points that `actuation` does not know."""
+
+
+class _Plant(NamedTuple):
+    """The robot as it moves: gears give where the scene says so.
+
+    Attributes:
+        model: its equations of motion.
+        gears: what the inverse analysis found of gears that give, by joint.
+        source: the motion of the inverse analysis in the coordinates of `model`: q, v, a (T, …).
+    """
+
+    model: SpatialModel
+    gears: dict[str, GearMotion]
+    source: tuple[Array, Array, Array]
+
+
+def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialClosedLoop) -> SpatialRun:
+    """The closed loop of `analysis` about the motion of an inverse analysis, from its initial state.
+
+    The run's details are a `LoopRecord`. One that diverges ends there and is kept. Raises `InputError` for controllers
+    that do not fit the robot, `SolveError` where a user's function fails.
+    """
+    assert analysis.actuation is not None
+    source = context.runs[analysis.actuation]
+    plant, robot = _plant(context, source), SpatialRobot(without_paths(context.model), context.patches, source)
+    given, more = (
+        [s for sensor in sensors for s in spatial_signals(plant.model, context.patches, sensor)]
+        for sensors in (analysis.sensor, needed_sensors(robot, analysis.controller))
+    )
+    read = merged(given, more)
+    sensing = SpatialSensing(plant.model.tree, read)
+    outputs = replay_times(source, analysis)
+    setup = _setup(context, analysis, robot, plant, read, outputs, sensing.read(*plant.source))
+    acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
+    limit = np.full(len(setup.inputs), np.inf) if analysis.unlimited else _limits(context)
+    loop = Loop(setup, read, acting, limit, analysis.seed)
+    splits = plant.model.tree.n_q, plant.model.tree.n_q + plant.model.tree.n_v
+
+    def at_sample(k: int, t: float, state: Array) -> Array:
+        return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
+
+    control = SpatialControl(_commands(context, plant.model), loop.first, setup.times, analysis.delay, at_sample)
+    drives = Drives(at_points=tuple(PointDrive(str(load.point), load.components) for load in analysis.disturbance))
+    run = spatial_drive(
+        plant.model, analysis, _start(context, analysis, plant), context.progress, drives=drives, times=outputs,
+        control=control,
+    )  # fmt: skip
+    held = held_commands(run.time, setup, loop)
+    record = loop_record(analysis, setup, loop, acting, _followed(run, source, held), bool(plant.gears))
+    record = judged(record, analysis, loop_models_in_space(robot))
+    return replace(run, commanded=_by_joint(context.model, held), details=record)
+
+
+def loop_models_in_space(robot: SpatialRobot) -> tuple[LinearModel, ...]:
+    """The robot at rest on its reference at start, middle and end; none where it is singular, or has none yet."""
+    source = robot.source
+    rest, rows = np.zeros(robot.model.tree.n_v), sorted({0, len(source.time) // 2, len(source.time) - 1})
+    with suppress(SolveError, InputError):
+        linearisation = SpatialLinearisation(robot.model, source.q[0])
+        return tuple(state_space(linearisation.at(float(source.time[k]), source.q[k], rest, rest), {}) for k in rows)
+    return ()
+
+
+def _plant(context: ActuatedSpatialContext, source: SpatialRun) -> _Plant:
+    model = with_compliance_in_space(without_paths(context.model))
+    if not model.tree.gears:
+        return _Plant(model, {}, (source.q, source.v, source.a))
+    if model.scene.motors == "frame":
+        raise InputError(
+            f'{model.scene.path}: motors: expected "section" where joints with stiffness are controlled, found "frame"'
+        )
+    state = Accelerated(source.model.tree, source.q, source.v, source.a, source.model.tree.frames(source.q))
+    gears = gears_of_motion(source.model, state, source.time, motor_forces_of(source).moments)
+    known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
+    more = (np.column_stack([getattr(of, order) for of in known]) for order in ("angle", "rate", "acceleration"))
+    q, v, a = (np.hstack(pair) for pair in zip((source.q, source.v, source.a), more, strict=True))
+    return _Plant(model, gears, (q, v, a))
+
+
+def _setup(
+    context: ActuatedSpatialContext,
+    analysis: SpatialClosedLoop,
+    robot: SpatialRobot,
+    plant: _Plant,
+    read: Sequence[SpatialSignal],
+    outputs: Array,
+    readings: Array,
+) -> Setup:
+    """What controllers may know; `readings` (T, sensors) are those of the inverse analysis at its outputs."""
+    times, source = sample_times(outputs, analysis.sample_time), robot.source
+    return Setup(
+        robot, robot.model, context.patches, input_names(robot), tuple(s.name for s in read), times,
+        analysis.sample_time, analysis.delay, between(times, source.time, readings),
+        _feed_forward(context, analysis, source, plant, times), source,
+    )  # fmt: skip
+
+
+def _feed_forward(
+    context: ActuatedSpatialContext, analysis: SpatialClosedLoop, source: SpatialRun, plant: _Plant, times: Array
+) -> Array:
+    """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
+    middle = held_until(times, analysis, source.time[-1])
+
+    def found(run: SpatialRun) -> Array:
+        forces = motor_forces_of(run)
+        moments = np.hstack([*forces.moments.values(), np.zeros((len(run.time), 0))])
+        if analysis.feed_forward == "none":
+            moments[:] = 0.0
+        voltages = [np.zeros((len(run.time), of.Phi_V.shape[1])) for of in context.patches.values()]
+        if analysis.feed_forward == "joints+pzt":
+            voltages = [
+                np.hstack([one.required if analysis.unlimited else one.within_limit for one in volts.values()])
+                for volts in (of.voltages(forces.modal[body]) for body, of in context.patches.items())
+            ]
+        return np.hstack([moments, *voltages])
+
+    if source.again is None:
+        values = between(middle, source.time, in_parts(source, found))
+    else:
+        nodes, which = np.unique(np.append(source.time[0], middle), return_inverse=True)
+        values = in_parts(source.again(nodes), found)[which[1:]]
+    column = 0
+    for joint, columns in context.model.motors.items():  # behind gears that give: known at outputs
+        if joint in plant.gears and analysis.feed_forward != "none":
+            values[:, column : column + 1] = between(middle, source.time, plant.gears[joint].moment[:, None])
+        column += len(columns)
+    return values
+
+
+def _limits(context: ActuatedSpatialContext) -> Array:
+    """(inputs,) largest moments and voltages, infinite where the scene gives none."""
+    return np.concatenate(
+        [largest_moments(context.model, limits=True), *(of.reach.limit for of in context.patches.values())]
+    )
+
+
+def _commands(context: ActuatedSpatialContext, model: SpatialModel) -> tuple[Command, ...]:
+    """What a unit of each does: moments of motors, on sections or on frames, and voltages on the modes of links."""
+    joints, found = {joint.name: joint for joint in model.scene.joint}, []
+    for joint, columns in model.motors.items():
+        sign = model.sign(joint)
+        on_frames = model.scene.motors == "frame" and joints[joint].units == ("rad",)
+        frame = (model.tree.carried[joint], sign) if on_frames else None
+        found += [Command(sign * np.eye(model.tree.n_v)[k], frame) for k in columns]
+    for body, of_link in context.patches.items():
+        found += [Command(modal_direction(model, body, column)) for column in of_link.Phi_V.T]
+    return tuple(found)
+
+
+def _start(context: ActuatedSpatialContext, analysis: SpatialClosedLoop, plant: _Plant) -> State:
+    """As the inverse analysis starts, or as the scene says, gears that give wound as in that."""
+    q, v = plant.source[0][0].copy(), plant.source[1][0].copy()
+    if analysis.start == "actuation":
+        return State(q, v)
+    first = initial_state(context.model)
+    twists = [[part[0] for part in gear.twist(q[None], v[None])] for gear in plant.model.tree.gears]
+    q[: len(first.q)], v[: len(first.v)] = first.q, first.v
+    for gear, (way, rate) in zip(plant.model.tree.gears, twists, strict=True):
+        q[gear.motor.q.start] = gear.sign * q[gear.joint.q.start] + way
+        v[gear.motor.v.start] = gear.sign * v[gear.joint.v.start] + rate
+    return State(q, v)
+
+
+def _followed(run: SpatialRun, source: SpatialRun, held: Array) -> Followed:
+    """Where the tip went against where it should be."""
+    analysis, model = run.analysis, run.model
+    assert isinstance(analysis, SpatialClosedLoop)
+    tip = analysis.tip or _default_tip(model)
+    paths = [path.components for path in model.scene.trajectory if path.point == tip]
+    known = source.time, _position(source, tip)
+    error = _position(run, tip) - place_of_tip(run.time, analysis.last_time, known, paths)
+    columns = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(int)
+    signs = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of])
+    completed = run.status == "completed"
+    return Followed(run.time, error, signs * run.v[:, columns], held, completed, bool(analysis.disturbance))
+
+
+def _position(run: SpatialRun, point: str) -> Array:
+    tree = run.model.tree
+    return tree.motion(tree.section(point, np.eye(3)), run.q, tree.frames(run.q)).r
+
+
+def _default_tip(model: SpatialModel) -> str:
+    """The point of the first trajectory of one, or the last tip."""
+    driven = [trajectory.point for trajectory in model.scene.trajectory if trajectory.point is not None]
+    if driven:
+        return driven[0]
+    body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)
+    return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"
+
+
+def _by_joint(model: SpatialModel, held: Array) -> dict[str, Array]:
+    """Moments (T, k) of motors, of all commands (T, inputs)."""
+    found, column = {}, 0
+    for joint, columns in model.motors.items():
+        found[joint] = held[:, column : column + len(columns)]
+        column += len(columns)
+    return found

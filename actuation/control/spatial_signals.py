@@ -1,0 +1,131 @@
+"""Readings of sensors in space by name, as linear models name them: joints, motors, points, patches, modes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...common.arrays import Array, Indices
+from ...common.errors import InputError
+from ...mbs.model.spatial_accelerations import Accelerated
+from ...mbs.model.spatial_model import SpatialModel
+from ...mbs.model.spatial_tree import Section, SpatialTree
+from ...mbs.solve.spatial_linearisation import labelled
+from ..patches.spatial_patches import LinkPatches
+from .records import Sensor
+from .signals import ORDERS, Reading, volts_per_modal_coordinate
+
+
+@dataclass(frozen=True)
+class SpatialSignal(Reading):
+    """In space: the coordinate `axis` (0, 1, 2) of a `point`, or `along` (n_v,) times joint and modal coordinates."""
+
+    along: Array = field(default_factory=lambda: np.zeros(0))
+    point: str = ""
+    axis: int = 0
+
+
+class SpatialSensing:
+    """What signals read of states of a tree."""
+
+    def __init__(self, tree: SpatialTree, read: Sequence[SpatialSignal]) -> None:
+        self._tree, self._count = tree, len(read)
+        self._linear = np.array([k for k, signal in enumerate(read) if not signal.point], dtype=int)
+        self._order = np.array([read[k].order for k in self._linear], dtype=int)
+        self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
+        self._where = _places_in_q(tree)
+        sections = {signal.point: tree.section(signal.point, np.eye(3)) for signal in read if signal.point}
+        self._points: list[tuple[Section, list[tuple[int, int, int]]]] = [
+            (section, [(k, s.order, s.axis) for k, s in enumerate(read) if s.point == point])
+            for point, section in sections.items()
+        ]
+        self._accelerations = any(signal.point and signal.order == ORDERS["acceleration"] for signal in read)
+
+    def read(self, q: Array, v: Array, a: Array) -> Array:
+        """Readings (T, signals) of q (T, n_q), v and a (T, n_v)."""
+        found = np.zeros((len(q), self._count))
+        values = np.stack([q[:, self._where] @ self._along.T, v @ self._along.T])
+        found[:, self._linear] = np.where(self._order == ORDERS["value"], *values)
+        if not self._points:
+            return found
+        state = Accelerated(self._tree, q, v, a, self._tree.frames(q))
+        frames = state.of_frames() if self._accelerations else []
+        for section, columns in self._points:
+            at = self._tree.motion(section, q, state.frames)
+            orders = [at.r, state.velocity(at)[0]]
+            if self._accelerations:
+                orders.append(state.of_section(section, frames).r)
+            for k, order, axis in columns:
+                found[:, k] = orders[order][:, axis]
+        return found
+
+
+def _places_in_q(tree: SpatialTree) -> Indices:
+    """(n_v,) where in q the coordinate of each rate is; of orientations, which nothing reads so, some other place."""
+    places = np.zeros(tree.n_v, dtype=np.intp)
+    for node in tree.nodes:
+        if node.joint.q_count == node.joint.freedoms:
+            places[node.v] = np.arange(node.q.start, node.q.stop)
+        places[node.p_v] = np.arange(node.p_q.start, node.p_q.stop)
+    return places
+
+
+def spatial_signals(model: SpatialModel, patches: Mapping[str, LinkPatches], sensor: Sensor) -> Iterator[SpatialSignal]:
+    """The readings of one sensor of the scene. Raises `InputError` for a joint without coordinates in the tree."""
+    order, ending = ORDERS[sensor.measure], "" if sensor.measure == "value" else f"/{sensor.measure}"
+    quality = order, sensor.resolution, sensor.noise
+    if sensor.joint is not None:
+        check_joint(model, sensor.joint)
+        sign = -1.0 if model.tree.nodes[model.tree.carried[sensor.joint]].backwards else 1.0
+        for name, k in labelled(model, sensor.joint):
+            yield SpatialSignal(f"{name}{ending}", *quality, along=sign * np.eye(model.tree.n_v)[k])
+    elif sensor.motor is not None:
+        k = model.driven(sensor.motor).v.start
+        yield SpatialSignal(f"motor/{sensor.motor}{ending}", *quality, along=np.eye(model.tree.n_v)[k])
+    elif sensor.point is not None:
+        for axis, name in enumerate("xyz"):
+            yield SpatialSignal(f"point/{sensor.point}/{name}{ending}", *quality, point=sensor.point, axis=axis)
+    elif sensor.pzt is not None:
+        body = next(body for body, of_link in patches.items() if sensor.pzt in of_link.arrays)
+        for k, volts in enumerate(volts_of_layout(model, patches, body, sensor.pzt, sensor.capacitance), 1):
+            yield SpatialSignal(f"pzt/{sensor.pzt}/{k}", *quality, along=_on_modes(model, body, volts))
+    elif sensor.modal is not None:
+        for k, unit in enumerate(np.eye(model.tree.nodes[model.tree.index[sensor.modal]].body.n_modes), 1):
+            yield SpatialSignal(
+                f"modal/{sensor.modal}/{k}{ending}", *quality, along=_on_modes(model, sensor.modal, unit)
+            )
+
+
+def volts_of_layout(
+    model: SpatialModel, patches: Mapping[str, LinkPatches], body: str, layout: str, capacitance: float | None = None
+) -> Array:
+    """(k, n) that the patches of a layout read per unit of the link's modal coordinates in the tree."""
+    array, reached = patches[body].arrays[layout], patches[body].modes[layout]
+    to_file = model.tree.nodes[model.tree.index[body]].body.modal_transform
+    found: Array = volts_per_modal_coordinate(array, capacitance) @ np.linalg.solve(reached.T, to_file[reached.rows])
+    return found
+
+
+def check_joint(model: SpatialModel, joint: str) -> None:
+    """Raise `InputError` unless controllers can read and name the coordinates of a joint."""
+    scene = model.scene
+    record = next(each for each in scene.joint if each.name == joint)
+    if not record.units or joint not in model.tree.carried:
+        why = "at which a loop is cut" if record.units else "whose orientation is no list of coordinates"
+        raise InputError(
+            f"{scene.path}: sensor or controller: joint: expected one with coordinates, found"
+            f' "{joint}", a {record.type} joint {why}'
+        )
+    if record.type == "planar" and model.tree.nodes[model.tree.carried[joint]].backwards:
+        raise InputError(
+            f"{scene.path}: {record.label}: between: expected the side nearer to the ground first where sensors read a"
+            " planar joint, found it second"
+        )
+
+
+def _on_modes(model: SpatialModel, body: str, vector: Array) -> Array:
+    along = np.zeros(model.tree.n_v)
+    along[model.tree.nodes[model.tree.index[body]].p_v] = vector
+    return along

@@ -1,0 +1,16 @@
+"""What an analysis in space may use that knows of patches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ..mbs.analysis.spatial_run import SpatialContext
+from .patches.spatial_patches import LinkPatches
+
+
+@dataclass(frozen=True)
+class ActuatedSpatialContext(SpatialContext):
+    """With the `patches` of links by body."""
+
+    patches: Mapping[str, LinkPatches] = field(default_factory=dict)

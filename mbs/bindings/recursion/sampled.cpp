@@ -1,0 +1,109 @@
+// Motions in joint coordinates under a sampled controller: core/integrate/sampled_loop.h.
+#include "core/integrate/sampled_loop.h"
+
+#include <nanobind/stl/function.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings/recursion/tree_run.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace ffrobot;
+using namespace ffrobot::recursion;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+using Controller = std::function<VectorXd(std::size_t, double, const VectorXd &)>;
+
+// Reads (q, v, a)
+template <class Space> class Plant final : public SampledPlant {
+public:
+  Plant(const Mechanism<Space> &mechanism, RecursiveMotion<Space> &reader, HeldForces &held)
+      : reader_(reader), held_(held), n_q_(mechanism.n_q), n_v_(mechanism.n_v), read_(n_q_ + 2 * n_v_) {}
+
+  void hold(const VectorXd &u) override {
+    check_size("commands", u.size(), held_.direction().cols());
+    held_.hold(u);
+  }
+
+  VectorXd read(double t, const double *y) override {
+    read_.head(n_q_ + n_v_) = Eigen::Map<const VectorXd>(y, n_q_ + n_v_);
+    reader_.evaluate(t, y, y + n_q_, read_.data() + n_q_ + n_v_);
+    return read_;
+  }
+
+private:
+  RecursiveMotion<Space> &reader_;
+  HeldForces &held_;
+  Index n_q_, n_v_;
+  VectorXd read_;
+};
+
+template <class Space> void check_held(const Model<Space> &model, const HeldForces &held) {
+  check_size("rows of held forces", held.direction().rows(), model.mechanism.n_v);
+  for (const auto &[input, share] : held.frame_motors()) {
+    check_index("input of a motor on frames", static_cast<int>(input),
+                static_cast<std::size_t>(held.direction().cols()));
+    check_share(share, model.mechanism.n_q, model.mechanism.n_v);
+  }
+}
+
+template <class Space>
+TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                          const VectorXd &q, const VectorXd &v, const IntegrationControls &controls,
+                          const std::function<bool(double)> &carry_on, HeldForces held, const VectorXd &first_command,
+                          const std::vector<double> &samples, double delay, const Controller &controller) {
+  model.check_state(q, v);
+  check_scene(model, scene);
+  check_held(model, held);
+  check_size("first_command", first_command.size(), held.direction().cols());
+  const nb::gil_scoped_release unlocked;
+  held.hold(first_command);
+  RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data(), &held);
+  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data(), &held);
+  Plant<Space> plant(model.mechanism, reader, held);
+  const Sampling sampling{samples, delay, [&](std::size_t k, double t, const VectorXd &state) {
+                            const nb::gil_scoped_acquire locked;
+                            return controller(k, t, state);
+                          }};
+  const SampledLoop loop(plant, sampling, times.back());
+  TreeRun run(model, times.size());
+  run.last << q, v;
+  run.report = integrate(
+      motion, times, run.last, controls,
+      [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
+      [&](double t) {
+        const nb::gil_scoped_acquire locked;
+        return carry_on(t);
+      },
+      nullptr, &loop.breaks());
+  run.finish(motion);
+  return run;
+}
+
+template <class Space> void bind_sampled_motion(nb::module_ &m) {
+  m.def("tree_sampled", &sampled_motion_of<Space>, nb::kw_only(), "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a,
+        "controls"_a, "carry_on"_a, "held"_a, "first_command"_a, "samples"_a, "delay"_a, "controller"_a,
+        "As tree_motion, under commands that `controller`(k, t, (q, v, a)) gives at samples and that act as `held` "
+        "says.");
+}
+
+} // namespace
+
+void bind_tree_sampled(nb::module_ &m) {
+  nb::class_<HeldForces>(m, "HeldForces", "What a unit of each command does: see mbs/core/recursion/held_forces.h.")
+      .def(nb::init<Eigen::MatrixXd>(), "direction"_a, "Generalized forces (n_v, inputs).")
+      .def(
+          "add_frame_motor",
+          [](HeldForces &held, Index input, int q, int v, const Eigen::MatrixXd &rotation,
+             const Eigen::Vector3d &axis) {
+            check_size("rotation", rotation.rows(), 3);
+            held.add_frame_motor(input, {q, v, rotation, axis});
+          },
+          "input"_a, "q"_a, "v"_a, "rotation"_a, "axis"_a,
+          "What a motor that turns the frame of a body takes back on its modes: see core/recursion/frame_motor.h.");
+  bind_sampled_motion<Planar>(m);
+  bind_sampled_motion<Spatial>(m);
+}

@@ -1,0 +1,97 @@
+// What a motion in joint coordinates is at outputs, and what its scene has to be like.
+#pragma once
+
+#include "bindings/recursion/recursion.h"
+#include "core/integrate/integrate.h"
+#include "core/recursion/observe.h"
+
+#include <string>
+#include <vector>
+
+namespace ffrobot::recursion {
+
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+inline void check_index(const char *name, int got, std::size_t count) {
+  if (got < 0 || got >= static_cast<int>(count))
+    throw nanobind::value_error(
+        (std::string(name) + ": expected 0 to " + std::to_string(count) + " - 1, got " + std::to_string(got)).c_str());
+}
+
+inline void check_share(const FrameShare &share, int n_q, int n_v) {
+  const auto last = static_cast<int>(share.Phi_r.cols()) - 1;
+  for (const int k : {0, last}) {
+    check_index("q of a motor on frames", share.q + k, static_cast<std::size_t>(n_q));
+    check_index("v of a motor on frames", share.v + k, static_cast<std::size_t>(n_v));
+  }
+}
+
+template <class Space> void check_scene(const Model<Space> &model, const Scene &scene) {
+  check_size("targets", static_cast<Eigen::Index>(scene.targets.size()), model.rows());
+  const auto n_q = static_cast<std::size_t>(model.mechanism.n_q), n_v = static_cast<std::size_t>(model.mechanism.n_v);
+  for (const Load &load : scene.loads)
+    for (const auto &[i, share] : load.along)
+      check_index("coordinate of a load", i, n_v);
+  for (const PointLoad &load : scene.point_loads) {
+    check_index("wrench of a load", load.wrench, model.mechanism.wrenches.size());
+    check_index("component of a load", load.component, Space::dim);
+  }
+  for (const JointForce &force : scene.joint_forces)
+    check_index("q of a joint's force", force.q, n_q), check_index("v of a joint's force", force.v, n_v);
+  for (const FrameMotor &motor : scene.frame_motors)
+    check_share(motor.share, model.mechanism.n_q, model.mechanism.n_v);
+  for (const GearSpring &gear : scene.gears)
+    for (const GearSpring::Side &side : {gear.a, gear.b})
+      check_index("q of a gear", side.q, n_q), check_index("v of a gear", side.v, n_v);
+  if (scene.watch)
+    check_size("is_path", static_cast<Eigen::Index>(scene.watch->is_path.size()), model.rows());
+  for (const DrivenMarker &driven : scene.driven)
+    check_index("marker of the ground", driven.marker, model.mechanism.ground.size());
+}
+
+// As far as it got.
+struct TreeRun {
+  IntegrationReport report;
+  Eigen::VectorXd last;                         // (q, v) of the last accepted step
+  RowMajorMatrix states, accelerations, lambda; // (T, n_q + n_v), (T, n_v), (T, rows)
+  RowMajorMatrix frames;                        // (T, 6 bodies) of each body: R_ddot of its origin, alpha
+  RowMajorMatrix energy;                        // (T, 3) kinetic, strain, gravitational
+  double least_ratio = 1, singular_at = 0;      // of the scene's watch
+  Eigen::VectorXd singular_posture;
+
+  template <class Space> TreeRun(const Model<Space> &model, std::size_t count) {
+    const auto T = static_cast<Eigen::Index>(count);
+    const Eigen::Index n = model.mechanism.n_q + model.mechanism.n_v;
+    last.resize(n), states.resize(T, n), accelerations.resize(T, model.mechanism.n_v), lambda.resize(T, model.rows());
+    frames.resize(T, 6 * static_cast<Eigen::Index>(model.mechanism.nodes.size())), energy.resize(T, 3);
+  }
+
+  // All that is read off a state (q, v), into row i; `reader` evaluates it
+  template <class Space>
+  void evaluate(std::size_t output, double t, const double *state, RecursiveMotion<Space> &reader,
+                const Mechanism<Space> &mechanism) {
+    const auto i = static_cast<Eigen::Index>(output);
+    states.row(i) = Eigen::Map<const Eigen::RowVectorXd>(state, states.cols());
+    const double *q = states.row(i).data(), *v = q + mechanism.n_q;
+    reader.evaluate(t, q, v, accelerations.row(i).data());
+    lambda.row(i) = Eigen::Map<const Eigen::RowVectorXd>(reader.workspace().lambda.data(), lambda.cols());
+    Eigen::Index column = 0;
+    for (const FrameMotion &frame : frame_motions(mechanism, q, v, reader.workspace())) {
+      frames.row(i).segment<3>(column) = frame.a_origin.transpose();
+      frames.row(i).segment<3>(column + 3) = frame.alpha.transpose();
+      column += 6;
+    }
+    const Totals sum = totals(mechanism, q, v, reader.workspace());
+    energy.row(i) << sum.kinetic, sum.strain, sum.gravitational;
+  }
+
+  // What only the end of an integration tells
+  template <class Space> void finish(const RecursiveMotion<Space> &motion) {
+    least_ratio = motion.least_ratio(), singular_at = motion.singular_at();
+    singular_posture = motion.singular_posture();
+    for (auto *x : {&states, &accelerations, &lambda, &frames, &energy})
+      x->conservativeResize(static_cast<Eigen::Index>(report.outputs), Eigen::NoChange);
+  }
+};
+
+} // namespace ffrobot::recursion
