@@ -131,7 +131,7 @@ class SpatialServo:
         for k, step in enumerate(steps):
             moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
             moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
-            r = self.residuals(at.tolist(), *moved.reshape(3, -1, n)).reshape(-1, 2, n, n)
+            r = self.residuals(list(at), *moved.reshape(3, -1, n)).reshape(-1, 2, n, n)
             found.append(((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1))
         K, D, M = found
         return Derivatives(M, D, K)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import matplotlib
 import numpy as np
@@ -137,7 +138,8 @@ class SpatialPicture:
         triangles = self.scene.triangles[normals(points, self.scene.triangles) @ SPACE.viewer > 0.0]
         colors = lit(points, triangles, np.array(matplotlib.colors.to_rgb(FACE)), SPACE)
         order = np.argsort((points @ SPACE.viewer)[triangles].mean(axis=1), kind="stable")
-        self.surface.set_verts(projected(points, SPACE)[triangles[order]])
+        # An array is drawn faster than the list of corners that Matplotlib's types ask for.
+        self.surface.set_verts(cast(Sequence[Array], projected(points, SPACE)[triangles[order]]))
         self.surface.set(facecolors=colors[order], edgecolors=colors[order])
         axes, tools = self.scene.axes[k], self.scene.tools[k]
         self.lines.set_segments(list(projected(np.concatenate([axes, tools]), SPACE)))
