@@ -52,6 +52,7 @@ struct SpatialData {
   Eigen::VectorXd h_spin;
   Eigen::MatrixXd S_spin;
   Eigen::Vector3d spin_axis = Eigen::Vector3d::UnitX(), spin_booked = Eigen::Vector3d::UnitZ();
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity(); // columns: those of the modal file, where most blocks vanish
   std::vector<SpatialMarker> markers;
   Eigen::Index modes() const { return stiffness.size(); }
 };

@@ -61,9 +61,8 @@ inline void section_pose(const spatial::Body &body, int port, const spatial::Sta
     turn(constants.R, s.u_dot.data() + constants.row, turned);
     for (int i = 0; i < 3; ++i)
       v[i] += turned[i];
-    T rate[3], axes[3][3];
-    spatial::section_rate(motion, rate);
-    turn(constants.R, rate, turned);
+    T axes[3][3];
+    turn(constants.R, motion.rate, turned);
     for (int i = 0; i < 3; ++i) {
       omega[i] += turned[i];
       for (int j = 0; j < 3; ++j)

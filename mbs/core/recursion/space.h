@@ -4,7 +4,7 @@
 
 #include "core/recursion/joint/joints.h"
 #include "core/recursion/planar/body.h"
-#include "core/recursion/spatial/body.h"
+#include "core/recursion/spatial/port.h"
 
 namespace ffrobot::recursion {
 

@@ -14,6 +14,8 @@ namespace {
 
 constexpr double negligible = 1e-12; // as in mbs/model/planar_body.py
 
+constexpr int before[3] = {5, 6, 1}, after[3] = {7, 2, 3}; // m_thetaf_x = integral of u_y S_z - u_z S_y, and so on
+
 MatrixXd I_bar_of(const SpatialData &data) { return data.I_bar.size() ? data.I_bar : MatrixXd::Zero(9, data.modes()); }
 
 // With that of spin: h_s along the axis is half of it on either side of the diagonal, h_a = eps_abc I_bar_bc. What is
@@ -40,7 +42,7 @@ SpatialData moved(const SpatialData &data, const Vector3d &position, const Matri
           (data.J2 - position * data.first_moment.transpose() - data.first_moment * position.transpose() +
            data.mass * position * position.transpose()) *
           triad;
-  to.spin_axis = R * data.spin_axis, to.spin_booked = R * data.spin_booked;
+  to.spin_axis = R * data.spin_axis, to.spin_booked = R * data.spin_booked, to.axes = R * data.axes;
   if (n) {
     to.S_bar = R * data.S_bar;
     MatrixXd I_bar = I_bar_of(data);
@@ -73,132 +75,139 @@ SpatialData moved(const SpatialData &data, const Vector3d &position, const Matri
 
 Body::Body(const SpatialData &data, const std::vector<int> &used) : n(static_cast<int>(data.modes())) {
   mass = data.mass;
-  const Matrix3d spin = data.J_spin * data.spin_axis * data.spin_axis.transpose();
-  const Matrix3d inertia = data.J2.trace() * Matrix3d::Identity() - data.J2 + spin;
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < 3; ++i)
     s0[i] = data.first_moment[i];
-    for (int j = 0; j < 3; ++j)
-      E0[i][j] = data.J2(i, j), J0[i][j] = inertia(i, j);
-  }
-  const auto port_count = static_cast<int>(used.size());
-  width = 16 + 8 * std::max(port_count - 1, 0);
+  width = lanes * (1 + static_cast<int>(used.size()));
+  fill_rows(data, used, complete_I_bar(data));
+  fill_residuals(data, used);
+  fill_damping(data);
+  if (n)
+    fill_tensors(moved(data, Vector3d::Zero(), data.axes), data.axes);
+}
 
-  // Rows of W and their Gram matrix
-  const MatrixXd I = complete_I_bar(data);
-  MatrixXd rows = MatrixXd::Zero(width, n);
+// Rows of W, and ports
+void Body::fill_rows(const SpatialData &data, const std::vector<int> &used, const MatrixXd &I) {
+  MatrixXd all = MatrixXd::Zero(width, n);
   if (n) {
-    rows.topRows<3>() = data.S_bar;
-    rows.row(h) = I.row(5) - I.row(7), rows.row(h + 1) = I.row(6) - I.row(2), rows.row(h + 2) = I.row(1) - I.row(3);
+    all.topRows<3>() = data.S_bar;
+    for (int c = 0; c < 3; ++c)
+      all.row(h + c) = I.row(before[c]) - I.row(after[c]);
   }
-  for (int i = 0; i < port_count; ++i) {
-    const SpatialMarker &marker = data.markers[static_cast<std::size_t>(used[static_cast<std::size_t>(i)])];
+  for (const int marker_index : used) {
+    const SpatialMarker &marker = data.markers[static_cast<std::size_t>(marker_index)];
     Port port;
-    port.row = i == 0 ? 6 : 16 + 8 * (i - 1);
+    port.row = lanes * (1 + static_cast<int>(ports.size()));
     for (int k = 0; k < 3; ++k) {
       port.r[k] = marker.position[k];
       for (int l = 0; l < 3; ++l)
-        port.R[k][l] = marker.triad(k, l);
+        port.R[k][l] = port.turning[l][3 + k] = marker.triad(k, l);
     }
     if (n) {
-      rows.middleRows<3>(port.row) = marker.triad.transpose() * marker.Phi.topRows<3>();
-      rows.middleRows<3>(port.row + 3) = marker.triad.transpose() * marker.Phi.bottomRows<3>();
+      all.middleRows<3>(port.row) = marker.triad.transpose() * marker.Phi.topRows<3>();
+      all.middleRows<3>(port.row + 3) = marker.triad.transpose() * marker.Phi.bottomRows<3>();
       port.is_soft = marker.Phi.cwiseAbs().maxCoeff() > negligible / std::sqrt(mass);
     }
     ports.push_back(port);
   }
-  const ExtendedMatrix extended = rows.cast<long double>();
-  const ExtendedMatrix gram = n ? ExtendedMatrix(extended * extended.transpose()) : ExtendedMatrix::Zero(width, width);
-  W.assign(static_cast<std::size_t>(std::max(n, 1) * width), 0.0), G.resize(static_cast<std::size_t>(width * width));
-  for (int r = 0; r < width; ++r) {
+  W.assign(static_cast<std::size_t>(n * width), 0.0);
+  rows.assign(static_cast<std::size_t>(width * padded(n)), 0.0);
+  for (int r = 0; r < width; ++r)
     for (int k = 0; k < n; ++k)
-      W[static_cast<std::size_t>(k * width + r)] = rows(r, k);
-    for (int c = 0; c < width; ++c)
-      G[static_cast<std::size_t>(r * width + c)] = static_cast<double>(gram(r, c));
-  }
+      W[static_cast<std::size_t>(k * width + r)] = rows[static_cast<std::size_t>(r * padded(n) + k)] = all(r, k);
+}
 
-  // What elimination leaves, differences taken in extended precision
+// What elimination leaves, differences taken in extended precision
+void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used) {
+  ExtendedMatrix extended(width, n);
+  for (int r = 0; r < width; ++r)
+    for (int k = 0; k < n; ++k)
+      extended(r, k) = W[static_cast<std::size_t>(k * width + r)];
+  const ExtendedMatrix gram_ = n ? ExtendedMatrix(extended * extended.transpose()) : ExtendedMatrix::Zero(width, width);
+  G.resize(static_cast<std::size_t>(width * width));
+  for (int r = 0; r < width; ++r)
+    for (int c = 0; c < width; ++c)
+      G[static_cast<std::size_t>(r * width + c)] = static_cast<double>(gram_(r, c));
   const auto tilde = [](const Vector3d &x) {
     return (Matrix3d() << 0, -x[2], x[1], x[2], 0, -x[0], -x[1], x[0], 0).finished();
   };
+  const Matrix3d inertia =
+      data.J2.trace() * Matrix3d::Identity() - data.J2 + data.J_spin * data.spin_axis * data.spin_axis.transpose();
   Eigen::Matrix<double, 6, 6> M;
   M << mass * Matrix3d::Identity(), -tilde(data.first_moment), tilde(data.first_moment), inertia;
   for (int r = 0; r < 6; ++r)
     for (int c = 0; c < 6; ++c)
-      residual[r][c] = static_cast<double>(M(r, c) - gram(r, c));
-  for (int i = 0; i < port_count; ++i) {
-    const SpatialMarker &marker = data.markers[static_cast<std::size_t>(used[static_cast<std::size_t>(i)])];
-    Port &port = ports[static_cast<std::size_t>(i)];
+      residual[r][c] = static_cast<double>(M(r, c) - gram_(r, c));
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      J0[i][3 + j] = inertia(i, j);
+  for (std::size_t i = 0; i < ports.size(); ++i) {
+    const SpatialMarker &marker = data.markers[static_cast<std::size_t>(used[i])];
     const Matrix3d R = marker.triad.transpose();
     Eigen::Matrix<double, 6, 6> X;
     X << R, -R * tilde(marker.position), Matrix3d::Zero(), R;
     for (int r = 0; r < 6; ++r)
       for (int c = 0; c < 6; ++c)
-        port.T[r][c] = static_cast<double>(X(r, c) - gram(port.row + r, c));
+        ports[i].T[r][c] = static_cast<double>(X(r, c) - gram_(ports[i].row + r, c));
   }
-
-  K.assign(static_cast<std::size_t>(n + 8), 0.0), D = K;
-  for (int k = 0; k < n; ++k)
-    K[static_cast<std::size_t>(k)] = data.stiffness[k];
-  if (n && data.damping.size() && data.damping.cwiseAbs().maxCoeff() > 0) {
-    const bool diagonal = data.damping.cols() == 1 || data.damping.isDiagonal(0);
-    if (diagonal) {
-      is_damped = true;
-      for (int k = 0; k < n; ++k)
-        D[static_cast<std::size_t>(k)] = data.damping.cols() == 1 ? data.damping(k, 0) : data.damping(k, k);
-    } else
-      D_full = data.damping;
-  }
-  book_blocks(data, I);
 }
 
-void Body::book_blocks(const SpatialData &data, const MatrixXd &I) {
-  I_bar.assign(static_cast<std::size_t>(9 * n + 8), 0.0);
-  if (n == 0)
+void Body::fill_damping(const SpatialData &data) {
+  K.assign(static_cast<std::size_t>(padded(n)), 0.0), D = K;
+  for (int k = 0; k < n; ++k)
+    K[static_cast<std::size_t>(k)] = data.stiffness[k];
+  if (n == 0 || data.damping.size() == 0 || data.damping.cwiseAbs().maxCoeff() == 0)
     return;
+  is_damped = data.damping.cols() == 1 || data.damping.isDiagonal(0);
+  if (!is_damped)
+    D_full = data.damping;
+  else
+    for (int k = 0; k < n; ++k)
+      D[static_cast<std::size_t>(k)] = data.damping.cols() == 1 ? data.damping(k, 0) : data.damping(k, k);
+}
+
+// T_s, g_s, G_s and z_c, A_c, from data along the axes z, which are the columns of `axes`
+void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes) {
   const double reach = std::sqrt(std::max(data.J2.trace(), 1e-300) / std::max(mass, 1e-300));
-  std::array<MatrixXd, 9> blocks_;
-  std::array<int, 9> filled{};
-  for (int k = 0; k < 3; ++k)
-    for (int l = 0; l < 3; ++l) {
-      const auto slot = static_cast<std::size_t>(3 * k + l);
-      has_I_bar[slot] = I.row(3 * k + l).cwiseAbs().maxCoeff() > negligible * reach;
-      for (int i = 0; i < n; ++i)
-        I_bar[static_cast<std::size_t>((3 * k + l) * n + i)] = I(3 * k + l, i);
-      MatrixXd D_kl = data.S_bar_kl[slot].size() ? data.S_bar_kl[slot] : MatrixXd::Zero(n, n);
-      if (data.S_spin.size())
-        D_kl -= data.spin_booked[k] * data.spin_booked[l] * data.S_spin;
-      D_kl = (D_kl.array().abs() > negligible).select(D_kl, 0.0);
-      filled[slot] = static_cast<int>((D_kl.array() != 0).count());
-      blocks_[slot] = D_kl; // integral of u_k S_l: column i multiplies p_i
-    }
-  // B^kl_i = I_bar_kl,i + sum over j of (S_bar_lk)_ij p_j, for (S_bar_kl)_ji = integral of S_k,j S_l,i
-  const auto is_dense = [&](std::size_t slot) { return filled[slot] * 3 > n * n; };
-  for (std::size_t slot = 0; slot < 9; ++slot)
-    if (is_dense(slot))
-      block[slot] = blocks++;
-  dense_blocks = blocks;
-  stacked = (dense_blocks * n + 7) / 8 * 8;
-  dense.assign(static_cast<std::size_t>(stacked * n), 0.0);
-  for (std::size_t slot = 0; slot < 9; ++slot) {
-    const MatrixXd &D_kl = blocks_[slot];
-    if (filled[slot] == 0)
-      continue;
-    if (!is_dense(slot))
-      block[slot] = blocks++;
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) {
-        const double value = D_kl(j, i); // integral of S_k,j S_l,i
-        const int row = block[slot] * n + i;
-        if (is_dense(slot))
-          dense[static_cast<std::size_t>(j * stacked + row)] = value;
-        else if (value != 0)
-          sparse.push_back({row, j, value});
+  const MatrixXd I = complete_I_bar(data);
+  const auto without_spin = [&](int slot) { // transposed: column i multiplies p_i
+    const auto &given = data.S_bar_kl[static_cast<std::size_t>(slot)];
+    MatrixXd block = given.size() ? MatrixXd(given.transpose()) : MatrixXd::Zero(n, n);
+    if (data.S_spin.size())
+      block -= data.spin_booked[slot / 3] * data.spin_booked[slot % 3] * data.S_spin;
+    return block;
+  };
+  const auto cleaned = [](const MatrixXd &M) { return MatrixXd((M.array().abs() > negligible).select(M, 0.0)); };
+  for (int a = 0; a < 3; ++a)
+    for (int b = a; b < 3; ++b) {
+      const Eigen::VectorXd g = 0.5 * (I.row(3 * a + b) + I.row(3 * b + a));
+      Stretch of;
+      of.has_g = g.cwiseAbs().maxCoeff() > negligible * reach;
+      of.G = ModeMatrix(cleaned(0.5 * (without_spin(3 * a + b) + without_spin(3 * b + a))));
+      if (!of.has_g && of.G.kind == ModeMatrix::Kind::zero)
+        continue;
+      of.g.assign(static_cast<std::size_t>(padded(n)), 0.0);
+      for (int k = 0; of.has_g && k < n; ++k)
+        of.g[static_cast<std::size_t>(k)] = g[k];
+      Matrix3d T = axes.col(a) * axes.col(b).transpose();
+      if (a != b)
+        T += T.transpose().eval();
+      const Matrix3d J = T.trace() * Matrix3d::Identity() - T;
+      const auto s = stretches.size();
+      for (int i = 0; i < 3; ++i) {
+        tension[i][s] = J(i, i), tension[3 + i][s] = 2 * J(i, (i + 1) % 3);
+        for (int j = 0; j < 3; ++j)
+          of.inertia[i][3 + j] = J(i, j);
       }
-  }
+      stretches.push_back(std::move(of));
+    }
   for (int c = 0; c < 3; ++c) {
-    constexpr std::size_t plus[3] = {5, 6, 1}, minus[3] = {7, 2, 3};
-    if (filled[plus[c]] || filled[minus[c]])
-      h_moves = h_moves || (blocks_[plus[c]] - blocks_[minus[c]]).cwiseAbs().maxCoeff() > negligible;
+    Twist of;
+    of.A = ModeMatrix(cleaned(without_spin(before[c]) - without_spin(after[c])));
+    if (of.A.kind == ModeMatrix::Kind::zero)
+      continue;
+    for (int i = 0; i < 3; ++i)
+      of.axis[3 + i] = axes(i, c);
+    twists.push_back(std::move(of));
   }
 }
 

@@ -33,10 +33,8 @@ FFROBOT_INLINE void inner_section(const Mechanism<Spatial> &m, const Node<Spatia
   turn_back(parent.body.ports[port].R, p.omega, to.omega);
   product(p.absolute, parent.body.ports[port].R, to.axes);
   if (parent.body.ports[port].is_soft) {
-    T rate[3];
-    section_rate(p.ports[port], rate);
     for (int i = 0; i < 3; ++i)
-      to.omega[i] += rate[i];
+      to.omega[i] += p.ports[port].rate[i];
     to.tilt = p.ports[port].turn;
   }
 }
@@ -118,11 +116,10 @@ FFROBOT_APART void kinematics(const Mechanism<Spatial> &m, const T *q, const T *
     product(inner.axes, hinge.turn.R, s.absolute);
     if (node.inboard >= 0) { // from the section to the frame
       const spatial::PortMotion<T> &port = s.ports[node.inboard];
-      T undeformed[3], rate[3], axes[3][3], turned[3][3];
+      T undeformed[3], axes[3][3], turned[3][3];
       turn(port.turn, s.omega, undeformed);
-      spatial::section_rate(port, rate);
       for (int k = 0; k < 3; ++k)
-        undeformed[k] -= rate[k];
+        undeformed[k] -= port.rate[k];
       turn(node.body.ports[node.inboard].R, undeformed, s.omega);
       for (int k = 0; k < 3; ++k)
         for (int l = 0; l < 3; ++l)
@@ -151,11 +148,11 @@ template <class T> FFROBOT_INLINE SpatialTurn<T> inboard_tilt(const Node<Spatial
 }
 
 template <class T>
-FFROBOT_APART void evaluate_inertia(const Node<Spatial> &node, const T *p, const T *v, spatial::State<T> &s,
+FFROBOT_APART void evaluate_inertia(const Node<Spatial> &node, const T *, const T *, spatial::State<T> &s,
                                     Pack<T, 6> *M, T *b) {
-  inertia(node.body, p, v, s);
+  inertia(node.body, s);
   for (int i = 0; i < 6; ++i)
-    M[i] = s.M[i], b[i] = s.b[i];
+    M[i] = s.M[i], b[i] = s.bias[i];
 }
 
 template <bool by_multipliers, class T>

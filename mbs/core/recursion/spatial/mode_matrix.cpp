@@ -1,0 +1,34 @@
+#include "core/recursion/spatial/mode_matrix.h"
+
+namespace ffrobot::recursion::spatial {
+
+// Full where its columns take fewer operations on whole registers than its entries one by one
+ModeMatrix::ModeMatrix(const Eigen::MatrixXd &M) {
+  const int n = static_cast<int>(M.rows()), filled = static_cast<int>((M.array() != 0).count());
+  if (filled == 0)
+    return;
+  if (M.isDiagonal(0)) {
+    kind = Kind::diagonal;
+    values.assign(static_cast<std::size_t>(padded(n)), 0.0);
+    for (int i = 0; i < n; ++i)
+      values[static_cast<std::size_t>(i)] = M(i, i);
+    return;
+  }
+  kind = filled < n * padded(n) / modes_at_once ? Kind::sparse : Kind::full;
+  if (kind == Kind::full) {
+    values.assign(static_cast<std::size_t>(n * padded(n)), 0.0);
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i)
+        values[static_cast<std::size_t>(j * padded(n) + i)] = M(i, j);
+    return;
+  }
+  for (int i = 0; i < n; ++i) {
+    first.push_back(static_cast<int>(column.size()));
+    for (int j = 0; j < n; ++j)
+      if (M(i, j) != 0)
+        column.push_back(j), values.push_back(M(i, j));
+  }
+  first.push_back(static_cast<int>(column.size()));
+}
+
+} // namespace ffrobot::recursion::spatial

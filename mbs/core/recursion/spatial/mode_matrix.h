@@ -1,0 +1,93 @@
+// Matrices over the modes of a body, (n, n) and constant, kept as what they are: full, sparse or diagonal.
+//
+// Modes lie side by side in registers of eight: vectors over modes are padded with zeros to a multiple of that. Of
+// other scalars than doubles (duals) each mode goes by itself.
+#pragma once
+
+#include "core/recursion/pack.h"
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <vector>
+
+namespace ffrobot::recursion::spatial {
+
+constexpr int modes_at_once = 8;
+constexpr int padded(int n) { return (n + modes_at_once - 1) / modes_at_once * modes_at_once; }
+
+template <class T> constexpr int step = std::is_same_v<T, double> ? modes_at_once : 1;
+template <class T> using Modes = Pack<T, step<T>>; // of a vector over modes
+
+// sum += factor row, `n` numbers of a constant row
+template <int n, class T> FFROBOT_INLINE void add_scaled(const T &factor, const double *row, Pack<T, n> &sum) {
+  if constexpr (std::is_same_v<T, double>)
+    sum += factor * Pack<double, n>::read(row);
+  else
+    for (int i = 0; i < n; ++i)
+      sum.x[i] += row[i] * factor;
+}
+
+// Constants as numbers that change
+template <int n, class T> FFROBOT_INLINE Pack<T, n> constant_row(const double *x) {
+  if constexpr (std::is_same_v<T, double>)
+    return Pack<double, n>::read(x);
+  else {
+    Pack<T, n> to;
+    for (int i = 0; i < n; ++i)
+      to.x[i] = T(x[i]);
+    return to;
+  }
+}
+template <class T> FFROBOT_INLINE Modes<T> constants(const double *x) { return constant_row<step<T>, T>(x); }
+
+// Those among them that there are, `left` from here on, to where nothing is padded
+template <int n, class T> FFROBOT_INLINE void write_modes(const Pack<T, n> &x, int left, T *to) {
+  if constexpr (n == modes_at_once)
+    store_part(to, x.v, std::min(left, n));
+  else
+    to[0] = x[0];
+}
+
+struct ModeMatrix {
+  enum class Kind { zero, diagonal, sparse, full };
+  ModeMatrix() = default;
+  explicit ModeMatrix(const Eigen::MatrixXd &M);
+
+  Kind kind = Kind::zero;
+  Aligned<double> values; // full: columns, padded; diagonal: padded; sparse: row after row
+  std::vector<int> first; // sparse: of row i, first[i] … first[i + 1] - 1
+  std::vector<int> column;
+};
+
+// y = M x, both padded
+template <class T> FFROBOT_INLINE void multiply(const ModeMatrix &M, int n, const T *x, T *y) {
+  switch (M.kind) {
+  case ModeMatrix::Kind::full:
+    for (int i = 0; i < n; i += step<T>) {
+      auto sum = Modes<T>::zero();
+      const double *column = M.values.data() + i;
+      for (int k = 0; k < n; ++k, column += padded(n))
+        add_scaled(x[k], column, sum);
+      sum.write(y + i);
+    }
+    return;
+  case ModeMatrix::Kind::diagonal:
+    for (int i = 0; i < n; i += step<T>)
+      (constants<T>(M.values.data() + i) * Modes<T>::read(x + i)).write(y + i);
+    return;
+  case ModeMatrix::Kind::sparse:
+    for (int i = 0; i < n; ++i) {
+      T sum(0.);
+      for (int k = M.first[i]; k < M.first[i + 1]; ++k)
+        sum += M.values[k] * x[M.column[k]];
+      y[i] = sum;
+    }
+    return;
+  case ModeMatrix::Kind::zero:
+    for (int i = 0; i < n; ++i)
+      y[i] = T(0.);
+  }
+}
+
+} // namespace ffrobot::recursion::spatial
