@@ -14,8 +14,8 @@ from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial import SpatialResult, SpatialSolution
-from .forces import write_path
 from .control import write_loop
+from .forces import write_path
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
 from .write import write_head

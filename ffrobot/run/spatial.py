@@ -11,12 +11,10 @@ from pathlib import Path
 
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.spatial_kinds import IN_SPACE
-from ..actuation.control.spatial_linear import ActuatedSpatialContext
 from ..actuation.feasibility import Feasibility
 from ..actuation.patches.spatial_patches import LinkPatches
-from ..common.errors import SolveError, of_file
 from ..actuation.spatial_context import ActuatedSpatialContext
-from ..common.errors import of_file
+from ..common.errors import SolveError, of_file
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.operating_points import InstantAnalysis
