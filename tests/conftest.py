@@ -178,3 +178,11 @@ analysis = [{ name = "inverse", kind = "pcid", end = 0.02, output_step = 0.002 }
     done = ffrobot("solve", "scene.toml", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder
+
+
+@pytest.fixture(scope="session")
+def can_draw():
+    """Whether PyVista draws here; only a machine without it, or without OpenGL, may skip."""
+    pytest.importorskip("pyvista")
+    if not list(Path("/usr/lib").glob("*/libEGL_mesa*")):
+        pytest.skip("no EGL on this machine")

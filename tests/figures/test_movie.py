@@ -98,9 +98,9 @@ def test_gif_keeps_colours():
             assert np.abs(np.asarray(movie.convert("RGB"), dtype=int) - frame).max() <= 8
 
 
+@pytest.mark.usefixtures("can_draw")
 def test_movie_in_space_follows_the_slider(results, slider_crank, tmp_path):
     """By PyVista: the rod ends where the solver has the slider."""
-    pytest.importorskip("pyvista")
     path = tmp_path / "m.gif"
     view_movie(results, path, MovieOptions(analysis="forward", seconds=0.2, scale=1.0))
     with Image.open(path) as movie:

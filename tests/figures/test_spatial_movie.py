@@ -38,10 +38,10 @@ def orange(frame):
 
 
 @pytest.mark.parametrize("write", [write_motion, view_movie])
-def test_movie_shows_the_tool_where_it_is(arm_3r, tmp_path, write):
+def test_movie_shows_the_tool_where_it_is(arm_3r, tmp_path, write, request):
     """Pixels follow a + s (r + c x) of its place r and axis x, with one a, s, c for all frames and both directions."""
     if write is view_movie:
-        pytest.importorskip("pyvista")
+        request.getfixturevalue("can_draw")
     assert write(arm_3r.folder / "scene.results.h5", tmp_path / "m.gif", SHORT) == []
     seen = np.array([orange(frame) for frame in frames_of(tmp_path / "m.gif")])
     time = arm_3r.file["inverse/time"][()]

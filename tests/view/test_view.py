@@ -185,14 +185,6 @@ def test_same_results_give_the_same_file(solid_arm, tmp_path):
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
 
 
-@pytest.fixture(scope="module")
-def can_draw():
-    """Whether PyVista draws here; only a machine without it, or without OpenGL, may skip."""
-    pytest.importorskip("pyvista")
-    if not list(Path("/usr/lib").glob("*/libEGL_mesa*")):
-        pytest.skip("no EGL on this machine")
-
-
 @pytest.mark.usefixtures("can_draw")
 def test_picture_shows_the_arm_exaggerated(solid_arm, tmp_path, capsys):
     """In colour as exaggerated, in grey outline as it was: 1 mm of 400 mm, 60 times, is far to be seen at the tip."""
