@@ -46,7 +46,7 @@ def test_derivatives_are_those_of_evaluations(joint, loops):
 
     for derivative, by in ((found.a_q, "dq"), (found.a_v, "dv"), (found.a_f, "df")):
         expected = differences(lambda x, by=by: a(**{by: x}), tree.n_v)
-        np.testing.assert_allclose(derivative, expected, rtol=0, atol=5e-9 * max(1, np.abs(expected).max()))
+        np.testing.assert_allclose(derivative, expected, rtol=0, atol=2e-8 * max(1, np.abs(expected).max()))
     if loops:
         np.testing.assert_allclose(found.value_q, row_values(motion.model, q[None], np.zeros(1))[1][0], atol=1e-12)
         expected = differences(lambda x: system.core.measure(tree.integrate(q, x), v)[1], tree.n_v)
