@@ -85,6 +85,7 @@ def test_exaggeration_keeps_joints_shut(grids, arm_3r):
         assert largest > 0.05  # 19 times some millimetres
 
 
+@pytest.mark.usefixtures("can_draw")
 def test_picture_stands_upright(arm_3r, tmp_path):
     """The column is drawn: dark pixels one above the other, higher than it is broad; the arm goes to its right."""
     viewed = view_file(arm_3r.folder / "scene.results.h5", tmp_path, Options(time=0.0, pictures=True))
