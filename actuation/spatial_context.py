@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.spatial_run import SpatialContext
 from .patches.spatial_patches import LinkPatches
 
 
 @dataclass(frozen=True)
 class ActuatedSpatialContext(SpatialContext):
-    """With the `patches` of links by body."""
+    """With the `patches` of links by body, and the modal bodies of `links`."""
 
     patches: Mapping[str, LinkPatches] = field(default_factory=dict)
+    links: Mapping[str, ModalBody] = field(default_factory=dict)

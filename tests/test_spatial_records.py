@@ -3,6 +3,7 @@
 import copy
 import tomllib
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,10 +11,12 @@ import scene_of
 from spatial_checkpoints import CASES, load
 from spatial_scenes import checkpoint_scene
 
+from ffrobot.actuation.control.spatial_kinds import IN_SPACE
 from ffrobot.common.errors import InputError
 from ffrobot.common.key_descriptions import key_descriptions
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
+from ffrobot.scene.kinds import AnyKindInSpace
 from ffrobot.scene.load import load_scene
 from ffrobot.scene.spatial import SpatialSceneKeys, check_available, spatial_scene
 from ffrobot.schema import DIALECT
@@ -203,9 +206,9 @@ MISTAKES = {
         add("joint", **tomllib.loads(ARM)["joint"][0]),
         'joint "waist": expected one joint of this name',
     ),
-    "kind that is not there yet": (
-        add("analysis", name="where", kind="placement", placement={"body": "upper"}),
-        'analysis "where": kind: expected "pcid", .* "linear", "closed-loop" in space = "spatial", found "placement"',
+    "kind that is none": (
+        add("analysis", name="where", kind="inverse"),
+        'kind: expected .*"closed-loop".*found "inverse"',
     ),
     "what is applied by patches that are not there": (
         add("analysis", name="again", kind="forward", actuation="inverse", apply="joints+pzt"),
@@ -251,6 +254,10 @@ def test_planar_readers_refuse_scenes_in_space(tmp_path):
     path.write_text(ARM)
     with pytest.raises(InputError, match='space: expected "planar", found "spatial": scenes in space run by'):
         load_scene(path)
+
+
+def test_every_kind_in_space_has_what_runs_it():
+    assert {kind.kind_name() for kind in get_args(AnyKindInSpace)} == set(IN_SPACE)
 
 
 def test_every_key_says_what_it_means():

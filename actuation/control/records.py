@@ -219,7 +219,7 @@ class Placement(Record):
     """
 
     body: str
-    """Link with patches."""
+    """Link with patches; in space with one layout of them."""
     count: PatchCount | None = None
     """Number of patches; by default that of its [[pzt]]."""
     criterion: Literal["controllability", "voltage"] = "controllability"

@@ -9,10 +9,12 @@ from ...mbs.analysis.spatial_kinds import MECHANICAL_IN_SPACE
 from ...mbs.analysis.spatial_run import SpatialRun
 from .spatial_closed_loop import run_spatial_closed_loop
 from .spatial_linear import run_spatial_linear
+from .spatial_placement import run_spatial_placement
 
 IN_SPACE: Mapping[str, Callable[[Any, Any], SpatialRun]] = {
     **MECHANICAL_IN_SPACE,
     "linear": run_spatial_linear,
     "closed-loop": run_spatial_closed_loop,
+    "placement": run_spatial_placement,
 }
 """By `kind`; each takes an `ActuatedSpatialContext` and the record of its kind: that of planar scenes, or its like."""

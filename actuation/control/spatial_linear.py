@@ -9,7 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mbs._core import TimeFunction
-from ...mbs.analysis.operating_points import row_at
+from ...mbs.analysis.operating_points import InstantAnalysis, row_at
 from ...mbs.analysis.spatial_run import SpatialRun, without_paths
 from ...mbs.analysis.spatial_static import run_spatial_static
 from ...mbs.model.spatial_model import SpatialModel, SpatialRow
@@ -25,9 +25,14 @@ from .linear_model import LinearModel, state_space
 
 def run_spatial_linear(context: ActuatedSpatialContext, analysis: Linear) -> SpatialRun:
     """The posture or instants that it is about, with `LinearModels`. Raises `SolveError` in singular postures."""
-    source = None if analysis.source is None else context.runs[analysis.source]
-    run = _equilibrium(context, analysis) if source is None else _instants(context.model, analysis, source)
+    run = operating_points_in_space(context, analysis)
     return replace(run, details=linear_models_in_space(context, analysis, run))
+
+
+def operating_points_in_space(context: ActuatedSpatialContext, analysis: InstantAnalysis) -> SpatialRun:
+    """The equilibrium, or the instants of a motion, that an analysis is about."""
+    source = None if analysis.source is None else context.runs[analysis.source]
+    return _equilibrium(context, analysis) if source is None else _instants(context.model, analysis, source)
 
 
 def linear_models_in_space(context: ActuatedSpatialContext, analysis: Linear, run: SpatialRun) -> LinearModels:
@@ -49,7 +54,7 @@ def _equilibrium(context: ActuatedSpatialContext, analysis: Analysis) -> Spatial
     return run_spatial_static(context, analysis)
 
 
-def _instants(model: SpatialModel, analysis: Linear, source: SpatialRun) -> SpatialRun:
+def _instants(model: SpatialModel, analysis: InstantAnalysis, source: SpatialRun) -> SpatialRun:
     rows = [row_at(model.scene.path, analysis, source, float(t)) for t in analysis.times]
     return replace(source.rows(rows), analysis=analysis, steps=0, evaluations=0, warnings=(), again=None)
 

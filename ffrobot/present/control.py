@@ -10,7 +10,7 @@ from rich.table import Table
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.metrics import Metrics
-from ..actuation.control.placement import Placed
+from ..actuation.control.placing import Placed
 from ..mbs.analysis.outcome import Details
 from .tables import plain_table
 

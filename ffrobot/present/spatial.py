@@ -56,6 +56,8 @@ def print_spatial_summary(
     for one in verdict.analyses:
         if one.answer:
             notes.add_row("verdict", f"{one.name}: {one.answer}")
+        for text in (*([one.margins] if one.margins else []), *(f"to try: {text}" for text in one.advice)):
+            notes.add_row("", f"{one.name}: {text}")
     for line in control_lines(details):
         notes.add_row("linear", line)
     for note in solution.path_notes:

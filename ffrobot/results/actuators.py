@@ -8,7 +8,7 @@ from dataclasses import MISSING, fields
 import h5py
 import numpy as np
 
-from ..actuation.control.placement import Placed
+from ..actuation.control.placing import Placed
 from ..actuation.feasibility import Feasibility
 from ..actuation.motors import MotorFeasibility
 from ..actuation.patches.patches import PatchArray
@@ -18,7 +18,6 @@ from ..actuation.points import PointForces, PointSet
 from ..actuation.prediction import Unsupplied
 from ..actuation.spatial_feasibility import UnsuppliedInSpace
 from ..common.arrays import Array
-from ..mbs.analysis.outcome import Outcome
 from ..run.solution import AnalysisResult, Solution
 
 
@@ -110,7 +109,7 @@ def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces
     group.attrs["condition_number"] = forces.condition_number
 
 
-def write_placement(group: h5py.Group, outcome: Outcome, placed: Placed) -> None:
+def write_placement(group: h5py.Group, placed: Placed) -> None:
     """Of an analysis: placement/, with the patches found and those spread evenly.
 
     What each reaches, and what one patch would reach anywhere.

@@ -9,11 +9,13 @@ import numpy as np
 
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.loop_record import LoopRecord
+from ..actuation.control.placing import Placed
 from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial import SpatialResult, SpatialSolution
+from .actuators import write_placement
 from .control import write_loop
 from .forces import write_path
 from .linear import write_spatial_linear
@@ -59,6 +61,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     _write_joints(group, result)
     if isinstance(run.details, LoopRecord):
         write_loop(group, run.details)
+    if isinstance(run.details, Placed):
+        write_placement(group, run.details)
     for trajectory in motion.followed:
         entry = group.create_group(f"trajectories/{trajectory.name}")
         entry["force"] = motion.path_force(trajectory.name)

@@ -11,7 +11,7 @@ import h5py
 
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.loop_record import LoopRecord
-from ..actuation.control.placement import Placed
+from ..actuation.control.placing import Placed
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.files import write_atomically
 from ..common.version import program_version
@@ -33,7 +33,7 @@ DETAILS: dict[type[Details], Callable[[h5py.Group, Outcome, Any], None]] = {
     InvertedPath: write_inversion,
     LinearModels: write_linear,
     LoopRecord: lambda group, _outcome, record: write_loop(group, record),
-    Placed: write_placement,
+    Placed: lambda group, _outcome, placed: write_placement(group, placed),
 }
 """What writes to the group of an analysis that which only its kind finds."""
 

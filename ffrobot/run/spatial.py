@@ -202,7 +202,7 @@ def _context(
 
     runs = {name: result.run for name, result in results.items()}
     supply = partial(supplied_by_patches, solution.patches)
-    return ActuatedSpatialContext(solution.model, runs, progress, supply, solution.patches)
+    return ActuatedSpatialContext(solution.model, runs, progress, supply, solution.patches, solution.links)
 
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:

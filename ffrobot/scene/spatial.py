@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.patches.spatial_records import SpatialPztLayout
 from ..common.arrays import Array
 from ..common.errors import InputError
@@ -201,8 +200,6 @@ def _not_available_of(analysis: AnyKindInSpace, scene: SpatialSceneKeys) -> Iter
     """Keys of an analysis that ask for what is not there yet, and what was expected and found."""
     apply = getattr(analysis, "apply", None)
     not_yet = "which is not available there yet"
-    if analysis.kind not in IN_SPACE:
-        yield "kind", f'{quoted(IN_SPACE)} in space = "spatial", found "{analysis.kind}", {not_yet}'
     if analysis.is_checked:
         yield "check", 'none in space = "spatial", found it: not available yet'
     if apply not in (None, *APPLICABLE):

@@ -8,7 +8,8 @@ from mechanisms import make_model, revolute
 from scipy.linalg import solve_continuous_lyapunov
 
 from ffrobot.actuation.control.linear_model import linear_model
-from ffrobot.actuation.control.placement import held_modes, place
+from ffrobot.actuation.control.placement import patchable_link
+from ffrobot.actuation.control.placing import held_modes, place
 from ffrobot.actuation.control.records import Placement
 from ffrobot.actuation.patches.patches import patch_array
 from ffrobot.actuation.patches.records import PztLayout
@@ -40,12 +41,13 @@ def layout(**keys):
 def placed(arm, count, F_p=None, **keys):
     modal, planar, model = arm
     wanted = Placement(body="arm", count=count, **keys)
-    return place(SCENE, wanted, layout(count=count), modal, planar, None if F_p is not None else model, F_p)
+    link = patchable_link(SCENE, layout(count=count), modal, planar)
+    return place(SCENE, wanted, link, None if F_p is not None else model, F_p)
 
 
 def test_held_modes_are_those_of_the_clamped_link(arm):
-    _, planar, model = arm
-    reach = held_modes(model, planar, 3)
+    modal, planar, model = arm
+    reach = held_modes(model, patchable_link(SCENE, layout(count=1), modal, planar), 3)
     np.testing.assert_allclose(reach.frequency, np.sqrt(planar.stiffness[:3]) / (2 * np.pi), rtol=1e-9)
     np.testing.assert_allclose(reach.share, 1.0, rtol=1e-9)
 

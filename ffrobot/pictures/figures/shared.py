@@ -40,6 +40,13 @@ def tip_error_figures(results: Results) -> Iterator[FigureRecord]:
         )
 
 
+def placement_figures(results: Results, analysis: str) -> Iterator[FigureRecord]:
+    """Where the patches are that an analysis found, if it sought any."""
+    if results.has(f"{analysis}/placement"):
+        name, title = file_name("placement", analysis), f"patches, {analysis}"
+        yield FigureRecord(name=name, title=title, kind="placement", analysis=analysis)
+
+
 def joint_figures(results: Results) -> Iterator[FigureRecord]:
     """Coordinates, moments, moments over speed, and size of the reaction, of every joint."""
     for joint in members(results, "joints"):

@@ -14,6 +14,7 @@ from .shared import (
     file_name,
     joint_figures,
     moving_configurations,
+    placement_figures,
     response_figures,
     tip_error_figures,
     voltage_figures,
@@ -44,6 +45,7 @@ def spatial_figures(results: Results) -> tuple[FigureRecord, ...]:
 
 def _responses(results: Results) -> Iterator[FigureRecord]:
     for analysis in results.analyses:
+        yield from placement_figures(results, analysis)
         if results.has(f"{analysis}/linear"):
             yield from response_figures(results, analysis)
 

@@ -16,6 +16,7 @@ from .shared import (
     joint_figures,
     members,
     moving_configurations,
+    placement_figures,
     response_figures,
     tip_error_figures,
     voltage_figures,
@@ -134,9 +135,7 @@ def _stress_points(results: Results, body: str) -> list[str]:
 def _linear(results: Results) -> Iterator[FigureRecord]:
     """Places of patches, mode shapes of the robot, and responses."""
     for analysis in results.analyses:
-        if results.has(f"{analysis}/placement"):
-            name, title = file_name("placement", analysis), f"patches, {analysis}"
-            yield FigureRecord(name=name, title=title, kind="placement", analysis=analysis)
+        yield from placement_figures(results, analysis)
         if not results.has(f"{analysis}/linear"):
             continue
         yield FigureRecord(

@@ -1,0 +1,63 @@
+"""Where patches on a link in space do most: the analysis `kind = "placement"` there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.errors import InputError
+from ...mbs.analysis.spatial_replay import motor_forces_of
+from ...mbs.analysis.spatial_run import SpatialRun, without_paths
+from ...mbs.solve.spatial_linearisation import SpatialLinearisation
+from ..patches.patches import PatchArray
+from ..patches.spatial_patches import link_patches
+from ..patches.spatial_records import SpatialPztLayout
+from ..spatial_context import ActuatedSpatialContext
+from .linear_model import state_space
+from .placement import PatchPlacement
+from .placing import PatchableLink, elsewhere, place
+from .spatial_linear import operating_points_in_space
+
+
+def run_spatial_placement(context: ActuatedSpatialContext, analysis: PatchPlacement) -> SpatialRun:
+    """The operating point, or those of the path, with what was `Placed`.
+
+    Raises `InputError` for a link with several layouts, or without room for the patches.
+    """
+    model, wanted = context.model, analysis.placement
+    link = _link(context, wanted.body)
+    if analysis.is_over_path:
+        assert analysis.source is not None
+        source = context.runs[analysis.source]
+        run = replace(source, analysis=analysis, steps=0, evaluations=0, warnings=(), again=None)
+        reached = context.patches[wanted.body].modes[link.layout.label]
+        F_p = reached.forces(motor_forces_of(source).modal[wanted.body])
+        return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
+    run, free = operating_points_in_space(context, analysis), without_paths(model)
+    at = SpatialLinearisation(free, run.q[0]).at(float(run.time[0]), run.q[0], run.v[0], run.a[0])
+    return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None))
+
+
+def _link(context: ActuatedSpatialContext, name: str) -> PatchableLink:
+    """By the coordinates that its layout reaches; patches elsewhere reach the same."""
+    path, of_link, body = context.model.scene.path, context.patches[name], context.links[name]
+    spatial = context.model.tree.nodes[context.model.tree.index[name]].body
+    if len(of_link.arrays) > 1:
+        raise InputError(
+            f'{path}: placement.body: expected a link with one layout of patches in space, found "{name}" with'
+            f" {len(of_link.arrays)}"
+        )
+    ((label, array),) = of_link.arrays.items()
+    reached, layout = of_link.modes[label], array.layout
+    assert isinstance(layout, SpatialPztLayout)
+
+    def patches(**changes: object) -> PatchArray:
+        keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None} | changes
+        found = link_patches(path, [layout.model_copy(update=elsewhere(layout, keys))], body, spatial)
+        if not np.array_equal(found.modes[label].rows, reached.rows):
+            raise InputError(f'{path}: placement.body: expected patches that reach the modes of "{label}"')
+        return found.arrays[label]
+
+    own = np.linalg.solve(reached.T, spatial.modal_transform[reached.rows])
+    return PatchableLink(name, body.length, layout, reached.stiffness, reached.served, own, patches)
