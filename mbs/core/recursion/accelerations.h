@@ -43,7 +43,7 @@ inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<
         inward_pin<T, W>(m, *node, q, v, forces, w, S, gamma);
         continue;
       }
-    inward<Space, T, W>(m, *node, q, v, forces, w, S);
+    inward<Space, T, W>(m, *node, q, v, forces, w, S, gamma);
   }
   Cols y = Cols::zero();
   y.set(0, T(1.));
@@ -71,13 +71,13 @@ inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<
 }
 
 // `call` with the number of columns as a constant
-template <class T, class F> FFROBOT_INLINE void with_columns(int columns, const F &call) {
+template <class Space, class T, class F> FFROBOT_INLINE void with_columns(int columns, const F &call) {
   if constexpr (std::is_same_v<T, double>)
     switch (columns) {
     case 1:
       return call(std::integral_constant<int, 1>());
-    case 3:
-      return call(std::integral_constant<int, 3>());
+    case Space::linear + 1:
+      return call(std::integral_constant<int, Space::linear + 1>());
     case 7:
       return call(std::integral_constant<int, 7>());
     }
@@ -87,7 +87,7 @@ template <class T, class F> FFROBOT_INLINE void with_columns(int columns, const 
 template <class Space, class T>
 void accelerations(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
                    Workspace<Space, T> &w, T *a) {
-  with_columns<T>(w.columns, [&](auto W) { run<Space, T, W>(m, q, v, forces, target, w, a); });
+  with_columns<Space, T>(w.columns, [&](auto W) { run<Space, T, W>(m, q, v, forces, target, w, a); });
 }
 
 template <class Space, class T>
@@ -98,8 +98,8 @@ void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspac
   for (std::size_t r = 0; r < w.active.size(); ++r)
     w.y[r + 1] = residual[w.active[r]];
   solve_again(w.factor.data(), count, w.y.data() + 1);
-  with_columns<T>(w.columns,
-                  [&](auto W) { release_all<true, Space, T, W>(m, q, Pack<T, W>::read(w.y.data()), w, dq); });
+  with_columns<Space, T>(w.columns,
+                         [&](auto W) { release_all<true, Space, T, W>(m, q, Pack<T, W>::read(w.y.data()), w, dq); });
 }
 
 template <class Space, class T>
@@ -124,7 +124,8 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
   const int needed = static_cast<int>(m.rows.size()) + 1;
   columns = most_columns;
   if constexpr (std::is_same_v<T, double>)
-    columns = *std::find_if(std::begin(column_counts), std::end(column_counts) - 1, [&](int c) { return c >= needed; });
+    columns = *std::find_if(std::begin(column_counts<Space>), std::end(column_counts<Space>) - 1,
+                            [&](int c) { return c >= needed; });
   if (m.rows.size() > static_cast<std::size_t>(most_rows))
     throw std::invalid_argument("rows: expected at most " + std::to_string(most_rows) + ", got " +
                                 std::to_string(m.rows.size()));
@@ -153,6 +154,7 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
     for (int k = 0; k < d; ++k) {
       hinge.c[k] = hinge.A[k] = T(0.);
       hinge.Lambda[k] = hinge.U[k] = Pack<T, d>::zero();
+      std::fill(std::begin(hinge.column[k]), std::end(hinge.column[k]), T(0.));
     }
     for (int k = 0; k < Space::linear; ++k)
       hinge.r[k] = hinge.r_dot[k] = T(0.);

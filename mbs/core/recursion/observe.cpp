@@ -48,11 +48,12 @@ Inertia inertia_of(const planar::Body &b, const double *p, const double *v, plan
 
 Inertia inertia_of(const spatial::Body &b, const double *, const double *, spatial::State<double> &s) {
   Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero()};
-  inertia(b, s);
+  spatial::FrameTerms<double> frame;
+  inertia(b, s, frame);
   to.s = vector(s.s);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      to.J(i, j) = s.J[i][3 + j];
+      to.J(i, j) = frame.J[i][3 + j];
   if (b.n) {
     to.S_p_dot = vector(s.u_dot.data()), to.h_p_dot = vector(s.h_rate);
   }

@@ -57,7 +57,7 @@ inline void release_joint(const Node<Space> &node, const T *q, const Hinge<Space
     a[k] = x[k];
 }
 
-// Forces f on ports and their accelerations, the last eliminated first
+// Accelerations of ports and forces f on those that modes move, the last eliminated first
 template <class Space, class T, int W>
 inline void release_ports(const Mechanism<Space> &m, const Node<Space> &node, bool by_multipliers,
                           Workspace<Space, T> &w, const Pack<T, W> &y, const T *A) {
@@ -77,26 +77,21 @@ inline void release_ports(const Mechanism<Space> &m, const Node<Space> &node, bo
           for (int i = 0; i < d; ++i)
             X_A[i] += Kf[i];
         }
-    T Y[d];
-    const bool loaded = m.children[node.first_port + k] >= 0;
-    if (loaded)
-      multiply<d, T>(port.Y, X_A, Y);
-    for (int i = 0; i < d; ++i) {
-      port.f[i] = -answer<Space, T, W>(w, node.port_slot(k) + i, y);
-      if (loaded)
-        port.f[i] -= Y[i];
+    auto moved = Pack<T, d>::zero();
+    if (node.body.ports[k].is_soft) { // of others nobody asks for f
+      auto held = moved;
+      if (m.children[node.first_port + k] >= 0)
+        held = symmetric_product<d, T>(port.Y, X_A);
+      for (int i = 0; i < d; ++i)
+        port.f[i] = -(answer<Space, T, W>(w, node.port_slot(k) + i, y) + held[i]);
+      moved = symmetric_product<d, T>(port.G, port.f);
     }
-    T G_f[d];
-    if (node.body.ports[k].is_soft)
-      multiply<d, T>(port.G, port.f, G_f);
     for (int i = 0; i < d; ++i) {
-      port.A[i] = X_A[i];
+      port.A[i] = X_A[i] + moved[i];
       if (n > 1)
         port.A[i] += (Pack<T, W>::read(w.bias.data() + ((node.first_port + k) * d + i) * stride) * y).sum();
       else if (!by_multipliers)
         port.A[i] += port.beta[i];
-      if (node.body.ports[k].is_soft)
-        port.A[i] += G_f[i];
     }
   }
 }

@@ -59,6 +59,14 @@ template <int d, class T> FFROBOT_INLINE void multiply(const Pack<T, d> *M, cons
   }
 }
 
+// y = M x, M symmetric, as a row
+template <int d, class T> FFROBOT_INLINE Pack<T, d> symmetric_product(const Pack<T, d> *M, const T *x) {
+  Pack<T, d> y = x[0] * M[0];
+  for (int i = 1; i < d; ++i)
+    y += x[i] * M[i];
+  return y;
+}
+
 // The inverse of a symmetric positive definite matrix, in its place (Gauss and Jordan)
 template <int d, class T> FFROBOT_APART void invert(Pack<T, d> *M) {
   for (int k = 0; k < d; ++k) {

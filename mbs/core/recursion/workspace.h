@@ -9,8 +9,9 @@
 namespace ffrobot::recursion {
 
 // Columns side by side: 0 is what acts without constraints, column r what a unit of multiplier r does. Sizes that are
-// compiled; where there are fewer rows the rest is zero. Of other scalars than doubles the largest alone.
-constexpr int column_counts[] = {1, 3, 7, 16};
+// compiled (the first with a row: of a point); where there are fewer rows the rest is zero. Of other scalars than
+// doubles the largest alone.
+template <class Space> constexpr int column_counts[] = {1, Space::linear + 1, 7, 16};
 constexpr int most_columns = 16;
 constexpr int most_rows = 15;
 
@@ -22,6 +23,7 @@ template <class Space, class T> struct Hinge {
   T r[Space::linear], r_dot[Space::linear]; // origin of the section from the port's, and its rate
   T c[d];                                   // acceleration by velocities
   Pack<T, d> Lambda[d];                     // what the port feels: f = Lambda A + bias
+  T column[d][packed<T, d>];                // force of 1 along each axis of the section, in axes of the port
   Pack<T, d> U[d];                          // by freedoms, the last eliminated first
   T D_inverse[d];
   T A[d];    // of the section
@@ -35,7 +37,7 @@ template <class Space, class T> struct PortWork {
   Pack<T, d> X[d], G[d], Y[d]; // A_port = X A + beta + G f; f = -Y (X A + …) - …
   T beta[d];
   T A[d]; // axes of the undeformed section
-  T f[d]; // on the body, by what hangs there and by rows
+  T f[d]; // on the body, by what hangs there and by rows; where modes move the port
   // of a port in the plane that passes forces only
   T Lambda_xx, Lambda_xy, Lambda_yy, Y_xx, Y_xy, Y_yy, X_xa, X_ya, beta_x, beta_y;
 };
@@ -51,7 +53,7 @@ template <class Space, class T> struct Workspace {
   static constexpr int d = Space::dim;
   explicit Workspace(const Mechanism<Space> &m);
 
-  int columns; // entry of column_counts; most_columns of other scalars than doubles
+  int columns; // one of column_counts; most_columns of other scalars than doubles
   std::vector<typename Space::template State<T>> bodies;
   std::vector<Hinge<Space, T>> hinges;
   Aligned<PortWork<Space, T>> ports;

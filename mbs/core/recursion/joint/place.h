@@ -3,7 +3,8 @@
 //
 // Axes of a joint are those of the two triads, equal where its coordinates are zero. It leaves free single components
 // of (a, alpha), the acceleration of the outer section in that section's own axes (`Freedoms`); universal and screw
-// joints, whose free directions are not axes, first go to coordinates in which they are (`eliminate` in articulated.h).
+// joints, whose free directions are not axes, first go to coordinates in which they are (`eliminate_joint` in
+// joint_elimination.h).
 #pragma once
 
 #include "core/recursion/small.h"
@@ -29,6 +30,7 @@ struct JointShape {
   int quaternion; // its first entry among the q of the joint; -1 without
   Freedoms freedoms;
   bool in_inner_axes = false; // translations are along axes of the inner section, not of the outer one
+  bool free_are_axes = true;  // what is free is an axis of the outer section
 };
 
 // Of the outer section: turned by R (cosine, sine of it in the plane), its origin at r from the inner one's; relative

@@ -5,7 +5,7 @@
 #include "core/recursion/joint/place.h"
 namespace ffrobot::recursion {
 struct Universal {
-  static constexpr JointShape spatial{2, 2, -1, {3, 4}};
+  static constexpr JointShape spatial{2, 2, -1, {3, 4}, false, false};
   template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, SpatialPlace<T> &to) {
     T sa, ca, sb, cb;
     sine_and_cosine(q[0], sa, ca);

@@ -96,6 +96,11 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
         hinge.r[k] = to.r[k], hinge.r_dot[k] = to.r_dot[k];
       hinge.c[0] = -(oo * to.r[0]) - o2 * to.r_dot[1], hinge.c[1] = o2 * to.r_dot[0] - oo * to.r[1], hinge.c[2] = T(0.);
     }
+    if (!node.is_pin) {
+      hinge.column[0][0] = cosine, hinge.column[0][1] = sine, hinge.column[0][2] = -hinge.r[1];
+      hinge.column[1][0] = -sine, hinge.column[1][1] = cosine, hinge.column[1][2] = hinge.r[0];
+      hinge.column[2][2] = T(1.);
+    }
     if (node.inboard >= 0) { // from the section to the frame
       T c, n;
       sine_and_cosine(section_angle(node.body, node.inboard, s), n, c);

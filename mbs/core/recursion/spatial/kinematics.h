@@ -94,6 +94,22 @@ inline void turn_any(const Node<Spatial> &node, const InnerSection<T> &inner, co
   }
 }
 
+// Forces and moments of 1 along the axes of the section, in axes of the port
+template <class T> FFROBOT_INLINE void force_columns(const Node<Spatial> &node, Hinge<Spatial, T> &hinge) {
+  const auto &R = hinge.turn.R;
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k)
+      hinge.column[i][k] = hinge.column[3 + i][3 + k] = R[k][i];
+  if (node.joint == JointKind::revolute) // its axis goes through the port
+    return;
+  const T *r = hinge.r;
+  for (int i = 0; i < 3; ++i) { // r x e_i = r_k e_j - r_j e_k
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    for (int l = 0; l < 3; ++l)
+      hinge.column[i][3 + l] = r[k] * R[l][j] - r[j] * R[l][k];
+  }
+}
+
 } // namespace spatial
 
 template <class T>
@@ -113,6 +129,7 @@ FFROBOT_APART void kinematics(const Mechanism<Spatial> &m, const T *q, const T *
       spatial::turn_any(node, inner, q + node.q, v + node.v, hinge, s.omega);
     if (node.rotor_inertia > 0)
       spatial::spin_rotor(node, v[node.v], s.omega, hinge);
+    spatial::force_columns(node, hinge);
     product(inner.axes, hinge.turn.R, s.absolute);
     if (node.inboard >= 0) { // from the section to the frame
       const spatial::PortMotion<T> &port = s.ports[node.inboard];
@@ -150,9 +167,10 @@ template <class T> FFROBOT_INLINE SpatialTurn<T> inboard_tilt(const Node<Spatial
 template <class T>
 FFROBOT_APART void evaluate_inertia(const Node<Spatial> &node, const T *, const T *, spatial::State<T> &s,
                                     Pack<T, 6> *M, T *b) {
-  inertia(node.body, s);
+  spatial::FrameTerms<T> found;
+  inertia(node.body, s, found);
   for (int i = 0; i < 6; ++i)
-    M[i] = s.M[i], b[i] = s.bias[i];
+    M[i] = found.M[i], b[i] = found.bias[i];
 }
 
 template <bool by_multipliers, class T>

@@ -60,33 +60,57 @@ struct ModeMatrix {
   std::vector<int> column;
 };
 
-// y = M x, both padded
-template <class T> FFROBOT_INLINE void multiply(const ModeMatrix &M, int n, const T *x, T *y) {
+// Rows `first` … of y_c = M x_c, M full by columns `stride` apart, for `count` vectors at once
+template <int blocks, int count, class T>
+FFROBOT_INLINE void full_rows(const double *column, int stride, int n, const T *const (&x)[count], T *const (&y)[count],
+                              int first) {
+  Modes<T> sum[count][blocks];
+  for (auto &of : sum)
+    for (auto &block : of)
+      block = Modes<T>::zero();
+  column += first;
+  for (int k = 0; k < n; ++k, column += stride)
+    for (int c = 0; c < count; ++c)
+      for (int i = 0; i < blocks; ++i)
+        add_scaled(x[c][k], column + i * step<T>, sum[c][i]);
+  for (int c = 0; c < count; ++c)
+    for (int i = 0; i < blocks; ++i)
+      sum[c][i].write(y[c] + first + i * step<T>);
+}
+template <int count, class T>
+FFROBOT_INLINE void full_product(const double *columns, int stride, int rows, int n, const T *const (&x)[count],
+                                 T *const (&y)[count]) {
+  int first = 0;
+  for (; first + step<T> < rows; first += 2 * step<T>)
+    full_rows<2, count, T>(columns, stride, n, x, y, first);
+  if (first < rows)
+    full_rows<1, count, T>(columns, stride, n, x, y, first);
+}
+
+// y_c = M x_c, all padded
+template <int count, class T>
+FFROBOT_INLINE void multiply(const ModeMatrix &M, int n, const T *const (&x)[count], T *const (&y)[count]) {
   switch (M.kind) {
   case ModeMatrix::Kind::full:
-    for (int i = 0; i < n; i += step<T>) {
-      auto sum = Modes<T>::zero();
-      const double *column = M.values.data() + i;
-      for (int k = 0; k < n; ++k, column += padded(n))
-        add_scaled(x[k], column, sum);
-      sum.write(y + i);
-    }
-    return;
+    return full_product<count, T>(M.values.data(), padded(n), n, n, x, y);
   case ModeMatrix::Kind::diagonal:
     for (int i = 0; i < n; i += step<T>)
-      (constants<T>(M.values.data() + i) * Modes<T>::read(x + i)).write(y + i);
+      for (int c = 0; c < count; ++c)
+        (constants<T>(M.values.data() + i) * Modes<T>::read(x[c] + i)).write(y[c] + i);
     return;
   case ModeMatrix::Kind::sparse:
-    for (int i = 0; i < n; ++i) {
-      T sum(0.);
-      for (int k = M.first[i]; k < M.first[i + 1]; ++k)
-        sum += M.values[k] * x[M.column[k]];
-      y[i] = sum;
-    }
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < count; ++c) {
+        T sum(0.);
+        for (int k = M.first[i]; k < M.first[i + 1]; ++k)
+          sum += M.values[k] * x[c][M.column[k]];
+        y[c][i] = sum;
+      }
     return;
   case ModeMatrix::Kind::zero:
-    for (int i = 0; i < n; ++i)
-      y[i] = T(0.);
+    for (int i = 0; i < n; i += step<T>)
+      for (int c = 0; c < count; ++c)
+        Modes<T>::zero().write(y[c] + i);
   }
 }
 

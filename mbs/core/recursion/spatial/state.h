@@ -15,10 +15,7 @@ template <class T> struct State {
   T omega[3];             // body axes
   T A[6];                 // of the last evaluation
   T s[3];                 // first moment
-  Pack<T, 6> J[3];        // inertia, in the place of alpha
   T h_rate[3];            // m_thetaf p_dot
-  Pack<T, 6> M[6];        // M_rr - m m^T
-  T bias[6];              // -(Q_r - m Q_f)
   Aligned<T> p, v;        // padded, as all vectors over modes
   Aligned<T> Q_f;         // modal forces
   Aligned<T> b;           // b_s, one after the other

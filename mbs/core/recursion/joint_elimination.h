@@ -1,0 +1,132 @@
+// Inward through a joint: its freedoms leave the inertia of what it carries.
+#pragma once
+
+#include "core/recursion/columns.h"
+#include "core/recursion/planar/kinematics.h"
+#include "core/recursion/spatial/kinematics.h"
+
+namespace ffrobot::recursion {
+
+// In axes of the cross of a universal joint, and back: x and z turn about y
+template <class T, class X> FFROBOT_INLINE void to_cross(const Hinge<Spatial, T> &h, X *x) {
+  for (const int k : {0, 3}) {
+    const X u = h.cross_cosine * x[k] + h.cross_sine * x[k + 2], v = h.cross_cosine * x[k + 2] - h.cross_sine * x[k];
+    x[k] = u, x[k + 2] = v;
+  }
+}
+template <class T, class X> FFROBOT_INLINE void from_cross(const Hinge<Spatial, T> &h, X *x) {
+  for (const int k : {0, 3}) {
+    const X u = h.cross_cosine * x[k] - h.cross_sine * x[k + 2], v = h.cross_cosine * x[k + 2] + h.cross_sine * x[k];
+    x[k] = u, x[k + 2] = v;
+  }
+}
+
+// Symmetric matrix of rows, from both sides
+template <class F, int d, class T> FFROBOT_INLINE void both_sides(const F &change, Pack<T, d> *M) {
+  change(M);
+  for (int i = 0; i < d; ++i) {
+    T x[d];
+    for (int j = 0; j < d; ++j)
+      x[j] = M[i][j];
+    change(x);
+    for (int j = 0; j < d; ++j)
+      M[i].set(j, x[j]);
+  }
+}
+
+// One freedom along component f: row and column of M leave, with what the rotor on the inner section adds.
+template <class Space, class T, int W>
+FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, const T *force, Hinge<Space, T> &hinge,
+                                      const Mechanism<Space> &m, Workspace<Space, T> &w, Pack<T, Space::dim> *M,
+                                      Pack<T, W> *H, Pack<T, W> (&S)[W]) {
+  constexpr int d = Space::dim, stride = stride_of(W);
+  using Cols = Pack<T, W>;
+  const int f = node.shape.freedoms.component[freedom];
+  Cols applied = Cols::zero(); // force along the freedom
+  if (force)
+    applied.set(0, force[freedom]);
+  if (node.has_rows)
+    for (std::size_t r = 0; r < w.active.size(); ++r) {
+      const Row &row = m.rows[w.active[r]];
+      if (row.node >= 0 && &m.nodes[row.node] == &node && row.freedom == freedom)
+        applied.set(static_cast<int>(r) + 1, T(-1.));
+    }
+  const Cols su = H[f] - applied;
+  Pack<T, d> &U = hinge.U[freedom];
+  U = M[f];
+  const double J = node.rotor_inertia, N = node.gear_ratio;
+  const T M_ff = M[f][f], D = J > 0 ? M_ff + N * N * J : M_ff;
+  hinge.D_inverse[freedom] = T(1.) / D;
+  const Cols sd = hinge.D_inverse[freedom] * su;
+  sd.write(w.answer.data() + node.joint_slot(freedom) * stride);
+  if (W > 1)
+    gain(S, sd, su);
+  for (int j = 0; j < d; ++j) {
+    const T U_j = U[j];
+    if (j != f) {
+      M[j] -= (U_j * hinge.D_inverse[freedom]) * U;
+      M[j].set(f, J > 0 ? T(U_j * (N * (N - 1) * J) * hinge.D_inverse[freedom]) : T(0.));
+      H[j] -= U_j * sd;
+    }
+  }
+  if (J > 0) {
+    M[f] = (N * (N - 1) * J * hinge.D_inverse[freedom]) * U;
+    M[f].set(f, M_ff * ((N - 1) * (N - 1) * J) * hinge.D_inverse[freedom]);
+    U.set(f, M_ff + N * J);
+    H[f] -= U[f] * sd;
+  } else {
+    M[f] = Pack<T, d>::zero();
+    H[f] = applied;
+  }
+}
+
+template <class Space, class T, int W>
+inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, const T *q, const T *force,
+                            Workspace<Space, T> &w, Pack<T, Space::dim> *M, Pack<T, W> *H, Pack<T, W> (&S)[W]) {
+  constexpr int d = Space::dim;
+  Hinge<Space, T> &hinge = w.hinges[&node - m.nodes.data()];
+  T applied[6], outer[6];
+  if (force) {
+    for (int i = 0; i < 6; ++i)
+      applied[i] = T(0.);
+    for (int k = 0; k < node.shape.freedoms.count; ++k)
+      applied[k] = force[k];
+    if (node.shape.in_inner_axes) { // freedoms ascending: translations first
+      T x[6] = {applied[0], applied[1], T(0.), T(0.), T(0.), T(0.)};
+      if (Space::dim == 6 && node.joint == JointKind::free)
+        x[2] = applied[2];
+      to_outer_axes(node, q, x, outer);
+      for (int k = 0; k < (node.joint == JointKind::free ? Space::linear : 2); ++k)
+        applied[k] = outer[k];
+    }
+  }
+  const bool universal = d == 6 && node.joint == JointKind::universal, screw = d == 6 && node.joint == JointKind::screw;
+  if constexpr (d == 6) {
+    if (universal) {
+      const auto change = [&](auto *x) { to_cross(hinge, x); };
+      both_sides<decltype(change), d, T>(change, M);
+      change(H);
+    } else if (screw) { // a_z = a_z' + lead alpha_z: the free direction is the last axis
+      const auto change = [&](auto *x) { x[5] += node.lead * x[2]; };
+      both_sides<decltype(change), d, T>(change, M);
+      change(H);
+    }
+  }
+  for (int k = node.shape.freedoms.count - 1; k >= 0; --k)
+    eliminate_freedom<Space, T, W>(node, k, force ? applied : nullptr, hinge, m, w, M, H, S);
+  for (int i = 0; i < d; ++i)
+    hinge.Lambda[i] = M[i]; // in axes of the cross, or without the last row: `factors` knows
+  if constexpr (d == 6) {
+    if (universal) {
+      const auto change = [&](auto *x) { from_cross(hinge, x); };
+      both_sides<decltype(change), d, T>(change, M);
+      change(H);
+    } else if (screw) {
+      const auto change = [&](auto *x) { x[5] -= node.lead * x[2]; };
+      both_sides<decltype(change), d, T>(change, M);
+      change(H);
+    }
+  }
+}
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,211 @@
+// Inward over the ports of a body: what hangs there, by elimination of the body's modes.
+#pragma once
+
+#include "core/recursion/planar/kinematics.h"
+#include "core/recursion/port_stiffness.h"
+#include "core/recursion/spatial/kinematics.h"
+
+namespace ffrobot::recursion {
+
+// The block of forces on port b by accelerations of port a, a < b, of a node with n ports
+constexpr int cross_index(int a, int b, int n) { return a * n - a * (a + 1) / 2 + b - a - 1; }
+
+// Port k of a body with several is eliminated: its force acts on the ports after it.
+template <class Space, class T, int W>
+inline void spread_to_later_ports(const Node<Space> &node, int k, bool loaded, const Pack<T, W> *F,
+                                  Workspace<Space, T> &w) {
+  constexpr int d = Space::dim, stride = stride_of(W);
+  using Row = Pack<T, d>;
+  using Cols = Pack<T, W>;
+  const int n = node.ports();
+  const PortWork<Space, T> &port = w.ports[node.first_port + k];
+  const auto cross = [&](int a, int b) { return w.cross.data() + (node.first_cross + cross_index(a, b, n)) * d; };
+  for (int l = k + 1; l < n; ++l) {
+    if (!node.body.ports[k].is_soft || !node.body.ports[l].is_soft)
+      continue;
+    PortWork<Space, T> &later = w.ports[node.first_port + l];
+    const Row *K = cross(k, l); // rows of port k by columns of port l
+    T *bias = w.bias.data() + (node.first_port + l) * d * stride;
+    Row YX[d], YK[d];
+    if (loaded)
+      for (int i = 0; i < d; ++i) {
+        YX[i] = port.Y[i][0] * port.X[0], YK[i] = port.Y[i][0] * K[0];
+        for (int j = 1; j < d; ++j)
+          YX[i] += port.Y[i][j] * port.X[j], YK[i] += port.Y[i][j] * K[j];
+      }
+    for (int r = 0; r < d; ++r) {
+      Cols B = Cols::read(bias + r * stride);
+      for (int i = 0; i < d; ++i) {
+        const T factor = K[i][r];
+        B -= factor * F[i];
+        if (loaded)
+          later.X[r] -= factor * YX[i], later.G[r] -= factor * YK[i];
+      }
+      B.write(bias + r * stride);
+    }
+    if (loaded)
+      for (int o = l + 1; o < n; ++o)
+        if (node.body.ports[o].is_soft) {
+          Row *between = cross(l, o);
+          const Row *other = cross(k, o);
+          for (int i = 0; i < d; ++i) {
+            Row Y_other = port.Y[i][0] * other[0];
+            for (int j = 1; j < d; ++j)
+              Y_other += port.Y[i][j] * other[j];
+            for (int r = 0; r < d; ++r)
+              between[r] -= K[i][r] * Y_other;
+          }
+        }
+  }
+}
+
+// Ports of the body, one after the other: M, H, S and gamma gain what hangs there.
+template <class Space, class T, int W>
+inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
+                            Pack<T, Space::dim> *M, Pack<T, W> *H, Pack<T, W> (&S)[W], Pack<T, W> &gamma) {
+  constexpr int d = Space::dim, stride = stride_of(W);
+  using Cols = Pack<T, W>;
+  auto &state = w.bodies[&node - m.nodes.data()];
+  const bool several = node.ports() > 1;
+  for (int k = 0; k < node.ports(); ++k) {
+    PortWork<Space, T> &port = w.ports[node.first_port + k];
+    port_rows(node.body, k, state, port.X, port.beta, port.G);
+    if (several) {
+      T *bias = w.bias.data() + (node.first_port + k) * d * stride;
+      for (int i = 0; i < d; ++i) {
+        Cols B = Cols::zero();
+        B.set(0, port.beta[i]);
+        B.write(bias + i * stride);
+      }
+      for (int l = k + 1; l < node.ports(); ++l)
+        if (node.body.ports[k].is_soft && node.body.ports[l].is_soft)
+          port_gram(node.body, state, k, l, w.cross.data() + (node.first_cross + cross_index(k, l, node.ports())) * d);
+    }
+  }
+  for (int k = 0; k < node.outboard; ++k) {
+    const int index = node.first_port + k;
+    PortWork<Space, T> &port = w.ports[index];
+    const bool is_soft = node.body.ports[k].is_soft;
+    const int child = m.children[index];
+    const bool loaded = child >= 0;
+    if (loaded)
+      port_stiffness<Space, T>(m.nodes[child], w.hinges[child], is_soft, port.G, port.Y);
+    Cols P[d], E[d], F[d];
+    for (int i = 0; i < d; ++i)
+      E[i] = P[i] = Cols::read(w.force.data() + (index * d + i) * stride);
+    if (is_soft) {
+      Cols GP[d];
+      apply<d, T>(port.G, P, GP);
+      if (loaded)
+        for (int i = 0; i < d; ++i)
+          for (int j = 0; j < d; ++j)
+            E[i] -= port.Y[i][j] * GP[j];
+      if (W > 1) // P^T G E
+        for (int i = 0; i < d; ++i)
+          gain(S, GP[i], E[i]);
+    }
+    for (int i = 0; i < d; ++i)
+      F[i] = E[i];
+    if (several) {
+      const T *bias = w.bias.data() + index * d * stride;
+      Cols B[d];
+      for (int i = 0; i < d; ++i)
+        B[i] = Cols::read(bias + i * stride);
+      if (loaded)
+        for (int i = 0; i < d; ++i)
+          for (int j = 0; j < d; ++j)
+            F[i] += port.Y[i][j] * B[j];
+      if (W > 1)
+        for (int i = 0; i < d; ++i)
+          lose(S, B[i], F[i]), lose(S, E[i], B[i]);
+    } else {
+      if (W > 1)
+        for (int i = 0; i < d; ++i)
+          gamma += port.beta[i] * E[i];
+      if (loaded) {
+        const auto Y_beta = symmetric_product<d, T>(port.Y, port.beta);
+        for (int i = 0; i < d; ++i)
+          F[i].add(0, Y_beta[i]);
+      }
+    }
+    for (int i = 0; i < d; ++i) {
+      F[i].write(w.answer.data() + (node.port_slot(k) + i) * stride);
+      for (int j = 0; j < d; ++j)
+        H[j] += port.X[i][j] * F[i];
+    }
+    if (loaded)
+      for (int i = 0; i < d; ++i) {
+        Pack<T, d> YX = port.Y[i][0] * port.X[0];
+        for (int j = 1; j < d; ++j)
+          YX += port.Y[i][j] * port.X[j];
+        for (int r = 0; r < d; ++r)
+          M[r] += port.X[i][r] * YX;
+      }
+    if (several)
+      spread_to_later_ports<Space, T, W>(node, k, loaded, F, w);
+  }
+}
+
+// From the frame to the section that the joint holds, where modes move it: the inboard port is the last one, and force
+// and acceleration change their parts. f = N^-1 (A_section - B'), N = X M^-1 X^T + G, B' = B - X M^-1 H.
+template <class Space, class T, int W>
+inline void move_to_section(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
+                            Pack<T, Space::dim> *M, Pack<T, W> *H, Pack<T, W> (&S)[W]) {
+  constexpr int d = Space::dim, stride = stride_of(W);
+  using Row = Pack<T, d>;
+  using Cols = Pack<T, W>;
+  const auto i_node = &node - m.nodes.data();
+  const int index = node.first_port + node.inboard;
+  PortWork<Space, T> &port = w.ports[index];
+  Row *R = w.soft.data() + w.first_soft[i_node]; // M^-1 X^T
+  invert<d, T>(M);
+  for (int i = 0; i < d; ++i) {
+    T row[d];
+    for (int r = 0; r < d; ++r)
+      row[r] = (M[i] * port.X[r]).sum();
+    for (int r = 0; r < d; ++r)
+      R[i].set(r, row[r]);
+  }
+  Row N[d];
+  for (int r = 0; r < d; ++r) {
+    N[r] = port.G[r];
+    for (int i = 0; i < d; ++i)
+      N[r] += port.X[r][i] * R[i];
+  }
+  invert<d, T>(N);
+  Cols MH[d], B[d], Pi[d];
+  apply<d, T>(M, H, MH);
+  for (int r = 0; r < d; ++r) {
+    if (node.ports() > 1)
+      B[r] = Cols::read(w.bias.data() + (index * d + r) * stride);
+    else
+      B[r] = Cols::zero(), B[r].set(0, port.beta[r]);
+    for (int i = 0; i < d; ++i)
+      B[r] -= port.X[r][i] * MH[i];
+  }
+  apply<d, T>(N, B, Pi);
+  const auto tilt = inboard_tilt(node, w.bodies[i_node]);
+  for (int i = 0; i < d; ++i) {
+    Pi[i] = T(-1.) * Pi[i];
+    if (W > 1)
+      gain(S, H[i], MH[i]), gain(S, B[i], Pi[i]);
+    MH[i].write(w.answer.data() + (node.inboard_slot() + i) * stride);
+    Pi[i].write(w.answer.data() + (node.inboard_slot() + d + i) * stride);
+    R[d + i] = N[i];
+  }
+  // N turned into axes of the section: Q^T N Q
+  Row half[d];
+  for (int i = 0; i < d; ++i) {
+    T x[d], y[d];
+    for (int j = 0; j < d; ++j)
+      x[j] = N[i][j];
+    tilt.back(x, y);
+    half[i] = Row::zero();
+    for (int j = 0; j < d; ++j)
+      half[i].set(j, y[j]);
+  }
+  tilt.back(half, M);
+  tilt.back(Pi, H);
+}
+
+} // namespace ffrobot::recursion
