@@ -53,6 +53,8 @@ TABLES = {
     ("arm_3r", "run"): 1e-3,
     ("arm_6r", "motor"): 0.01,
     ("arm_6r", "run"): 0.02,
+    ("arm_6r", "gears"): 0.01,
+    ("arm_6r", "behind gears"): 0.02,
     ("slider_crank_3d", "largest"): 1e-3,
     ("slewing_appendage", "largest"): 1e-3,
 }

@@ -2,16 +2,19 @@
 
 import json
 import re
+import runpy
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
+import h5py
 import numpy as np
 import pytest
 from checkpoints import CASES, check_table, peak, reference
 from rigid_robots import moments, numbers
+from scipy.spatial.distance import pdist
 
 from ffrobot import Results
 from ffrobot.common.rotations import exponential, of_quaternion
@@ -125,6 +128,57 @@ def test_numbers_of_the_readme(arm, held):
         way, turn = deviation(group)
         rows[name] = [way[0], way.max(), way[-1], turn.max()]
     check_table("arm_6r", "run", rows, smallest=1e-6)
+
+
+@pytest.fixture(scope="module")
+def behind_gears(arm, ffrobot):
+    """The groups of the scenes of behind_gears.py by their names."""
+    subprocess.run([sys.executable, CASE / "behind_gears.py", arm.folder], check=True)
+    groups = {}
+    for name in ("gears", "swift", "slower", "shaped"):
+        done = ffrobot("solve", arm.folder / f"{name}.toml", timeout=300)
+        assert done.returncode == 0, done.stderr
+        groups[name] = h5py.File(arm.folder / f"{name}.results.h5")[name]
+    return groups
+
+
+def after_path(group):
+    """Times (T,) and places (T, 3) of the tool, mm, once the motors stand still."""
+    late = group["time"][()] >= group["trajectories/waist"].attrs["end"]
+    return group["time"][late], 1e3 * group["points/flange.tool/position"][late]
+
+
+def test_twists_at_rest_are_moments_over_stiffness(behind_gears):
+    """At the start, in equilibrium: τ = k (θ_m − γ); motors are where the path has them."""
+    for joint, (stiffness, *_) in runpy.run_path(str(CASE / "behind_gears.py"))["GEARS"].items():
+        entry = behind_gears["gears"][f"joints/{joint}"]
+        twist = entry["motor_angle"][0] - entry["coordinate"][0]
+        assert stiffness * twist == pytest.approx(entry["moment"][0], rel=1e-6, abs=1e-4)
+
+
+def test_the_shaper_is_for_the_frequency_with_which_the_tool_swings(behind_gears):
+    """Zero crossings of the fastest direction of swing, about those along the path."""
+    t, place = after_path(behind_gears["slower"])
+    swing = place - place.mean(axis=0)
+    along = swing @ np.linalg.svd(swing)[2][0]
+    rises = np.flatnonzero((along[1:] > 0) & (along[:-1] <= 0))
+    crossings = t[rises] - along[rises] * np.diff(t)[rises] / np.diff(along)[rises]
+    frequency = (len(crossings) - 1) / (crossings[-1] - crossings[0])
+    lowest, second = behind_gears["shaped"]["trajectories/waist"].attrs["shaper_frequency"]
+    assert 0.93 * lowest < frequency < 1.07 * second  # means along the path, over which they change by 7 %
+
+
+def test_numbers_behind_gears(behind_gears):
+    way, turn = deviation(behind_gears["gears"])
+    check_table("arm_6r", "gears", {"motors held": [way[0], way.max(), way[-1], turn.max()]})
+    rows = {
+        f"{name}.toml": [
+            group["trajectories/waist"].attrs["end"], pdist(after_path(group)[1]).max(),
+            peak(group["joints/waist/moment"]), peak(group["joints/shoulder/moment"]),
+        ]
+        for name, group in behind_gears.items()
+    }  # fmt: skip
+    check_table("arm_6r", "behind gears", rows, smallest=2e-3)
 
 
 def test_distance_of_the_figure(held):

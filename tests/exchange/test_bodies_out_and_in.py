@@ -273,6 +273,51 @@ def test_damaged_files(read, edit, expected, bodies):
         read(text, "cloud")
 
 
+def test_a_symmetric_part_in_both_integrals_is_left_out(bodies):
+    """As PY_SID writes of plates: in C_r's M1 and twice in G_e, where geometric stiffness is not."""
+    body = bodies["cloud"]
+    text = sid_text(body)[0]
+    # Entry (1, 2) about z and its mirror: of four modes those are m1(1, 2, 3) and m0(1, 10) = m0(1, 2 + 2·4).
+    for name, entries, more in (
+        ("Cr", ("m1( 1, 2, 3)", "m1( 2, 1, 3)"), 0.01),
+        ("Ge", ("m0( 1,10)", "m0( 2, 9)"), 0.02),
+    ):
+        head, inside, tail = re.split(rf"(?s)(\n\s+{name}\n.*?end {name}\n)", text, maxsplit=1)
+        for entry in entries:
+            found = re.search(re.escape(entry) + r"\s*=\s*(\S+)", inside)
+            value = float(found[1].replace("D", "E")) + more
+            inside = inside[: found.start(1)] + f"{value:.16E}".replace("E", "D") + inside[found.end(1) :]
+        text = head + inside + tail
+    back, remarks = read_sid(text, body.name)
+    assert any("Cr, Ge: both have a symmetric part, 0.01" in line for line in remarks)
+    assert max(differences(integrals_of(body), integrals_of(back), vars(integrals_of(body))).values()) < 1e-11
+
+
+def test_modal_masses_of_few_digits():
+    """A line of masses without inertia about its axis, shapes of five digits: sums are taken, and that is told."""
+    n, x = 11, np.linspace(0.0, 1.0, 11)
+    shape = "\n".join(f"0 0 {np.sin(np.pi * at):.5f} 0 0 0" for at in x)
+    masses = "\n".join(f"{m} {m} {m} 0 0 0" for m in [0.1, *[0.2] * 9, 0.1])
+    records = {1: f"REV0 {n} 1 0 0 0", 2: " ".join(map(str, range(n))), 3: "0", 4: "0", 5: "\n".join(map(str, x)),
+               6: "0\n" * n, 7: "0\n" * n, 8: shape, 9: "1.", 10: "98.696", 11: masses}  # fmt: skip
+    text = "".join(f"** RECORD GROUP {k}, TITLE\n{content}\n**\n" for k, content in records.items())
+    body, remarks = read_fem(text, "beam")
+    total = sum(m * float(f"{np.sin(np.pi * at):.5f}") ** 2 for m, at in zip([0.1, *[0.2] * 9, 0.1], x, strict=True))
+    assert body.frequency[0] == pytest.approx(np.sqrt(98.696 / total) / (2 * np.pi), rel=1e-12)
+    assert any("modal masses are sums over masses and shapes" in line for line in remarks)
+    with pytest.raises(InputError, match="modal masses: expected the sums over masses and shapes"):
+        read_fem(text.replace("\n1.\n", "\n1.2\n"), "beam")
+
+
+def test_shapes_that_are_too_long_for_their_modal_mass_are_refused(bodies):
+    """S̄ᵀS̄/m is at most M_e, as it is not in a file of EMBSlib."""
+    text = sid_text(bodies["line"])[0]
+    head, inside, tail = re.split(r"(?s)(\n\s+mdCM\n.*?end mdCM\n)", text, maxsplit=1)
+    longer = re.sub(r"(m1\(.*?= +)(\S+)D", lambda m: f"{m[1]}{3 * float(m[2]):.16f}D", inside)
+    with pytest.raises(InputError, match="times as far as its modal mass allows"):
+        read_sid(head + longer + tail, "line")
+
+
 def test_geometric_stiffness_among_the_integrals_is_refused(bodies):
     """A symmetric part of C_r's M1 cannot come from ∫ρ Φ_k × Φ_l."""
     text = sid_text(bodies["cloud"])[0]

@@ -10,16 +10,19 @@ codes, Mech. Struct. Mach. 22, 1994, 283–304), to first order in the modal coo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
+from ...common.errors import InputError
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
 from ...mbs.model.spatial_body import from_modal_body
 
 POSITIVE = 1e-9  # of the largest entry: less is rounding
+EXACT = 1e-12  # of the largest entry: modal masses are those of the shapes
+ROUNDED = 1e-3  # likewise, in files of few digits
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 """ω_a ω_b of the columns of O_e."""
 
@@ -115,6 +118,44 @@ def slopes(S: Array) -> tuple[Array, Array]:
     return np.einsum("abc,bckl->alk", LEVI_CIVITA, S), np.array(centrifugal)
 
 
+def with_agreed_masses(found: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str, ...]]:
+    """The integrals with modal masses that the shapes can have, and what was changed for it.
+
+    Files of few digits give M_e otherwise than the masses and shapes beside it do. Where nothing has inertia about the
+    axis, so that no section can account for that, ∫ρΦᵀΦ of these is taken.
+
+    Raises:
+        InputError: M_e and ∫ρΦᵀΦ contradict each other there, or M_e is less than what the mean motion of the shapes
+            alone has, S̄ᵀS̄/m.
+    """
+    if not np.abs(found.modal_mass).max(initial=0.0) > 0:
+        return found, ()  # which is refused as no mass matrix
+    mean = found.S_bar.T @ found.S_bar / found.mass
+    sizes = np.sqrt(np.abs(np.diag(mean)) / np.maximum(np.diag(found.modal_mass), 1e-300))
+    if sizes.max(initial=0.0) > 1.0 + ROUNDED:
+        raise InputError(
+            f"modal masses: expected at least those that the mean motion of the shapes has, found mode"
+            f" {sizes.argmax() + 1} whose shape moves the center of mass {sizes.max():.3g} times as far as its modal"
+            " mass allows: shapes and modal masses of the file contradict each other"
+        )
+    off = np.abs(found.modal_mass - found.translational_mass).max(initial=0.0) / np.abs(found.modal_mass).max()
+    if off <= EXACT or np.linalg.eigvalsh(about_center(found))[0] > EXACT * np.abs(found.inertia).max():
+        return found, ()
+    if off > ROUNDED:
+        raise InputError(
+            f"modal masses: expected the sums over masses and shapes, as nothing has inertia about the axis, found them"
+            f" off by {off:.2g} of the largest"
+        )
+    told = f"modal masses are sums over masses and shapes: those in the file are off by {off:.1e} of the largest"
+    return replace(found, modal_mass=found.translational_mass), (told,)
+
+
+def about_center(found: ShapeIntegrals) -> Array:
+    """Inertia (3, 3) about the center of mass, kg·m²."""
+    center = found.first_moment / found.mass
+    return as_floats(found.inertia - found.mass * (center @ center * np.eye(3) - np.outer(center, center)))
+
+
 def section_inertia(found: ShapeIntegrals) -> dict[str, Array | float]:
     """J_spin, h_spin, S_spin and second_moment of `ModalBody`, which only together make J_0, C_r0 and M_e.
 
@@ -125,10 +166,8 @@ def section_inertia(found: ShapeIntegrals) -> dict[str, Array | float]:
     """
     turning = found.modal_mass - found.translational_mass
     n, J_spin, h_spin = found.n_modes, 0.0, np.zeros(found.n_modes)
-    center = found.first_moment / found.mass
-    about_center = found.inertia - found.mass * (center @ center * np.eye(3) - np.outer(center, center))
-    if np.abs(turning).max(initial=0.0) > 1e-12 * np.abs(found.modal_mass).max(initial=1.0):
-        J_spin = float(1 / np.linalg.inv(about_center)[0, 0])
+    if np.abs(turning).max(initial=0.0) > EXACT * np.abs(found.modal_mass).max(initial=1.0):
+        J_spin = float(1 / np.linalg.inv(about_center(found))[0, 0])
         rest = np.linalg.eigvalsh(turning - np.outer(found.spin[0], found.spin[0]) / J_spin)
         if rest[0] >= -POSITIVE * np.abs(turning).max():
             h_spin = found.spin[0].copy()

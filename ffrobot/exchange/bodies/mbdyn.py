@@ -18,7 +18,7 @@ from ...common.errors import InputError
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
-from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, slopes
+from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, slopes, with_agreed_masses
 from .make import NOT_IN_THE_FILE, modal_body
 
 GROUP = re.compile(r"\*\*\s*RECORD GROUP\s+(\d+)")
@@ -123,7 +123,8 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     if match is not None:
         pairs = (pair.rpartition("=") for pair in match["numbers"].split(", "))
         numbers, condition = {key: int(number) for key, _, number in pairs}, match["condition"]
-    return modal_body(name, found, nodes, numbers, condition), tuple(remarks)
+    found, told = with_agreed_masses(found)
+    return modal_body(name, found, nodes, numbers, condition), (*remarks, *told)
 
 
 def _records(text: str) -> dict[int, list[str]]:

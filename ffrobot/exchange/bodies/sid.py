@@ -14,14 +14,15 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...fe_models.modal_body import Interface, ModalBody
-from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of
+from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, with_agreed_masses
 from .make import NOT_IN_THE_FILE, modal_body
 from .sid_text import Layout, Section, Taylor, fortran, layout_of, lines_of, parse, taylor
 
 ROWS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Entries of a symmetric matrix in the six rows of J."""
 NOTE = re.compile(r"ffrobot: (?P<condition>[\w-]+); (?P<numbers>.*)")
-LARGEST_ASYMMETRY = 1e-6  # of C_r's M1: a symmetric part is geometric stiffness
+LARGEST_ASYMMETRY = 1e-6  # of C_r's M1: a symmetric part is geometric stiffness, or wrong
+SAME = 1e-3  # symmetric parts of G_e and C_r, of the largest
 
 
 def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
@@ -105,7 +106,9 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     if match is not None:
         pairs = (pair.rpartition("=") for pair in match["numbers"].split(", "))
         numbers, condition = {key: int(number) for key, _, number in pairs}, match["condition"]
-    return modal_body(name, found, nodes, numbers, condition), (NOT_IN_THE_FILE, *_checks(modal, found, layout))
+    agreed, told = with_agreed_masses(found)
+    remarks = (NOT_IN_THE_FILE, *told, *_checks(modal, found, layout))
+    return modal_body(name, agreed, nodes, numbers, condition), remarks
 
 
 def _modal(top: Section) -> Section:
@@ -124,8 +127,7 @@ def _integrals(modal: Section, layout: Layout) -> ShapeIntegrals:
     Me, Ke, De = (taylor(modal[key], layout).m0 for key in ("Me", "Ke", "De"))
     J0, J1 = _inertia(J)
     slope = Cr.m1.transpose(2, 0, 1)
-    symmetric = np.abs(slope + slope.transpose(0, 2, 1)).max(initial=0.0)
-    if symmetric > LARGEST_ASYMMETRY * max(np.abs(slope).max(initial=0.0), np.abs(Me).max()):
+    if _symmetric_part(slope, Me) is not None and not _is_in_both(modal, slope, layout):
         raise InputError(
             "Cr: expected m1 without a symmetric part, found one: the file has geometric stiffness among its integrals,"
             " which cannot be told apart from them in Oe; write it without"
@@ -134,6 +136,24 @@ def _integrals(modal: Section, layout: Layout) -> ShapeIntegrals:
         modal["refmod"].number("mass"), mdCM.m0[:, 0], mdCM.m1[:, :, 0], J0, J1, Cr.m0.T,
         0.5 * (slope - slope.transpose(0, 2, 1)), Me, Oe.m1.transpose(2, 0, 1), Ke, De,
     )  # fmt: skip
+
+
+def _symmetric_part(slope: Array, Me: Array) -> Array | None:
+    """Of M1 of C_r (3, n, n); None where it has none."""
+    symmetric: Array = 0.5 * (slope + slope.transpose(0, 2, 1))
+    scale = max(np.abs(slope).max(initial=0.0), np.abs(Me).max())
+    return symmetric if np.abs(symmetric).max(initial=0.0) > 0.5 * LARGEST_ASYMMETRY * scale else None
+
+
+def _is_in_both(modal: Section, slope: Array, layout: Layout) -> bool:
+    """Whether G_e has twice the symmetric part that C_r has: geometric stiffness would be in C_r alone."""
+    n, Ge = layout.modes, taylor(modal["Ge"], layout).m0
+    if Ge.shape != (n, 3 * n):
+        return False
+    layouts = (Ge.reshape(n, 3, n).transpose(1, 0, 2), Ge.reshape(n, n, 3).transpose(2, 0, 1))
+    wanted = slope + slope.transpose(0, 2, 1)
+    found = (0.5 * (each + each.transpose(0, 2, 1)) for each in layouts)
+    return any(np.abs(each - wanted).max() < SAME * np.abs(wanted).max() for each in found)
 
 
 def _inertia(J: Taylor) -> tuple[Array, Array]:
@@ -156,6 +176,12 @@ def _checks(modal: Section, found: ShapeIntegrals, layout: Layout) -> Iterator[s
     errors = [float(np.abs((each + each.transpose(1, 0, 2)) / 2 - wanted).max(initial=0.0)) for each in layouts]
     if min(errors) > 1e-6 * scale:
         yield f"Gr: its symmetric part is off the slope of J by {min(errors) / scale:.2g} of its largest entry"
+    symmetric = _symmetric_part(taylor(modal["Cr"], layout).m1.transpose(2, 0, 1), found.modal_mass)
+    if symmetric is not None:
+        yield (
+            f"Cr, Ge: both have a symmetric part, {np.abs(symmetric).max():.2g} in m1 of Cr, which ∫ρΦᵀe~Φ cannot have"
+            " and geometric stiffness would have in Cr alone: left out"
+        )
     identities = (
         ("Ct", taylor(modal["Ct"], layout).m0, found.S_bar.T, "the slope of mdCM"),
         ("Oe", taylor(modal["Oe"], layout).m0, found.centrifugal, "−½ and −1 times the slope of J"),
