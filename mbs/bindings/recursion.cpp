@@ -167,4 +167,5 @@ void bind_recursion(nb::module_ &m) {
       .def("derivatives", &derivatives_at, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
            "At a state under given forces, while rows follow `target` (rows): exact.");
   bind_tree_motion(m);
+  bind_held_motion(m);
 }
