@@ -4,6 +4,7 @@
 #include "core/forward/held_motion.h"
 #include "fmu/fmi2.h"
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <fstream>
@@ -24,9 +25,11 @@ struct Instance {
 };
 
 fmi2Status fail(const fmi2CallbackFunctions *callbacks, const std::string &name, const std::string &message) {
+  std::string format; // the message is one of printf
+  for (const char c : message)
+    format += c == '%' ? "%%" : std::string(1, c);
   if (callbacks && callbacks->logger)
-    callbacks->logger(callbacks->componentEnvironment, name.c_str(), fmi2Error, "logStatusError", "%s",
-                      message.c_str());
+    callbacks->logger(callbacks->componentEnvironment, name.c_str(), fmi2Error, "logStatusError", format.c_str());
   return fmi2Error;
 }
 fmi2Status fail(fmi2Component c, const std::string &message) {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import tomli_w
 from fmpy import extract, read_model_description, simulate_fmu
-from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.validation import validate_fmu
 
 from ffrobot import InputError, Results
@@ -169,13 +169,11 @@ def test_motion(robot):
 
 
 @pytest.fixture
-def slave(robot, tmp_path):
-    """An instance of the arm's FMU, what it logs, and the folder in which it is unpacked: one with blanks."""
-    name, fmu, _ = robot
-    if name != "arm":
-        pytest.skip("one model is enough")
-    folder, told = tmp_path / "an FMU, unpacked", []
-    extract(str(fmu), str(folder))
+def slave(tmp_path):
+    """The folder in which the arm's FMU is unpacked, one with blanks, what it logs, and what makes an instance."""
+    folder, told, scene = tmp_path / "an FMU, unpacked", [], tmp_path / "scene.toml"
+    scene.write_text(scene_text("arm"))
+    extract(str(export_file(scene, "fmu", None, None).path), str(folder))
     return folder, told, lambda: instance_of(folder, told)
 
 
@@ -185,10 +183,8 @@ def instance_of(folder, told):
         guid=description.guid, unzipDirectory=str(folder), instanceName="arm",
         modelIdentifier=description.coSimulation.modelIdentifier,
     )  # fmt: skip
-    from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-
     callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(lambda *values: told.append(b" ".join(values[-2:])))
+    callbacks.logger = fmi2CallbackLoggerTYPE(lambda *values: told.append(values[-1].decode()))
     found.instantiate(callbacks=callbacks)
     found.setupExperiment(startTime=0.0)
     found.enterInitializationMode()
@@ -220,24 +216,42 @@ def test_reset_and_length_of_steps(slave):
 
 
 def test_wrong_calls_and_files(slave):
-    folder, _, make = slave
+    """Each is an error with a message in the log."""
+    folder, told, make = slave
     instance, reference = make()
-    for call in (
-        lambda: instance.setReal([reference["joint/shoulder"]], [1.0]), lambda: instance.doStep(0.0, -1.0),
-        lambda: instance.getReal([10_000]), lambda: instance.setReal([0], [float("nan")]),
-    ):  # fmt: skip
+    for call, message in (
+        (lambda: instance.setReal([reference["joint/shoulder"]], [1.0]), "expected a finite value of an input"),
+        (lambda: instance.setReal([0], [float("nan")]), "expected a finite value of an input"),
+        (lambda: instance.doStep(0.0, -1.0), "expected a step of zero or more seconds"),
+        (lambda: instance.getReal([10_000]), "expected a value reference of modelDescription.xml"),
+    ):
         with pytest.raises(Exception, match="fmi2"):
             call()
+        assert message in told[-1]
     instance.freeInstance()
     model = folder / "resources" / "model.bin"
     data = model.read_bytes()
-    for content in (data[: len(data) // 2], data + b"x", b"something else", data[:40] + b"\xff" * 8 + data[48:]):
+    for content, message in (
+        (data[: len(data) // 2], "found the end of the file"),
+        (data + b"x", "expected the end of the file"),
+        (b"something else", "expected a model of this version of ffrobot"),
+        (data[:22] + b"\xff" * 8 + data[30:], "expected a count"),
+        (data.replace(b"{", b"[", 1), "of another export"),
+    ):
         model.write_bytes(content)
         with pytest.raises(Exception, match="instantiate"):
             make()
+        assert message in told[-1]
     model.unlink()
     with pytest.raises(Exception, match="instantiate"):
         make()
+    assert "model.bin of the FMU, found none" in told[-1]
+
+
+def test_results_of_a_forward_analysis(robot):
+    """They do not say what robot it was: the scene does."""
+    with pytest.raises(InputError, match=r'found "swing" of kind "forward": export the scene'):
+        export_file(robot[1].with_name("loaded.results.h5"), "fmu", "swing", None)
 
 
 def test_the_archive_is_the_library_and_the_model(robot):

@@ -26,6 +26,11 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
     """
     with Results(path) as results:
         name = results.linear_analysis(analysis)
+        if name in results.analyses and results.attributes(name)["kind"] == "forward":
+            raise InputError(
+                f'{path}: --analysis: expected a linear analysis of results, found "{name}" of kind "forward": export'
+                " the scene, SCENE.toml, for an FMU of that motion"
+            )
         models, scene = results.linear(name), results.scene
     if len(models) != 1:
         times = f"{len(models)}, from t = {models[0].time:g} s to t = {models[-1].time:g} s"
