@@ -95,7 +95,7 @@ INPUTS = {
 def scene_text(name, loads=()):
     analysis = {"name": "swing", "kind": "forward", "end": END, "output_step": STEP, "tolerance": 1e-8}
     if name == "radau":
-        analysis |= {"tolerance": 1e-6, "integrator": "radau"}
+        analysis |= {"tolerance": 1e-7, "integrator": "radau"}
     keys = {"name": f"{name} as an FMU", "space": "spatial", "gravity": [0.0, 0.0, -9.81], **SCENES[name]}
     return tomli_w.dumps(keys | {"load": list(loads), "analysis": [analysis]})
 
