@@ -71,12 +71,13 @@ def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
     "file_format",
     metavar="FORMAT",
     required=True,
-    help="Of results csv, joint-trajectory, rosbag2, fmu; of bodies sid, mbdyn, craig-bampton, exudyn; of scenes urdf.",
+    help="Of results csv, joint-trajectory, rosbag2, fmu; of scenes urdf, fmu; of bodies sid, mbdyn, craig-bampton,"
+    " exudyn.",
 )
 @click.option(
     "--analysis",
     metavar="NAME",
-    help="Of this analysis; if absent the first with moving joints, of fmu the first linear one.",
+    help="Of this analysis; if absent the first with moving joints, of fmu the first linear or forward one.",
 )
 @click.option("-o", "--output", metavar="FILE", type=FILE, help="Where to write [beside the input].")
 @logging_options
@@ -94,6 +95,7 @@ def export(file: Path, file_format: str, analysis: str | None, output: Path | No
     craig-bampton     .npz with M, K, C in interface coordinates and fixed-interface modes
     exudyn            .npz of EXUDYN's ObjectFFRFreducedOrderInterface
     urdf              of a scene in space, for viewers: links rigid, shapes simple
+    fmu               of a scene in space: FMI 2.0, co-simulation, of a forward motion under moments and voltages
     """  # noqa: D301 (click wants the backspace itself)
     from ..common.hdf5 import reading
     from ..present.summary import summary_console

@@ -17,6 +17,7 @@ from .bodies.craig_bampton import craig_bampton_file
 from .bodies.exudyn import exudyn_file
 from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
+from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import linear_fmu
 from .motion.joint_trajectory import joint_trajectory_text
 from .motion.joints import csv_text, robot_motion
@@ -64,6 +65,7 @@ OF_RESULTS: Mapping[str, tuple[str, Callable[[Path, str | None], tuple[Content, 
 
 OF_SCENES: Mapping[str, tuple[str, Callable[[Path, str | None], tuple[Content, str, tuple[str, ...]]]]] = {
     "urdf": (".urdf", lambda path, _: scene_as_urdf(path)),
+    "fmu": (".fmu", forward_fmu),
 }
 """Formats of scenes, likewise."""
 
@@ -90,8 +92,8 @@ def export_file(path: Path, file_format: str, analysis: str | None, output: Path
     kind = "a scene" if is_scene else "a modal body" if is_body else "results"
     if file_format not in known:
         raise InputError(f'{path}: --format: expected one of {quoted(known)} of {kind}, found "{file_format}"')
-    if analysis is not None and (is_scene or is_body):
-        raise InputError(f"{path}: --analysis: expected it with results only, found {kind}")
+    if analysis is not None and (is_body or file_format == "urdf"):
+        raise InputError(f"{path}: --analysis: expected it with results and FMUs only, found {kind} as {file_format}")
     if is_body:
         return _export_body(path, file_format, output)
     suffix, make = (OF_SCENES if is_scene else OF_RESULTS)[file_format]

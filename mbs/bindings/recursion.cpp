@@ -168,4 +168,5 @@ void bind_recursion(nb::module_ &m) {
            "At a state under given forces, while rows follow `target` (rows): exact.");
   bind_tree_motion(m);
   bind_tree_sampled(m);
+  bind_held_motion(m);
 }

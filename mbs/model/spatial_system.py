@@ -88,11 +88,16 @@ class SpatialSystem:
         for number, _ in self._turning:
             ground[number].turns = True
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
+        self._parts = bodies, ground, rows
         self.core = _core.SpatialModel(bodies, ground, rows, wrenches, np.array(model.scene.gravity))
         moments = [self._load(load) for load in model.scene.load if load.joint is not None]
         self._along = [*moments, *model.modal_loads, *drives.along]
         self._on_frames = drives.on_frames
         self.scene = self._follow()
+
+    def held(self) -> _core.HeldModel:
+        """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
+        return _core.HeldModel(*self._parts, np.array(self.model.scene.gravity), self.scene)
 
     def _check(self) -> None:
         """Raise `InputError` for what the core does not take."""

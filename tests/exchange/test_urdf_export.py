@@ -229,7 +229,7 @@ def test_what_cannot_be_exported(tmp_path):
     with pytest.raises(InputError, match="gravity"):  # a planar scene is read as one
         export_file(scene, "urdf", None, None)
     scene.write_text(with_motion(ARM, *MOTION))
-    with pytest.raises(InputError, match='expected one of "urdf" of a scene, found "fmu"'):
-        export_file(scene, "fmu", None, None)
-    with pytest.raises(InputError, match="--analysis: expected it with results only, found a scene"):
+    with pytest.raises(InputError, match='expected one of "urdf", "fmu" of a scene, found "csv"'):
+        export_file(scene, "csv", None, None)
+    with pytest.raises(InputError, match="--analysis: expected it with results and FMUs only, found a scene"):
         export_file(scene, "urdf", "inverse", None)

@@ -1,4 +1,4 @@
-"""modelDescription.xml of FMI 2.0 for a linear model."""
+"""modelDescription.xml of FMI 2.0 for linear models and forward motions."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 
 from ...actuation.control.linear_model import LinearModel
 from ...common.arrays import Array
+from ...mbs.analysis.forward import Forward
+from .forward_model import HeldUnit
 from .variables import UNITS, Variable, derivatives_of
 
 SOURCE = "linear.c"
@@ -50,10 +52,7 @@ class Unit:
 
 def model_description(unit: Unit, generator: str) -> bytes:
     """The file, in UTF-8."""
-    root = ElementTree.Element(
-        "fmiModelDescription", fmiVersion="2.0", modelName=unit.name, guid=unit.guid, description=unit.description,
-        generationTool=generator, variableNamingConvention="flat", numberOfEventIndicators="0",
-    )  # fmt: skip
+    root = _root(unit.name, unit.guid, unit.description, generator)
     abilities = {
         "modelIdentifier": unit.identifier, "canNotUseMemoryManagementFunctions": "true",
         "canGetAndSetFMUstate": "true", "providesDirectionalDerivative": "true",
@@ -62,18 +61,52 @@ def model_description(unit: Unit, generator: str) -> bytes:
     for kind, more in (("ModelExchange", {"completedIntegratorStepNotNeeded": "true"}), ("CoSimulation", stepping)):
         files = ElementTree.SubElement(ElementTree.SubElement(root, kind, abilities | more), "SourceFiles")
         ElementTree.SubElement(files, "File", name=SOURCE)
-    _units(ElementTree.SubElement(root, "UnitDefinitions"), unit)
-    ElementTree.SubElement(ElementTree.SubElement(root, "LogCategories"), "Category", name="logStatusError")
-    ElementTree.SubElement(root, "DefaultExperiment", _experiment(unit.model.A))
-    _variables(ElementTree.SubElement(root, "ModelVariables"), unit)
+    groups = {"states": unit.states, "derivatives": unit.derivatives, "inputs": unit.inputs, "outputs": unit.outputs}
+    _add_variables(root, groups, _experiment(unit.model.A))
     _structure(ElementTree.SubElement(root, "ModelStructure"), unit)
+    return _text(root)
+
+
+def forward_description(unit: HeldUnit, identifier: str, name: str, analysis: Forward, generator: str) -> bytes:
+    """That of a forward motion under held inputs, in UTF-8; outputs follow the state alone, no input."""
+    about = "motion from the initial state under held inputs; gravity and friction act as in the scene"
+    root = _root(name, unit.data.guid, about, generator)
+    stepping = {"canHandleVariableCommunicationStepSize": "true", "canNotUseMemoryManagementFunctions": "true"}
+    ElementTree.SubElement(root, "CoSimulation", {"modelIdentifier": identifier, **stepping})
+    experiment = {"startTime": "0", "stopTime": f"{analysis.last_time:g}", "stepSize": f"{analysis.output_step:g}"}
+    _add_variables(root, {"inputs": unit.inputs, "outputs": unit.outputs}, experiment)
+    structure, first = ElementTree.SubElement(root, "ModelStructure"), len(unit.inputs) + 1
+    for group in ("Outputs", "InitialUnknowns"):
+        element = ElementTree.SubElement(structure, group)
+        for index in range(first, first + len(unit.outputs)):
+            ElementTree.SubElement(element, "Unknown", index=str(index), dependencies="")
+    return _text(root)
+
+
+def _root(name: str, guid: str, description: str, generator: str) -> ElementTree.Element:
+    return ElementTree.Element(
+        "fmiModelDescription", fmiVersion="2.0", modelName=name, guid=guid, description=description,
+        generationTool=generator, variableNamingConvention="flat", numberOfEventIndicators="0",
+    )  # fmt: skip
+
+
+def _text(root: ElementTree.Element) -> bytes:
     ElementTree.indent(root)
     text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text + b"\n"
 
 
-def _units(parent: ElementTree.Element, unit: Unit) -> None:
-    used = {each.unit for each in unit.variables}
+def _add_variables(
+    root: ElementTree.Element, groups: Mapping[str, tuple[Variable, ...]], experiment: dict[str, str]
+) -> None:
+    """Units, log, experiment and variables, in the order that FMI wants."""
+    _units(ElementTree.SubElement(root, "UnitDefinitions"), {each.unit for of in groups.values() for each in of})
+    ElementTree.SubElement(ElementTree.SubElement(root, "LogCategories"), "Category", name="logStatusError")
+    ElementTree.SubElement(root, "DefaultExperiment", experiment)
+    _variables(ElementTree.SubElement(root, "ModelVariables"), groups)
+
+
+def _units(parent: ElementTree.Element, used: set[str]) -> None:
     for name, exponents in UNITS.items():
         if name in used:
             definition = ElementTree.SubElement(parent, "Unit", name=name)
@@ -90,7 +123,7 @@ def _experiment(A: Array) -> dict[str, str]:
     return {"startTime": "0", "stopTime": f"{stop:g}", "stepSize": f"{stop / 1000:g}"}
 
 
-def _variables(parent: ElementTree.Element, unit: Unit) -> None:
+def _variables(parent: ElementTree.Element, groups: Mapping[str, tuple[Variable, ...]]) -> None:
     attributes: Mapping[str, Mapping[str, str]] = {
         "states": {"causality": "local", "initial": "exact"},
         "derivatives": {"causality": "local", "initial": "calculated"},
@@ -98,8 +131,9 @@ def _variables(parent: ElementTree.Element, unit: Unit) -> None:
         "outputs": {"causality": "output", "initial": "calculated"},
     }
     reference = 0
-    for group, fixed in attributes.items():
-        for k, each in enumerate(getattr(unit, group), 1):
+    for group, variables in groups.items():
+        fixed = attributes[group]
+        for k, each in enumerate(variables, 1):
             words = {"description": each.description} if each.description else {}
             named = {"name": each.name, "valueReference": str(reference), **words, "variability": "continuous", **fixed}
             variable = ElementTree.SubElement(parent, "ScalarVariable", named)

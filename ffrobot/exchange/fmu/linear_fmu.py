@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import re
-import zipfile
 from collections.abc import Mapping
 from importlib.metadata import version
-from io import BytesIO
 from pathlib import Path
 from uuid import NAMESPACE_URL, uuid5
 
@@ -15,12 +12,10 @@ import numpy as np
 from ...actuation.control.linear_model import LinearModel
 from ...common.errors import InputError
 from ...results.file import Results
+from .archive import identifier_of, zipped
 from .description import Unit, model_description
 from .source import binary, numbers, sources
 from .variables import inputs_of, joint_units, outputs_of, states_of
-
-LONGEST = 60  # characters of a name in the identifier
-DATE = (1980, 1, 1, 0, 0, 0)  # of all files in it: the same model is the same FMU, byte for byte
 
 
 def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...]]:
@@ -31,6 +26,11 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
     """
     with Results(path) as results:
         name = results.linear_analysis(analysis)
+        if name in results.analyses and results.attributes(name)["kind"] == "forward":
+            raise InputError(
+                f'{path}: --analysis: expected a linear analysis of results, found "{name}" of kind "forward": export'
+                " the scene, SCENE.toml, for an FMU of that motion"
+            )
         models, scene = results.linear(name), results.scene
     if len(models) != 1:
         times = f"{len(models)}, from t = {models[0].time:g} s to t = {models[-1].time:g} s"
@@ -51,16 +51,15 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
     else:
         content[compiled[0]] = compiled[1]
     what = f"{name}, {len(unit.states)} states, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
-    return _zipped(content), what, tuple(remarks)
+    return zipped(content), what, tuple(remarks)
 
 
 def make_unit(scene: str, analysis: str, model: LinearModel, units: Mapping[str, str]) -> Unit:
     """Names and variables of the FMU of a model; `units` of the joints' coordinates."""
-    plain = re.sub(r"[^A-Za-z0-9_]", "_", f"{scene}_{analysis}")[:LONGEST]
     states, inputs, outputs = (of(model, units) for of in (states_of, inputs_of, outputs_of))
     names = "\n".join(each.name for each in (*states, *inputs, *outputs))
     return Unit(
-        identifier=plain if plain[0].isalpha() else f"robot_{plain}"[:LONGEST],
+        identifier=identifier_of(scene, analysis),
         name=f"{scene}, {analysis}",
         description=f"linear model about t = {model.time:g} s; all values are deviations from the configuration there",
         guid=f"{{{uuid5(NAMESPACE_URL, numbers(model) + names)}}}",
@@ -76,11 +75,3 @@ def _check(path: Path, analysis: str, model: LinearModel) -> None:
         )
     if not all(np.all(np.isfinite(getattr(model, key))) for key in "ABCD"):
         raise InputError(f"{path}: {analysis}: expected finite matrices A, B, C, D, found others")
-
-
-def _zipped(content: dict[str, bytes]) -> bytes:
-    archive = BytesIO()
-    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-        for name, data in content.items():
-            file.writestr(zipfile.ZipInfo(name, DATE), data, zipfile.ZIP_DEFLATED)
-    return archive.getvalue()

@@ -17,18 +17,11 @@ from scipy.linalg import matrix_balance
 
 from ...actuation.control.linear_model import LinearModel
 from ...common.arrays import Array
+from .archive import PLATFORMS
 from .description import SOURCE, Unit
 
 HEADER = "model.h"
 COMPILERS = ("cc", "gcc", "clang")
-PLATFORMS: Mapping[tuple[str, str], tuple[str, str]] = {
-    ("linux", "x86_64"): ("linux64", ".so"),
-    ("linux", "i686"): ("linux32", ".so"),
-    ("darwin", "x86_64"): ("darwin64", ".dylib"),
-    ("darwin", "arm64"): ("darwin64", ".dylib"),
-    ("win32", "AMD64"): ("win64", ".dll"),
-}
-"""By system and processor: FMI 2.0's name of the platform, and the end of a library's name there."""
 
 
 def sources(unit: Unit) -> dict[str, str]:

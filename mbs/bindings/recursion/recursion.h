@@ -10,6 +10,7 @@
 void bind_tree_data(nanobind::module_ &m);
 void bind_tree_motion(nanobind::module_ &m);
 void bind_tree_sampled(nanobind::module_ &m);
+void bind_held_motion(nanobind::module_ &m);
 
 namespace ffrobot::recursion {
 

@@ -1,0 +1,103 @@
+"""`ffrobot export SCENE.toml --format fmu`: a forward motion in space as an FMU for co-simulation."""
+
+from __future__ import annotations
+
+import logging
+import platform
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from uuid import NAMESPACE_URL, uuid5
+
+from ...common.errors import InputError
+from ...common.validation import quoted
+from ...mbs import _core
+from ...mbs.analysis.forward import Forward
+from ...mbs.analysis.spatial_run import without_paths
+from ...mbs.model.spatial_gears import with_compliance_in_space
+from ...mbs.model.spatial_model import build_spatial_model
+from ...run.spatial_actuation import patches_in_space
+from ...run.spatial_bodies import load_spatial_bodies
+from ...scene.any_space import load_any_scene
+from ...scene.spatial import SpatialScene
+from .archive import PLATFORMS, identifier_of, zipped
+from .description import forward_description
+from .forward_model import HeldUnit, has_own_coordinates, held_unit
+
+logger = logging.getLogger(__name__)
+
+LIBRARY = "ffrobot_fmu.so"  # beside the core (CMakeLists.txt)
+RESOURCE = "resources/model.bin"  # mbs/fmu/forward.cpp
+
+
+def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...]]:
+    """The FMU of an analysis of kind "forward", the first if not named; a few words on it, remarks.
+
+    Raises:
+        InputError: there is no such analysis, the scene is planar, or something acts that the FMU does not have.
+        SolveError: the scene has no state to start from.
+    """
+    scene = load_any_scene(path)
+    if not isinstance(scene, SpatialScene):
+        raise InputError(
+            f'{path}: --format fmu: expected a scene with space = "spatial", found a planar one: forward motions in the'
+            " plane are not available as FMUs yet"
+        )
+    chosen = _chosen(path, scene, analysis)
+    _check(path, scene)
+    place = PLATFORMS.get((sys.platform, platform.machine()))
+    if place is None:
+        raise InputError(f"{path}: --format fmu: FMI 2.0 has no name for {sys.platform} on {platform.machine()}")
+    bodies = load_spatial_bodies(scene, lambda stage: logger.info("%s", stage))
+    loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
+    model = with_compliance_in_space(without_paths(build_spatial_model(scene, [part.spatial for part in bodies])))
+    unit = held_unit(model, patches_in_space(scene, loaded), chosen)
+    names = "\n".join(each.name for each in (*unit.inputs, *unit.outputs))
+    unit.data.guid = f"{{{uuid5(NAMESPACE_URL, unit.data.to_bytes().hex() + names)}}}"
+    identifier, (folder, suffix) = identifier_of(scene.name, chosen.name), place
+    library = Path(str(_core.__file__)).with_name(LIBRARY)
+    content = {
+        "modelDescription.xml": forward_description(
+            unit, identifier, f"{scene.name}, {chosen.name}", chosen, f"ffrobot {version('ffrobot')}"
+        ),
+        RESOURCE: unit.data.to_bytes(),
+        f"binaries/{folder}/{identifier}{suffix}": library.read_bytes(),
+    }
+    what = f"{chosen.name}, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
+    silent = [node.joint.name for node in model.tree.nodes if node.joint.units and not has_own_coordinates(node)]
+    return zipped(content), what, tuple(_remarks(unit, silent, folder))
+
+
+def _chosen(path: Path, scene: SpatialScene, name: str | None) -> Forward:
+    """The analysis of this name, or the first that fits."""
+    found = {each.name: each for each in scene.analysis}
+    if name is not None and name not in found:
+        raise InputError(f'{path}: --analysis: expected one of {quoted(found)}, found "{name}"')
+    fitting = [each for each in scene.analysis if isinstance(each, Forward) and each.actuation is None]
+    wanted = 'an analysis of kind "forward" without actuation, whose motors are the inputs of the FMU'
+    if name is None:
+        if not fitting:
+            raise InputError(f"{path}: --analysis: expected {wanted}, found none")
+        return fitting[0]
+    for each in fitting:
+        if each.name == name:
+            return each
+    kind = getattr(found[name], "kind", "?")
+    what = f'kind "{kind}"' + (" with actuation" if isinstance(found[name], Forward) else "")
+    raise InputError(f'{path}: --analysis: expected {wanted}, found "{name}" of {what}')
+
+
+def _check(path: Path, scene: SpatialScene) -> None:
+    if scene.load:
+        raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs, found some")
+    if scene.motors == "frame":
+        raise InputError(f'{path}: motors: expected "section" of a scene for an FMU, found "frame"')
+
+
+def _remarks(unit: HeldUnit, silent: list[str], folder: str) -> list[str]:
+    found = [f"inputs are held over a communication step; binary for {folder} alone, without sources"]
+    if not unit.inputs:
+        found.append("there are no inputs: no joint has a motor, no link patches")
+    if silent:
+        found.append(f"{quoted(silent)}: no outputs of their coordinates, as they are none of the state")
+    return [*found, "limits of motors and patches do not act"]

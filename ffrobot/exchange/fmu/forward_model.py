@@ -1,0 +1,116 @@
+"""A forward motion in space as co-simulation FMUs have it: inputs, outputs and what the core's library reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...actuation.patches.spatial_patches import LinkPatches
+from ...common.arrays import Array
+from ...mbs import _core
+from ...mbs.analysis.forward import Forward
+from ...mbs.analysis.spatial_drive import integrator_of
+from ...mbs.model.spatial_model import SpatialModel, modal_direction
+from ...mbs.model.spatial_system import SpatialSystem
+from ...mbs.model.spatial_tree import Node
+from ...mbs.solve.integrators import METHODS
+from ...mbs.solve.spatial_statics import initial_state
+from .variables import Variable
+
+UNIT_OF_FORCE = {"rad": "N.m", "m": "N"}
+
+
+@dataclass(frozen=True)
+class HeldUnit:
+    """Variables in the order of their value references, inputs first, and the `data` of the model."""
+
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    data: _core.HeldModel
+
+
+def held_unit(model: SpatialModel, patches: Mapping[str, LinkPatches], analysis: Forward) -> HeldUnit:
+    """The motion of `analysis` from its initial state under moments of motors and voltages of `patches` (by body).
+
+    Raises `InputError` and `SolveError` as the analysis itself does.
+    """
+    data, start = SpatialSystem(model).held(), initial_state(model)
+    data.q, data.v = start.q, start.v
+    data.method = METHODS[integrator_of(model, analysis.integrator)]
+    data.spectral_radius, data.tolerance = analysis.spectral_radius, analysis.tolerance
+    data.duration = analysis.last_time
+    inputs = [*_motors(model), *_voltages(model, patches)]
+    linear = [*_joints(model), *_modes(model)]
+    places = list(_places(model))
+    data.inputs = [direction for _, direction in inputs]
+    data.linear, data.places = [output for _, output in linear], [output for _, output in places]
+    of_places = [
+        Variable(f"point/{point}/{axis}", "m", f"place of {point} along {axis}")
+        for point, _ in places
+        for axis in "xyz"
+    ]
+    return HeldUnit(tuple(each for each, _ in inputs), (*(each for each, _ in linear), *of_places), data)
+
+
+def _numbered(joint: str, number: int, count: int) -> str:
+    return f"{joint} {number}" if count > 1 else joint
+
+
+def _motors(model: SpatialModel) -> Iterator[tuple[Variable, Array]]:
+    """What a unit of each does along v (n_v,): behind a gear that gives on its motor."""
+    units = {joint.name: joint.units for joint in model.scene.joint}
+    for joint, columns in model.motors.items():
+        for k, (column, unit) in enumerate(zip(columns, units[joint], strict=True), 1):
+            name, what = _numbered(joint, k, len(columns)), "force" if unit == "m" else "moment"
+            variable = Variable(f"joint/{name}/moment", UNIT_OF_FORCE[unit], f"{what} of the motor of {name}")
+            yield variable, model.sign(joint) * np.eye(model.tree.n_v)[column]
+
+
+def _voltages(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> Iterator[tuple[Variable, Array]]:
+    for body, of_link in patches.items():
+        columns = iter(of_link.Phi_V.T)
+        for layout, array in of_link.arrays.items():
+            for k in range(1, len(array.edges) + 1):
+                variable = Variable(f"pzt/{layout}/{k}", "V", f"voltage of patch {k} of {layout}")
+                yield variable, modal_direction(model, body, next(columns))
+
+
+def _joints(model: SpatialModel) -> Iterator[tuple[Variable, _core.LinearOutput]]:
+    """Coordinates and rates of joints whose coordinates are those of the state."""
+    tree = model.tree
+    for joint in model.scene.joint:
+        node = tree.nodes[tree.carried[joint.name]] if joint.name in tree.carried else None
+        if node is None or not has_own_coordinates(node):
+            continue
+        columns = model.columns(joint.name)
+        sign = -1.0 if node.backwards else 1.0
+        for k, (column, unit) in enumerate(zip(columns, joint.units, strict=True), 1):
+            name, entry = _numbered(joint.name, k, len(columns)), node.q.start + int(column) - node.v.start
+            yield Variable(f"joint/{name}", unit, f"coordinate of joint {name}"), _core.LinearOutput([entry], [sign])
+            rate = Variable(f"joint/{name}/rate", f"{unit}/s", f"rate of joint {name}")
+            yield rate, _core.LinearOutput([tree.n_q + int(column)], [sign])
+
+
+def has_own_coordinates(node: Node) -> bool:
+    """Whether the joint's coordinates are entries of q, but for a sign."""
+    joint = node.joint
+    return bool(joint.units) and joint.q_count == joint.freedoms and not (joint.type == "planar" and node.backwards)
+
+
+def _modes(model: SpatialModel) -> Iterator[tuple[Variable, _core.LinearOutput]]:
+    """Modal coordinates of the file of each body."""
+    for node in model.tree.nodes:
+        entries = list(range(node.p_q.start, node.p_q.stop))
+        for k, row in enumerate(node.body.modal_transform, 1):
+            name = node.body.name
+            variable = Variable(f"modal/{name}/{k}", "kg0.5.m", f"modal coordinate {k} of {name}")
+            yield variable, _core.LinearOutput(entries, row.tolist())
+
+
+def _places(model: SpatialModel) -> Iterator[tuple[str, _core.PlaceOutput]]:
+    """By "BODY.POINT"."""
+    for number, node in enumerate(model.tree.nodes):
+        for label, at in node.body.points.items():
+            yield f"{node.body.name}.{label}", _core.PlaceOutput(number, at.position, at.translation)

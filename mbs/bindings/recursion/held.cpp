@@ -1,0 +1,59 @@
+// Motions under held inputs, as FMUs run them: mbs/core/forward/held_motion.h.
+#include "core/forward/held_motion.h"
+
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings/recursion/recursion.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace ffrobot;
+using namespace ffrobot::recursion;
+using Eigen::VectorXd;
+
+void bind_held_motion(nb::module_ &m) {
+  nb::class_<LinearOutput>(m, "LinearOutput", "An output that is linear in the state (q, v).")
+      .def(
+          "__init__",
+          [](LinearOutput *o, const std::vector<int> &entries, const std::vector<double> &weights) {
+            new (o) LinearOutput{entries, weights};
+          },
+          "entries"_a, "weights"_a);
+  nb::class_<PlaceOutput>(m, "PlaceOutput", "Three outputs: where a section of a body is, m, global axes.")
+      .def(
+          "__init__",
+          [](PlaceOutput *o, int body, const Eigen::Vector3d &position, const Eigen::MatrixXd &Phi) {
+            new (o) PlaceOutput{body, position, Phi};
+          },
+          "body"_a, "position"_a, "Phi"_a);
+  nb::class_<HeldModel>(m, "HeldModel",
+                        "All that a motion under held inputs needs; see mbs/core/forward/held_motion.h.")
+      .def(
+          "__init__",
+          [](HeldModel *model, const std::vector<BodyModel<SpatialData>> &bodies,
+             const std::vector<SpatialMarker> &ground, const std::vector<RowModel> &rows, const VectorXd &gravity,
+             const Scene &scene) {
+            new (model) HeldModel();
+            model->bodies = bodies, model->ground = ground, model->rows = rows, model->gravity = gravity;
+            model->joint_forces = scene.joint_forces, model->gears = scene.gears;
+          },
+          "bodies"_a, "ground"_a, "rows"_a, "gravity"_a, "scene"_a, "Of the scene joint forces and gears.")
+      .def_rw("guid", &HeldModel::guid)
+      .def_rw("inputs", &HeldModel::inputs)
+      .def_rw("linear", &HeldModel::linear)
+      .def_rw("places", &HeldModel::places)
+      .def_rw("q", &HeldModel::q)
+      .def_rw("v", &HeldModel::v)
+      .def_rw("method", &HeldModel::method)
+      .def_rw("spectral_radius", &HeldModel::spectral_radius)
+      .def_rw("tolerance", &HeldModel::tolerance)
+      .def_rw("duration", &HeldModel::duration)
+      .def(
+          "to_bytes",
+          [](const HeldModel &model) {
+            const std::string bytes = bytes_of(model);
+            return nb::bytes(bytes.data(), bytes.size());
+          },
+          "What FMUs read.");
+}

@@ -1,0 +1,170 @@
+#include "core/forward/held_motion.h"
+
+#include "core/forward/archive.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace ffrobot {
+
+namespace recursion {
+
+template <class Archive> void fields(Archive &a, SpatialMarker &x) {
+  archived_all(a, x.position, x.triad, x.Phi, x.turns);
+}
+template <class Archive> void fields(Archive &a, SpatialData &x) {
+  archived_all(a, x.mass, x.first_moment, x.J2, x.stiffness, x.damping, x.S_bar, x.I_bar, x.S_bar_kl, x.J_spin,
+               x.h_spin, x.S_spin, x.spin_axis, x.spin_booked, x.markers);
+}
+template <class Archive> void fields(Archive &a, BodyModel<SpatialData> &x) {
+  archived_all(a, x.name, x.parent, x.parent_marker, x.inboard_marker, x.joint, x.lead, x.rotor_inertia, x.gear_ratio,
+               x.driven, x.data);
+}
+template <class Archive> void fields(Archive &a, MarkerAt &x) { archived_all(a, x.body, x.marker); }
+template <class Archive> void fields(Archive &a, RowModel &x) {
+  archived_all(a, x.name, x.kind, x.a, x.b, x.f, x.g, x.coordinate);
+}
+template <class Archive> void fields(Archive &a, JointForce &x) {
+  archived_all(a, x.q, x.v, x.stiffness, x.rest, x.friction.viscous, x.friction.coulomb, x.friction.speed);
+}
+template <class Archive> void fields(Archive &a, GearSpring &x) {
+  archived_all(a, x.a.q, x.a.v, x.b.q, x.b.v, x.ratio, x.stiffness, x.damping);
+}
+
+} // namespace recursion
+
+template <class Archive> void fields(Archive &a, LinearOutput &x) { archived_all(a, x.entries, x.weights); }
+template <class Archive> void fields(Archive &a, PlaceOutput &x) { archived_all(a, x.body, x.position, x.Phi); }
+template <class Archive> void fields(Archive &a, HeldModel &x) {
+  archived_all(a, x.guid, x.bodies, x.ground, x.rows, x.gravity, x.joint_forces, x.gears, x.inputs, x.linear, x.places,
+               x.q, x.v, x.method, x.spectral_radius, x.tolerance, x.duration);
+}
+
+namespace {
+
+using namespace recursion;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+const std::string head = "ffrobot held motion 1\n"; // another number wherever fields() change
+
+VectorXd joined(const VectorXd &q, const VectorXd &v) {
+  VectorXd y(q.size() + v.size());
+  y << q, v;
+  return y;
+}
+
+void check(bool holds, const char *expected) {
+  if (!holds)
+    throw std::invalid_argument(std::string("expected ") + expected);
+}
+
+} // namespace
+
+std::string bytes_of(const HeldModel &model) {
+  Writer writer;
+  HeldModel copy = model; // one description serves both ways
+  writer.bytes = head;
+  archived(writer, copy);
+  return writer.bytes;
+}
+
+HeldModel held_model_of(const std::string &bytes) {
+  if (bytes.compare(0, head.size(), head) != 0)
+    throw std::runtime_error("expected a model of this version of ffrobot, found another file");
+  const std::string content = bytes.substr(head.size());
+  Reader reader(content);
+  HeldModel model;
+  archived(reader, model);
+  if (reader.left() != 0)
+    throw std::runtime_error("expected the end of the file, found more data");
+  return model;
+}
+
+HeldMotion::HeldMotion(HeldModel model)
+    : model_(std::move(model)), mechanism_(model_.bodies, model_.ground, model_.rows, {}, model_.gravity),
+      scene_(scene_of(model_)), y_(joined(model_.q, model_.v)),
+      motion_(mechanism_, scene_, 0, model_.q.data(), model_.v.data()), inputs_(model_.inputs.size(), 0.0),
+      outputs_(output_count(), 0.0) {}
+
+// Checked before anything reads the state.
+Scene HeldMotion::scene_of(const HeldModel &model) {
+  Index n_q = 0, n_v = 0;
+  for (const auto &body : model.bodies) {
+    const JointShape shape = Spatial::shape(body.joint);
+    n_q += shape.q_count + body.data.modes(), n_v += shape.v_count + body.data.modes();
+  }
+  check(model.q.size() == n_q && model.v.size() == n_v, "a state of the bodies' joints and modes");
+  check(model.duration > 0, "a duration above 0");
+  Scene scene;
+  scene.targets.assign(model.rows.size(), {TimeFunction(Constant(0)), 1});
+  for (const VectorXd &direction : model.inputs) {
+    check(direction.size() == n_v, "inputs along v");
+    scene.loads.emplace_back(direction, Constant(0));
+  }
+  for (const LinearOutput &output : model.linear) {
+    check(output.entries.size() == output.weights.size(), "a weight for each entry of an output");
+    for (const int entry : output.entries)
+      check(entry >= 0 && entry < n_q + n_v, "outputs of the state");
+  }
+  for (const PlaceOutput &output : model.places)
+    check(output.body >= 0 && output.body < static_cast<int>(model.bodies.size()), "places on bodies");
+  scene.joint_forces = model.joint_forces;
+  scene.gears = model.gears;
+  return scene;
+}
+
+IntegrationStatus HeldMotion::step(double t, double h) {
+  for (std::size_t i = 0; i < inputs_.size(); ++i)
+    scene_.loads[i].magnitude = Constant(inputs_[i]);
+  IntegrationControls controls;
+  controls.tolerance = model_.tolerance * std::min(1.0, h / model_.duration);
+  controls.methods = {{{model_.method, model_.spectral_radius}, 1, 0}};
+  if (history_.has_begun()) // step sizes go on; the state is the first output
+    history_.time = t, history_.outputs = 1;
+  outputs_are_old_ = true;
+  const IntegrationReport report = integrate(
+      motion_, {t, t + h}, y_, controls, [](std::size_t, double, const double *) {}, [](double) { return true; },
+      nullptr, nullptr, &history_);
+  return report.status;
+}
+
+const std::vector<double> &HeldMotion::outputs() {
+  if (!outputs_are_old_)
+    return outputs_;
+  outputs_are_old_ = false;
+  std::size_t i = 0;
+  for (const LinearOutput &output : model_.linear) {
+    double sum = 0;
+    for (std::size_t k = 0; k < output.entries.size(); ++k)
+      sum += output.weights[k] * y_[output.entries[k]];
+    outputs_[i++] = sum;
+  }
+  if (model_.places.empty())
+    return outputs_;
+  const double *q = y_.data(), *v = q + mechanism_.n_q;
+  VectorXd a(mechanism_.n_v);
+  motion_.evaluate(0, q, v, a.data());
+  const auto frames = frame_motions(mechanism_, q, v, motion_.workspace());
+  for (const PlaceOutput &output : model_.places) {
+    const Eigen::Vector3d r = place(output, frames);
+    std::copy_n(r.data(), 3, outputs_.begin() + static_cast<std::ptrdiff_t>(i));
+    i += 3;
+  }
+  return outputs_;
+}
+
+Eigen::Vector3d HeldMotion::place(const PlaceOutput &at, const std::vector<FrameMotion> &frames) const {
+  const auto number = static_cast<std::size_t>(at.body);
+  const auto &node = mechanism_.nodes[number];
+  const auto &body = model_.bodies[number].data;
+  const auto inboard = static_cast<std::size_t>(model_.bodies[number].inboard_marker);
+  Eigen::Vector3d x = at.position;
+  if (node.n())
+    x += at.Phi * y_.segment(node.p_q(), node.n());
+  if (node.inboard < 0) // the frame sits at the joint, with the axes of its triad
+    x = node.origin + body.markers[inboard].triad.transpose() * x;
+  return frames[number].r + frames[number].R * x;
+}
+
+} // namespace ffrobot

@@ -1,0 +1,80 @@
+// The motion of a robot in space under inputs that are held over steps, without Python: what an FMU runs.
+#pragma once
+
+#include "core/integrate/integrate.h"
+#include "core/recursion/motion.h"
+#include "core/recursion/observe.h"
+
+#include <string>
+#include <vector>
+
+namespace ffrobot {
+
+// An output that is linear in the state: weights on entries of y = (q, v).
+struct LinearOutput {
+  std::vector<int> entries;
+  std::vector<double> weights;
+};
+
+// Three outputs, the place of a section in global axes (m): r + A (position + Phi p).
+struct PlaceOutput {
+  int body = 0;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero(); // m, body axes
+  Eigen::MatrixXd Phi;                                // (3, n)
+};
+
+// Everything that such a motion needs; rows close loops.
+struct HeldModel {
+  std::string guid; // of the export that it belongs to
+  std::vector<recursion::BodyModel<recursion::SpatialData>> bodies;
+  std::vector<recursion::SpatialMarker> ground;
+  std::vector<recursion::RowModel> rows;
+  Eigen::VectorXd gravity; // (3) m/s^2
+  std::vector<recursion::JointForce> joint_forces;
+  std::vector<recursion::GearSpring> gears;
+  std::vector<Eigen::VectorXd> inputs; // (n_v) generalized forces of a unit of each
+  std::vector<LinearOutput> linear;    // outputs, before those of `places`
+  std::vector<PlaceOutput> places;
+  Eigen::VectorXd q, v; // at the start
+  MethodKind method = MethodKind::dop853;
+  double spectral_radius = 0.8; // of generalized-alpha
+  double tolerance = 1e-6;      // over `duration` (s)
+  double duration = 1;
+};
+
+std::string bytes_of(const HeldModel &model);
+// Throws std::runtime_error for bytes that are none of bytes_of().
+HeldModel held_model_of(const std::string &bytes);
+
+class HeldMotion {
+public:
+  // Throws std::invalid_argument where the model does not fit together.
+  explicit HeldMotion(HeldModel model);
+  HeldMotion(const HeldMotion &) = delete;
+  HeldMotion &operator=(const HeldMotion &) = delete;
+
+  const HeldModel &model() const { return model_; }
+  std::vector<double> &inputs() { return inputs_; } // held from now on
+  std::size_t output_count() const { return model_.linear.size() + 3 * model_.places.size(); }
+
+  // From time t over h (s) by steps of the integrator, whose errors keep to the tolerance times h / duration: those of
+  // all steps together keep to the tolerance.
+  IntegrationStatus step(double t, double h);
+
+  const std::vector<double> &outputs(); // now: evaluated when first asked for after a step
+
+private:
+  static recursion::Scene scene_of(const HeldModel &model);
+  Eigen::Vector3d place(const PlaceOutput &at, const std::vector<recursion::FrameMotion> &frames) const;
+
+  HeldModel model_;
+  recursion::Mechanism<recursion::Spatial> mechanism_;
+  recursion::Scene scene_;
+  Eigen::VectorXd y_; // (q, v)
+  recursion::RecursiveMotion<recursion::Spatial> motion_;
+  IntegrationCheckpoint history_; // of the step before
+  std::vector<double> inputs_, outputs_;
+  bool outputs_are_old_ = true;
+};
+
+} // namespace ffrobot

@@ -1,0 +1,238 @@
+// FMI 2.0, co-simulation, of the forward motion of a robot in space: the same library for all robots, whose model is in
+// resources/model.bin (core/forward/held_motion.h). Value references count inputs, then outputs. Inputs are held over
+// a communication step.
+#include "core/forward/held_motion.h"
+#include "fmu/fmi2.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+using namespace ffrobot;
+
+namespace {
+
+struct Instance {
+  std::string name;
+  const fmi2CallbackFunctions *callbacks;
+  HeldModel model;
+  std::unique_ptr<HeldMotion> motion;
+};
+
+fmi2Status fail(const fmi2CallbackFunctions *callbacks, const std::string &name, const std::string &message) {
+  std::string format; // the message is one of printf
+  for (const char c : message)
+    format += c == '%' ? "%%" : std::string(1, c);
+  if (callbacks && callbacks->logger)
+    callbacks->logger(callbacks->componentEnvironment, name.c_str(), fmi2Error, "logStatusError", format.c_str());
+  return fmi2Error;
+}
+fmi2Status fail(fmi2Component c, const std::string &message) {
+  const auto *instance = static_cast<const Instance *>(c);
+  return fail(instance->callbacks, instance->name, message);
+}
+
+int digit(char c) { return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : c - 'A' + 10; }
+
+// The folder that a URI of the scheme file names (RFC 8089): "file:/x", "file:///x", with %-escapes.
+std::string folder_of(const std::string &uri) {
+  std::string escaped = uri;
+  if (escaped.rfind("file:", 0) == 0)
+    escaped.erase(0, 5);
+  if (escaped.rfind("//", 0) == 0)
+    escaped.erase(0, std::min(escaped.find('/', 2), escaped.size()));
+  std::string path;
+  for (std::size_t i = 0; i < escaped.size(); ++i)
+    if (escaped[i] == '%' && i + 2 < escaped.size()) {
+      path += static_cast<char>(16 * digit(escaped[i + 1]) + digit(escaped[i + 2]));
+      i += 2;
+    } else {
+      path += escaped[i];
+    }
+  return path;
+}
+
+HeldModel model_in(const std::string &uri) {
+  const std::string path = folder_of(uri) + "/model.bin";
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+    throw std::runtime_error("expected the file " + path + " of the FMU, found none");
+  try {
+    return held_model_of({std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()});
+  } catch (const std::exception &error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+}
+
+const char *in_words(IntegrationStatus status) {
+  switch (status) {
+  case IntegrationStatus::completed:
+    return "completed";
+  case IntegrationStatus::step_underflow:
+    return "no step size meets the tolerance";
+  case IntegrationStatus::too_many_steps:
+    return "too many steps";
+  case IntegrationStatus::interrupted:
+    return "interrupted";
+  case IntegrationStatus::diverged:
+    return "the motion diverged";
+  }
+  return "unknown";
+}
+
+} // namespace
+
+// ---- life of an instance ----
+
+FMI2_EXPORT const char *fmi2GetTypesPlatform() { return "default"; }
+FMI2_EXPORT const char *fmi2GetVersion() { return "2.0"; }
+
+FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                                          const fmi2CallbackFunctions *callbacks, fmi2Boolean, fmi2Boolean) {
+  const std::string called = name ? name : "";
+  try {
+    if (type != fmi2CoSimulation)
+      throw std::runtime_error("expected co-simulation, found model exchange");
+    auto instance = std::make_unique<Instance>();
+    instance->name = called, instance->callbacks = callbacks;
+    instance->model = model_in(resources ? resources : "");
+    if (!guid || instance->model.guid != guid)
+      throw std::runtime_error("expected the guid " + instance->model.guid +
+                               " of modelDescription.xml, found another: resources/model.bin is of another export");
+    instance->motion = std::make_unique<HeldMotion>(instance->model);
+    return instance.release();
+  } catch (const std::exception &error) {
+    fail(callbacks, called, std::string("fmi2Instantiate: ") + error.what());
+    return nullptr;
+  }
+}
+
+FMI2_EXPORT void fmi2FreeInstance(fmi2Component c) { delete static_cast<Instance *>(c); }
+
+FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component, fmi2Boolean, size_t, const fmi2String[]) { return fmi2OK; }
+
+FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component, fmi2Boolean, fmi2Real, fmi2Real, fmi2Boolean, fmi2Real) {
+  return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component) { return fmi2OK; }
+FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component) { return fmi2OK; }
+FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component) { return fmi2OK; }
+
+FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c) {
+  auto *instance = static_cast<Instance *>(c);
+  try {
+    instance->motion = std::make_unique<HeldMotion>(instance->model);
+    return fmi2OK;
+  } catch (const std::exception &error) {
+    return fail(c, std::string("fmi2Reset: ") + error.what());
+  }
+}
+
+// ---- values ----
+
+FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real value[]) {
+  auto *instance = static_cast<Instance *>(c);
+  HeldMotion &motion = *instance->motion;
+  const std::size_t n_u = motion.inputs().size();
+  try {
+    for (size_t i = 0; i < n; ++i) {
+      if (r[i] >= n_u + motion.output_count())
+        return fail(c, "fmi2GetReal: expected a value reference of modelDescription.xml, found another");
+      value[i] = r[i] < n_u ? motion.inputs()[r[i]] : motion.outputs()[r[i] - n_u];
+    }
+    return fmi2OK;
+  } catch (const std::exception &error) {
+    return fail(c, std::string("fmi2GetReal: ") + error.what());
+  }
+}
+
+FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Real value[]) {
+  auto &inputs = static_cast<Instance *>(c)->motion->inputs();
+  for (size_t i = 0; i < n; ++i) {
+    if (r[i] >= inputs.size() || !std::isfinite(value[i]))
+      return fail(c, "fmi2SetReal: expected a finite value of an input, found something else");
+    inputs[r[i]] = value[i];
+  }
+  return fmi2OK;
+}
+
+// There are real variables only.
+#define NONE_OF(type)                                                                                                  \
+  FMI2_EXPORT fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference[], size_t n, fmi2##type[]) {          \
+    return n ? fail(c, "expected real variables, found a reference to one of type " #type) : fmi2OK;                   \
+  }                                                                                                                    \
+  FMI2_EXPORT fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference[], size_t n, const fmi2##type[]) {    \
+    return n ? fail(c, "expected real variables, found a reference to one of type " #type) : fmi2OK;                   \
+  }
+NONE_OF(Integer)
+NONE_OF(Boolean)
+NONE_OF(String)
+
+// ---- co-simulation ----
+
+FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean) {
+  auto *instance = static_cast<Instance *>(c);
+  if (!(h >= 0 && std::isfinite(h) && std::isfinite(time)))
+    return fail(c, "fmi2DoStep: expected a step of zero or more seconds");
+  if (h == 0)
+    return fmi2OK;
+  try {
+    const IntegrationStatus status = instance->motion->step(time, h);
+    if (status == IntegrationStatus::completed)
+      return fmi2OK;
+    return fail(c, "fmi2DoStep: at t = " + std::to_string(time) + " s: " + in_words(status));
+  } catch (const std::exception &error) {
+    return fail(c, std::string("fmi2DoStep: ") + error.what());
+  }
+}
+
+FMI2_EXPORT fmi2Status fmi2CancelStep(fmi2Component c) {
+  return fail(c, "fmi2CancelStep: no step is left to finish later");
+}
+
+FMI2_EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference[], size_t n,
+                                                   const fmi2Integer[], const fmi2Real[]) {
+  return n ? fail(c, "fmi2SetRealInputDerivatives: inputs are held over a step") : fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference[], size_t n,
+                                                    const fmi2Integer[], fmi2Real[]) {
+  return n ? fail(c, "fmi2GetRealOutputDerivatives: outputs come without derivatives") : fmi2OK;
+}
+
+#define NO_STATUS(name, type)                                                                                          \
+  FMI2_EXPORT fmi2Status name(fmi2Component, const fmi2StatusKind, type *) { return fmi2Discard; }
+NO_STATUS(fmi2GetStatus, fmi2Status)
+NO_STATUS(fmi2GetRealStatus, fmi2Real)
+NO_STATUS(fmi2GetIntegerStatus, fmi2Integer)
+NO_STATUS(fmi2GetBooleanStatus, fmi2Boolean)
+NO_STATUS(fmi2GetStringStatus, fmi2String)
+
+// ---- what modelDescription.xml says that there is not ----
+
+FMI2_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference[], size_t,
+                                                    const fmi2ValueReference[], size_t, const fmi2Real[], fmi2Real[]) {
+  return fail(c, "fmi2GetDirectionalDerivative: there are none");
+}
+FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *) {
+  return fail(c, "fmi2GetFMUstate: states are not kept");
+}
+FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate) {
+  return fail(c, "fmi2SetFMUstate: states are not kept");
+}
+FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component, fmi2FMUstate *) { return fmi2OK; }
+FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate, size_t *) {
+  return fail(c, "fmi2SerializedFMUstateSize: states are not kept");
+}
+FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate, fmi2Byte[], size_t) {
+  return fail(c, "fmi2SerializeFMUstate: states are not kept");
+}
+FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte[], size_t, fmi2FMUstate *) {
+  return fail(c, "fmi2DeSerializeFMUstate: states are not kept");
+}

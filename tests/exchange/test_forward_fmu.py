@@ -1,0 +1,295 @@
+"""Forward motions as co-simulation FMUs, run by FMPy, against `solve` under the same held inputs."""
+
+import tomllib
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from fmpy import extract, read_model_description, simulate_fmu
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.validation import validate_fmu
+
+from ffrobot import InputError, Results
+from ffrobot.exchange.export import export_file
+
+STEP, END = 0.01, 0.3
+CHANGES = (0.1, 0.2)  # s, at which inputs change
+
+
+def link(name, modes, *, width=0.003):
+    return {
+        "name": name, "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+        "geometry": {"kind": "beam", "length": 0.4,
+                     "section": {"shape": "rectangle", "height": 0.02, "width": width}},
+        "mesh": {"elements": 12}, "reference": {"condition": "cantilever"}, "modes": {"count": modes},
+        "damping": {"ratio": 0.02},
+    }  # fmt: skip
+
+
+def box(**points):
+    return {"mass": 0.4, "center": [0.1, 0.0, 0.01], "inertia": [2e-4, 1e-3, 1e-3], "points": points}
+
+
+def pin(name, first, second, axis=(0.0, 1.0, 0.0), **keys):
+    return {"name": name, "type": "revolute", "between": [first, second], "axis": list(axis), **keys}
+
+
+ROOT, TIP = [0.0, 0.0, 0.02], [0.3, 0.01, 0.0]
+SCENES = {
+    # flexible links, an outer first side, a rotor behind a stiff gear, friction, patches, three analyses to choose from
+    "arm": {
+        "body": [{"name": "upper", "link": link("upper", 2)}, {"name": "fore", "rigid": box(root=ROOT, tip=TIP)}],
+        "joint": [
+            pin("shoulder", "ground", "upper.root", (0.1, 1.0, 0.2), viscous_friction=0.05),
+            pin("elbow", "fore.root", "upper.tip", rotor_inertia=2e-5, gear_ratio=50.0),
+        ],
+        "pzt": [
+            {"body": "upper", "bends": "out-of-plane", "centers": [0.06, 0.2, 0.34], "length": 0.06, "width": 0.01,
+             "thickness": 0.5e-3, "modulus": 63e9, "d31": -1.9e-10, "density": 7600.0, "limit": 200.0}
+        ],
+        "initial": {"joints": {"shoulder": -0.4, "elbow": 0.7}},
+    },
+    # gears that give: motors turn rotors, from static equilibrium without motors' moments in the plane of the table
+    "gears": {
+        "gravity": [0.0, 0.0, 0.0],
+        "body": [{"name": "upper", "link": link("upper", 2)}, {"name": "fore", "rigid": box(root=ROOT, tip=TIP)}],
+        "joint": [
+            pin("shoulder", "ground", "upper.root", (0.0, 0.0, 1.0), stiffness=50.0, damping=0.05, rotor_inertia=1e-5,
+                gear_ratio=60.0),
+            pin("elbow", "upper.tip", "fore.root", (0.0, 0.0, 1.0), stiffness=30.0, rotor_inertia=1e-5,
+                gear_ratio=40.0),
+        ],
+    },
+    # a loop of four bars, one of them flexible, and joints of two and six coordinates
+    "loop": {
+        "body": [{"name": "crank", "rigid": box(a=[0.0, 0.0, 0.0], b=[0.1, 0.0, 0.0])},
+                 {"name": "coupler", "link": link("coupler", 1, width=0.01)},
+                 {"name": "rocker", "rigid": box(a=[0.0, 0.0, 0.0], b=[0.3, 0.0, 0.0])},
+                 {"name": "pendulum", "rigid": box(a=[0.0, 0.0, 0.1])}, {"name": "flyer", "rigid": box()}],
+        "joint": [
+            pin("drive", "ground", "crank.a", motor=True), pin("knee", "crank.b", "coupler.root"),
+            pin("out", "ground", "rocker.a", at=[0.4, 0.0, 0.0]),
+            {"name": "close", "type": "spherical", "between": ["rocker.b", "coupler.tip"]},
+            {"name": "cross", "type": "universal", "between": ["rocker.b", "pendulum.a"], "axis": [0.0, 1.0, 0.0],
+             "second_axis": [1.0, 0.0, 0.0]},
+        ],
+        "initial": {"joints": {"drive": -1.2, "knee": 0.9, "out": -1.9}},
+    },
+    # dry friction: implicit steps
+    "radau": {
+        "body": [{"name": "upper", "link": link("upper", 1)}],
+        "joint": [pin("shoulder", "ground", "upper.root", coulomb_friction=0.05)],
+    },
+}  # fmt: skip
+INPUTS = {
+    "arm": {"joint/shoulder/moment": (-3.0, -1.0, 2.0), "joint/elbow/moment": (0.5, -1.5, 1.0),
+            "pzt/upper/2": (150.0, -200.0, 0.0)},
+    "gears": {"joint/shoulder/moment": (4.0, -5.0, 1.0), "joint/elbow/moment": (-1.0, 2.0, 0.0)},
+    "loop": {"joint/drive/moment": (0.3, -1.0, 1.5)},
+    "radau": {"joint/shoulder/moment": (-1.2, -0.2, 0.6)},
+}  # fmt: skip
+
+
+def scene_text(name, loads=()):
+    analysis = {"name": "swing", "kind": "forward", "end": END, "output_step": STEP, "tolerance": 1e-8}
+    if name == "radau":
+        analysis |= {"tolerance": 1e-7, "integrator": "radau"}
+    keys = {"name": f"{name} as an FMU", "space": "spatial", "gravity": [0.0, 0.0, -9.81], **SCENES[name]}
+    return tomli_w.dumps(keys | {"load": list(loads), "analysis": [analysis]})
+
+
+def loads_of(name):
+    """The inputs as loads of a scene: steps of time."""
+    found = []
+    for key, (a, b, c) in INPUTS[name].items():
+        size = f"where(t < {CHANGES[0]}, {a}, where(t < {CHANGES[1]}, {b}, {c}))"
+        kind, of, last = key.split("/")
+        if kind == "joint":
+            found.append({"joint": of, "moment": size})
+        else:
+            found.append({"pzt": of, "voltage": [size if k == int(last) else "0" for k in (1, 2, 3)]})
+    return found
+
+
+def held_inputs(name):
+    t = np.arange(round(END / STEP) + 1) * STEP
+    table = np.zeros(len(t), dtype=[("time", float), *((key, float) for key in INPUTS[name])])
+    table["time"] = t
+    for key, values in INPUTS[name].items():
+        table[key] = np.select([t < c - STEP / 2 for c in CHANGES], values[:2], values[2])
+    return table
+
+
+@pytest.fixture(scope="module", params=list(SCENES))
+def robot(request, tmp_path_factory, ffrobot):
+    """Name of the scene, its FMU, and results of `solve` under the inputs."""
+    folder = tmp_path_factory.mktemp(request.param)
+    scene, loaded = folder / "scene.toml", folder / "loaded.toml"
+    scene.write_text(scene_text(request.param))
+    loaded.write_text(scene_text(request.param, loads_of(request.param)))
+    for command in (("export", scene, "--analysis", "swing", "--format", "fmu"), ("solve", loaded)):
+        done = ffrobot(*command)
+        assert done.returncode == 0, done.stderr
+    return request.param, folder / "scene.fmu", Results(folder / "loaded.results.h5")
+
+
+def expected(results, variable):
+    """Of `solve`, by the name that the FMU has."""
+    kind, name, *last = variable.split("/")
+    if kind == "point":
+        return results[f"swing/points/{name}/position"][:, "xyz".index(last[0])]
+    if kind == "modal":
+        return results[f"swing/bodies/{name}/modal"][:, int(last[0]) - 1]
+    joint, _, number = name.partition(" ")
+    found = results[f"swing/joints/{joint}/{'rate' if last else 'coordinate'}"]
+    return found[:, int(number) - 1] if number else found
+
+
+def test_motion(robot):
+    """Every output at every step: to 1e-6 of the largest of its kind."""
+    name, fmu, results = robot
+    assert validate_fmu(str(fmu)) == []
+    outputs = [each.name for each in read_model_description(str(fmu)).modelVariables if each.causality == "output"]
+    found = simulate_fmu(str(fmu), stop_time=END, output_interval=STEP, input=held_inputs(name), output=outputs)
+    np.testing.assert_allclose(found["time"], results["swing/time"], atol=1e-12)
+    sizes = {}
+    for variable in outputs:
+        values = np.abs(expected(results, variable)).max()
+        kind = variable.split("/")[0] + variable.endswith("rate") * " rate"
+        sizes[variable] = kind, values
+    largest = {kind: max(size for of, size in sizes.values() if of == kind) for kind, _ in sizes.values()}
+    assert largest["joint"] > 0.3  # it moves
+    for variable in outputs:
+        np.testing.assert_allclose(
+            found[variable], expected(results, variable), rtol=0, atol=1e-6 * largest[sizes[variable][0]],
+            err_msg=variable,
+        )  # fmt: skip
+
+
+@pytest.fixture
+def slave(tmp_path):
+    """The folder in which the arm's FMU is unpacked, one with blanks, what it logs, and what makes an instance."""
+    folder, told, scene = tmp_path / "an FMU, unpacked", [], tmp_path / "scene.toml"
+    scene.write_text(scene_text("arm"))
+    extract(str(export_file(scene, "fmu", None, None).path), str(folder))
+    return folder, told, lambda: instance_of(folder, told)
+
+
+def instance_of(folder, told):
+    description = read_model_description(str(folder))
+    found = FMU2Slave(
+        guid=description.guid, unzipDirectory=str(folder), instanceName="arm",
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )  # fmt: skip
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(lambda *values: told.append(values[-1].decode()))
+    found.instantiate(callbacks=callbacks)
+    found.setupExperiment(startTime=0.0)
+    found.enterInitializationMode()
+    found.exitInitializationMode()
+    return found, {each.name: each.valueReference for each in description.modelVariables}
+
+
+def test_reset_and_length_of_steps(slave):
+    """The same again after a reset; held inputs in one step or in fifteen, to the tolerance."""
+    _, _, make = slave
+    instance, reference = make()
+    outputs = [reference[name] for name in ("joint/shoulder", "joint/elbow/rate", "point/fore.tip/z")]
+
+    def run(steps):
+        instance.setReal([reference["joint/elbow/moment"]], [-0.5])
+        for k in range(steps):
+            instance.doStep(k * 0.3 / steps, 0.3 / steps)
+        return np.array(instance.getReal(outputs))
+
+    first = run(1)
+    instance.reset()
+    assert instance.getReal([reference["joint/elbow/moment"]]) == [0.0]
+    again = run(1)
+    instance.reset()
+    np.testing.assert_array_equal(again, first)
+    np.testing.assert_allclose(run(15), first, rtol=1e-7)
+    instance.terminate()
+    instance.freeInstance()
+
+
+def test_wrong_calls_and_files(slave):
+    """Each is an error with a message in the log."""
+    folder, told, make = slave
+    instance, reference = make()
+    for call, message in (
+        (lambda: instance.setReal([reference["joint/shoulder"]], [1.0]), "expected a finite value of an input"),
+        (lambda: instance.setReal([0], [float("nan")]), "expected a finite value of an input"),
+        (lambda: instance.doStep(0.0, -1.0), "expected a step of zero or more seconds"),
+        (lambda: instance.getReal([10_000]), "expected a value reference of modelDescription.xml"),
+    ):
+        with pytest.raises(Exception, match="fmi2"):
+            call()
+        assert message in told[-1]
+    instance.freeInstance()
+    model = folder / "resources" / "model.bin"
+    data = model.read_bytes()
+    for content, message in (
+        (data[: len(data) // 2], "found the end of the file"),
+        (data + b"x", "expected the end of the file"),
+        (b"something else", "expected a model of this version of ffrobot"),
+        (data[:22] + b"\xff" * 8 + data[30:], "expected a count"),
+        (data.replace(b"{", b"[", 1), "of another export"),
+    ):
+        model.write_bytes(content)
+        with pytest.raises(Exception, match="instantiate"):
+            make()
+        assert message in told[-1]
+    model.unlink()
+    with pytest.raises(Exception, match="instantiate"):
+        make()
+    assert "model.bin of the FMU, found none" in told[-1]
+
+
+def test_results_of_a_forward_analysis(robot):
+    """They do not say what robot it was: the scene does."""
+    with pytest.raises(InputError, match=r'found "swing" of kind "forward": export the scene'):
+        export_file(robot[1].with_name("loaded.results.h5"), "fmu", "swing", None)
+
+
+def test_the_archive_is_the_library_and_the_model(robot):
+    """The binary is that of the installation: no compiler is asked for. The same scene gives the same bytes."""
+    import ffrobot.mbs._core as core
+
+    _, fmu, _ = robot
+    with zipfile.ZipFile(fmu) as file:
+        names = file.namelist()
+        binary = next(name for name in names if name.startswith("binaries/"))
+        assert file.read(binary) == Path(core.__file__).with_name("ffrobot_fmu.so").read_bytes()
+    assert not any(name.startswith("sources/") for name in names)
+    again = export_file(fmu.with_name("scene.toml"), "fmu", "swing", fmu.with_name("again.fmu"))
+    assert again.path.read_bytes() == fmu.read_bytes()
+
+
+PATH = {"name": "path", "joint": "shoulder", "value": "t**2"}
+INVERSE = {"name": "inverse", "kind": "pcid", "end": 0.3, "output_step": 0.01}
+AGAIN = {"name": "again", "kind": "forward", "end": 0.3, "output_step": 0.01, "actuation": "inverse", "apply": "joints"}
+
+
+@pytest.mark.parametrize(
+    ("keys", "analysis", "message"),
+    [
+        ({}, "no such", 'expected one of "swing", found "no such"'),
+        ({"trajectory": [PATH], "analysis": [INVERSE]}, "inverse", 'found "inverse" of kind "pcid"'),
+        ({"trajectory": [PATH], "analysis": [INVERSE, AGAIN]}, "again", 'of kind "forward" with actuation'),
+        (
+            {"trajectory": [PATH], "analysis": [INVERSE, AGAIN]},
+            None,
+            "whose motors are the inputs of the FMU, found none",
+        ),
+        ({"load": [{"joint": "shoulder", "moment": "1"}]}, None, "load: expected none of a scene for an FMU"),
+        ({"motors": "frame"}, "swing", 'motors: expected "section"'),
+    ],
+)
+def test_what_cannot_be_exported(tmp_path, keys, analysis, message):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(tomli_w.dumps(tomllib.loads(scene_text("radau")) | keys))
+    with pytest.raises(InputError, match=message):
+        export_file(scene, "fmu", analysis, None)
