@@ -76,8 +76,9 @@ class SpatialRigidArm:
         friction = -resistance(self._model.tree, v[None])[0]
 
         def moments(target: Array) -> Array:
-            found: Array = -self._system.core.evaluate(q, v, target, friction, None)[1][self._motors]
-            return found
+            signs = self._system.row_signs
+            found: Array = -(signs * self._system.core.evaluate(q, v, signs * target, friction, None)[1])
+            return found[self._motors]
 
         h = moments(np.zeros(len(C_v)))
         return np.column_stack([moments(unit) - h for unit in np.eye(len(C_v))[self._motors]]), h
