@@ -77,8 +77,9 @@ class SpatialRigidArm:
 
         def moments(target: Array) -> Array:
             signs = self._system.row_signs
-            found: Array = -(signs * self._system.core.evaluate(q, v, signs * target, friction, None)[1])
-            return found[self._motors]
+            multipliers = self._system.core.evaluate(q, v, signs * target, friction, None)[1]
+            found: Array = -(signs * multipliers)[self._motors]
+            return found
 
         h = moments(np.zeros(len(C_v)))
         return np.column_stack([moments(unit) - h for unit in np.eye(len(C_v))[self._motors]]), h

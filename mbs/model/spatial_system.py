@@ -121,7 +121,7 @@ class SpatialSystem:
 
     @property
     def row_signs(self) -> Array:
-        """(rows,) −1 where the core's row, target and multiplier are those of the tree's coordinate, not the joint's."""
+        """(rows,) −1 where the core's row, target and multiplier count the tree's coordinate, not the joint's."""
         return np.array([row.sign for row in self.model.rows])
 
     def target(self, t: float) -> Array:
@@ -263,7 +263,12 @@ def _rotor(node: Node) -> tuple[float, float]:
 
 def _negated(function: TimeFunction) -> TimeFunction:
     """Of the other sign: Python's, which takes a microsecond more in every evaluation."""
-    return TimeFunction.python(lambda t: tuple(-x for x in function(t)))
+
+    def other(t: float) -> tuple[float, float, float]:
+        value, rate, acceleration = function(t)
+        return -value, -rate, -acceleration
+
+    return TimeFunction.python(other)
 
 
 def _turning_law(law: OrientationLaw) -> _core.TurningLaw:
