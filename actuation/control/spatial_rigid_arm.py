@@ -76,7 +76,9 @@ class SpatialRigidArm:
         friction = -resistance(self._model.tree, v[None])[0]
 
         def moments(target: Array) -> Array:
-            found: Array = -self._system.core.evaluate(q, v, target, friction, None)[1][self._motors]
+            signs = self._system.row_signs
+            multipliers = self._system.core.evaluate(q, v, signs * target, friction, None)[1]
+            found: Array = -(signs * multipliers)[self._motors]
             return found
 
         h = moments(np.zeros(len(C_v)))

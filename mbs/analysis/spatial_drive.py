@@ -81,7 +81,7 @@ def spatial_drive(
     system.scene.watch_posture([row.is_trajectory for row in model.rows], robot_size(model))
     run = _integrated(system, times, start, controls, control, progress)
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
-    multipliers = run.multipliers * np.array([row.sign for row in model.rows])
+    multipliers = run.multipliers * system.row_signs
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture)
     cause = f"{posture}: move the path, or start in another posture" if run.least_ratio < SINGULAR else ""
     told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q))

@@ -127,9 +127,14 @@ class SpatialSystem:
             omega, alpha = law.rates(at)
             self.core.turn_marker(number, law.sample(at)[0], omega[0], alpha[0])
 
+    @property
+    def row_signs(self) -> Array:
+        """(rows,) −1 where the core's row, target and multiplier count the tree's coordinate, not the joint's."""
+        return np.array([row.sign for row in self.model.rows])
+
     def target(self, t: float) -> Array:
-        """Second derivatives that the rows of the core follow at time t (rows,)."""
-        return np.array([0.0 if row.target is None else row.sign * row.target(t)[2] for row in self.model.rows])
+        """Second derivatives that the core's rows follow at time t (rows,)."""
+        return self.row_signs * [0.0 if row.target is None else row.target(t)[2] for row in self.model.rows]
 
     def force(self, t: float) -> Array | None:
         """Given forces along v (n_v,) at time t; None where there are none."""
@@ -153,7 +158,9 @@ class SpatialSystem:
                 wrench[number, OF_POINT.index(name)] += magnitude(t)[0]
         found = self.core.derivatives(q, v, self.target(t), force, wrench.ravel())
         slope = resistance_slope(self.model.tree, v[None])[0]
-        return Derivatives(found.a_q, found.a_v - found.a_f * slope, found.a_f, found.value_q, found.rate_q)
+        signs = self.row_signs[:, None]
+        by_v = found.a_v - found.a_f * slope
+        return Derivatives(found.a_q, by_v, found.a_f, signs * found.value_q, signs * found.rate_q)
 
     def _follow(self) -> _core.TreeScene:
         """Targets of the rows, and given forces along joints."""
