@@ -109,6 +109,6 @@ def _integrated(
         return _core.tree_motion(system.core, system.scene, as_list(times), start.q, start.v, controls, progress)
     return _core.tree_sampled(
         model=system.core, scene=system.scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
-        carry_on=progress, held=system.held(control.commands), first_command=control.first,
+        carry_on=progress, held=system.held_forces(control.commands), first_command=control.first,
         samples=as_list(control.times), delay=control.delay, controller=control.controller,
     )  # fmt: skip

@@ -95,7 +95,7 @@ class SpatialSystem:
         self._on_frames = drives.on_frames
         self.scene = self._follow()
 
-    def held(self) -> _core.HeldModel:
+    def held_model(self) -> _core.HeldModel:
         """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
         return _core.HeldModel(*self._parts, np.array(self.model.scene.gravity), self.scene)
 
@@ -204,7 +204,7 @@ class SpatialSystem:
                 axis = sign * side * section.triad[:, 2]
                 yield of.p_q.start, of.p_v.start, _rows_of(of.body, section)[0][3:], axis
 
-    def held(self, commands: Sequence[Command]) -> _core.HeldForces:
+    def held_forces(self, commands: Sequence[Command]) -> _core.HeldForces:
         """Forces of commands that are held, in their order."""
         found = _core.HeldForces(np.reshape([c.direction for c in commands], (len(commands), self.model.tree.n_v)).T)
         for number, command in enumerate(commands):

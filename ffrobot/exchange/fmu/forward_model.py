@@ -36,7 +36,7 @@ def held_unit(model: SpatialModel, patches: Mapping[str, LinkPatches], analysis:
 
     Raises `InputError` and `SolveError` as the analysis itself does.
     """
-    data, start = SpatialSystem(model).held(), initial_state(model)
+    data, start = SpatialSystem(model).held_model(), initial_state(model)
     data.q, data.v = start.q, start.v
     data.method = METHODS[integrator_of(model, analysis.integrator)]
     data.spectral_radius, data.tolerance = analysis.spectral_radius, analysis.tolerance
