@@ -57,7 +57,8 @@ inline void release_joint(const Node<Space> &node, const T *q, const Hinge<Space
     a[k] = x[k];
 }
 
-// Accelerations of ports and forces f on those that modes move, the last eliminated first
+// Accelerations of ports, and forces f on those that modes move or where a joint hangs, whose forces steps are judged
+// by; the last eliminated first.
 template <class Space, class T, int W>
 inline void release_ports(const Mechanism<Space> &m, const Node<Space> &node, bool by_multipliers,
                           Workspace<Space, T> &w, const Pack<T, W> &y, const T *A) {
@@ -77,15 +78,15 @@ inline void release_ports(const Mechanism<Space> &m, const Node<Space> &node, bo
           for (int i = 0; i < d; ++i)
             X_A[i] += Kf[i];
         }
-    auto moved = Pack<T, d>::zero();
-    if (node.body.ports[k].is_soft) { // of others nobody asks for f
-      auto held = moved;
-      if (m.children[node.first_port + k] >= 0)
-        held = symmetric_product<d, T>(port.Y, X_A);
+    auto moved = Pack<T, d>::zero(), held = moved;
+    const bool is_soft = node.body.ports[k].is_soft, loaded = m.children[node.first_port + k] >= 0;
+    if (loaded)
+      held = symmetric_product<d, T>(port.Y, X_A);
+    if (is_soft || loaded)
       for (int i = 0; i < d; ++i)
         port.f[i] = -(answer<Space, T, W>(w, node.port_slot(k) + i, y) + held[i]);
+    if (is_soft)
       moved = symmetric_product<d, T>(port.G, port.f);
-    }
     for (int i = 0; i < d; ++i) {
       port.A[i] = X_A[i] + moved[i];
       if (n > 1)
