@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
 from ...common.arrays import Array, Indices
 from ...common.rotations import skew
@@ -95,6 +94,9 @@ def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
 
 def _coupled_blocks(*matrices: Array) -> list[Indices]:
     """Numbers of the modes that feel each other in any of the matrices (n, n), set by set."""
+    # Loaded here: only links with patches of mass pay for it.
+    from scipy.sparse.csgraph import connected_components
+
     coupled = np.zeros_like(matrices[0], dtype=bool)
     for matrix in matrices:
         scale = np.sqrt(np.diag(matrix))
