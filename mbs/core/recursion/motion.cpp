@@ -144,10 +144,13 @@ template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z)
   return left < 1e-11;
 }
 
+// Of a state: what smaller errors change of forces is rounding, which grows without bounds near singular postures.
+constexpr double rounding = 1e-13;
+
 template <class Space> double RecursiveMotion<Space>::error_size(double t, const double *z, const double *e) {
   const double size = norm_.of_state(e);
   norm_.observe(workspace_);
-  if (!norm_.observes() || std::isnan(size))
+  if (!norm_.observes() || !(size > rounding)) // also NaN
     return size;
   // Multipliers amplify errors of the state (stiffness times the error of a
   // fast mode): measure what e does to them.
