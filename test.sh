@@ -23,7 +23,8 @@ check "mypy" env -C build/types ../../.venv/bin/mypy --config-file ../../pyproje
 check "clang-format" .venv/bin/clang-format --dry-run --Werror "${cpp[@]}"
 
 status=0
-.venv/bin/python -m pytest "$@" || status=$?
+# A process for each core; a file's tests share one, and what it sets up. -n 0 among the arguments: one after the other.
+.venv/bin/python -m pytest -n auto --dist loadfile "$@" || status=$?
 
 if ((${#failed[@]})); then
   printf 'failed, see above: %s\n' "${failed[@]}" >&2

@@ -1,10 +1,12 @@
 """The program as a user runs it: the installed command, the cases of the repository, a cache folder of its own."""
 
+import fcntl
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,6 +58,29 @@ class SolvedCase:
         rows = np.abs(output[:, None] - times).argmin(axis=0)
         np.testing.assert_allclose(output[rows], times, rtol=0, atol=1e-12)
         return rows
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item):
+    """Where several processes run tests (pytest -n), one marked "alone" waits for the others, and they for it."""
+    run = getattr(item.config, "workerinput", {}).get("testrunuid")
+    if run is None:
+        return (yield)
+    with Path(tempfile.gettempdir(), f"ffrobot-tests-{run}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX if item.get_closest_marker("alone") else fcntl.LOCK_SH)
+        return (yield)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """With --dist loadfile, all of tests/stress as one file: its table knows what all of them have tried."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            return "tests/stress" if nodeid.startswith("tests/stress/") else super()._split_scope(nodeid)
+
+    return Scheduling(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -9,6 +9,10 @@ import subprocess
 import sys
 import time
 
+import pytest
+
+pytestmark = pytest.mark.alone
+
 HEAVY = ("numpy", "scipy", "h5py", "pydantic", "rich", "dolfinx", "matplotlib", "plotly")
 IMPORT_AIM, HELP_AIM = 0.05, 0.2  # s
 

@@ -12,6 +12,8 @@ import pytest
 
 from ffrobot.bench.growth import LINKS, MODES, MODES_IN_CHAINS, chain, evaluation_timer
 
+pytestmark = pytest.mark.alone
+
 ROUNDS = 15
 NEARLY_LINEAR = 1.35
 

@@ -20,6 +20,8 @@ from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.pcid import Pcid, run_pcid
 from ffrobot.run.prepare import prepare
 
+pytestmark = pytest.mark.alone
+
 ROOT = Path(__file__).parents[2]
 ALARM = {"evaluation": 4.6, "pcid": 8.2}
 

@@ -40,6 +40,8 @@ from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.run.prepare import prepare
 
+pytestmark = pytest.mark.alone
+
 INVERSE = '\n[[analysis]]\nname = "inverse"\nkind = "pcid"\nend = 1.0\noutput_step = 0.001\ntolerance = 1e-6\n'
 EVALUATIONS = 1000
 LIBRARIES = "import numpy, scipy.linalg, h5py, pydantic, rich, click"
