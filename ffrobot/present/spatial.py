@@ -12,6 +12,7 @@ from rich.table import Table
 from ..results.verdict import Verdict
 from ..run.spatial import SpatialSolution
 from .control import control_lines, control_tables
+from .lines import integrator_lines
 from .tables import plain_table
 from .voltages import voltage_table
 
@@ -26,7 +27,8 @@ def print_spatial_summary(
     for name, result in solution.analyses.items():
         run = result.run
         off = f"{result.motion.violation.max(initial=0.0):.1e}"
-        table.add_row(name, run.analysis.kind, run.status, run.integrator, f"{run.steps}", f"{run.evaluations}", off)
+        counts = f"{run.steps}", f"{run.evaluations}"
+        table.add_row(name, run.analysis.kind, run.status, run.integrator.name, *counts, off)
         found = result.motion.motor_forces
         for joint, moments in {} if found is None else found.moments.items():
             for unit, values in zip(units[joint], moments.T, strict=True):
@@ -58,6 +60,9 @@ def print_spatial_summary(
             notes.add_row("verdict", f"{one.name}: {one.answer}")
         for text in (*([one.margins] if one.margins else []), *(f"to try: {text}" for text in one.advice)):
             notes.add_row("", f"{one.name}: {text}")
+    chosen = {name: one.run.integrator for name, one in solution.analyses.items() if one.run.analysis.is_integrated}
+    for line in integrator_lines(chosen):
+        notes.add_row("integrator", line)
     for line in control_lines(details):
         notes.add_row("linear", line)
     for note in solution.path_notes:

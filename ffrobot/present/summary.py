@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..results.verdict import Verdict
 from ..run.solution import ModeChoice, Solution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
+from .lines import alike, integrator_lines
 from .tables import plain_table
 from .voltages import voltage_table
 
@@ -72,11 +73,9 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
     outcomes = solution.outcomes
     yield from (("path", note) for note in solution.path_notes)
     chosen = {
-        name: f"{chosen.name}; {chosen.reason}"
-        for name, outcome in outcomes.items()
-        if outcome.analysis.is_integrated and (chosen := outcome.statistics.integrator).is_automatic
+        name: outcome.statistics.integrator for name, outcome in outcomes.items() if outcome.analysis.is_integrated
     }
-    yield from (("integrator", line) for line in _alike(chosen.items()))
+    yield from (("integrator", line) for line in integrator_lines(chosen))
     for name, outcome in outcomes.items():
         if isinstance(outcome.details, InvertedPath):
             yield "motors only", f"{name}: {_inversion(outcome, outcome.details)}"
@@ -100,16 +99,7 @@ def _warnings(solution: Solution) -> Iterator[str]:
         others = [name for name in bent if name != worst]
         yield f"{worst}: {bent[worst]}" + (f" (likewise, but less: {', '.join(others)})" if others else "")
     told = ((name, text) for name, result in solution.analyses.items() for text in result.warnings)
-    yield from _alike((name, text) for name, text in told if text != bent.get(name))
-
-
-def _alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """What is said of several analyses, once for all of them."""
-    names: dict[str, list[str]] = {}
-    for name, text in lines:
-        names.setdefault(text, []).append(name)
-    for text, of in names.items():
-        yield f"{', '.join(of)}: {text}"
+    yield from alike((name, text) for name, text in told if text != bent.get(name))
 
 
 def _modes(solution: Solution, choice: ModeChoice) -> str:

@@ -51,7 +51,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
     group.attrs["actuation"] = (analysis.source or "") if analysis.takes_actuation else ""
     group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
-    for key in ("integrator", "steps", "evaluations", "wall_seconds", "status"):
+    group.attrs.update({"integrator": run.integrator.name, "integrator_reason": run.integrator.reason})
+    for key in ("steps", "evaluations", "wall_seconds", "status"):
         group.attrs[key] = getattr(run, key)
     group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
     if joints := resolving_joints(motion.model):

@@ -221,5 +221,5 @@ def _log(run: SpatialRun) -> None:
     logger.info(
         'analysis "%s": %s at t = %g s, %d steps, %d evaluations, %.3f s; integrator %s',
         run.analysis.name, run.status, run.time[-1] if len(run.time) else 0.0, run.steps, run.evaluations,
-        run.wall_seconds, run.integrator,
+        run.wall_seconds, run.integrator.name,
     )  # fmt: skip

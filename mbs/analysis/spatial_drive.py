@@ -14,7 +14,8 @@ from ..model.spatial_drives import NO_DRIVES, Command, Drives
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
-from ..solve.integrators import METHODS
+from ..solve.integrators import integration_controls
+from ..solve.spatial_integrators import choose_integrator_in_space
 from ..solve.spatial_limits import left_ranges
 from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
 from ..solve.state import State
@@ -40,19 +41,6 @@ class SpatialControl:
     controller: Callable[[int, float, Array], Array]
 
 
-def integrator_of(model: SpatialModel, name: str) -> str:
-    """The method that stands behind a name in scenes.
-
-    "auto" is Radau where dry friction acts on links with modes: near rest it is a damper so stiff for the light ends of
-    links that explicit steps take nanoseconds; else DOP853.
-    """
-    if name != "auto":
-        return name
-    nodes = model.tree.nodes
-    sticks = any(friction.coulomb > 0 for node in nodes for friction in node.joint.frictions)
-    return "radau" if sticks and any(node.body.n_modes for node in nodes) else "dop853"
-
-
 def spatial_drive(
     model: SpatialModel,
     analysis: IntegratedAnalysis,
@@ -71,13 +59,8 @@ def spatial_drive(
     """
     times = analysis.times if times is None else times
     system, began = SpatialSystem(model, drives), time.perf_counter()
-    integrator = integrator_of(model, analysis.integrator)
-    controls = _core.IntegrationControls(
-        tolerance=analysis.tolerance,
-        max_steps=analysis.max_steps,
-        methods=[(METHODS[integrator], 1.0, 0.0)],
-        spectral_radius=analysis.spectral_radius,
-    )
+    integrator = choose_integrator_in_space(system, analysis, start, len(times), is_sampled=control is not None)
+    controls = integration_controls(analysis, integrator)
     system.scene.watch_posture([row.is_trajectory for row in model.rows], robot_size(model))
     run = _integrated(system, times, start, controls, control, progress)
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
@@ -92,7 +75,7 @@ def spatial_drive(
 
     return SpatialRun(
         analysis, model, times[: len(q)], q, v, run.accelerations, multipliers, applied=drives.at_points,
-        status="diverged" if in_posture else STATUS[run.status], integrator=integrator, steps=run.steps,
+        status="diverged" if in_posture else STATUS[run.status], integrator=integrator.changed_in(run), steps=run.steps,
         evaluations=run.evaluations, wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
         again=again if control is None else None,
     )  # fmt: skip

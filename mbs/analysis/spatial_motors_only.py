@@ -12,6 +12,7 @@ from ...common.arrays import Array
 from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel, row_values
 from ..scene.analysis import output_times
+from ..solve.integrators import Choice
 from ..solve.servo import is_unstable
 from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import Inversion, invert
@@ -52,7 +53,7 @@ def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[Spatial
 
     return SpatialRun(
         analysis, without_paths(model), times[kept], found.q[kept], found.v[kept], found.a[kept],
-        -found.split.loops[kept], found.required[kept], status=inversion.status, integrator="collocation",
+        -found.split.loops[kept], found.required[kept], status=inversion.status, integrator=Choice("collocation", ""),
         steps=len(curve.x) - 1, evaluations=inversion.iterations, again=again,
     )  # fmt: skip
 

@@ -10,6 +10,7 @@ from ...common.errors import SolveError
 from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel
 from ..scene.analysis import Analysis
+from ..solve.integrators import NOT_INTEGRATED, Choice
 from .drive import Progress
 from .outcome import ADVICE, Details
 
@@ -28,7 +29,7 @@ class SpatialRun:
         is_at_rest: whether targets stand still, as in an equilibrium.
         applied: forces on points beside the loads of the scene.
         status: how it ended.
-        integrator: its name.
+        integrator: which, and why.
         steps, evaluations: how many.
         wall_seconds: of all.
         before, after: s, how long it acts before t = 0 and after the end of the analysis.
@@ -50,7 +51,7 @@ class SpatialRun:
     is_at_rest: bool = False
     applied: tuple[PointDrive, ...] = ()
     status: str = "completed"
-    integrator: str = "none"
+    integrator: Choice = NOT_INTEGRATED
     steps: int = 0
     evaluations: int = 0
     wall_seconds: float = 0.0

@@ -68,7 +68,7 @@ class Choice:
         """Whether the program made it, not the scene."""
         return self.reason != ASKED_FOR
 
-    def changed_in(self, run: _core.Run) -> Choice:
+    def changed_in(self, run: _core.Run | _core.TreeRun) -> Choice:
         """What it has become during `run`, which says when and why."""
         if not run.changes:
             return self
@@ -115,15 +115,31 @@ def choose_integrator(
     if not len(modes.frequency):
         return Choice("dop853", "nothing vibrates")
     excited = modal_excitation(assembly, start, modes, steering)
-    top, scale = modes.frequency[-1], analysis.tolerance / 1e-4
-    phase = partial(_ringing_phase, modes.frequency, modes.damping_ratio, excited, analysis.end)
+    cost = COST_OF_RADAU if steering is None else COST_OF_RADAU_STEERED
+    return faster_of(modes.frequency, modes.damping_ratio, excited, analysis, outputs, cost)
+
+
+def faster_of(
+    frequency: Array, damping_ratio: Array, excited: Array, analysis: IntegratedAnalysis, outputs: int, cost: float
+) -> Choice:
+    """DOP853 or Radau IIA, whichever is expected to be faster, with the other to take over where it is not.
+
+    Args:
+        frequency: (n,) rad/s, ascending, of what vibrates.
+        damping_ratio: (n,) of it.
+        excited: (n,) relative size with which each rings from the start on.
+        analysis: gives end and tolerance.
+        outputs: how many, none of which a step goes beyond.
+        cost: of a step of Radau IIA, in steps of DOP853.
+    """
+    top, scale = frequency[-1], analysis.tolerance / 1e-4
+    phase = partial(_ringing_phase, frequency, damping_ratio, excited, analysis.end)
     explicit = phase(NEGLIGIBLE_DOP853 * analysis.tolerance) / (RESOLVED_DOP853 * scale ** (1 / 8))
     implicit = phase(NEGLIGIBLE_RADAU * analysis.tolerance) / (RESOLVED_RADAU * scale ** (1 / 5))
     explicit, implicit = max(analysis.end * top / STABLE, explicit), max(outputs, implicit) + STEPS_TO_START
     rings = excited > analysis.tolerance
-    felt = f"{modes.frequency[rings].max():.3g} rad/s" if rings.any() else "no frequency"
+    felt = f"{frequency[rings].max():.3g} rad/s" if rings.any() else "no frequency"
     reason = f"vibrations up to {top:.3g} rad/s, ringing above the tolerance up to {felt}"
-    cost = COST_OF_RADAU if steering is None else COST_OF_RADAU_STEERED
     dop853 = Candidate("dop853", 1.0, analysis.end / explicit)
     radau = Candidate("radau", cost, analysis.end / (cost * implicit))
     first, second = (radau, dop853) if radau.pace > dop853.pace else (dop853, radau)

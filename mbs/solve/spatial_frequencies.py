@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +29,7 @@ def spatial_path_frequencies(model: SpatialModel, begin: float, end: float, mode
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.
     """
     model = with_held_motors(resolved(model, end))
-    unheld = SpatialSystem(_without_rows(model))
+    unheld = without_rows(model)
     state, found = undeformed_posture(model), []
     for t in np.linspace(begin, end, INSTANTS):
         q = solve_posture(model, float(t), state.q)
@@ -38,15 +39,32 @@ def spatial_path_frequencies(model: SpatialModel, begin: float, end: float, mode
                 f" at t = {t:.6g} s that meets {quoted(dict.fromkeys(row.owner for row in model.rows))}"
             )
         state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
-        found.append(vibrations_in_space(model, unheld, float(t), state.q))
+        found.append(vibrations_in_space(model, unheld, float(t), state.q)[:2])
     return common_modes(model.scene.path, found, modes)
 
 
-def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q: Array) -> tuple[Array, Array]:
-    """ω (n,) rad/s, ascending, and damping ratios (n,) of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest at q (n_q,).
+class SpatialVibrations(NamedTuple):
+    """Of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest; rigid motion is left out.
+
+    frequency ω (n,) rad/s ascending; damping_ratio (n,); shape (n_v, n), M-orthonormal; springs K (n_v, n_v).
+    """
+
+    frequency: Array
+    damping_ratio: Array
+    shape: Array
+    springs: Array
+
+
+def without_rows(model: SpatialModel) -> SpatialSystem:
+    """The mechanism that follows nothing and whose loops are open."""
+    return SpatialSystem(replace(model, rows=()))
+
+
+def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q: Array) -> SpatialVibrations:
+    """Those about q (n_q,), with the rows of `model` held.
 
     M⁻¹ is what the core says that forces do to accelerations where `unheld`. K are the stiffnesses of links and gears,
-    D their damping and viscous friction; neither gravity nor dry friction. Rigid motion is left out.
+    D their damping and viscous friction; neither gravity nor dry friction.
     """
     M = np.linalg.inv(unheld.derivatives(t, q, np.zeros(model.tree.n_v), np.zeros(model.tree.n_v)).a_f)
     C_v = row_values(model, q[None], np.array([t]))[1][0]
@@ -57,7 +75,8 @@ def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q:
     squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)
     stiff = squares > STIFF * squares.max(initial=0.0)
     omega, shape = np.sqrt(squares[stiff]), free @ L_inverse.T @ vectors[:, stiff]
-    return as_floats(omega), as_floats(np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega))
+    ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
+    return SpatialVibrations(as_floats(omega), as_floats(ratio), shape, K)
 
 
 def _springs(model: SpatialModel) -> tuple[Array, Array]:
@@ -80,7 +99,3 @@ def _twist(gear: ElasticGearInSpace, n_v: int) -> Array:
     found = np.zeros(n_v)
     found[gear.motor.v.start], found[gear.joint.v.start] = 1.0, -gear.sign
     return found
-
-
-def _without_rows(model: SpatialModel) -> SpatialModel:
-    return replace(model, rows=())

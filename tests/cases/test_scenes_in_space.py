@@ -36,7 +36,7 @@ def test_times_and_status(solved):
     data, file = solved
     np.testing.assert_allclose(file["inverse/time"], [sample["t"] for sample in data["samples"]], atol=1e-15)
     assert file["inverse"].attrs["status"] == "completed"
-    assert file["inverse"].attrs["integrator"] == "dop853"
+    assert file["inverse"].attrs["integrator"].startswith("dop853")  # perhaps after a trial of another
     assert np.max(file["inverse/constraint_violation"]) < 1e-9
     assert file.attrs["space"] == "spatial"
 

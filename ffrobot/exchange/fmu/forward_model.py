@@ -11,11 +11,11 @@ from ...actuation.patches.spatial_patches import LinkPatches
 from ...common.arrays import Array
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
-from ...mbs.analysis.spatial_drive import integrator_of
 from ...mbs.model.spatial_model import SpatialModel, modal_direction
 from ...mbs.model.spatial_system import SpatialSystem
 from ...mbs.model.spatial_tree import Node
 from ...mbs.solve.integrators import METHODS
+from ...mbs.solve.spatial_integrators import integrator_of
 from ...mbs.solve.spatial_statics import initial_state
 from .variables import Variable
 

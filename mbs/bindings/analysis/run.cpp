@@ -8,6 +8,7 @@
 
 #include "bindings/analysis/analysis.h"
 #include "bindings/bindings.h"
+#include "bindings/changes.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -66,13 +67,6 @@ void bind_checkpoint(nb::module_ &m) {
       .def_ro("peaks", &Checkpoint::peaks);
 }
 
-auto changes_of(const Run &r) {
-  std::vector<std::tuple<double, MethodKind, MethodKind, double>> changes;
-  for (const MethodChange &change : r.report.changes)
-    changes.emplace_back(change.time, change.from, change.to, change.mean_step);
-  return changes;
-}
-
 void bind_outputs(nb::module_ &m) {
   nb::class_<Run>(m, "Run", "Outputs of an analysis, one row per output time reached, and how it went.")
       .def_prop_ro("status", [](const Run &r) { return r.report.status; })
@@ -83,7 +77,9 @@ void bind_outputs(nb::module_ &m) {
       .def_prop_ro("evaluations", [](const Run &r) { return r.report.evaluations; })
       .def_prop_ro("last_step", [](const Run &r) { return r.report.last_step; })
       .def_prop_ro("last_error", [](const Run &r) { return r.report.last_error; })
-      .def_prop_ro("changes", &changes_of, "Of integrators: (time, from, to, mean step before) of each.")
+      .def_prop_ro(
+          "changes", [](const Run &r) { return changes_of(r.report); },
+          "Of integrators: (time, from, to, mean step before) of each.")
       // references: the arrays are views that keep their Run alive
       .def_prop_ro("q", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.q; })
       .def_prop_ro("v", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.v; })

@@ -8,6 +8,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "bindings/changes.h"
 #include "bindings/recursion/tree_run.h"
 
 namespace nb = nanobind;
@@ -78,6 +79,9 @@ void bind_run_and_laws(nb::module_ &m) {
       .def_prop_ro("rejected", [](const TreeRun &r) { return r.report.rejected; })
       .def_prop_ro("evaluations", [](const TreeRun &r) { return r.report.evaluations; })
       .def_prop_ro("time_reached", [](const TreeRun &r) { return r.report.time; })
+      .def_prop_ro(
+          "changes", [](const TreeRun &r) { return changes_of(r.report); },
+          "Of integrators: (time, from, to, mean step before) of each.")
       .def_ro("least_ratio", &TreeRun::least_ratio,
               "Of the scene's watch: 1 without; see mbs/core/recursion/posture.h.")
       .def_ro("singular_at", &TreeRun::singular_at, "When that was, s.")

@@ -25,6 +25,15 @@ FFROBOT_INLINE void release_all(const Mechanism<Space> &m, const T *q, const Pac
   }
 }
 
+// Of coordinates that rows prescribe: exactly what these say. Where a light link carries a heavy one, multipliers leave
+// them more rounding than the tolerance of a step at rest has room for.
+template <class Space, class T>
+void prescribe(const Mechanism<Space> &m, const T *target, const Workspace<Space, T> &w, T *a) {
+  for (const int r : w.active)
+    if (const Row &row = m.rows[static_cast<std::size_t>(r)]; row.model.kind == RowKind::coordinate)
+      a[m.nodes[static_cast<std::size_t>(row.node)].v + row.freedom] = target[r];
+}
+
 template <class Space, class T, int W>
 inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
                 Workspace<Space, T> &w, T *a) {
@@ -67,6 +76,8 @@ inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<
       w.lambda[w.active[r]] = lambda[r];
   }
   release_all<false, Space, T, W>(m, q, y, w, a);
+  if constexpr (W > 1)
+    prescribe(m, target, w, a);
   ++w.evaluations;
 }
 

@@ -1,0 +1,90 @@
+"""Which integrator a scene in space asks for: the rule of the plane, on the vibrations of the robot in space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...common.arrays import Array
+from .. import _core
+from ..model.spatial_model import SpatialModel
+from ..model.spatial_system import SpatialSystem
+from ..scene.analysis import IntegratedAnalysis
+from .integrators import ASKED_FOR, Choice, faster_of
+from .spatial_frequencies import SpatialVibrations, vibrations_in_space, without_rows
+from .state import State
+
+# Time of a step of Radau IIA in steps of DOP853: 1.4 to 2.4 in cases/arm_3r and cases/slider_crank_3d, more with more
+# modes; where both are expected to take as long, DOP853 is the one whose steps the tolerance says more of.
+COST_OF_RADAU = 3.0
+
+
+def integrator_of(model: SpatialModel, name: str) -> str:
+    """The method that stands behind a name in scenes, where none takes over from another.
+
+    "auto" is Radau where dry friction acts on links with modes: near rest it is a damper so stiff for the light ends of
+    links that explicit steps take nanoseconds; else DOP853.
+    """
+    if name != "auto":
+        return name
+    return "radau" if _sticks(model) else "dop853"
+
+
+def choose_integrator_in_space(
+    system: SpatialSystem, analysis: IntegratedAnalysis, start: State, outputs: int, *, is_sampled: bool
+) -> Choice:
+    """The integrator for an analysis from `start` with that many outputs, as `choose_integrator` in the plane.
+
+    Where a controller `is_sampled`, every sample starts anew and nothing takes over.
+    """
+    model = system.model
+    if analysis.integrator != "auto":
+        return Choice(analysis.integrator, ASKED_FOR)
+    if outputs == 1:
+        return Choice("dop853", "nothing to integrate")
+    if not any(node.body.n_modes for node in model.tree.nodes):
+        return Choice("dop853", "nothing vibrates")
+    if _sticks(model):
+        return Choice("radau", "dry friction is a stiff damper to the light ends of links")
+    if model.tree.gears:
+        return Choice("dop853", "springs in joints are not among the stiff forces of implicit integrators")
+    if is_sampled:
+        return Choice("dop853", "every sample of the controller begins anew")
+    found = vibrations_in_space(model, without_rows(model), 0.0, start.q)
+    if not len(found.frequency):
+        return Choice("dop853", "nothing vibrates")
+    excited = _excitation(system, start, found)
+    return faster_of(found.frequency, found.damping_ratio, excited, analysis, outputs, COST_OF_RADAU)
+
+
+def _sticks(model: SpatialModel) -> bool:
+    nodes = model.tree.nodes
+    has_friction = any(friction.coulomb > 0 for node in nodes for friction in node.joint.frictions)
+    return has_friction and any(node.body.n_modes for node in nodes)
+
+
+def _excitation(system: SpatialSystem, start: State, found: SpatialVibrations) -> Array:
+    """Size (n,) with which each vibration rings from `start` on, in the elastic forces of a link, relative to these.
+
+    As `modal_excitation` in the plane: velocities, accelerations and jerk of modes are vibrations v/ω, a/ω², j/ω³.
+    """
+    model, omega, K = system.model, found.frequency, found.springs
+    dt = 1e-3 / float(omega.max())
+    q, v, a = start.q, start.v, _acceleration(system, 0.0, start)
+    later = State(model.tree.integrate(q, dt * v), v + dt * a)
+    jerk = (_acceleration(system, dt, later) - a) / dt
+    project = (K @ found.shape).T / omega[:, None] ** 2
+    amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
+    forces = K @ found.shape * amplitude
+    bodies = [node for node in model.tree.nodes if node.body.n_modes]
+    of_each = np.array([np.linalg.norm(forces[node.p_v], axis=0) for node in bodies])
+    sizes = np.array([np.linalg.norm(node.body.stiffness * q[node.p_q]) for node in bodies]) + of_each.sum(axis=1)
+    sizes = np.maximum(sizes, max(1e-3 * float(sizes.max()), 1e-300))
+    largest: Array = (of_each / sizes[:, None]).max(axis=0)
+    return largest
+
+
+def _acceleration(system: SpatialSystem, t: float, state: State) -> Array:
+    """(n_v,) at time t."""
+    states = np.concatenate([state.q, state.v])[None]
+    found: Array = _core.tree_outputs(system.core, system.scene, [t], states).accelerations[0]
+    return found
