@@ -14,6 +14,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double singular_ratio = 1e-6; // of Posture: below, joints cannot follow
+constexpr double least_shift = 1e-8;    // of a state, relative: forces change by more than their rounding
 
 } // namespace
 
@@ -149,11 +150,12 @@ template <class Space> double RecursiveMotion<Space>::error_size(double t, const
   norm_.observe(workspace_);
   if (!norm_.observes())
     return size;
-  // Multipliers amplify errors of the state (stiffness times the error of a
-  // fast mode): measure what e does to them.
-  shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + Eigen::Map<const VectorXd>(e, 2 * n_v());
+  // Forces amplify errors of the state (stiffness times the error of a fast mode): measure what e does to them. Where
+  // it is small, in a difference that rounding of forces does not disturb.
+  const double stretch = size > 0 ? std::max(1.0, least_shift / size) : 1;
+  shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + stretch * Eigen::Map<const VectorXd>(e, 2 * n_v());
   evaluate(t, local().state(shifted_.data()), shifted_.data() + n_v(), unused_.data());
-  const double of_forces = norm_.of_observed(workspace_);
+  const double of_forces = norm_.of_observed(workspace_) / stretch;
   return of_forces <= size ? size : of_forces; // keeps NaN
 }
 
