@@ -12,7 +12,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double small_force = 1e-3; // of the largest: forces below count like this one
+constexpr double small_force = 2e-4; // of the largest: forces below count like this one
+constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
 constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
 constexpr double nothing = 1e-12;
@@ -68,6 +69,7 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism) : mechanism_(me
       is_moment_.push_back(key.second);
     force_group_.push_back(at->second);
   }
+  of_rows_ = is_moment_.size();
   for (std::size_t port = 0; port < mechanism.children.size(); ++port)
     if (mechanism.children[port] >= 0) {
       const int force = static_cast<int>(is_moment_.size());
@@ -120,7 +122,8 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
   for (std::size_t g = 0; g < is_moment_.size(); ++g) {
     const double least = small_force * (is_moment_[g] ? moment : force);
     const double scale = std::max({force_peak_[g], force_now_[g], least, nothing});
-    if (const double size = force_error_[g] / scale; !(size <= worst))
+    const double size = (g < of_rows_ ? leverage : 1) * force_error_[g] / scale;
+    if (!(size <= worst))
       worst = size; // keeps NaN
   }
   return worst;

@@ -37,6 +37,7 @@ private:
   std::vector<std::size_t> carriers_; // of all ports: on which a joint of the tree hangs
   std::vector<int> force_group_;      // of each row, then of each component at these ports
   std::vector<bool> is_moment_;       // of each group of these
+  std::size_t of_rows_ = 0;           // how many groups are of rows
   std::vector<double> force_peak_, force_now_, force_error_;
   Eigen::VectorXd observed_, change_;
   double inertial_ = 0; // N, largest sum of mass times acceleration
