@@ -20,6 +20,7 @@ from .control import write_loop
 from .forces import write_path
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
+from .spatial_resume import write_state_in_space
 from .write import write_head
 
 
@@ -40,6 +41,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
                 write_spatial_linear(file[name], result.motion, result.run.details)
             if result.actuation is not None:
                 write_actuation(file[name], solution, result.actuation)
+        write_state_in_space(file, solution)
         file.flush()
         image: bytes = file.id.get_file_image()
     return image

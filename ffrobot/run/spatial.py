@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from ..common.errors import SolveError, of_file
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.operating_points import InstantAnalysis
+from ..mbs.analysis.spatial_earlier import EarlierSpatialRun
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ..mbs.model.spatial_wrench import Wrench
@@ -81,6 +82,7 @@ class SpatialSolution:
         seconds: wall time by stage.
         failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
         path_notes: what was found of paths before the analyses, one line each.
+        earlier: runs of analyses to go on with, from a results file: see `results.spatial_resume`.
     """
 
     scene: SpatialScene
@@ -91,6 +93,12 @@ class SpatialSolution:
     seconds: Mapping[str, float]
     failure: Exception | None = None
     path_notes: tuple[str, ...] = ()
+    earlier: Mapping[str, EarlierSpatialRun] = field(default_factory=dict)
+
+    @property
+    def outcomes(self) -> dict[str, SpatialRun]:
+        """How each analysis went, by its name."""
+        return {name: result.run for name, result in self.analyses.items()}
 
     @property
     def links(self) -> dict[str, ModalBody]:
@@ -120,6 +128,11 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
+    return run_spatial(prepare_spatial(scene, watcher), watcher, keep)
+
+
+def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher) -> SpatialSolution:
+    """All that analyses start from, nothing solved yet. Raises `InputError` as `solve_spatial`."""
     if isinstance(scene, Path):
         scene = load_spatial_scene(scene)
     began = time.perf_counter()
@@ -127,10 +140,14 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     seconds = {"bodies": time.perf_counter() - began}
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
     patches = patches_in_space(scene, bodies)
-    solution = SpatialSolution(scene, _model(scene, bodies, patches), bodies, patches, {}, seconds)
+    return SpatialSolution(scene, _model(scene, bodies, patches), bodies, patches, {}, seconds)
+
+
+def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None = None) -> SpatialSolution:
+    """What `solve_spatial` does with everything prepared; analyses go on from where `solution.earlier` has them."""
     with Interruption(watcher.stopping) as interruption:
-        judge = partial(_judged, solution, watcher, interruption)
-        scene, notes = with_paths_in_space(scene, solution.model, judge, watcher.stage)
+        judge = partial(_judged, replace(solution, earlier={}), watcher, interruption)
+        scene, notes = with_paths_in_space(solution.scene, solution.model, judge, watcher.stage)
         solution = replace(_with_scene(solution, scene) if notes else solution, path_notes=notes)
         solution = _run_all(solution, watcher, interruption)
         if keep is not None and solution.analyses:
@@ -202,7 +219,9 @@ def _context(
 
     runs = {name: result.run for name, result in results.items()}
     supply = partial(supplied_by_patches, solution.patches)
-    return ActuatedSpatialContext(solution.model, runs, progress, supply, solution.patches, solution.links)
+    return ActuatedSpatialContext(
+        solution.model, runs, progress, supply, solution.earlier.get(analysis.name), solution.patches, solution.links
+    )
 
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ from ..solve.spatial_limits import left_ranges
 from ..solve.spatial_posture import SINGULAR, robot_size, told_posture
 from ..solve.state import State
 from .drive import STATUS, Progress
+from .spatial_earlier import ROWS, EarlierSpatialRun
 from .spatial_run import SpatialRun
 
 
@@ -63,11 +65,13 @@ def spatial_drive(
     warnings: tuple[str, ...] = (),
     times: Array | None = None,
     control: SpatialControl | None = None,
+    earlier: EarlierSpatialRun | None = None,
 ) -> SpatialRun:
     """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
 
     Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
-    `progress` says so, and in a posture in which the joints cannot follow the path, with a warning.
+    `progress` says so, and in a posture in which the joints cannot follow the path, with a warning. It goes on with an
+    `earlier` run of the same analysis.
     """
     times = analysis.times if times is None else times
     system, began = SpatialSystem(model, drives), time.perf_counter()
@@ -79,9 +83,10 @@ def spatial_drive(
         spectral_radius=analysis.spectral_radius,
     )
     system.scene.watch_posture([row.is_trajectory for row in model.rows], robot_size(model))
-    run = _integrated(system, times, start, controls, control, progress)
-    q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
-    multipliers = run.multipliers * system.row_signs
+    checkpoint = _core.TreeCheckpoint() if earlier is None else earlier.checkpoint
+    with nullcontext() if earlier is None else earlier.checked(model, times):
+        run = _integrated(system, times, start, controls, control, progress, checkpoint)
+    q, v, a, multipliers = _rows(system, run, earlier)
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture)
     cause = f"{posture}: move the path, or start in another posture" if run.least_ratio < SINGULAR else ""
     told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q))
@@ -89,12 +94,23 @@ def spatial_drive(
     def again(others: Array) -> SpatialRun:
         return spatial_drive(model, analysis, start, progress, drives=drives, times=others)
 
-    return SpatialRun(
-        analysis, model, times[: len(q)], q, v, run.accelerations, multipliers, applied=drives.at_points,
+    found = SpatialRun(
+        analysis, model, times[: len(q)], q, v, a, multipliers, applied=drives.at_points,
         status=STATUS[run.status], integrator=integrator, steps=run.steps, evaluations=run.evaluations,
         wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
-        again=again if control is None else None,
+        checkpoint=checkpoint if control is None else None, again=again if control is None else None,
     )  # fmt: skip
+    return found if earlier is None else found.added_to(earlier)
+
+
+def _rows(system: SpatialSystem, run: _core.TreeRun, earlier: EarlierSpatialRun | None) -> list[Array]:
+    """What a run has of each output, `ROWS`, after what an earlier one had."""
+    q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [system.model.tree.n_q], axis=1))
+    found = [q, v, run.accelerations, run.multipliers * system.row_signs]
+    if earlier is None:
+        return found
+    known = [getattr(earlier, name) for name in ROWS]
+    return [np.concatenate([before, now[len(before) :]]) for before, now in zip(known, found, strict=True)]
 
 
 def _integrated(
@@ -104,9 +120,12 @@ def _integrated(
     controls: _core.IntegrationControls,
     control: SpatialControl | None,
     progress: Progress,
+    checkpoint: _core.TreeCheckpoint,
 ) -> _core.TreeRun:
     if control is None:
-        return _core.tree_motion(system.core, system.scene, as_list(times), start.q, start.v, controls, progress)
+        return _core.tree_motion(
+            system.core, system.scene, as_list(times), start.q, start.v, controls, progress, checkpoint
+        )
     return _core.tree_sampled(
         model=system.core, scene=system.scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
         carry_on=progress, held=system.held_forces(control.commands), first_command=control.first,

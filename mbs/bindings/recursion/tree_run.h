@@ -49,6 +49,12 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
     check_index("marker of the ground", driven.marker, model.mechanism.ground.size());
 }
 
+// Where a run has stopped, and all that its next step depends on.
+struct TreeCheckpoint {
+  IntegrationCheckpoint integration;
+  MotionHistory history;
+};
+
 // As far as it got.
 struct TreeRun {
   IntegrationReport report;
