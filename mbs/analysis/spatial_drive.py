@@ -17,7 +17,7 @@ from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.integrators import METHODS
 from ..solve.spatial_limits import left_ranges
-from ..solve.spatial_posture import SINGULAR, robot_size, told_posture
+from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
 from ..solve.state import State
 from .drive import STATUS, Progress
 from .spatial_earlier import ROWS, EarlierSpatialRun
@@ -87,8 +87,9 @@ def spatial_drive(
     with nullcontext() if earlier is None else earlier.checked(model, times):
         run = _integrated(system, times, start, controls, control, progress, checkpoint)
     q, v, a, multipliers = _rows(system, run, earlier)
-    posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture)
-    cause = f"{posture}: move the path, or start in another posture" if run.least_ratio < SINGULAR else ""
+    in_posture = _ends_in_posture(run)
+    posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
+    cause = f"{posture}: move the path, or start in another posture" if in_posture else ""
     told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q))
 
     def again(others: Array) -> SpatialRun:
@@ -96,8 +97,8 @@ def spatial_drive(
 
     found = SpatialRun(
         analysis, model, times[: len(q)], q, v, a, multipliers, applied=drives.at_points,
-        status=STATUS[run.status], integrator=integrator, steps=run.steps, evaluations=run.evaluations,
-        wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
+        status="diverged" if in_posture else STATUS[run.status], integrator=integrator, steps=run.steps,
+        evaluations=run.evaluations, wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
         checkpoint=checkpoint if control is None else None, again=again if control is None else None,
     )  # fmt: skip
     return found if earlier is None else found.added_to(earlier)
@@ -111,6 +112,13 @@ def _rows(system: SpatialSystem, run: _core.TreeRun, earlier: EarlierSpatialRun 
         return found
     known = [getattr(earlier, name) for name in ROWS]
     return [np.concatenate([before, now[len(before) :]]) for before, now in zip(known, found, strict=True)]
+
+
+def _ends_in_posture(run: _core.TreeRun) -> bool:
+    """Whether a posture ended the run: joints cannot follow there, or steps vanish next to it as none leads across."""
+    if STATUS[run.status] == "step underflow" and run.singular_at == run.time_reached:
+        return run.least_ratio < NEARLY_SINGULAR
+    return STATUS[run.status] == "diverged" and run.least_ratio < SINGULAR
 
 
 def _integrated(

@@ -28,24 +28,11 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
   const nb::gil_scoped_release unlocked;
   RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data());
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data());
-  TreeRun run(model, times.size());
-  run.last << q, v;
   if (checkpoint && checkpoint->integration.has_begun()) {
-    check_size("state of the checkpoint", checkpoint->integration.state.size(), run.last.size());
+    check_size("state of the checkpoint", checkpoint->integration.state.size(), q.size() + v.size());
     motion.go_on(checkpoint->history);
   }
-  run.report = integrate(
-      motion, times, run.last, controls,
-      [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
-      [&](double t) {
-        const nb::gil_scoped_acquire locked;
-        return carry_on(t);
-      },
-      nullptr, nullptr, checkpoint ? &checkpoint->integration : nullptr);
-  if (checkpoint)
-    checkpoint->history = motion.history();
-  run.finish(motion);
-  return run;
+  return integrated(model, motion, reader, times, q, v, controls, carry_on, nullptr, checkpoint);
 }
 
 // The same of states (T, n_q + n_v) that are known
