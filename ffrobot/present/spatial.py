@@ -58,6 +58,9 @@ def print_spatial_summary(
             notes.add_row("verdict", f"{one.name}: {one.answer}")
         for text in (*([one.margins] if one.margins else []), *(f"to try: {text}" for text in one.advice)):
             notes.add_row("", f"{one.name}: {text}")
+    for name, result in solution.analyses.items():
+        if result.check is not None:
+            notes.add_row("accuracy", f"{name}, {result.check.in_words}")
     for line in control_lines(details):
         notes.add_row("linear", line)
     for note in solution.path_notes:

@@ -21,7 +21,7 @@ from .forces import write_path
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
 from .spatial_resume import write_state_in_space
-from .write import write_head
+from .write import write_check, write_head
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -59,6 +59,7 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     if joints := resolving_joints(motion.model):
         group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     group["time"] = run.time
+    write_check(group, result.check)
     _write_bodies(group, result)
     _write_joints(group, result)
     if isinstance(run.details, LoopRecord):

@@ -28,6 +28,7 @@ from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
 from .paths import with_paths_in_space
+from .solution import FinerCheck
 from .spatial_actuation import (
     SpatialActuation,
     actuated_in_space,
@@ -36,6 +37,7 @@ from .spatial_actuation import (
     supplied_by_patches,
 )
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
+from .spatial_finer import checked_in_space
 from .watcher import Interruption, Watcher
 
 logger = logging.getLogger(__name__)
@@ -51,6 +53,7 @@ class SpatialResult:
         reactions: forces in joints by name.
         energies, momentum: of the robot.
         actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
+        check: what a replay on finer links found, where that is asked for.
     """
 
     run: SpatialRun
@@ -59,6 +62,7 @@ class SpatialResult:
     energies: Energies
     momentum: Momentum
     actuation: SpatialActuation | None
+    check: FinerCheck | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -149,7 +153,7 @@ def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None =
         judge = partial(_judged, replace(solution, earlier={}), watcher, interruption)
         scene, notes = with_paths_in_space(solution.scene, solution.model, judge, watcher.stage)
         solution = replace(_with_scene(solution, scene) if notes else solution, path_notes=notes)
-        solution = _run_all(solution, watcher, interruption)
+        solution = checked_in_space(_run_all(solution, watcher, interruption), prepare_spatial, watcher)
         if keep is not None and solution.analyses:
             keep(solution)
     if solution.failure is not None:

@@ -149,7 +149,7 @@ def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -
 
     found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
     sizes = iter(found.functions)
-    motors = list(_motors(model, sizes))
+    motors = list(motor_drives(model, sizes))
     with_patches = _supplied(context, analysis, motor_forces_of(source.rows(slice(0, 1))))
     modal = tuple(drive for body in with_patches for drive in modal_drives(model, body, sizes))
     along = tuple(drive for drive in motors if isinstance(drive, Drive))
@@ -162,7 +162,7 @@ def _supplied(context: SpatialContext, analysis: Forward, found: MotorForces) ->
     return dict(context.supply(found.modal, analysis.limits)) if analysis.apply == "joints+pzt" else {}
 
 
-def _motors(model: SpatialModel, sizes: Iterator[TimeFunction]) -> Iterator[Drive | FrameDrive]:
+def motor_drives(model: SpatialModel, sizes: Iterator[TimeFunction]) -> Iterator[Drive | FrameDrive]:
     """The motors with the next functions, in the order of `SpatialModel.motors`; their signs are those of the joint."""
     joints = {joint.name: joint for joint in model.scene.joint}
     for joint, columns in model.motors.items():
