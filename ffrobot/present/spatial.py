@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..results.verdict import Verdict
-from ..run.spatial import SpatialSolution
+from ..run.spatial_solution import SpatialSolution
 from .control import control_lines, control_tables
 from .tables import plain_table
 from .voltages import voltage_table

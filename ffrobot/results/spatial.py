@@ -14,7 +14,7 @@ from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
-from ..run.spatial import SpatialResult, SpatialSolution
+from ..run.spatial_solution import SpatialResult, SpatialSolution
 from .actuators import write_placement
 from .control import write_loop
 from .forces import write_path

@@ -15,7 +15,8 @@ from ..mbs import _core
 from ..mbs.analysis.outcome import METHOD_HISTORY, STEPS
 from ..mbs.analysis.spatial_earlier import MEMORY, ROWS, VECTORS, EarlierSpatialRun
 from ..mbs.analysis.spatial_run import SpatialRun
-from ..run.spatial import Keep, SpatialSolution, prepare_spatial, run_spatial
+from ..run.spatial import Keep, prepare_spatial, run_spatial
+from ..run.spatial_solution import SpatialSolution
 from ..run.watcher import Watcher
 from ..scene.spatial import SpatialScene
 from .file import Results

@@ -12,7 +12,7 @@ from .file import Results
 
 if TYPE_CHECKING:  # else every solve in the plane would load what is of space
     from ..mbs.analysis.spatial_run import SpatialRun
-    from ..run.spatial import SpatialSolution
+    from ..run.spatial_solution import SpatialSolution
 
 GROUP = "resume"  # in the group of an analysis
 STOPPED = ("interrupted", "too many steps")

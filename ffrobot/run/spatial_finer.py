@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,12 +27,10 @@ from ..mbs.solve.state import State
 from ..scene.spatial import SpatialScene
 from .finer import MOST_SAMPLES, SAMPLES_PER_RADIAN, TIGHTEST, with_twice_the_modes
 from .solution import FinerCheck
+from .spatial_solution import SpatialSolution
 from .watcher import Watcher
 
-if TYPE_CHECKING:
-    from .spatial import SpatialSolution
-
-Prepare = Callable[[SpatialScene, Watcher], "SpatialSolution"]
+Prepare = Callable[[SpatialScene, Watcher], SpatialSolution]
 """All that analyses of a scene start from."""
 
 
