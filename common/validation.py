@@ -220,10 +220,16 @@ def _alternatives(
             model for c in candidates if part in c.model_fields for model in _models(c.model_fields[part].annotation)
         ]
         # A part that is no key tells which alternative of a union was taken.
-        tagged = [c for c in candidates if any(part in get_args(f.annotation) for f in c.model_fields.values())]
         allowed = inner or allowed
-        candidates = inner or tagged or candidates
+        candidates = inner or _tagged(candidates, part) or candidates
     return candidates, allowed
+
+
+def _tagged(records: Sequence[type[BaseModel]], tag: str) -> list[type[BaseModel]]:
+    """Those with a key that can be nothing but `tag`; where there is none, those with a key that can be that."""
+    values = {record: [get_args(field.annotation) for field in record.model_fields.values()] for record in records}
+    only = [record for record, choices in values.items() if (tag,) in choices]
+    return only or [record for record, choices in values.items() if any(tag in choice for choice in choices)]
 
 
 def _known_keys(records: Iterable[type[BaseModel]]) -> list[str]:

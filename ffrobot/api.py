@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .fit import Fit
     from .results.file import Results
     from .run.solution import Solution
-    from .run.spatial import SpatialSolution
+    from .run.spatial_solution import SpatialSolution
     from .run.watcher import Watcher
     from .scene.any_space import AnyScene
     from .scene.spatial import SpatialScene
@@ -44,8 +44,8 @@ def solve(
     from .common.files import check_output
     from .common.outputs import protected
     from .results.file import FORMAT, Results
-    from .results.resume import how_to_go_on
     from .results.resume import resume as run_on
+    from .results.stopped import how_to_go_on
     from .results.write import results_image, write_results
     from .run.inputs import files_of, files_of_tables
     from .run.solve import solve as run
@@ -90,27 +90,32 @@ def _solve_spatial(
     scene: SpatialScene, path: Path | None, watcher: Watcher | None, inputs: Iterable[Path], *, resume: bool
 ) -> Results:
     """The same of a scene in space."""
-    from .common.errors import FfrobotWarning, InputError
+    from .common.errors import FfrobotWarning
     from .common.outputs import protected
     from .results.file import Results
     from .results.spatial import spatial_image, write_spatial_results
+    from .results.spatial_resume import resume_spatial
+    from .results.stopped import how_to_go_on
     from .run.spatial import solve_spatial
     from .run.watcher import Watcher
-
-    if resume:
-        raise InputError(f'{scene.path}: resume: expected a planar scene, found space = "spatial": not available yet')
 
     def keep(solution: SpatialSolution) -> None:
         if path is not None:
             with protected(inputs):
                 write_spatial_results(solution, path)
 
-    solution = solve_spatial(scene, watcher or Watcher(), keep)
+    watcher = watcher or Watcher()
+    if path is not None and resume:
+        solution = resume_spatial(scene, path, watcher, keep)
+        if solution is None:
+            return Results(path)
+    else:
+        solution = solve_spatial(scene, watcher, keep)
     for name, result in solution.analyses.items():
         for text in result.run.warnings:
             warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=3)
-    for result in solution.analyses.values():
-        result.run.check_completed()
+    for run in solution.outcomes.values():
+        run.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if path is not None else "")
     return Results(path) if path is not None else Results.from_image(spatial_image(solution), scene.path)
 
 

@@ -24,7 +24,7 @@ MOST = 100_000  # runs of a sweep, frames of a view
 
 if TYPE_CHECKING:
     from .run.solution import Solution
-    from .run.spatial import SpatialSolution
+    from .run.spatial_solution import SpatialSolution
 
 
 def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -105,8 +105,8 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     from .present.progress import Display
     from .present.summary import print_summary, summary_console
     from .results.file import FORMAT, Results
-    from .results.resume import how_to_go_on, left_out
     from .results.resume import resume as resume_scene
+    from .results.stopped import how_to_go_on, left_out
     from .results.write import write_results
     from .run.inputs import files_of
     from .run.solve import solve as solve_scene
@@ -115,8 +115,9 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     path = output or scene_file.with_suffix(".results.h5")
     _protect(files_of(scene_file))
     check_output(path, FORMAT)
+    again = f"ffrobot solve {scene_file}{f' -o {output}' if output else ''} --resume"
     if is_spatial(scene_file):
-        _solve_spatial(scene_file, path, resume=resume, strict=strict)
+        _solve_spatial(scene_file, path, again, resume=resume, strict=strict)
         return
     writing = 0.0
 
@@ -134,8 +135,7 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     with Results(path) as results:
         verdict = results.verdict
     print_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
-    where = f" -o {output}" if output else ""
-    go_on = how_to_go_on(solution, f"ffrobot solve {scene_file}{where} --resume")
+    go_on = how_to_go_on(solution, again)
     try:
         for outcome in solution.outcomes.values():
             outcome.check_completed(go_on)
@@ -149,18 +149,18 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
-def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) -> None:
-    """The same for a scene in space."""
-    from .common.errors import InputError, SolveError, StoppedError
+def _solve_spatial(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
+    """The same for a scene in space; `again` is the command that goes on with it."""
+    from .common.errors import SolveError, StoppedError
     from .present.progress import Display
     from .present.spatial import print_spatial_summary
     from .present.summary import summary_console
     from .results.file import Results
     from .results.spatial import write_spatial_results
+    from .results.spatial_resume import resume_spatial
+    from .results.stopped import how_to_go_on, left_out
     from .run.spatial import solve_spatial
 
-    if resume:
-        raise InputError(f'{scene_file}: --resume: expected a planar scene, found space = "spatial": not available yet')
     writing = 0.0
 
     def keep(solution: SpatialSolution) -> None:
@@ -170,17 +170,24 @@ def _solve_spatial(scene_file: Path, path: Path, *, resume: bool, strict: bool) 
         writing = time.perf_counter() - began
 
     with Display() as display:
-        solution = solve_spatial(scene_file, display, keep)
+        solution = (
+            resume_spatial(scene_file, path, display, keep) if resume else solve_spatial(scene_file, display, keep)
+        )
+    if solution is None:
+        click.echo(f"{path}: complete, nothing to go on with")
+        return
     with Results(path) as results:
         verdict = results.verdict
     print_spatial_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
+    go_on = how_to_go_on(solution, again)
     try:
-        for result in solution.analyses.values():
-            result.run.check_completed()
+        for run in solution.outcomes.values():
+            run.check_completed(go_on)
     except SolveError as error:
         raise StoppedError(str(error), display.signal) if display.signal else error from None
     if display.signal:
-        raise StoppedError(f"{scene_file}: stopped on request; what was computed is in {path}", display.signal)
+        done = "before all analyses" if left_out(solution) else "when all was computed and written"
+        raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
     for name, result in solution.analyses.items() if strict else ():
         for text in result.warnings:
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')

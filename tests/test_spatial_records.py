@@ -214,6 +214,11 @@ MISTAKES = {
         add("analysis", name="again", kind="forward", actuation="inverse", apply="joints+pzt"),
         r'analysis "again": apply: expected at least one \\[\\[pzt\\]\\] for "joints\+pzt", found none',
     ),
+    "key of other kinds of analysis": (
+        add("analysis", name="rest", kind="static", integrator="radau"),
+        'analysis "rest": expected the key "integrator" only in kind = "pcid", "forward" or "closed-loop", found kind ='
+        ' "static"',
+    ),
     "shape of a rigid body": (
         put("analysis", kind="fcid", shape="given", modal={"base": ["0.1*t"]}),
         'analysis "inverse": modal: expected a flexible body, found "base", which is rigid',

@@ -168,7 +168,9 @@ def _feed_forward(
         values = between(middle, source.time, in_parts(source, found))
     else:
         nodes, which = np.unique(np.append(source.time[0], middle), return_inverse=True)
-        values = in_parts(source.again(nodes), found)[which[1:]]
+        made_again = source.again(nodes)
+        made_again.check_completed()
+        values = in_parts(made_again, found)[which[1:]]
     column = 0
     for joint, columns in context.model.motors.items():  # behind gears that give: known at outputs
         if joint in plant.gears and analysis.feed_forward != "none":

@@ -50,7 +50,9 @@ def _equilibrium(context: ActuatedSpatialContext, analysis: Analysis) -> Spatial
     """Static; where nothing is followed, motors keep the initial posture."""
     model = context.model
     if not any(row.is_trajectory for row in model.rows):
-        context = replace(context, model=replace(model, rows=(*model.rows, *_held_by_motors(model))))
+        context = replace(
+            context, model=replace(model, rows=(*model.rows, *held_by_motors(model, undeformed_posture(model).q)))
+        )
     return run_spatial_static(context, analysis)
 
 
@@ -59,14 +61,14 @@ def _instants(model: SpatialModel, analysis: InstantAnalysis, source: SpatialRun
     return replace(source.rows(rows), analysis=analysis, steps=0, evaluations=0, warnings=(), again=None)
 
 
-def _held_by_motors(model: SpatialModel) -> list[SpatialRow]:
-    """Rows that keep the coordinates of motors where they are at the start."""
-    start, rows = undeformed_posture(model).q, []
+def held_by_motors(model: SpatialModel, q: Array) -> list[SpatialRow]:
+    """Rows that keep the coordinates of motors where they are at q (n_q,)."""
+    rows = []
     for joint, columns in model.motors.items():
         node = model.tree.nodes[model.tree.carried[joint]]
         for k in columns:
             q_index = node.q.start + int(k) - node.v.start
-            target, nothing = TimeFunction.constant(float(start[q_index])), np.zeros(3)
+            target, nothing = TimeFunction.constant(float(q[q_index])), np.zeros(3)
             rows.append(
                 SpatialRow(
                     joint, "coordinate", node.inner, node.outer, nothing, nothing, coordinate=int(k), q_index=q_index,

@@ -101,6 +101,8 @@ def check_all_served(key: str, reach: Reach) -> None:
     """Raise `InputError` unless the patches reach every mode that they are to serve."""
     advice = 'or be content with the best they can do: allocation = "least-squares"'
     n, k = reach.served, reach.Phi_V.shape[1]
+    if not n:
+        raise InputError(f"{key}: expected modes of the link for the patches to serve, found none")
     if k < n:
         raise InputError(f"{key}: expected as many patches as modes ({n}) or more, found {k}: add patches, {advice}")
     unreached = reach.unreached_modes

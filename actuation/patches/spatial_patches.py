@@ -108,6 +108,8 @@ def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBod
     placed = [_placed(path, layout, body) for layout in layouts]
     found = effects(key, placed, body)
     modes = {one.layout.label: _reached(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
+    for layout in layouts:
+        _check_reached(path, layout, modes[layout.label], body)
     arrays = {
         one.layout.label: _array(path, one, body, spatial, of, modes[one.layout.label])
         for one, of in zip(placed, found, strict=True)
@@ -158,6 +160,16 @@ def _reached(per_volt: Array, body: ModalBody, spatial: SpatialBody) -> ReachedM
     modes_first = np.argsort(body.residual[rows], kind="stable")
     served = int(np.count_nonzero(body.residual[rows] == 0))
     return ReachedModes(rows, T[:, modes_first], stiffness[modes_first], served)
+
+
+def _check_reached(path: Path, layout: SpatialPztLayout, modes: ReachedModes, body: ModalBody) -> None:
+    """Raise `InputError` where a layout bends or twists the link in no mode."""
+    if not modes.served:
+        families = ", ".join(dict.fromkeys(str(family) for family in body.family)) or "none"
+        raise InputError(
+            f'{_key(path, layout.label)}: bends: expected modes of the link that patches for "{layout.acts_in}" reach,'
+            f" found modes in {families}: move the patches, or add such modes to the link ([modes] family)"
+        )
 
 
 def _array(

@@ -20,10 +20,8 @@ def error_budget(solution: Solution) -> Iterator[str]:
     yield f"modes: {_modes(solution)}"
     yield f"deflection: {_deflection(solution)}"
     for name, result in solution.analyses.items():
-        if (check := result.check) is not None:
-            ended = "" if check.status == "completed" else f", which ended early ({check.status})"
-            modes = ", ".join(map(str, dict.fromkeys(check.modes.values())))
-            yield f"{name}, replayed on {modes} modes{ended}: {check.point} is off by {1e3 * check.error:.2g} mm"
+        if result.check is not None:
+            yield f"{name}, {result.check.in_words}"
     yield from (f"patches of {patches.stiffness_in_words}" for patches in solution.patches.values())
 
 

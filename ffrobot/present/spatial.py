@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..results.verdict import Verdict
-from ..run.spatial import SpatialSolution
+from ..run.spatial_solution import SpatialSolution
 from .control import control_lines, control_tables
 from .lines import integrator_lines
 from .tables import plain_table
@@ -63,6 +63,9 @@ def print_spatial_summary(
     chosen = {name: one.run.integrator for name, one in solution.analyses.items() if one.run.analysis.is_integrated}
     for line in integrator_lines(chosen):
         notes.add_row("integrator", line)
+    for name, result in solution.analyses.items():
+        if result.check is not None:
+            notes.add_row("accuracy", f"{name}, {result.check.in_words}")
     for line in control_lines(details):
         notes.add_row("linear", line)
     for note in solution.path_notes:

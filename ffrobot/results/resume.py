@@ -8,19 +8,13 @@ run again.
 from __future__ import annotations
 
 import json
-import tomllib
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import h5py
 
-from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.hdf5 import blaming
-from ..common.tables import key_path
-from ..common.version import program_version
 from ..mbs import _core
 from ..mbs.analysis.outcome import (
     BODY_PEAKS,
@@ -35,19 +29,17 @@ from ..mbs.analysis.outcome import (
 )
 from ..mbs.scene.analysis import IntegratedAnalysis
 from ..mbs.solve.integrators import METHODS, Choice
-from ..run.inputs import digest_of_file, named_files
 from ..run.prepare import prepare, stiffened
 from ..run.solution import Solution
 from ..run.solve import Keep, run_analyses
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
 from .file import Results
+from .same_input import check_same_input, input_files
+from .stopped import GROUP, STOPPED, analyses, goes_on, is_kept, row_of_numbers
 
-GROUP = "resume"  # in the group of an analysis
-STOPPED = ("interrupted", "too many steps")
 ROWS = ("q", "v", "a", "lambda_", "tau", "F_p")  # what results files do not hold anyway
 COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
-MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 
 def resume(
@@ -62,8 +54,8 @@ def resume(
     if not results.exists():
         return run_analyses(solution, watcher, keep)
     with blaming(results), Results(results) as file:
-        _check_same_input(solution, file)
-        status = [file.attributes(name)["status"] if file.has(name) else "" for name in _analyses(solution)]
+        check_same_input(solution.scene, solution.bodies, file)
+        status = [file.attributes(name)["status"] if file.has(name) else "" for name in analyses(solution)]
         if all(found == "completed" for found in status):
             return None
         if file.attributes("/")["geometric_stiffening"] and not solution.stiffened:
@@ -75,43 +67,10 @@ def resume(
 
 def write_state(file: h5py.File, solution: Solution) -> None:
     """Add to a results file, where the run was stopped, what `resume` needs."""
-    file.attrs["input_files"] = json.dumps(_input_files(solution.scene))
-    if not _stopped(solution) and not left_out(solution):
-        return
-    for name, outcome in solution.outcomes.items():
-        if _goes_on(solution, outcome):
+    file.attrs["input_files"] = json.dumps(input_files(solution.scene))
+    for name, outcome in solution.outcomes.items() if is_kept(solution) else ():
+        if goes_on(solution, outcome):
             _write_outcome(file[name].create_group(GROUP), outcome.computed)
-
-
-def how_to_go_on(solution: Solution, command: str) -> str:
-    """What a message about a run that was stopped adds; empty where it cannot be gone on with."""
-    outcome = _stopped(solution)
-    if outcome is None:
-        return "".join(f'; {command} goes on with "{name}"' for name in left_out(solution)[:1])
-    if _goes_on(solution, outcome):
-        return f"; {command} goes on from t = {outcome.statistics.time_reached:.9g} s"
-    return f'; {command} runs "{outcome.analysis.name}" again from its start'
-
-
-def left_out(solution: Solution) -> list[str]:
-    """Analyses that were not begun when the run was stopped, or ended by an error."""
-    if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
-        return []
-    return [name for name in _analyses(solution) if name not in solution.outcomes]
-
-
-def _stopped(solution: Solution) -> Outcome | None:
-    return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
-
-
-def _goes_on(solution: Solution, outcome: Outcome) -> bool:
-    """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
-    searched = any("auto" in (body.modes, body.pieces) for body in solution.scene.body)
-    return not searched and outcome.analysis.is_resumable
-
-
-def _analyses(solution: Solution) -> list[str]:
-    return [analysis.name for analysis in solution.scene.analysis]
 
 
 def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
@@ -163,7 +122,7 @@ def _continuation(solution: Solution, file: Results, name: str) -> Continuation:
         return Continuation(checkpoint)
     analysis = next(analysis for analysis in solution.scene.analysis if analysis.name == name)
     assert isinstance(analysis, IntegratedAnalysis)
-    times, states = (_vector(file, f"{group}/recording/{key}") for key in ("times", "states"))
+    times, states = (row_of_numbers(file, f"{group}/recording/{key}") for key in ("times", "states"))
     methods = _methods(file, f"{group}/recording")
     return Continuation(
         checkpoint, _core.Recording(times, states, methods, analysis.spectral_radius, analysis.tolerance)
@@ -188,73 +147,13 @@ def _checkpoint(file: Results, group: str) -> _core.Checkpoint:
     try:
         return _core.Checkpoint(
             time=float(about["time"]),
-            state=_vector(file, f"{group}/state"),
+            state=row_of_numbers(file, f"{group}/state"),
             steps=_core.StepHistory(**{name: about[name].item() for name in STEPS}),
-            peaks=_core.Peaks(**{name: _vector(file, f"{group}/peaks/{name}") for name in (*BODY_PEAKS, "groups")}),
+            peaks=_core.Peaks(
+                **{name: row_of_numbers(file, f"{group}/peaks/{name}") for name in (*BODY_PEAKS, "groups")}
+            ),
             outputs=int(about["outputs"]),
             methods=_core.MethodHistory(**{name: about[name].item() for name in METHOD_HISTORY}),
         )
     except (TypeError, ValueError, KeyError, AttributeError) as error:
         raise InputError(f"{file.path}: {group}: expected where the run has stopped, found {error}") from None
-
-
-def _vector(file: Results, name: str) -> Array:
-    values = file[name]
-    if values.ndim != 1:
-        raise InputError(f"{file.path}: {name}: expected a row of numbers, found an array of shape {values.shape}")
-    return values
-
-
-def _check_same_input(solution: Solution, file: Results) -> None:
-    """Raise `InputError` naming the first thing that is not as it was."""
-    found = next(_changes(solution, file), None)
-    if found is not None:
-        raise InputError(
-            f"{file.path}: resume: expected results of the same input, found that {found} has changed; solve it from"
-            " the start, or undo the change"
-        )
-
-
-def _changes(solution: Solution, file: Results) -> Iterator[str]:
-    """What of the input is not that of the results file."""
-    if file.ffrobot_version != program_version():
-        yield f"ffrobot {file.ffrobot_version}, now {program_version()},"
-    then, now = _without_limits(file.scene), _without_limits(tomllib.loads(solution.scene.text))
-    loc = _first_difference(then, now)
-    if loc is not None:
-        yield f"the scene ({key_path(loc, now)})"
-    for name, body in solution.bodies.items():
-        if body.path is not None and body.file_hash != file.modal_files[name].sha256:
-            yield f'the modal body of "{name}"'
-    files = json.loads(file.attributes("/").get("input_files", "{}"))
-    for name, digest in _input_files(solution.scene).items():
-        if files.get(name) != digest:
-            yield name
-
-
-def _without_limits(scene: Mapping[str, Any]) -> dict[str, Any]:
-    analyses = [{key: value for key, value in a.items() if key != MAY_CHANGE} for a in scene["analysis"]]
-    return {**scene, "analysis": analyses}
-
-
-def _first_difference(then: object, now: object, loc: tuple[int | str, ...] = ()) -> tuple[int | str, ...] | None:
-    """Where two values of TOML differ first; None where they are equal."""
-    if then == now:
-        return None
-    if isinstance(then, dict) and isinstance(now, dict):
-        inner = ((key, then.get(key), now.get(key)) for key in now | then)
-    elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
-        inner = ((k, *pair) for k, pair in enumerate(zip(then, now, strict=True)))
-    else:
-        return loc
-    found = (_first_difference(old, new, (*loc, key)) for key, old, new in inner)
-    return next((place for place in found if place is not None), loc)
-
-
-def _input_files(scene: Scene) -> dict[str, str]:
-    """SHA-256 of the files that a scene names besides links and modal bodies, by what messages call them."""
-    tables, folder = tomllib.loads(scene.text), scene.path.parent
-    waypoints = {entry["waypoints"] for entry in tables.get("trajectory", []) if "waypoints" in entry}
-    calls = {folder / name: f"the waypoints {name}" for name in waypoints}
-    besides = {key: value for key, value in tables.items() if key != "body"}
-    return {calls.get(file, f"the file {file.name}"): digest_of_file(file) for file in named_files(besides, folder)}

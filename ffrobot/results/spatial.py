@@ -14,13 +14,14 @@ from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
-from ..run.spatial import SpatialResult, SpatialSolution
+from ..run.spatial_solution import SpatialResult, SpatialSolution
 from .actuators import write_placement
 from .control import write_loop
 from .forces import write_path
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
-from .write import write_head
+from .spatial_resume import write_state_in_space
+from .write import write_check, write_head
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -40,6 +41,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
                 write_spatial_linear(file[name], result.motion, result.run.details)
             if result.actuation is not None:
                 write_actuation(file[name], solution, result.actuation)
+        write_state_in_space(file, solution)
         file.flush()
         image: bytes = file.id.get_file_image()
     return image
@@ -58,6 +60,7 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     if joints := resolving_joints(motion.model):
         group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     group["time"] = run.time
+    write_check(group, result.check)
     _write_bodies(group, result)
     _write_joints(group, result)
     if isinstance(run.details, LoopRecord):

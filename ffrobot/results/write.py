@@ -18,7 +18,7 @@ from ..common.version import program_version
 from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Details, Outcome
 from ..run.loaded_body import Loaded
-from ..run.solution import AnalysisResult, Solution
+from ..run.solution import AnalysisResult, FinerCheck, Solution
 from .actuators import write_actuators, write_placement
 from .bodies import write_bending, write_motion, write_stress
 from .control import write_loop
@@ -85,9 +85,7 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     if solution.mode_choice is not None and name in solution.mode_choice.errors:
         for kind, error in solution.mode_choice.errors[name].items():
             group.attrs[f"mode_error_{kind}"] = error
-    if result.check is not None:
-        check = vars(result.check) | {"modes": json.dumps(dict(result.check.modes))}
-        group.attrs.update({f"check_{key}": value for key, value in check.items()})
+    write_check(group, result.check)
     write_motion(group, outcome)
     write_bending(group, result.bending)
     for body, divided in solution.divided.items():
@@ -99,6 +97,13 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     for found, write in DETAILS.items():
         if isinstance(outcome.details, found):
             write(group, outcome, outcome.details)
+
+
+def write_check(group: h5py.Group, found: FinerCheck | None) -> None:
+    """Attributes check_… of an analysis that was replayed on finer links."""
+    if found is not None:
+        check = vars(found) | {"modes": json.dumps(dict(found.modes))}
+        group.attrs.update({f"check_{key}": value for key, value in check.items()})
 
 
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:

@@ -6,9 +6,10 @@ out. Here moments of motors and voltages of patches act, as functions of time, o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from ..mbs.model.raised_mass import coordinate_factors, integrated, modal_factor
 from ..mbs.model.system import MechanismSystem
 from ..mbs.quantities.observation import point_motion
 from ..mbs.scene.analysis import TimedAnalysis
+from ..mbs.scene.bodies import BodyKeys
 from ..mbs.solve.initial_state import undeformed_state
 from ..mbs.solve.linearisation import held_by_motors
 from ..mbs.solve.state import State
@@ -41,6 +43,8 @@ from .watcher import Watcher
 SAMPLES_PER_RADIAN = 4.0  # of the fastest mode, of splines through moments and voltages
 MOST_SAMPLES = 200_000
 TIGHTEST = 1e-5  # tolerance: what is looked for is larger
+
+B = TypeVar("B", bound=BodyKeys)
 
 
 @dataclass(frozen=True)
@@ -56,20 +60,31 @@ def finer_scene(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Scene:
 
     Raises `InputError` for a body whose link is not known, only its modal body file.
     """
+    links = {name: loaded.modal for name, loaded in bodies.items() if loaded.modal is not None}
+    finer = with_twice_the_modes(scene.path, scene.body, links)
+    forward = Forward(name="replay", kind="forward", end=1.0, output_step=1.0)  # asks nothing of patches
+    return scene.model_copy(update={"body": finer, "analysis": (forward,)})
+
+
+def with_twice_the_modes(path: Path, bodies: Sequence[B], links: Mapping[str, ModalBody]) -> tuple[B, ...]:
+    """The bodies of the scene at `path` with twice the eigenmodes of each link and nothing left out.
+
+    `links`: their modal bodies. Raises `InputError` for a body whose link is not known, only its modal body file.
+    """
     finer = []
-    for body in scene.body:
-        modal = bodies[body.name].modal
+    for body in bodies:
+        modal = links.get(body.name)
         if modal is not None:
             if body.link is None:
                 raise InputError(
-                    f'{scene.path}: analysis: check: expected "link" in body "{body.name}" for "finer", which computes'
+                    f'{path}: analysis: check: expected "link" in body "{body.name}" for "finer", which computes'
                     f" it with twice the modes, found only the modal body file {body.modal}"
                 )
             table = LinkTable(_twice_the_modes(link_keys(body.link), modal), link_path(body.link))
-            body = body.model_copy(update={"link": table, "modes": None})
+            keys = {"link": table, "modes": None}
+            body = body.model_copy(update={key: keys[key] for key in keys if key in type(body).model_fields})
         finer.append(body)
-    forward = Forward(name="replay", kind="forward", end=1.0, output_step=1.0)  # asks nothing of patches
-    return scene.model_copy(update={"body": tuple(finer), "analysis": (forward,)})
+    return tuple(finer)
 
 
 def _twice_the_modes(keys: dict[str, Any], modal: ModalBody) -> dict[str, Any]:

@@ -200,8 +200,6 @@ def _not_available_of(analysis: AnyKindInSpace, scene: SpatialSceneKeys) -> Iter
     """Keys of an analysis that ask for what is not there yet, and what was expected and found."""
     apply = getattr(analysis, "apply", None)
     not_yet = "which is not available there yet"
-    if analysis.is_checked:
-        yield "check", 'none in space = "spatial", found it: not available yet'
     if apply not in (None, *APPLICABLE):
         yield "apply", f'{quoted(APPLICABLE)} in space = "spatial", found "{apply}", {not_yet}'
 

@@ -283,6 +283,12 @@ class Outcome:
         )
 
     @property
+    def time_reached(self) -> float:
+        """Where the last step ended, s; the last output where that is not known."""
+        reached = self.statistics.time_reached
+        return float(self.time[-1]) if reached is None else reached
+
+    @property
     def failed(self) -> bool:
         """Whether the run did not do what it was for; of some kinds an early end is a finding."""
         return self.status not in ("completed", *self.analysis.findings)
@@ -290,9 +296,8 @@ class Outcome:
     def check_completed(self, how_to_go_on: str = "") -> None:
         """Raise `SolveError` with advice where the run failed."""
         if self.failed:
-            run = self.statistics
-            reached = self.time[-1] if run.time_reached is None else run.time_reached
+            run, path = self.statistics, self.assembly.model.scene.path
             raise SolveError(
-                f'{self.assembly.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
+                f'{path}: analysis "{self.analysis.name}" ended at t = {self.time_reached:.9g} s'
                 f" ({run.status}): {run.cause or ADVICE[run.status]}{how_to_go_on}"
             )

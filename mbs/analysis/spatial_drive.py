@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ..solve.spatial_limits import left_ranges
 from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
 from ..solve.state import State
 from .drive import STATUS, Progress
+from .spatial_earlier import ROWS, EarlierSpatialRun
 from .spatial_run import SpatialRun
 
 
@@ -51,20 +53,25 @@ def spatial_drive(
     warnings: tuple[str, ...] = (),
     times: Array | None = None,
     control: SpatialControl | None = None,
+    earlier: EarlierSpatialRun | None = None,
 ) -> SpatialRun:
     """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
 
     Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
-    `progress` says so, and in a posture in which the joints cannot follow the path, with a warning.
+    `progress` says so, and in a posture in which the joints cannot follow the path, with a warning. It goes on with an
+    `earlier` run of the same analysis.
     """
     times = analysis.times if times is None else times
     system, began = SpatialSystem(model, drives), time.perf_counter()
     integrator = choose_integrator_in_space(system, analysis, start, len(times), is_sampled=control is not None)
+    if earlier is not None:  # with the same candidates, and what they have become since
+        integrator = replace(integrator, name=earlier.integrator.name, reason=earlier.integrator.reason)
     controls = integration_controls(analysis, integrator)
     system.scene.watch_posture([row.is_trajectory for row in model.rows], robot_size(model))
-    run = _integrated(system, times, start, controls, control, progress)
-    q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
-    multipliers = run.multipliers * system.row_signs
+    checkpoint = _core.TreeCheckpoint() if earlier is None else earlier.checkpoint
+    with nullcontext() if earlier is None else earlier.checked(model, times):
+        run = _integrated(system, times, start, controls, control, progress, checkpoint)
+    q, v, a, multipliers = _rows(system, run, earlier)
     in_posture = _ends_in_posture(run)
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
     cause = f"{posture}: move the path, or start in another posture" if in_posture else ""
@@ -73,12 +80,23 @@ def spatial_drive(
     def again(others: Array) -> SpatialRun:
         return spatial_drive(model, analysis, start, progress, drives=drives, times=others)
 
-    return SpatialRun(
-        analysis, model, times[: len(q)], q, v, run.accelerations, multipliers, applied=drives.at_points,
+    found = SpatialRun(
+        analysis, model, times[: len(q)], q, v, a, multipliers, applied=drives.at_points,
         status="diverged" if in_posture else STATUS[run.status], integrator=integrator.changed_in(run), steps=run.steps,
         evaluations=run.evaluations, wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
-        again=again if control is None else None,
+        checkpoint=checkpoint if control is None else None, again=again if control is None else None,
     )  # fmt: skip
+    return found if earlier is None else found.added_to(earlier)
+
+
+def _rows(system: SpatialSystem, run: _core.TreeRun, earlier: EarlierSpatialRun | None) -> list[Array]:
+    """What a run has of each output, `ROWS`, after what an earlier one had."""
+    q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [system.model.tree.n_q], axis=1))
+    found = [q, v, run.accelerations, run.multipliers * system.row_signs]
+    if earlier is None:
+        return found
+    known = [getattr(earlier, name) for name in ROWS]
+    return [np.concatenate([before, now[len(before) :]]) for before, now in zip(known, found, strict=True)]
 
 
 def _ends_in_posture(run: _core.TreeRun) -> bool:
@@ -95,9 +113,12 @@ def _integrated(
     controls: _core.IntegrationControls,
     control: SpatialControl | None,
     progress: Progress,
+    checkpoint: _core.TreeCheckpoint,
 ) -> _core.TreeRun:
     if control is None:
-        return _core.tree_motion(system.core, system.scene, as_list(times), start.q, start.v, controls, progress)
+        return _core.tree_motion(
+            system.core, system.scene, as_list(times), start.q, start.v, controls, progress, checkpoint
+        )
     return _core.tree_sampled(
         model=system.core, scene=system.scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
         carry_on=progress, held=system.held_forces(control.commands), first_command=control.first,

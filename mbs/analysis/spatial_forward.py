@@ -28,10 +28,11 @@ from .spatial_run import SpatialContext, SpatialRun, without_paths
 
 
 class Applied(NamedTuple):
-    """What acts, and how far its functions of time are off (share of the largest value)."""
+    """What acts, how far its functions of time are off (share of the largest value), and whether that was stopped."""
 
     drives: Drives
     unresolved: float
+    was_stopped: bool
 
 
 def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRun:
@@ -42,19 +43,23 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
     """
     model, progress = with_compliance_in_space(without_paths(context.model)), context.progress
     if analysis.actuation is None:
-        return spatial_drive(model, analysis, initial_state(model), progress)
+        return spatial_drive(model, analysis, initial_state(model), progress, earlier=context.earlier)
     source = context.runs[analysis.actuation]
     if model.tree.gears:
         return _behind_gears(source, model, analysis, context)
     by_paths = analysis.apply == "trajectory"
     applied = _paths(source, analysis) if by_paths else _actuators(context, source, analysis)
+    progress = _stop if applied.was_stopped else progress
     start = State(source.q[0], source.v[0])
     warnings: tuple[str, ...] = ()
     if applied.unresolved > analysis.tolerance:
         off = f"off by {applied.unresolved:.1e} of the largest"
         warnings = (f'the forces of "{analysis.actuation}" change too fast to be replayed: {off}',)
     times = replay_times(source, analysis)
-    return spatial_drive(model, analysis, start, progress, drives=applied.drives, warnings=warnings, times=times)
+    return spatial_drive(
+        model, analysis, start, progress,
+        drives=applied.drives, warnings=warnings, times=times, earlier=context.earlier,
+    )  # fmt: skip
 
 
 def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, context: SpatialContext) -> SpatialRun:
@@ -89,7 +94,14 @@ def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, co
         first.q[node.q.start], first.v[node.v.start] = found.angle[0], found.rate[0]
     along = [Drive(direction, size) for direction, size in zip(_directions(model), sizes, strict=True)]
     times = replay_times(source, analysis)
-    return spatial_drive(model, analysis, first, context.progress, drives=Drives(tuple(along)), times=times)
+    return spatial_drive(
+        model, analysis, first, context.progress, drives=Drives(tuple(along)), times=times, earlier=context.earlier
+    )
+
+
+def _stop(t: float) -> bool:
+    """Of a run that was stopped before it began: its first output alone."""
+    return False
 
 
 def largest_moments(model: SpatialModel, *, limits: bool) -> Array:
@@ -121,7 +133,7 @@ def _paths(source: SpatialRun, analysis: Forward) -> Applied:
         PointDrive(point, {component: next(sizes) for component in OF_POINT})
         for point in path_wrenches(source.rows(slice(0, 1)))
     ]
-    return Applied(Drives(tuple(along), tuple(points)), found.unresolved)
+    return Applied(Drives(tuple(along), tuple(points)), found.unresolved, found.was_stopped)
 
 
 def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -> Applied:
@@ -137,12 +149,12 @@ def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -
 
     found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
     sizes = iter(found.functions)
-    motors = list(_motors(model, sizes))
+    motors = list(motor_drives(model, sizes))
     with_patches = _supplied(context, analysis, motor_forces_of(source.rows(slice(0, 1))))
     modal = tuple(drive for body in with_patches for drive in modal_drives(model, body, sizes))
     along = tuple(drive for drive in motors if isinstance(drive, Drive))
     on_frames = tuple(drive for drive in motors if isinstance(drive, FrameDrive))
-    return Applied(Drives(along + modal, on_frames=on_frames), found.unresolved)
+    return Applied(Drives(along + modal, on_frames=on_frames), found.unresolved, found.was_stopped)
 
 
 def _supplied(context: SpatialContext, analysis: Forward, found: MotorForces) -> dict[str, Array]:
@@ -150,7 +162,7 @@ def _supplied(context: SpatialContext, analysis: Forward, found: MotorForces) ->
     return dict(context.supply(found.modal, analysis.limits)) if analysis.apply == "joints+pzt" else {}
 
 
-def _motors(model: SpatialModel, sizes: Iterator[TimeFunction]) -> Iterator[Drive | FrameDrive]:
+def motor_drives(model: SpatialModel, sizes: Iterator[TimeFunction]) -> Iterator[Drive | FrameDrive]:
     """The motors with the next functions, in the order of `SpatialModel.motors`; their signs are those of the joint."""
     joints = {joint.name: joint for joint in model.scene.joint}
     for joint, columns in model.motors.items():

@@ -20,4 +20,6 @@ def run_spatial_pcid(context: SpatialContext, analysis: IntegratedAnalysis) -> S
     firm = resolved(context.model, analysis.last_time)
     warnings = tuple(check_path(firm, undeformed_posture(firm).q))
     model = with_held_motors(firm)
-    return spatial_drive(model, analysis, initial_state(model), context.progress, warnings=warnings)
+    return spatial_drive(
+        model, analysis, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier
+    )

@@ -28,10 +28,14 @@ GAIN = 32.0  # at least: by how much half the step makes a quintic spline better
 
 
 class Replayed(NamedTuple):
-    """Functions of time of each column, and how far they are off (share of the largest value, mean over time)."""
+    """Functions of time of each column, and how far they are off (share of the largest value, mean over time).
+
+    Where it `was_stopped`, on request, they are what they are at the start.
+    """
 
     functions: list[TimeFunction]
     unresolved: float
+    was_stopped: bool = False
 
 
 def replay_times(source: SpatialRun, analysis: TimedAnalysis) -> Array:
@@ -49,7 +53,12 @@ def replayed(source: SpatialRun, read: Callable[[SpatialRun], Array], times: Arr
     count = 2 * max(FEWEST_NODES // 2, source.steps) + 1
     while True:
         nodes = as_floats(np.linspace(times[0], times[-1], count))
-        values = in_parts(source.again(nodes), read)
+        made_again = source.again(nodes)
+        if made_again.status == "interrupted":
+            at_start = read(source.rows(slice(0, 1)))[0]
+            return Replayed([TimeFunction.constant(float(value)) for value in at_start], 0.0, was_stopped=True)
+        made_again.check_completed()
+        values = in_parts(made_again, read)
         peak = float(np.abs(values).max(initial=0.0))
         rough = np.array([f.sample(nodes[1::2])[0] for f in spline(nodes[::2], values[::2])]).T
         off = float(np.abs(rough - values[1::2]).mean(axis=0).max(initial=0.0)) if values.size else 0.0

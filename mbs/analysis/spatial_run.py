@@ -7,12 +7,14 @@ from dataclasses import dataclass, field, replace
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
+from .. import _core
 from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel
 from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
 from .drive import Progress
 from .outcome import ADVICE, Details
+from .spatial_earlier import EarlierSpatialRun
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,7 @@ class SpatialRun:
         cause: why it ended early, where more is known than its status says.
         commanded: (T, k) moments of motors by joint, N·m or N, where a controller commands them.
         details: what only its kind finds.
+        checkpoint: where its integration can be gone on with; None where that cannot be done.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
     """
 
@@ -61,7 +64,15 @@ class SpatialRun:
     cause: str = ""
     commanded: Mapping[str, Array] = field(default_factory=dict)
     details: Details = field(default=Details(), repr=False)
+    checkpoint: _core.TreeCheckpoint | None = field(default=None, repr=False)
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
+
+    @property
+    def time_reached(self) -> float:
+        """Where the last step ended, s; the last output where that is not known."""
+        if self.checkpoint is not None:
+            return self.checkpoint.time
+        return float(self.time[-1]) if len(self.time) else 0.0
 
     @property
     def failed(self) -> bool:
@@ -74,12 +85,16 @@ class SpatialRun:
         of_time = {name: getattr(self, name) for name in names}
         return replace(self, **{name: values[chosen] for name, values in of_time.items() if values is not None})
 
+    def added_to(self, earlier: EarlierSpatialRun) -> SpatialRun:
+        """With the work of the run that this one went on from."""
+        counts = ("steps", "evaluations", "wall_seconds")
+        return replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
+
     def check_completed(self, how_to_go_on: str = "") -> None:
         """Raise `SolveError` with advice where it ended early."""
         if self.failed:
-            reached = self.time[-1] if len(self.time) else 0.0
             raise SolveError(
-                f'{self.model.scene.path}: analysis "{self.analysis.name}" ended at t = {reached:.9g} s'
+                f'{self.model.scene.path}: analysis "{self.analysis.name}" ended at t = {self.time_reached:.9g} s'
                 f" ({self.status}): {self.cause or ADVICE[self.status]}{how_to_go_on}"
             )
 
@@ -105,12 +120,14 @@ class SpatialContext:
         runs: of the analyses before, by name.
         progress: see `drive.Progress`.
         supply: what patches do.
+        earlier: a run of this analysis to go on with; None from the start.
     """
 
     model: SpatialModel
     runs: Mapping[str, SpatialRun]
     progress: Progress
     supply: Supply = no_patches
+    earlier: EarlierSpatialRun | None = None
 
 
 def without_paths(model: SpatialModel) -> SpatialModel:

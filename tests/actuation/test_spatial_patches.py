@@ -45,7 +45,7 @@ elements = 10
 condition = "cantilever"
 [modes]
 count = {count}
-family = "all"
+family = "{family}"
 """
 
 
@@ -62,9 +62,9 @@ def link(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
 
-        def make(section, count=12):
+        def make(section, count=12, family="all"):
             path = folder / "link.toml"
-            path.write_text(LINK.format(name="link", section=section, count=count))
+            path.write_text(LINK.format(name="link", section=section, count=count, family=family))
             return cached_modal_body(path).body
 
         yield make
@@ -305,6 +305,10 @@ def test_patches_that_do_not_fit_their_link(link):
     old = replace(body, stations=replace(body.stations, width=None, outline=None))
     with pytest.raises(InputError, match="make it again from its link file"):
         link_patches(SCENE, [layout(bends="out-of-plane")], old, spatial)
+    upright = link(rectangle(0.006, 0.014), 4, "out-of-plane-bending")
+    for allocation in ("exact", "least-squares"):
+        with pytest.raises(InputError, match=r'bends: expected modes of the link that patches for "in-plane" reach'):
+            link_patches(SCENE, [layout(allocation=allocation)], upright, from_modal_body("link", upright))
     with pytest.raises(InputError, match="expected no weights beside other layouts"):
         link_patches(SCENE, [layout(name="a", point_weights={"tip": 1.0}), layout(name="b", bends="out-of-plane")],
                      body, spatial)  # fmt: skip

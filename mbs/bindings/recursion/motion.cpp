@@ -22,13 +22,18 @@ namespace {
 
 template <class Space>
 TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times, const VectorXd &q,
-                  const VectorXd &v, const IntegrationControls &controls, const std::function<bool(double)> &carry_on) {
+                  const VectorXd &v, const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
+                  TreeCheckpoint *checkpoint) {
   model.check_state(q, v);
   check_scene(model, scene);
   const nb::gil_scoped_release unlocked;
   RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data());
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data());
-  return integrated(model, motion, reader, times, q, v, controls, carry_on);
+  if (checkpoint && checkpoint->integration.has_begun()) {
+    check_size("state of the checkpoint", checkpoint->integration.state.size(), q.size() + v.size());
+    motion.go_on(checkpoint->history);
+  }
+  return integrated(model, motion, reader, times, q, v, controls, carry_on, nullptr, checkpoint);
 }
 
 // The same of states (T, n_q + n_v) that are known
@@ -62,14 +67,58 @@ std::tuple<VectorXd, VectorXd, double> projected(const Model<Space> &model, cons
 }
 
 template <class Space> void bind_motion(nb::module_ &m) {
-  m.def(
-      "tree_motion", &motion_of<Space>, "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
-      "Integrates the motion from (q, v) at the first of `times` and reports it at all of them; carry_on(t), which is\n"
-      "called now and then, ends it where it gives False.");
+  m.def("tree_motion", &motion_of<Space>, "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
+        "checkpoint"_a = nb::none(),
+        "Integrates the motion from (q, v) at the first of `times`, or on from a checkpoint, which it moves, and "
+        "reports\n"
+        "it at all of them; rows of outputs that were delivered before mean nothing. carry_on(t), which is called now "
+        "and\n"
+        "then, ends it where it gives False.");
   m.def("tree_outputs", &outputs_of<Space>, "model"_a, "scene"_a, "times"_a, "states"_a,
         "What a run reports of states (T, n_q + n_v) that are known.");
   m.def("tree_projected", &projected<Space>, "model"_a, "scene"_a, "t"_a, "q"_a, "v"_a,
         "(q, v, largest residual left) on the rows at time t, by Newton steps in the mass metric.");
+}
+
+VectorXd as_vector(const std::vector<double> &values) {
+  return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
+}
+
+void make_checkpoint(TreeCheckpoint *made, double time, VectorXd state, const StepHistory &steps, std::size_t outputs,
+                     const MethodHistory &methods, const std::vector<double> &state_peaks,
+                     const std::vector<double> &force_peaks, double inertial_peak, unsigned long accepted,
+                     double least_ratio, double singular_at, VectorXd singular_posture, double watched_at,
+                     double determinant) {
+  new (made) TreeCheckpoint{{time, std::move(state), steps, outputs, methods},
+                            {{state_peaks, force_peaks, inertial_peak},
+                             accepted,
+                             least_ratio,
+                             singular_at,
+                             std::move(singular_posture),
+                             watched_at,
+                             determinant}};
+}
+
+void bind_checkpoint(nb::module_ &m) {
+  nb::class_<TreeCheckpoint>(m, "TreeCheckpoint", "Where a run has stopped, and all that its next step depends on.")
+      .def(nb::init<>())
+      .def("__init__", &make_checkpoint, nb::kw_only(), "time"_a, "state"_a, "steps"_a, "outputs"_a, "methods"_a,
+           "state_peaks"_a, "force_peaks"_a, "inertial_peak"_a, "accepted"_a, "least_ratio"_a, "singular_at"_a,
+           "singular_posture"_a, "watched_at"_a, "determinant"_a, "state (n_q + n_v,).")
+      .def_prop_ro("time", [](const TreeCheckpoint &c) { return c.integration.time; })
+      .def_prop_ro("state", [](const TreeCheckpoint &c) { return c.integration.state; })
+      .def_prop_ro("steps", [](const TreeCheckpoint &c) { return c.integration.steps; })
+      .def_prop_ro("outputs", [](const TreeCheckpoint &c) { return c.integration.outputs; })
+      .def_prop_ro("methods", [](const TreeCheckpoint &c) { return c.integration.methods; })
+      .def_prop_ro("state_peaks", [](const TreeCheckpoint &c) { return as_vector(c.history.peaks.state); })
+      .def_prop_ro("force_peaks", [](const TreeCheckpoint &c) { return as_vector(c.history.peaks.force); })
+      .def_prop_ro("inertial_peak", [](const TreeCheckpoint &c) { return c.history.peaks.inertial; })
+      .def_prop_ro("accepted", [](const TreeCheckpoint &c) { return c.history.accepted; })
+      .def_prop_ro("least_ratio", [](const TreeCheckpoint &c) { return c.history.least_ratio; })
+      .def_prop_ro("singular_at", [](const TreeCheckpoint &c) { return c.history.singular_at; })
+      .def_prop_ro("singular_posture", [](const TreeCheckpoint &c) { return c.history.singular_posture; })
+      .def_prop_ro("watched_at", [](const TreeCheckpoint &c) { return c.history.watched_at; })
+      .def_prop_ro("determinant", [](const TreeCheckpoint &c) { return c.history.determinant; });
 }
 
 void bind_run_and_laws(nb::module_ &m) {
@@ -117,6 +166,7 @@ void bind_run_and_laws(nb::module_ &m) {
 } // namespace
 
 void bind_tree_motion(nb::module_ &m) {
+  bind_checkpoint(m);
   bind_run_and_laws(m);
   nb::class_<Scene>(m, "TreeScene", "What a mechanism in joint coordinates follows and what acts on it.")
       .def(nb::init<>())

@@ -69,7 +69,7 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
                             return controller(k, t, state);
                           }};
   const SampledLoop loop(plant, sampling, times.back());
-  return integrated(model, motion, reader, times, q, v, controls, carry_on, &loop.breaks());
+  return integrated(model, motion, reader, times, q, v, controls, carry_on, &loop.breaks(), nullptr);
 }
 
 template <class Space> void bind_sampled_motion(nb::module_ &m) {

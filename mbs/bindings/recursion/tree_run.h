@@ -50,6 +50,12 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
     check_index("marker of the ground", driven.marker, model.mechanism.ground.size());
 }
 
+// Where a run has stopped, and all that its next step depends on.
+struct TreeCheckpoint {
+  IntegrationCheckpoint integration;
+  MotionHistory history;
+};
+
 // As far as it got.
 struct TreeRun {
   IntegrationReport report;
@@ -96,12 +102,13 @@ struct TreeRun {
   }
 };
 
-// The motion from (q, v) at the first of `times`, with outputs at all of them, which `reader` evaluates
+// The motion from (q, v) at the first of `times`, or on from a checkpoint, with outputs at all of them, which `reader`
+// evaluates. `breaks` and `checkpoint` may be null.
 template <class Space>
 TreeRun integrated(const Model<Space> &model, RecursiveMotion<Space> &motion, RecursiveMotion<Space> &reader,
                    const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
                    const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
-                   const Breaks *breaks = nullptr) {
+                   const Breaks *breaks, TreeCheckpoint *checkpoint) {
   TreeRun run(model, times.size());
   run.last << q, v;
   run.report = integrate(
@@ -111,7 +118,9 @@ TreeRun integrated(const Model<Space> &model, RecursiveMotion<Space> &motion, Re
         const nanobind::gil_scoped_acquire locked;
         return carry_on(t);
       },
-      nullptr, breaks);
+      nullptr, breaks, checkpoint ? &checkpoint->integration : nullptr);
+  if (checkpoint)
+    checkpoint->history = motion.history(); // before what finish() looks at besides
   run.finish(motion);
   return run;
 }

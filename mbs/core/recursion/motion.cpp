@@ -193,6 +193,18 @@ template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z)
   return least_ratio_ >= singular_ratio && Eigen::Map<const VectorXd>(z, 2 * n_v()).allFinite();
 }
 
+template <class Space> MotionHistory RecursiveMotion<Space>::history() const {
+  return {norm_.peaks(), accepted_, least_ratio_, singular_at_, singular_posture_, watched_at_, determinant_};
+}
+
+template <class Space> void RecursiveMotion<Space>::go_on(const MotionHistory &history) {
+  norm_.set_peaks(history.peaks);
+  accepted_ = history.accepted;
+  least_ratio_ = history.least_ratio, singular_at_ = history.singular_at;
+  singular_posture_ = history.singular_posture;
+  watched_at_ = history.watched_at, determinant_ = history.determinant;
+}
+
 template class RecursiveMotion<Planar>;
 template class RecursiveMotion<Spatial>;
 

@@ -82,6 +82,15 @@ struct Scene {
   std::optional<PostureWatch> watch;
 };
 
+// What a motion remembers of its steps: with it another one of the same mechanism goes on as if it had taken them.
+struct MotionHistory {
+  NormPeaks peaks;
+  unsigned long accepted = 0;              // steps
+  double least_ratio = 1, singular_at = 0; // of the watch, as in RecursiveMotion
+  Eigen::VectorXd singular_posture;
+  double watched_at = 0, determinant = 0;
+};
+
 template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
   // The mechanism and the scene must outlive this. Rows that depend on others
@@ -123,6 +132,9 @@ public:
   double least_ratio() const { return least_ratio_; }
   double singular_at() const { return singular_at_; }
   const Eigen::VectorXd &singular_posture() const { return singular_posture_; }
+
+  MotionHistory history() const;
+  void go_on(const MotionHistory &history); // throws std::invalid_argument where it is that of another mechanism
 
   const Workspace<Space, double> &workspace() const { return workspace_; }
   Workspace<Space, double> &workspace() { return workspace_; }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <stdexcept>
 
 namespace ffrobot::recursion {
 
@@ -161,6 +162,12 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const Workspa
     inertial += mechanism_.nodes[i].body.mass * std::sqrt(square);
   }
   inertial_ = std::max(inertial_, inertial);
+}
+
+template <class Space> void MotionNorm<Space>::set_peaks(const NormPeaks &peaks) {
+  if (peaks.state.size() != peak_.size() || peaks.force.size() != force_peak_.size())
+    throw std::invalid_argument("peaks: expected those of the same mechanism, found those of another one");
+  peak_ = peaks.state, force_peak_ = peaks.force, inertial_ = peaks.inertial;
 }
 
 template class MotionNorm<Planar>;

@@ -5,6 +5,12 @@
 
 namespace ffrobot::recursion {
 
+// Largest sizes so far, all that a norm remembers: by group of what is alike in states, and in forces; N.
+struct NormPeaks {
+  std::vector<double> state, force;
+  double inertial = 0;
+};
+
 // Alike are all ways of joints, all their angles, each body's modes, the rates of each of these, the multipliers of one
 // joint or path that are forces, or moments, and so what one joint of the tree hands to the body that carries it.
 // Errors e and states z are local coordinates (space/local_coordinates.h).
@@ -22,6 +28,9 @@ public:
 
   // Peaks grow by the state z, its rate and the forces observed there; w: as at the last evaluation.
   void take(const double *z, const double *z_dot, const Workspace<Space, double> &w);
+
+  NormPeaks peaks() const { return {peak_, force_peak_, inertial_}; }
+  void set_peaks(const NormPeaks &peaks); // throws std::invalid_argument where they are those of another mechanism
 
 private:
   void forces(const Workspace<Space, double> &w, Eigen::VectorXd &values) const;

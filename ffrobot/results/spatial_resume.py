@@ -1,0 +1,105 @@
+"""Going on with a run in space that was stopped, from its results file: as `resume` in the plane."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from ..common.errors import InputError
+from ..common.hdf5 import blaming
+from ..mbs import _core
+from ..mbs.analysis.outcome import METHOD_HISTORY, STEPS
+from ..mbs.analysis.spatial_earlier import MEMORY, ROWS, VECTORS, EarlierSpatialRun
+from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.solve.integrators import Choice
+from ..run.spatial import Keep, prepare_spatial, run_spatial
+from ..run.spatial_solution import SpatialSolution
+from ..run.watcher import Watcher
+from ..scene.spatial import SpatialScene
+from .file import Results
+from .same_input import check_same_input, input_files
+from .stopped import GROUP, STOPPED, analyses, goes_on, is_kept, row_of_numbers
+
+COUNTS = ("steps", "evaluations", "wall_seconds")
+
+
+def resume_spatial(
+    scene: SpatialScene | Path, results: Path, watcher: Watcher, keep: Keep | None = None
+) -> SpatialSolution | None:
+    """`solve_spatial`, going on from the file `results`; None where that is complete. From the start if absent.
+
+    Raises `InputError` where the file is not that of the same scene, modal bodies and waypoints; else as
+    `solve_spatial`.
+    """
+    solution = prepare_spatial(scene, watcher)
+    if not results.exists():
+        return run_spatial(solution, watcher, keep)
+    with blaming(results), Results(results) as file:
+        check_same_input(solution.scene, solution.bodies, file)
+        names = analyses(solution)
+        if all(file.has(name) and file.attributes(name)["status"] == "completed" for name in names):
+            return None
+        kept = [name for name in file.analyses if file.has(f"{name}/{GROUP}")]
+        solution = replace(solution, earlier={name: _earlier_run(file, name) for name in kept})
+    return run_spatial(solution, watcher, keep)
+
+
+def write_state_in_space(file: h5py.File, solution: SpatialSolution) -> None:
+    """Add to a results file, where the run was stopped, what `resume_spatial` needs."""
+    file.attrs["input_files"] = json.dumps(input_files(solution.scene))
+    for name, run in solution.outcomes.items() if is_kept(solution) else ():
+        if goes_on(solution, run) and run.checkpoint is not None:
+            _write_run(file[name].create_group(GROUP), run, run.checkpoint)
+
+
+def _write_run(group: h5py.Group, run: SpatialRun, checkpoint: _core.TreeCheckpoint) -> None:
+    for name in ROWS:
+        group[name] = getattr(run, name)
+    for name in VECTORS:
+        group[f"checkpoint/{name}"] = getattr(checkpoint, name)
+    about = {name: getattr(checkpoint, name) for name in ("time", "outputs", *MEMORY)}
+    about |= {name: getattr(checkpoint.steps, name) for name in STEPS}
+    about |= {name: getattr(checkpoint.methods, name) for name in METHOD_HISTORY}
+    group["checkpoint"].attrs.update(about)
+
+
+def _earlier_run(file: Results, name: str) -> EarlierSpatialRun:
+    about, group = file.attributes(name), f"{name}/{GROUP}"
+    if missing := [row for row in ROWS if not file.has(f"{group}/{row}")]:
+        raise InputError(f"{file.path}: {group}/{missing[0]}: expected a dataset, found none")
+    checkpoint, expected = _checkpoint(file, f"{group}/checkpoint"), len(file.time(name))
+    if checkpoint.outputs != expected or about["status"] not in (*STOPPED, "completed"):
+        raise InputError(
+            f"{file.path}: {group}: expected as many outputs as times, {expected}, found {checkpoint.outputs}"
+        )
+    kept: dict[str, Any] = {row: file[f"{group}/{row}"] for row in ROWS}
+    kept |= {count: about[count].item() for count in COUNTS}
+    return EarlierSpatialRun(
+        time=file.time(name),
+        integrator=Choice(about["integrator"], about["integrator_reason"]),
+        status=about["status"],
+        **kept,
+        checkpoint=checkpoint,
+        where=f"{file.path}: {group}",
+    )
+
+
+def _checkpoint(file: Results, group: str) -> _core.TreeCheckpoint:
+    about = file.attributes(group)
+    try:
+        memory: dict[str, Any] = {name: about[name].item() for name in MEMORY}
+        memory |= {name: row_of_numbers(file, f"{group}/{name}") for name in VECTORS}
+        found: _core.TreeCheckpoint = _core.TreeCheckpoint(
+            time=float(about["time"]),
+            outputs=int(about["outputs"]),
+            steps=_core.StepHistory(**{name: about[name].item() for name in STEPS}),
+            methods=_core.MethodHistory(**{name: about[name].item() for name in METHOD_HISTORY}),
+            **memory,
+        )
+        return found
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise InputError(f"{file.path}: {group}: expected where the run has stopped, found {error}") from None

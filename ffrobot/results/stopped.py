@@ -1,0 +1,66 @@
+"""What of a run that was stopped can be gone on with, in the plane and in space, and what messages say of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..common.arrays import Array
+from ..common.errors import InputError
+from ..mbs.analysis.outcome import Outcome
+from ..run.solution import Solution
+from .file import Results
+
+if TYPE_CHECKING:  # else every solve in the plane would load what is of space
+    from ..mbs.analysis.spatial_run import SpatialRun
+    from ..run.spatial_solution import SpatialSolution
+
+GROUP = "resume"  # in the group of an analysis
+STOPPED = ("interrupted", "too many steps")
+
+
+def how_to_go_on(solution: Solution | SpatialSolution, command: str) -> str:
+    """What a message about a run that was stopped adds; empty where it cannot be gone on with."""
+    outcome = stopped(solution)
+    if outcome is None:
+        return "".join(f'; {command} goes on with "{name}"' for name in left_out(solution)[:1])
+    if goes_on(solution, outcome):
+        return f"; {command} goes on from t = {outcome.time_reached:.9g} s"
+    return f'; {command} runs "{outcome.analysis.name}" again from its start'
+
+
+def left_out(solution: Solution | SpatialSolution) -> list[str]:
+    """Analyses that were not begun when the run was stopped, or ended by an error."""
+    if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
+        return []
+    return [name for name in analyses(solution) if name not in solution.outcomes]
+
+
+def is_kept(solution: Solution | SpatialSolution) -> bool:
+    """Whether there is something to go on with."""
+    return stopped(solution) is not None or bool(left_out(solution))
+
+
+def stopped(solution: Solution | SpatialSolution) -> Outcome | SpatialRun | None:
+    """The analysis that was stopped."""
+    return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
+
+
+def goes_on(solution: Solution | SpatialSolution, outcome: Outcome | SpatialRun) -> bool:
+    """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
+    searched = any(
+        "auto" in (getattr(body, "modes", None), getattr(body, "pieces", None)) for body in solution.scene.body
+    )
+    return not searched and outcome.analysis.is_resumable
+
+
+def analyses(solution: Solution | SpatialSolution) -> list[str]:
+    """Names of all that the scene asks for."""
+    return [analysis.name for analysis in solution.scene.analysis]
+
+
+def row_of_numbers(file: Results, name: str) -> Array:
+    """A dataset (k,) of what was kept. Raises `InputError` where it is something else."""
+    values = file[name]
+    if values.ndim != 1:
+        raise InputError(f"{file.path}: {name}: expected a row of numbers, found an array of shape {values.shape}")
+    return values

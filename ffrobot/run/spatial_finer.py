@@ -1,0 +1,164 @@
+"""`check = "finer"` in space: an inverse analysis replayed on links with twice the modes, as `finer` in the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..actuation.control.spatial_linear import held_by_motors
+from ..common.arrays import Array, as_floats
+from ..common.errors import InputError
+from ..mbs.analysis.forward import Forward
+from ..mbs.analysis.spatial_drive import spatial_drive
+from ..mbs.analysis.spatial_forward import motor_drives
+from ..mbs.analysis.spatial_replay import in_parts, motor_forces_of, replay_times
+from ..mbs.analysis.spatial_run import SpatialRun, without_paths
+from ..mbs.fields.waypoints import spline
+from ..mbs.model.spatial_drives import Drive, Drives, FrameDrive
+from ..mbs.model.spatial_model import SpatialModel, modal_direction
+from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.scene.analysis import TimedAnalysis
+from ..mbs.solve.spatial_posture import undeformed_posture
+from ..mbs.solve.spatial_redundancy import resolved
+from ..mbs.solve.spatial_statics import static_equilibrium
+from ..mbs.solve.state import State
+from ..scene.spatial import SpatialScene
+from .finer import MOST_SAMPLES, SAMPLES_PER_RADIAN, TIGHTEST, with_twice_the_modes
+from .solution import FinerCheck
+from .spatial_solution import SpatialSolution
+from .watcher import Watcher
+
+Prepare = Callable[[SpatialScene, Watcher], SpatialSolution]
+"""All that analyses of a scene start from."""
+
+
+def checked_in_space(solution: SpatialSolution, prepare: Prepare, watcher: Watcher) -> SpatialSolution:
+    """The solution with completed analyses replayed on finer links where the scene asks for that."""
+    wanted = [name for name, run in solution.outcomes.items() if run.analysis.is_checked and run.status == "completed"]
+    if not wanted:
+        return solution
+    results, failure = dict(solution.analyses), solution.failure
+    try:
+        finer = prepare(_finer_scene(solution), watcher)
+        for name in wanted:
+            watcher.stage(f'check of "{name}" on finer links')
+            results[name] = replace(results[name], check=_check(solution, results[name].run, finer, watcher))
+    except Exception as error:
+        failure = failure or error
+    return replace(solution, analyses=results, failure=failure)
+
+
+def _finer_scene(solution: SpatialSolution) -> SpatialScene:
+    """The scene with twice the eigenmodes of each link, of whose patches only the modal forces per volt are asked."""
+    scene = solution.scene
+    bodies = with_twice_the_modes(scene.path, scene.body, solution.links)
+    forward = Forward(name="replay", kind="forward", end=1.0, output_step=1.0)  # asks nothing of patches
+    served = {"allocation": "least-squares", "mode_weights": None, "point_weights": None}
+    pzt = tuple(layout.model_copy(update=served) for layout in scene.pzt)
+    return scene.model_copy(update={"body": bodies, "pzt": pzt, "analysis": (forward,)})
+
+
+def _check(solution: SpatialSolution, source: SpatialRun, finer: SpatialSolution, watcher: Watcher) -> FinerCheck:
+    """Replay `source`, a run of `solution`, on the same robot with finer links."""
+    scene = solution.scene
+    if not source.model.motors or finer.model.tree.gears or any(getattr(j, "stiffness", None) for j in scene.joint):
+        raise InputError(
+            f'{scene.path}: analysis "{source.analysis.name}": check: expected motors, and joints without stiffness,'
+            ' for "finer"'
+        )
+    run = _replayed(source, finer.model, _drives(solution, source, finer), watcher)
+    followed = [trajectory.point for trajectory in scene.trajectory if trajectory.point is not None]
+    nodes = (solution.model.tree.nodes[solution.model.tree.index[name]] for name in solution.links)
+    points = followed or [f"{node.body.name}.{point}" for node in nodes for point in node.body.points]
+    errors = {point: _distance(source, run, point) for point in points}
+    worst = max(errors, key=lambda point: errors[point])
+    modes = {name: link.eigenmode_count for name, link in finer.links.items()}
+    return FinerCheck(modes, worst, errors[worst], run.status)
+
+
+def _drives(solution: SpatialSolution, source: SpatialRun, finer: SpatialSolution) -> Drives:
+    """Splines through what the source found, as dense as its fastest vibration asks for, on the finer links."""
+    assert source.again is not None
+    fastest = max(float(np.sqrt(node.body.stiffness.max(initial=0.0))) for node in source.model.tree.nodes)
+    begin, end = float(source.time[0]), float(source.time[-1])
+    count = int(np.clip(SAMPLES_PER_RADIAN * fastest * (end - begin), len(source.time), MOST_SAMPLES))
+    times = as_floats(np.linspace(begin, end, max(count, 6)))
+    made_again = source.again(times)
+    made_again.check_completed()
+    layouts = list(_layouts(solution)) if "joints+pzt" in source.analysis.applicable else []
+
+    def found(run: SpatialRun) -> Array:
+        forces = motor_forces_of(run)
+        voltages = {b: solution.patches[b].voltages(forces.modal[b]) for b in dict.fromkeys(b for b, _ in layouts)}
+        return np.hstack([*forces.moments.values(), *(voltages[b][layout].required for b, layout in layouts)])
+
+    sizes = iter(spline(times, in_parts(made_again, found), 3))
+    motors = list(motor_drives(finer.model, sizes))
+    modal = [
+        Drive(modal_direction(finer.model, body, column), next(sizes))
+        for body, layout in layouts
+        for column in finer.patches[body].of_layout(layout).T
+    ]
+    along = [drive for drive in motors if isinstance(drive, Drive)]
+    return Drives((*along, *modal), on_frames=tuple(drive for drive in motors if isinstance(drive, FrameDrive)))
+
+
+def _layouts(solution: SpatialSolution) -> Iterator[tuple[str, str]]:
+    """Bodies and their layouts of patches."""
+    for body, of_link in solution.patches.items():
+        for layout in of_link.arrays:
+            yield body, layout
+
+
+def _replayed(source: SpatialRun, finer: SpatialModel, drives: Drives, watcher: Watcher) -> SpatialRun:
+    """Forward dynamics of the finer robot under moments of its motors and voltages of its patches."""
+    given = source.analysis
+    assert isinstance(given, TimedAnalysis)
+    analysis = Forward(
+        name=f"check of {given.name}", kind="forward", end=given.end, output_step=given.output_step,
+        tolerance=max(given.tolerance, TIGHTEST),
+    )  # fmt: skip
+    end = float(source.time[-1])
+
+    def progress(t: float) -> bool:
+        return watcher.advance(t, end)
+
+    times = replay_times(source, analysis)[: len(source.time)]
+    return spatial_drive(without_paths(finer), analysis, _start(source, finer), progress, drives=drives, times=times)
+
+
+def _start(source: SpatialRun, finer: SpatialModel) -> State:
+    """Where the source starts: on its trajectories, or of motors alone with their coordinates.
+
+    Links are in equilibrium there, or undeformed where those of the source are.
+    """
+    follows = any(row.is_trajectory for row in source.model.rows)
+    if follows:
+        model = resolved(finer, source.analysis.last_time)
+    else:
+        alone = without_paths(finer)
+        model = replace(alone, rows=(*alone.rows, *held_by_motors(alone, _as_in(source, alone))))
+    start = undeformed_posture(model)
+    is_bent = any(source.q[0, node.p_q].any() for node in source.model.tree.nodes)
+    return static_equilibrium(model, start) if is_bent else start
+
+
+def _as_in(source: SpatialRun, model: SpatialModel) -> Array:
+    """Q (n_q,) of `model`, links undeformed, with the joints where `source` has them at its start."""
+    q = np.zeros(model.tree.n_q)
+    for node, other in zip(model.tree.nodes, source.model.tree.nodes, strict=True):
+        q[node.q] = source.q[0, other.q]
+    return q
+
+
+def _distance(source: SpatialRun, run: SpatialRun, point: str) -> float:
+    """The largest, m, between where the two runs have a point."""
+    path, found = (_motion(one).point(point).position for one in (source, run))
+    rows = min(len(path), len(found))
+    return float(np.linalg.norm(path[:rows] - found[:rows], axis=1).max(initial=0.0))
+
+
+def _motion(run: SpatialRun) -> SpatialMotion:
+    return SpatialMotion(run.model, run.time, run.q, run.v, run.a, run.multipliers)
