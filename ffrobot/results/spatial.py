@@ -16,6 +16,7 @@ from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial_solution import SpatialResult, SpatialSolution
 from .actuators import write_placement
+from .bodies import write_stress
 from .control import write_loop
 from .forces import write_path
 from .linear import write_spatial_linear
@@ -62,6 +63,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     write_check(group, result.check)
     _write_bodies(group, result)
     _write_joints(group, result)
+    for body, stress in result.stresses.items():
+        write_stress(group.create_group(f"stress/{body}"), stress)
     if isinstance(run.details, LoopRecord):
         write_loop(group, run.details)
     if isinstance(run.details, Placed):

@@ -32,6 +32,7 @@ from .spatial_actuation import (
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
 from .spatial_finer import checked_in_space
 from .spatial_solution import SpatialResult, SpatialSolution
+from .spatial_stresses import stresses_in_space
 from .watcher import Interruption, Watcher
 
 logger = logging.getLogger(__name__)
@@ -154,7 +155,8 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
     if is_judged:  # else nothing is asked of motors and patches
         actuation = actuated_in_space(solution.scene, motion, solution.bodies, solution.patches)
-    return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion), actuation)
+    stresses = stresses_in_space(motion, solution.bodies, solution.patches)
+    return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion), actuation, stresses)
 
 
 def _log(run: SpatialRun) -> None:

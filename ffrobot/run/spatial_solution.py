@@ -15,6 +15,7 @@ from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.quantities.spatial_energy import Energies, Momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.quantities.stress import BodyStress
 from ..scene.spatial import SpatialScene
 from .solution import FinerCheck
 from .spatial_actuation import SpatialActuation
@@ -31,6 +32,7 @@ class SpatialResult:
         reactions: forces in joints by name.
         energies, momentum: of the robot.
         actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
+        stresses: by body, where modal body files hold modal stresses.
         check: what a replay on finer links found, where that is asked for.
     """
 
@@ -40,6 +42,7 @@ class SpatialResult:
     energies: Energies
     momentum: Momentum
     actuation: SpatialActuation | None
+    stresses: Mapping[str, BodyStress] = field(default_factory=dict)
     check: FinerCheck | None = None
 
     @property
