@@ -151,6 +151,18 @@ def test_a_shaft_that_spins_up_a_disc():
     np.testing.assert_allclose(found[later], expected[later], rtol=0, atol=1e-2 * np.abs(expected).max())
 
 
+def test_a_force_between_the_ends_leaves_mode_displacement():
+    """Its static stress is not in the file of the link."""
+    keys = cantilever(
+        "all",
+        load=[{"point": "tube.mid", "z": "1.0"}],
+        trajectory=[{"name": "hold", "joint": "roll", "value": "0"}],
+        analysis=[{"name": "rest", "kind": "static"}],
+    )
+    with ffrobot.solve(ffrobot.make_scene(**keys)) as results:
+        assert results.attributes("rest/stress/tube")["method"] == "mode displacement"
+
+
 def test_motors_on_frames_leave_mode_displacement():
     keys = cantilever(
         "all",
