@@ -231,8 +231,8 @@ MISTAKES = {
         r'analysis "inverse": modal.hand\[0\]: expected a finite value during the whole run, found none at t = 0.1',
     ),
     "key that is not there yet": (
-        lambda data: data.update(actuation_points=[{"body": "hand"}]),
-        'actuation_points: expected no such key in space = "spatial", found it: not available there yet',
+        lambda data: data.update(load=[{"point": "hand.tip", "force": "f"}]),
+        'force: expected no such key in space = "spatial", found it: not available there yet',
     ),
     "gear that gives without a rotor": (
         put("joint", stiffness=100.0),

@@ -13,6 +13,7 @@ from ..results.verdict import Verdict
 from ..run.spatial_solution import SpatialSolution
 from .control import control_lines, control_tables
 from .lines import integrator_lines
+from .stresses import stress_table
 from .tables import plain_table
 from .voltages import voltage_table
 
@@ -48,9 +49,11 @@ def print_spatial_summary(
         for of_link in solution.patches.values()
         for layout, array in of_link.arrays.items()
     )
-    if voltages.row_count:
-        console.print()
-        console.print(voltages)
+    stresses = stress_table((name, one.run.time, one.stresses) for name, one in solution.analyses.items())
+    for table in (voltages, stresses):
+        if table.row_count:
+            console.print()
+            console.print(table)
     for name, result in solution.analyses.items():
         for text in result.warnings:
             console.print(f"warning    {name}: {text}")

@@ -20,6 +20,7 @@ from ..run.solution import ModeChoice, Solution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
 from .lines import alike, integrator_lines
+from .stresses import stress_table
 from .tables import plain_table
 from .voltages import voltage_table
 
@@ -65,7 +66,7 @@ def _tables(solution: Solution) -> Iterator[Table]:
     if any(result.voltages for result in solution.analyses.values()):
         yield _voltages(solution)
     if any(result.stresses for result in solution.analyses.values()):
-        yield _stresses(solution)
+        yield stress_table((name, one.outcome.time, one.stresses) for name, one in solution.analyses.items())
     yield from control_tables(_details(solution))
 
 
@@ -166,17 +167,6 @@ def _voltages(solution: Solution) -> Table:
         for name, result in solution.analyses.items()
         for body, values in result.voltages.items()
     )
-
-
-def _stresses(solution: Solution) -> Table:
-    table = plain_table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)", "by")
-    for name, result in solution.analyses.items():
-        for body, stress in result.stresses.items():
-            value, k, place = stress.largest()
-            table.add_row(
-                name, body, f"{value / 1e6:.4g}", place, f"{result.outcome.time[k]:g}", stress.recovery.method
-            )
-    return table
 
 
 def _violation(outcome: Outcome) -> str:

@@ -17,6 +17,7 @@ from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointForces, PointSet
 from ..actuation.prediction import Unsupplied
 from ..actuation.spatial_feasibility import UnsuppliedInSpace
+from ..actuation.spatial_points import SpatialPointSet
 from ..common.arrays import Array
 from ..run.solution import AnalysisResult, Solution
 
@@ -26,7 +27,7 @@ def write_actuators(group: h5py.Group, solution: Solution, result: AnalysisResul
     for body, voltages in result.voltages.items():
         write_voltages(group.create_group(f"pzt/{body}"), solution.patches[body], voltages, voltages.unmet)
     for body, forces in result.point_forces.items():
-        _write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)
+        write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)
     for body, effect in solution.structure.items():
         for key, pair in vars(effect).items():
             group[f"patch_structure/{body}/{key}"] = pair
@@ -98,7 +99,8 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | UnsuppliedInSpace | None:
     return Unsupplied(**(about | {"bodies": tuple(about["bodies"])}))
 
 
-def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces) -> None:
+def write_point_forces(group: h5py.Group, points: PointSet | SpatialPointSet, forces: PointForces) -> None:
+    """Of the actuation points of one body."""
     group["force"] = forces.force
     group["residual"] = forces.residual
     group["residual_force"] = forces.unmet

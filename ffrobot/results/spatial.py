@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
@@ -10,12 +11,14 @@ import numpy as np
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placing import Placed
+from ..actuation.spatial_points import SpatialPointSet
 from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial_solution import SpatialResult, SpatialSolution
-from .actuators import write_placement
+from .actuators import write_placement, write_point_forces
+from .bodies import write_stress
 from .control import write_loop
 from .forces import write_path
 from .linear import write_spatial_linear
@@ -36,7 +39,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
         file.attrs["space"] = "spatial"
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
-            _write_analysis(file.create_group(name), result)
+            _write_analysis(file.create_group(name), result, solution.points)
             if isinstance(result.run.details, LinearModels):
                 write_spatial_linear(file[name], result.motion, result.run.details)
             if result.actuation is not None:
@@ -47,7 +50,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
     return image
 
 
-def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
+def _write_analysis(group: h5py.Group, result: SpatialResult, points: Mapping[str, SpatialPointSet]) -> None:
     run, motion = result.run, result.motion
     analysis = run.analysis
     group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
@@ -63,6 +66,10 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     write_check(group, result.check)
     _write_bodies(group, result)
     _write_joints(group, result)
+    for body, forces in result.point_forces.items():
+        write_point_forces(group.create_group(f"actuation_points/{body}"), points[body], forces)
+    for body, stress in result.stresses.items():
+        write_stress(group.create_group(f"stress/{body}"), stress)
     if isinstance(run.details, LoopRecord):
         write_loop(group, run.details)
     if isinstance(run.details, Placed):

@@ -13,6 +13,7 @@ from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.feasibility import Feasibility
 from ..actuation.patches.spatial_patches import LinkPatches
 from ..actuation.spatial_context import ActuatedSpatialContext
+from ..actuation.spatial_points import forces_at_points, solve_spatial_points, spatial_point_set, with_spatial_points
 from ..common.errors import SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.spatial_run import SpatialRun
@@ -32,6 +33,7 @@ from .spatial_actuation import (
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
 from .spatial_finer import checked_in_space
 from .spatial_solution import SpatialResult, SpatialSolution
+from .spatial_stresses import stresses_in_space
 from .watcher import Interruption, Watcher
 
 logger = logging.getLogger(__name__)
@@ -61,7 +63,14 @@ def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher) -> SpatialSolu
     seconds = {"bodies": time.perf_counter() - began}
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
     patches = patches_in_space(scene, bodies)
-    return SpatialSolution(scene, _model(scene, bodies, patches), bodies, patches, {}, seconds)
+    points = {
+        layout.body: spatial_point_set(scene.path, layout, bodies[layout.body].modal, bodies[layout.body].spatial)
+        for layout in scene.actuation_points
+    }
+    for name, chosen in points.items():
+        bodies[name] = replace(bodies[name], spatial=with_spatial_points(bodies[name].spatial, chosen))
+    model = _model(scene, bodies, patches)
+    return SpatialSolution(scene, model, bodies, patches, {}, seconds, points=points)
 
 
 def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None = None) -> SpatialSolution:
@@ -141,8 +150,9 @@ def _context(
     runs = {name: result.run for name, result in results.items()}
     supply = partial(supplied_by_patches, solution.patches)
     return ActuatedSpatialContext(
-        solution.model, runs, progress, supply, solution.earlier.get(analysis.name), solution.patches, solution.links
-    )
+        solution.model, runs, progress, supply, partial(forces_at_points, solution.points),
+        solution.earlier.get(analysis.name), solution.patches, solution.links,
+    )  # fmt: skip
 
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
@@ -154,7 +164,15 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
     if is_judged:  # else nothing is asked of motors and patches
         actuation = actuated_in_space(solution.scene, motion, solution.bodies, solution.patches)
-    return SpatialResult(run, motion, reactions(motion), energies(motion), momentum(motion), actuation)
+        if actuation.unsupplied is not None and set(actuation.unsupplied.bodies) <= solution.points.keys():
+            actuation = replace(actuation, unsupplied=None)  # forces at actuation points supply it
+    stresses = stresses_in_space(motion, solution.bodies, solution.patches)
+    at_points = {}
+    if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
+        at_points = {name: solve_spatial_points(points, run) for name, points in solution.points.items()}
+    return SpatialResult(
+        run, motion, reactions(motion), energies(motion), momentum(motion), actuation, stresses, at_points
+    )
 
 
 def _log(run: SpatialRun) -> None:

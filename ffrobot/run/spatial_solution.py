@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.patches.spatial_patches import LinkPatches
+from ..actuation.points import PointForces
+from ..actuation.spatial_points import SpatialPointSet
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.spatial_earlier import EarlierSpatialRun
@@ -15,6 +17,7 @@ from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.quantities.spatial_energy import Energies, Momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.quantities.stress import BodyStress
 from ..scene.spatial import SpatialScene
 from .solution import FinerCheck
 from .spatial_actuation import SpatialActuation
@@ -31,6 +34,8 @@ class SpatialResult:
         reactions: forces in joints by name.
         energies, momentum: of the robot.
         actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
+        stresses: by body, where modal body files hold modal stresses.
+        point_forces: at actuation points, by body.
         check: what a replay on finer links found, where that is asked for.
     """
 
@@ -40,6 +45,8 @@ class SpatialResult:
     energies: Energies
     momentum: Momentum
     actuation: SpatialActuation | None
+    stresses: Mapping[str, BodyStress] = field(default_factory=dict)
+    point_forces: Mapping[str, PointForces] = field(default_factory=dict)
     check: FinerCheck | None = None
 
     @property
@@ -64,6 +71,7 @@ class SpatialSolution:
         seconds: wall time by stage.
         failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
         path_notes: what was found of paths before the analyses, one line each.
+        points: actuation points, by body.
         earlier: runs of analyses to go on with, from a results file: see `results.spatial_resume`.
     """
 
@@ -75,6 +83,7 @@ class SpatialSolution:
     seconds: Mapping[str, float]
     failure: Exception | None = None
     path_notes: tuple[str, ...] = ()
+    points: Mapping[str, SpatialPointSet] = field(default_factory=dict)
     earlier: Mapping[str, EarlierSpatialRun] = field(default_factory=dict)
 
     @property

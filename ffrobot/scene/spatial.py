@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..actuation.patches.spatial_records import SpatialPztLayout
+from ..actuation.spatial_points import SpatialActuationPoints
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
@@ -23,13 +24,11 @@ from ..mbs.scene.analysis import Surroundings
 from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys, SpatialMechanismScene
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from .actuation_times import with_times_of_actuation
-from .kinds import KINDS, AnalysisInSpace, AnyKindInSpace
-
-APPLICABLE = ("joints", "joints+pzt", "trajectory")  # values of `apply`
+from .kinds import KINDS, AnalysisInSpace
 
 # Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
 UNAVAILABLE = {
-    "": ("geometric_stiffening", "actuation_points"),
+    "": ("geometric_stiffening",),
     "body": ("modes", "pieces"),
     "load": ("force",),
 }
@@ -40,6 +39,8 @@ class SpatialSceneKeys(SpatialMechanismKeys):
 
     pzt: tuple[SpatialPztLayout, ...] = ()
     """Layouts of piezoelectric patches; several on a body are told apart by their names."""
+    actuation_points: tuple[SpatialActuationPoints, ...] = ()
+    """Places of forces that stand for the driving forces."""
     analysis: Annotated[tuple[AnalysisInSpace, ...], NotEmpty]
     """What is computed, in this order."""
 
@@ -48,6 +49,8 @@ class SpatialSceneKeys(SpatialMechanismKeys):
         yield from super().references()
         for layout in self.pzt:
             yield from under(f'pzt "{layout.label}"', layout.references())
+        for points in self.actuation_points:
+            yield from under(f'actuation_points "{points.body}"', points.references())
         for analysis in self.analysis:
             yield from under(f'analysis "{analysis.name}"', analysis.references())
 
@@ -126,6 +129,9 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
     for label, count in Counter(layout.label for layout in scene.pzt).items():
         if count > 1:
             yield f'pzt "{label}": name: expected a name of its own for each layout on a body, found {count} of this'
+    for name, count in Counter(points.body for points in scene.actuation_points).items():
+        if count > 1:
+            yield f'actuation_points "{name}": body: expected one table for each body, found {count}'
     yield from _reference_problems(scene)
     counts = {layout.label: layout.patch_count for layout in scene.pzt}
     for k, load in enumerate(scene.load, 1):
@@ -181,9 +187,6 @@ def _reference_problems(scene: SpatialSceneKeys) -> Iterator[str]:
 
 def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
     """The list of what the records can say and the program cannot do yet."""
-    for analysis in scene.analysis:
-        for key, problem in _not_available_of(analysis, scene):
-            yield f'analysis "{analysis.name}": {key}: expected {problem}'
     for joint in scene.joint:
         if not joint.units and getattr(joint, "motor", False):
             yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
@@ -194,14 +197,6 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
         loaded = next((joint for joint in scene.joint if joint.name == load.joint), None)
         if loaded is not None and len(loaded.units) != 1:
             yield f'load no. {k}: joint: expected one with a single coordinate, found "{loaded.name}", a {loaded.type}'
-
-
-def _not_available_of(analysis: AnyKindInSpace, scene: SpatialSceneKeys) -> Iterator[tuple[str, str]]:
-    """Keys of an analysis that ask for what is not there yet, and what was expected and found."""
-    apply = getattr(analysis, "apply", None)
-    not_yet = "which is not available there yet"
-    if apply not in (None, *APPLICABLE):
-        yield "apply", f'{quoted(APPLICABLE)} in space = "spatial", found "{apply}", {not_yet}'
 
 
 def _check_functions(scene: SpatialSceneKeys, path: Path) -> None:

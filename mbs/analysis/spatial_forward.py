@@ -47,8 +47,11 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
     source = context.runs[analysis.actuation]
     if model.tree.gears:
         return _behind_gears(source, model, analysis, context)
-    by_paths = analysis.apply == "trajectory"
-    applied = _paths(source, analysis) if by_paths else _actuators(context, source, analysis)
+    if analysis.apply == "points":
+        applied = _points(context, source, analysis)
+    else:
+        by_paths = analysis.apply == "trajectory"
+        applied = _paths(source, analysis) if by_paths else _actuators(context, source, analysis)
     progress = _stop if applied.was_stopped else progress
     start = State(source.q[0], source.v[0])
     warnings: tuple[str, ...] = ()
@@ -134,6 +137,21 @@ def _paths(source: SpatialRun, analysis: Forward) -> Applied:
         for point in path_wrenches(source.rows(slice(0, 1)))
     ]
     return Applied(Drives(tuple(along), tuple(points)), found.unresolved, found.was_stopped)
+
+
+def _points(context: SpatialContext, source: SpatialRun, analysis: Forward) -> Applied:
+    """Forces at the actuation points, as they were along the motion of the source: in global axes."""
+
+    def forces(run: SpatialRun) -> Array:
+        return np.hstack(list(context.at_points(run).values()))
+
+    found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
+    sizes = iter(found.functions)
+    points = tuple(
+        PointDrive(point, {axis: next(sizes) for axis in "xyz"})
+        for point in context.at_points(source.rows(slice(0, 1)))
+    )
+    return Applied(Drives(at_points=points), found.unresolved, found.was_stopped)
 
 
 def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -> Applied:

@@ -111,6 +111,15 @@ def no_patches(wanted: ModalForces, limited: bool) -> ModalForces:
     return {}
 
 
+ForcesAtPoints = Callable[[SpatialRun], Mapping[str, Array]]
+"""By "BODY.POINT" what a run's driving forces are there: (T, 3) N, global axes."""
+
+
+def no_points(run: SpatialRun) -> Mapping[str, Array]:
+    """None."""
+    return {}
+
+
 @dataclass(frozen=True)
 class SpatialContext:
     """What the run of an analysis in space starts from.
@@ -120,6 +129,7 @@ class SpatialContext:
         runs: of the analyses before, by name.
         progress: see `drive.Progress`.
         supply: what patches do.
+        at_points: what driving forces are at the actuation points.
         earlier: a run of this analysis to go on with; None from the start.
     """
 
@@ -127,6 +137,7 @@ class SpatialContext:
     runs: Mapping[str, SpatialRun]
     progress: Progress
     supply: Supply = no_patches
+    at_points: ForcesAtPoints = no_points
     earlier: EarlierSpatialRun | None = None
 
 

@@ -83,11 +83,11 @@ def _move_to_frames(
         along = model.sign(joint.name) * moments[joint.name]
         for section, sign in ((node.outer, 1.0), (node.inner, -1.0)):
             if section.body >= 0:
-                turn = np.einsum("ti,tij->tj", axis, _spin_of_modes(model, q, frames, section))
+                turn = np.einsum("ti,tij->tj", axis, spin_of_modes(model, q, frames, section))
                 left[:, tree.nodes[section.body].p_v] += sign * along * turn
 
 
-def _spin_of_modes(model: SpatialModel, q: Array, frames: Sequence[Motion], section: Section) -> Array:
+def spin_of_modes(model: SpatialModel, q: Array, frames: Sequence[Motion], section: Section) -> Array:
     """A J_l Φ_r (T, 3, n): the section's angular velocity by ṗ."""
     node = model.tree.nodes[section.body]
     Phi_r = node.body.points[section.point].rotation if section.point else np.zeros((3, node.body.n_modes))

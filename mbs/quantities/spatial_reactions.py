@@ -35,7 +35,7 @@ def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
     loads = [(load.point, load.components) for load in motion.model.scene.load if load.point is not None]
     for point, components in (*loads, *motion.applied):
         number = tree.index[point.partition(".")[0]]
-        totals[number] = totals[number].plus(_of_load(motion, point, components), -1.0)
+        totals[number] = totals[number].plus(load_wrench(motion, point, components), -1.0)
     for rotor in rotors(state):  # the body that carries it turns its angular momentum
         if rotor.first.body >= 0:
             moment = rotor.torque[:, None] * rotor.axis + rotor.gyroscopic
@@ -52,7 +52,7 @@ def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
     return found
 
 
-def _of_load(motion: SpatialMotion, point: str, components: Mapping[str, TimeFunction]) -> Wrench:
+def load_wrench(motion: SpatialMotion, point: str, components: Mapping[str, TimeFunction]) -> Wrench:
     """A given load at a point, moments about the global origin."""
     values = {name: function.sample(motion.time)[0] for name, function in components.items()}
     none = np.zeros(len(motion.time))

@@ -1,0 +1,232 @@
+"""Actuation points in space (Shaban 2022, Eqs. 5–10): generalized driving forces of a body as forces along x, y, z.
+
+Forces F_a at points of a body do L_a F_a on it, with a column [e; u × e; Φᵀe] for a unit force along e at u = x + Φp:
+on R and on the rotation, both in axes of the body, and on its modes. Q_a are the forces that the trajectories have on
+it, and those that hold a shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from ..common.arrays import Array
+from ..common.errors import InputError
+from ..common.validation import Record
+from ..fe_models.modal_body import ModalBody
+from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.fields.references import Reference
+from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
+from ..mbs.model.spatial_model import SpatialModel, row_values
+from ..mbs.model.spatial_motors import path_forces, spin_of_modes
+from ..mbs.model.spatial_tree import Motion, Section
+from ..mbs.model.spatial_wrench import Wrench, row_wrenches
+from .points import DEPENDENT, Place, PointForces
+
+AXES = "xyz"
+
+
+class SpatialActuationPoints(Record):
+    """Components of force on one body that carry its generalized driving forces (Shaban 2022, sec. 4).
+
+    `x`, `y` and `z` say at which places a component along that axis of the body's frame acts. Without any, as many as
+    are independent of each other are chosen.
+    """
+
+    body: str
+    """Body that they sit on."""
+    x: tuple[Place, ...] = ()
+    """Places (m from the root, or a point's name) where a force along the body's x axis acts."""
+    y: tuple[Place, ...] = ()
+    """Places where a force along the body's y axis acts."""
+    z: tuple[Place, ...] = ()
+    """Places where a force along the body's z axis acts."""
+
+    @property
+    def places(self) -> list[tuple[str, Place]]:
+        """Axis and place of each component."""
+        return [(axis, place) for axis in AXES for place in getattr(self, axis)]
+
+    def references(self) -> Iterator[Reference]:
+        """The body, and the places on it that are named."""
+        yield Reference("body", self.body)
+        for axis, place in self.places:
+            if isinstance(place, str):
+                yield Reference(axis, f"{self.body}.{place}")
+
+
+@dataclass(frozen=True)
+class SpatialPointSet:
+    """Components of force at points of one body.
+
+    Attributes:
+        body: its name.
+        names: of the points, one for each component.
+        axes: "x", "y" or "z", likewise.
+        points: likewise, in the coordinates of the `SpatialBody`.
+        scale: (6 + n) factors that make the rows of L_a forces in N: 1, 1/length, √mass.
+    """
+
+    body: str
+    names: tuple[str, ...]
+    axes: tuple[str, ...]
+    points: tuple[SpatialPoint, ...]
+    scale: Array
+
+    @property
+    def direction(self) -> Array:
+        """(3, c) unit vectors in body axes."""
+        return np.eye(3)[:, [AXES.index(axis) for axis in self.axes]]
+
+    def L_a(self, p: Array) -> Array:
+        """(T, 6 + n, c) at modal coordinates p (T, n) of the equations."""
+        e, columns = self.direction, []
+        for k, point in enumerate(self.points):
+            u = point.position + p @ point.translation.T
+            on_frame = np.hstack([np.broadcast_to(e[:, k], u.shape), np.cross(u, e[:, k])])
+            on_modes = np.broadcast_to(point.translation.T @ e[:, k], p.shape)
+            columns.append(np.hstack([on_frame, on_modes]))
+        return np.stack(columns, axis=2)
+
+
+def spatial_point_set(
+    scene_path: Path, layout: SpatialActuationPoints, body: ModalBody | None, spatial: SpatialBody
+) -> SpatialPointSet:
+    """The components that the scene asks for, or as many well-conditioned ones as are independent.
+
+    Raises `InputError` for places that the body has not, and for components that do the same to the body.
+    """
+    key = f'{scene_path}: actuation_points "{layout.body}"'
+    if not layout.places:
+        return _automatic(key, layout.body, body, spatial)
+    points = [_point(f"{key}: {axis}", place, body, spatial) for axis, place in layout.places]
+    chosen = _named(layout.body, tuple(axis for axis, _ in layout.places), points, spatial)
+    sizes = np.linalg.svd(_scaled(chosen, np.zeros((1, spatial.n_modes)))[0], compute_uv=False)
+    rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))
+    if rank < len(points):
+        raise InputError(
+            f"{key}: expected components that differ in what they do to the body, found {len(points)} of which only"
+            f" {rank} are independent: those along x coincide where no mode moves along the link, and it has"
+            f" {len(chosen.scale)} coordinates"
+        )
+    return chosen
+
+
+def with_spatial_points(spatial: SpatialBody, chosen: SpatialPointSet) -> SpatialBody:
+    """The body with the actuation points among its points, where forces can act."""
+    own = dict(zip(chosen.names, chosen.points, strict=True))
+    return replace(spatial, points=MappingProxyType({**spatial.points, **own}))
+
+
+def solve_spatial_points(chosen: SpatialPointSet, run: SpatialRun) -> PointForces:
+    """L_a F_a = Q_a at every output time; `unmet` (T, 6 + n) with force and moment on the frame in axes of the body."""
+    node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
+    Q_a = driving_forces_in_space(run)[chosen.body]
+    p = run.q[:, node.p_q]
+    scaled = _scaled(chosen, p)
+    force = np.einsum("tck,tk->tc", np.linalg.pinv(scaled, rcond=DEPENDENT), chosen.scale * Q_a)
+    unmet = Q_a - np.einsum("tkc,tc->tk", chosen.L_a(p), force)
+    sizes = np.linalg.svd(scaled, compute_uv=False)
+    rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[:, :1], axis=1).min())
+    condition = float((sizes[:, 0] / sizes[:, -1]).max())
+    return PointForces(force, unmet, np.linalg.norm(unmet * chosen.scale, axis=1), rank, condition)
+
+
+def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: SpatialRun) -> dict[str, Array]:
+    """By "BODY.POINT" the force (T, 3) there, N, global axes, along the motion of a run.
+
+    Raises `InputError` where a body without points has driving forces.
+    """
+    tree, found = run.model.tree, {}
+    driven = driving_forces_in_space(run)
+    largest = max(float(np.abs(Q_a).max(initial=0.0)) for Q_a in driven.values())
+    for body, Q_a in driven.items():
+        if body not in chosen and np.abs(Q_a).max(initial=0.0) > DEPENDENT * largest:
+            raise InputError(
+                f'{run.model.scene.path}: analysis "{run.analysis.name}": expected [[actuation_points]] on every body'
+                f' that trajectories drive or that is held to a shape, found none on "{body}"'
+            )
+    frames = tree.frames(run.q)
+    for body, points in chosen.items():
+        F = frames[tree.index[body]].F
+        force = solve_spatial_points(points, run).force
+        for k, name in enumerate(points.names):
+            found[f"{body}.{name}"] = force[:, k : k + 1] * (F @ points.direction[:, k])
+    return found
+
+
+def driving_forces_in_space(run: SpatialRun) -> dict[str, Array]:
+    """Q_a by body, (T, 6 + n): force and moment on its frame, both in its axes, and on its modes."""
+    model, frames = run.model, run.model.tree.frames(run.q)
+    found = {node.body.name: np.zeros((len(run.time), 6 + node.body.n_modes)) for node in model.tree.nodes}
+    for k, row in enumerate(model.rows):
+        if row.is_trajectory:
+            wrenches = row_wrenches(model.tree, row, -run.multipliers[:, k], run.q, run.time, frames)
+            for section, wrench in zip((row.a, row.b), wrenches, strict=True):
+                if section.body >= 0:
+                    body = model.tree.nodes[section.body].body
+                    found[body.name] += _on_body(model, run.q, frames, section, wrench)
+    if run.required is not None:  # a shape is held besides, by forces on the modes alone
+        C_v = row_values(model, run.q, run.time, frames)[1]
+        held = run.required - path_forces(model, C_v, run.multipliers)
+        for node in model.tree.nodes:
+            found[node.body.name][:, 6:] += held[:, node.p_v]
+    return found
+
+
+def _on_body(model: SpatialModel, q: Array, frames: Sequence[Motion], section: Section, wrench: Wrench) -> Array:
+    """(T, 6 + n) of a wrench on a section, moments about the global origin: on frame and modes of its body."""
+    node, frame, at = model.tree.nodes[section.body], frames[section.body], model.tree.motion(section, q, frames)
+    on_frame = [np.einsum("tji,tj->ti", frame.F, x) for x in wrench.seen_from(-frame.r)]
+    on_modes = np.einsum("ti,tij->tj", wrench.seen_from(-at.r).moment, spin_of_modes(model, q, frames, section))
+    if section.point:
+        on_modes += on_frame[0] @ node.body.points[section.point].translation
+    return np.hstack([*on_frame, on_modes])
+
+
+def _automatic(key: str, name: str, body: ModalBody | None, spatial: SpatialBody) -> SpatialPointSet:
+    """Out of all components at every station, those that QR with column pivoting takes first: far from dependent."""
+    from scipy.linalg import qr
+
+    places: list[float | str] = list(spatial.points)
+    if body is not None:
+        places = list(np.unique(body.stations.position[:, 0]))
+    points = [_point(key, place, body, spatial) for place in places]
+    candidates = _named(name, tuple(axis for axis in AXES for _ in points), points * 3, spatial)
+    _, R, order = qr(_scaled(candidates, np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(R))
+    kept = sorted(order[: int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))])
+    return _named(name, tuple(candidates.axes[k] for k in kept), [candidates.points[k] for k in kept], spatial)
+
+
+def _named(name: str, axes: tuple[str, ...], points: list[SpatialPoint], spatial: SpatialBody) -> SpatialPointSet:
+    names = tuple(f"actuation{k}" for k in range(1, len(points) + 1))
+    length = spatial.length or max(float(np.linalg.norm(p.position)) for p in spatial.points.values()) or 1.0
+    scale = np.concatenate([np.ones(3), np.full(3, 1.0 / length), np.full(spatial.n_modes, np.sqrt(spatial.mass))])
+    return SpatialPointSet(name, names, axes, tuple(points), scale)
+
+
+def _point(key: str, place: float | str, body: ModalBody | None, spatial: SpatialBody) -> SpatialPoint:
+    if isinstance(place, str):
+        if place not in spatial.points:
+            raise InputError(f'{key}: expected a point of the body ({", ".join(spatial.points)}), found "{place}"')
+        return spatial.points[place]
+    if body is None:
+        raise InputError(
+            f"{key}: expected points of the rigid body by name ({', '.join(spatial.points)}), found {place:g}"
+        )
+    slack = 1e-9 * body.length
+    if not -slack <= place <= body.length + slack:
+        raise InputError(f"{key}: expected places within the link, 0 … {body.length:g} m, found {place:g} m")
+    at, T = body.interpolate(place), spatial.modal_transform
+    return SpatialPoint(at.position, at.translation @ T, at.rotation @ T)
+
+
+def _scaled(chosen: SpatialPointSet, p: Array) -> Array:
+    """The scaled L_a (T, 6 + n, c) at p (T, n)."""
+    found: Array = chosen.scale[:, None] * chosen.L_a(p)
+    return found
