@@ -156,7 +156,8 @@ def unsupplied_in_space(
 
 def _largest_shift(link: LinkInMotion, left: Array) -> tuple[float, float]:
     """Of the points of a link over time, by modal forces (T, n): m, rad."""
-    p = left @ link.spatial.modal_transform / link.spatial.stiffness
-    shifts = [(p @ at.translation.T, p @ at.rotation.T) for at in link.spatial.points.values()]
+    body = link.spatial.whole
+    p = left @ body.modal_transform / body.stiffness
+    shifts = [(p @ at.translation.T, p @ at.rotation.T) for at in body.points.values()]
     deflection, rotation = (max(float(np.linalg.norm(shift[k], axis=1).max()) for shift in shifts) for k in range(2))
     return deflection, rotation

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .fit import Fit
     from .results.file import Results
     from .run.solution import Solution
-    from .run.spatial import SpatialSolution
+    from .run.spatial_solution import SpatialSolution
     from .run.watcher import Watcher
     from .scene.any_space import AnyScene
     from .scene.spatial import SpatialScene

@@ -24,7 +24,7 @@ MOST = 100_000  # runs of a sweep, frames of a view
 
 if TYPE_CHECKING:
     from .run.solution import Solution
-    from .run.spatial import SpatialSolution
+    from .run.spatial_solution import SpatialSolution
 
 
 def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:

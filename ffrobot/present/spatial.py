@@ -10,8 +10,9 @@ from rich.console import Console
 from rich.table import Table
 
 from ..results.verdict import Verdict
-from ..run.spatial import SpatialSolution
+from ..run.spatial_solution import SpatialSolution
 from .control import control_lines, control_tables
+from .modes import chosen_modes
 from .tables import plain_table
 from .voltages import voltage_table
 
@@ -62,6 +63,9 @@ def print_spatial_summary(
         notes.add_row("linear", line)
     for note in solution.path_notes:
         notes.add_row("path", note)
+    if solution.mode_choice is not None:
+        bodies = [body.spatial for body in solution.bodies.values()]
+        notes.add_row("modes", chosen_modes(bodies, solution.mode_choice))
     for note in solution.notes:
         notes.add_row("links", note)
     notes.add_row("time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))

@@ -12,15 +12,16 @@ from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placing import Placed
 from ..common.checksum import sealed
 from ..common.files import write_atomically
+from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
-from ..run.spatial import SpatialResult, SpatialSolution
+from ..run.spatial_solution import SpatialResult, SpatialSolution
 from .actuators import write_placement
 from .control import write_loop
 from .forces import write_path
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
-from .write import write_head
+from .write import write_head, write_mode_errors
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -36,6 +37,8 @@ def spatial_image(solution: SpatialSolution) -> bytes:
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
             _write_analysis(file.create_group(name), result)
+            if solution.mode_choice is not None:
+                write_mode_errors(file[name], name, solution.mode_choice)
             if isinstance(result.run.details, LinearModels):
                 write_spatial_linear(file[name], result.motion, result.run.details)
             if result.actuation is not None:
@@ -85,6 +88,9 @@ def _write_bodies(group: h5py.Group, result: SpatialResult) -> None:
             group[f"bodies/{name}/{key}"] = values
         if motion.motor_forces is not None:
             group[f"bodies/{name}/modal_force"] = motion.motor_forces.modal[name]
+        if node.body.whole.n_modes:
+            about = {"modal_coordinates": "modes of the modal body file", "modes_kept": modes_kept(node.body)}
+            group[f"bodies/{name}"].attrs.update(about)
         for label in node.body.points:
             for key, values in vars(motion.point(f"{name}.{label}")).items():
                 group[f"points/{name}.{label}/{key}"] = values

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import h5py
 
-from ..run.spatial import SpatialSolution
 from ..run.spatial_actuation import SpatialActuation
+from ..run.spatial_solution import SpatialSolution
 from .actuators import write_judgement, write_voltages
 
 

@@ -18,6 +18,7 @@ from ..common.version import program_version
 from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Details, Outcome
 from ..run.loaded_body import Loaded
+from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, Solution
 from .actuators import write_actuators, write_placement
 from .bodies import write_bending, write_motion, write_stress
@@ -82,9 +83,8 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     if result.mode_error is not None:
         group.attrs["mode_error"] = result.mode_error
     group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
-    if solution.mode_choice is not None and name in solution.mode_choice.errors:
-        for kind, error in solution.mode_choice.errors[name].items():
-            group.attrs[f"mode_error_{kind}"] = error
+    if solution.mode_choice is not None:
+        write_mode_errors(group, name, solution.mode_choice)
     if result.check is not None:
         check = vars(result.check) | {"modes": json.dumps(dict(result.check.modes))}
         group.attrs.update({f"check_{key}": value for key, value in check.items()})
@@ -99,6 +99,12 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     for found, write in DETAILS.items():
         if isinstance(outcome.details, found):
             write(group, outcome, outcome.details)
+
+
+def write_mode_errors(group: h5py.Group, analysis: str, choice: ModeChoice) -> None:
+    """What leaving out modes costs in an analysis, estimated."""
+    for kind, error in choice.errors.get(analysis, {}).items():
+        group.attrs[f"mode_error_{kind}"] = error
 
 
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:

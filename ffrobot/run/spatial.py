@@ -5,107 +5,38 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.feasibility import Feasibility
 from ..actuation.patches.spatial_patches import LinkPatches
 from ..actuation.spatial_context import ActuatedSpatialContext
 from ..common.errors import SolveError, of_file
-from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
-from ..mbs.model.spatial_wrench import Wrench
-from ..mbs.quantities.spatial_energy import Energies, Momentum, energies, momentum
+from ..mbs.quantities.spatial_energy import energies, momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
+from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
 from .spatial_actuation import (
-    SpatialActuation,
     actuated_in_space,
     given_voltages,
     patches_in_space,
     supplied_by_patches,
 )
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
+from .spatial_mode_choice import mode_levels_in_space, reported_in_space
+from .spatial_solution import SpatialResult, SpatialSolution
 from .watcher import Interruption, Watcher
 
 logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class SpatialResult:
-    """What was computed of one analysis.
-
-    Attributes:
-        run: how it went, and states.
-        motion: what is read off them.
-        reactions: forces in joints by name.
-        energies, momentum: of the robot.
-        actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
-    """
-
-    run: SpatialRun
-    motion: SpatialMotion
-    reactions: Mapping[str, Wrench]
-    energies: Energies
-    momentum: Momentum
-    actuation: SpatialActuation | None
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Why results may be wrong, or not mean what they seem to, a text each."""
-        missed = None if self.actuation is None else self.actuation.unsupplied
-        told = (*self.run.warnings, *unresolved_gears(self.motion.gears))
-        if isinstance(self.run.details, LoopRecord):
-            told = (*told, *self.run.details.warnings)
-        return told if missed is None else (*told, missed.in_words)
-
-
-@dataclass(frozen=True)
-class SpatialSolution:
-    """Everything a solve of a scene in space computed.
-
-    Attributes:
-        scene, model: what was solved.
-        bodies: by name.
-        patches: by body.
-        analyses: by name, in the order of the scene.
-        seconds: wall time by stage.
-        failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
-        path_notes: what was found of paths before the analyses, one line each.
-    """
-
-    scene: SpatialScene
-    model: SpatialModel
-    bodies: Mapping[str, LoadedSpatialBody]
-    patches: Mapping[str, LinkPatches]
-    analyses: Mapping[str, SpatialResult]
-    seconds: Mapping[str, float]
-    failure: Exception | None = None
-    path_notes: tuple[str, ...] = ()
-
-    @property
-    def links(self) -> dict[str, ModalBody]:
-        """The modal bodies of the flexible bodies, as their files have them."""
-        return {name: body.modal for name, body in self.bodies.items() if body.modal is not None}
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What patches do to the stiffness of their links, and what links cannot do, one line each."""
-        stiffness = (array.stiffness_in_words for of in self.patches.values() for array in of.arrays.values())
-        return tuple(stiffness) + tuple(
-            f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"
-            for name, body in self.bodies.items()
-            if body.rigid_in
-        )
 
 
 Keep = Callable[[SpatialSolution], None]
@@ -115,6 +46,7 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     """Run every analysis of a scene, or of a scene file, in space; stage 1 runs first for links that are out of date.
 
     Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
+    With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run (`SpatialRun.check_completed`).
     So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
@@ -127,17 +59,45 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     seconds = {"bodies": time.perf_counter() - began}
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
     patches = patches_in_space(scene, bodies)
-    solution = SpatialSolution(scene, _model(scene, bodies, patches), bodies, patches, {}, seconds)
+    first = mode_levels_in_space(scene, bodies)[0]
+    solution = _with_bodies(SpatialSolution(scene, _model(scene, bodies, patches), bodies, patches, {}, seconds), first)
     with Interruption(watcher.stopping) as interruption:
         judge = partial(_judged, solution, watcher, interruption)
         scene, notes = with_paths_in_space(scene, solution.model, judge, watcher.stage)
         solution = replace(_with_scene(solution, scene) if notes else solution, path_notes=notes)
-        solution = _run_all(solution, watcher, interruption)
+        if any(body.modes == "auto" for body in scene.body):
+            solution = _with_enough_modes(solution, watcher, interruption)
+        else:
+            solution = _run_all(solution, watcher, interruption)
         if keep is not None and solution.analyses:
             keep(solution)
     if solution.failure is not None:
         raise solution.failure
     return solution
+
+
+def _with_enough_modes(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
+    """The scene solved with as many modes as its tolerances need: see `mode_search`."""
+    search = ModeSearch(error_tolerances(solution.scene), mode_levels_in_space(solution.scene, solution.bodies))
+    while (bodies := search.next_bodies()) is not None:
+        solution = _run_all(_with_bodies(solution, bodies), watcher, interruption)
+        if solution.failure is not None:
+            return solution
+        results = solution.analyses
+        completed = len(results) == len(solution.scene.analysis) and all(
+            result.run.status == "completed" for result in results.values()
+        )
+        found = {name: reported_in_space(result) for name, result in results.items()} if completed else None
+        search.add(found, last=interruption.requested)
+    return replace(solution, mode_choice=search.choice())
+
+
+def _with_bodies(solution: SpatialSolution, spatial: Mapping[str, SpatialBody]) -> SpatialSolution:
+    """The scene with some of its bodies replaced, nothing solved yet; patches serve all modes of their links."""
+    bodies = {name: replace(body, spatial=spatial.get(name, body.spatial)) for name, body in solution.bodies.items()}
+    seconds = {"bodies": solution.seconds["bodies"]}
+    model = _model(solution.scene, bodies, solution.patches)
+    return replace(solution, bodies=bodies, model=model, analyses={}, seconds=seconds)
 
 
 def _model(

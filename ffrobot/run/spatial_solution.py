@@ -1,0 +1,92 @@
+"""What a solve of a scene in space computed: of the scene as a whole, and of each analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ..actuation.control.loop_record import LoopRecord
+from ..actuation.patches.spatial_patches import LinkPatches
+from ..fe_models.modal_body import ModalBody
+from ..mbs.analysis.elastic_joints import unresolved_gears
+from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.model.spatial_model import SpatialModel
+from ..mbs.model.spatial_wrench import Wrench
+from ..mbs.model.truncation import modes_kept
+from ..mbs.quantities.spatial_energy import Energies, Momentum
+from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..scene.spatial import SpatialScene
+from .mode_search import ModeChoice
+from .spatial_actuation import SpatialActuation
+from .spatial_bodies import LoadedSpatialBody
+
+
+@dataclass(frozen=True)
+class SpatialResult:
+    """What was computed of one analysis.
+
+    Attributes:
+        run: how it went, and states.
+        motion: what is read off them.
+        reactions: forces in joints by name.
+        energies, momentum: of the robot.
+        actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
+    """
+
+    run: SpatialRun
+    motion: SpatialMotion
+    reactions: Mapping[str, Wrench]
+    energies: Energies
+    momentum: Momentum
+    actuation: SpatialActuation | None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why results may be wrong, or not mean what they seem to, a text each."""
+        missed = None if self.actuation is None else self.actuation.unsupplied
+        told = (*self.run.warnings, *unresolved_gears(self.motion.gears))
+        if isinstance(self.run.details, LoopRecord):
+            told = (*told, *self.run.details.warnings)
+        return told if missed is None else (*told, missed.in_words)
+
+
+@dataclass(frozen=True)
+class SpatialSolution:
+    """Everything a solve of a scene in space computed.
+
+    Attributes:
+        scene, model: what was solved.
+        bodies: by name.
+        patches: by body.
+        analyses: by name, in the order of the scene.
+        seconds: wall time by stage.
+        failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
+        path_notes: what was found of paths before the analyses, one line each.
+        mode_choice: where `modes = "auto"`.
+    """
+
+    scene: SpatialScene
+    model: SpatialModel
+    bodies: Mapping[str, LoadedSpatialBody]
+    patches: Mapping[str, LinkPatches]
+    analyses: Mapping[str, SpatialResult]
+    seconds: Mapping[str, float]
+    failure: Exception | None = None
+    path_notes: tuple[str, ...] = ()
+    mode_choice: ModeChoice | None = None
+
+    @property
+    def links(self) -> dict[str, ModalBody]:
+        """The modal bodies of the flexible bodies, as their files have them."""
+        return {name: body.modal for name, body in self.bodies.items() if body.modal is not None}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What patches do to the stiffness of their links, what links cannot do, modes left out, one line each."""
+        found = [array.stiffness_in_words for of in self.patches.values() for array in of.arrays.values()]
+        for name, body in self.bodies.items():
+            if body.rigid_in:
+                found.append(f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes")
+            if body.spatial.reduction is not None:
+                found.append(f"{name}: all modes but {modes_kept(body.spatial)}")
+        return tuple(found)
