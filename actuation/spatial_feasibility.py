@@ -77,13 +77,14 @@ def _whoever(with_patches: bool) -> str:
     return "motors and patches do what they can" if with_patches else "motors act alone"
 
 
-def links_in_motion(motion: SpatialMotion, bodies: Mapping[str, ModalBody]) -> dict[str, LinkInMotion]:
-    """The links of a motion by name; `bodies` are their modal bodies."""
+def links_in_motion(
+    motion: SpatialMotion, bodies: Mapping[str, tuple[ModalBody, SpatialBody]]
+) -> dict[str, LinkInMotion]:
+    """The links of a motion by name; `bodies` are their modal bodies and equations."""
     forces, found = motion.motor_forces, {}
     assert forces is not None
-    for name, modal in bodies.items():
-        p, F_p = motion.body(name).modal, forces.modal[name]
-        found[name] = LinkInMotion(modal, motion.node(name).body, p, F_p)
+    for name, (modal, spatial) in bodies.items():
+        found[name] = LinkInMotion(modal, spatial, motion.body(name).modal, forces.modal[name])
     return found
 
 

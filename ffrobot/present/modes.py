@@ -1,13 +1,14 @@
-"""What a solve with `modes = "auto"` prints of the modes that it chose, in the plane and in space."""
+"""What a solve prints of modes that it chose, and of links in pieces, in the plane and in space."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.truncation import modes_kept
 from ..run.mode_search import ModeChoice
+from ..scene.pieces import BodyInPieces
 
 
 def chosen_modes(bodies: Sequence[PlanarBody | SpatialBody], choice: ModeChoice) -> str:
@@ -32,3 +33,8 @@ def chosen_modes(bodies: Sequence[PlanarBody | SpatialBody], choice: ModeChoice)
         f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
     )
     return "\n".join(lines)
+
+
+def pieces_in_words(divided: Mapping[str, BodyInPieces]) -> str:
+    """How many of each link."""
+    return ", ".join(f"{name}: {len(body.names)}" for name, body in divided.items())

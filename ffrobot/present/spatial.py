@@ -12,7 +12,7 @@ from rich.table import Table
 from ..results.verdict import Verdict
 from ..run.spatial_solution import SpatialSolution
 from .control import control_lines, control_tables
-from .modes import chosen_modes
+from .modes import chosen_modes, pieces_in_words
 from .tables import plain_table
 from .voltages import voltage_table
 
@@ -66,6 +66,8 @@ def print_spatial_summary(
     if solution.mode_choice is not None:
         bodies = [body.spatial for body in solution.bodies.values()]
         notes.add_row("modes", chosen_modes(bodies, solution.mode_choice))
+    if solution.divided:
+        notes.add_row("pieces", pieces_in_words(solution.divided))
     for note in solution.notes:
         notes.add_row("links", note)
     notes.add_row("time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))

@@ -18,7 +18,7 @@ from ..results.verdict import Verdict
 from ..run.solution import Solution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
-from .modes import chosen_modes
+from .modes import chosen_modes, pieces_in_words
 from .tables import plain_table
 from .voltages import voltage_table
 
@@ -83,7 +83,7 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
     if solution.mode_choice is not None:
         yield "modes", chosen_modes(solution.model.bodies, solution.mode_choice)
     if solution.divided:
-        yield "pieces", ", ".join(f"{name}: {len(body.names)}" for name, body in solution.divided.items())
+        yield "pieces", pieces_in_words(solution.divided)
     elif (raised := raised_in_words(solution.model)) and any(one.analysis.is_integrated for one in outcomes.values()):
         yield "modes", raised
     yield "accuracy", "\n".join(error_budget(solution))

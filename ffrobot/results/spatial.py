@@ -36,7 +36,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
         file.attrs["space"] = "spatial"
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
-            _write_analysis(file.create_group(name), result)
+            _write_analysis(file.create_group(name), solution, result)
             if solution.mode_choice is not None:
                 write_mode_errors(file[name], name, solution.mode_choice)
             if isinstance(result.run.details, LinearModels):
@@ -48,7 +48,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
     return image
 
 
-def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
+def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     run, motion = result.run, result.motion
     analysis = run.analysis
     group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
@@ -60,8 +60,8 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     if joints := resolving_joints(motion.model):
         group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     group["time"] = run.time
-    _write_bodies(group, result)
-    _write_joints(group, result)
+    _write_bodies(group, solution, result)
+    _write_joints(group, solution, result)
     if isinstance(run.details, LoopRecord):
         write_loop(group, run.details)
     if isinstance(run.details, Placed):
@@ -80,25 +80,27 @@ def _write_analysis(group: h5py.Group, result: SpatialResult) -> None:
     violation.attrs["columns"] = ["position", "velocity"]
 
 
-def _write_bodies(group: h5py.Group, result: SpatialResult) -> None:
+def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     motion = result.motion
-    for name in (body.name for body in motion.model.scene.body):
-        node = motion.node(name)
+    for name, points in motion.points.items():
         for key, values in vars(motion.body(name)).items():
             group[f"bodies/{name}/{key}"] = values
         if motion.motor_forces is not None:
             group[f"bodies/{name}/modal_force"] = motion.motor_forces.modal[name]
-        if node.body.whole.n_modes:
-            about = {"modal_coordinates": "modes of the modal body file", "modes_kept": modes_kept(node.body)}
+        if name in solution.links:
+            kept = modes_kept(solution.bodies[name].spatial)
+            about = {"modal_coordinates": "modes of the modal body file", "modes_kept": kept}
             group[f"bodies/{name}"].attrs.update(about)
-        for label in node.body.points:
+        if name in solution.divided:
+            group[f"bodies/{name}"].attrs["pieces"] = len(solution.divided[name].names)
+        for label in points:
             for key, values in vars(motion.point(f"{name}.{label}")).items():
                 group[f"points/{name}.{label}/{key}"] = values
 
 
-def _write_joints(group: h5py.Group, result: SpatialResult) -> None:
+def _write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     motion = result.motion
-    for joint in motion.model.scene.joint:
+    for joint in solution.scene.joint:
         entry = group.create_group(f"joints/{joint.name}")
         entry.attrs["type"] = joint.type
         acting = result.reactions[joint.name]

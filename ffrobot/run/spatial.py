@@ -11,15 +11,11 @@ from pathlib import Path
 
 from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.feasibility import Feasibility
-from ..actuation.patches.spatial_patches import LinkPatches
 from ..actuation.spatial_context import ActuatedSpatialContext
 from ..common.errors import SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.spatial_run import SpatialRun
-from ..mbs.model.spatial_body import SpatialBody
-from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ..mbs.quantities.spatial_energy import energies, momentum
-from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
@@ -27,12 +23,13 @@ from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
 from .spatial_actuation import (
     actuated_in_space,
-    given_voltages,
     patches_in_space,
     supplied_by_patches,
 )
-from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
+from .spatial_bodies import load_spatial_bodies
 from .spatial_mode_choice import mode_levels_in_space, reported_in_space
+from .spatial_pieces import MotionOfLinks, divided_links, wanted_pieces_in_space
+from .spatial_prepare import made_solution, with_bodies_in_space, with_pieces_in_space, with_scene_in_space
 from .spatial_solution import SpatialResult, SpatialSolution
 from .watcher import Interruption, Watcher
 
@@ -58,15 +55,18 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     loaded = load_spatial_bodies(scene, watcher.stage)
     seconds = {"bodies": time.perf_counter() - began}
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
-    patches = patches_in_space(scene, bodies)
-    first = mode_levels_in_space(scene, bodies)[0]
-    solution = _with_bodies(SpatialSolution(scene, _model(scene, bodies, patches), bodies, patches, {}, seconds), first)
+    counts = {body.name: 1 if body.pieces == "auto" else body.pieces for body in scene.body if body.pieces is not None}
+    solution = made_solution(scene, bodies, patches_in_space(scene, bodies), seconds)
+    solution = with_bodies_in_space(solution, mode_levels_in_space(scene, bodies)[0])
+    solution = with_pieces_in_space(solution, counts, watcher)
     with Interruption(watcher.stopping) as interruption:
         judge = partial(_judged, solution, watcher, interruption)
         scene, notes = with_paths_in_space(scene, solution.model, judge, watcher.stage)
-        solution = replace(_with_scene(solution, scene) if notes else solution, path_notes=notes)
+        solution = replace(with_scene_in_space(solution, scene) if notes else solution, path_notes=notes)
         if any(body.modes == "auto" for body in scene.body):
             solution = _with_enough_modes(solution, watcher, interruption)
+        elif any(body.pieces == "auto" for body in scene.body):
+            solution = _with_enough_pieces(solution, watcher, interruption)
         else:
             solution = _run_all(solution, watcher, interruption)
         if keep is not None and solution.analyses:
@@ -80,7 +80,7 @@ def _with_enough_modes(solution: SpatialSolution, watcher: Watcher, interruption
     """The scene solved with as many modes as its tolerances need: see `mode_search`."""
     search = ModeSearch(error_tolerances(solution.scene), mode_levels_in_space(solution.scene, solution.bodies))
     while (bodies := search.next_bodies()) is not None:
-        solution = _run_all(_with_bodies(solution, bodies), watcher, interruption)
+        solution = _run_all(with_bodies_in_space(solution, bodies), watcher, interruption)
         if solution.failure is not None:
             return solution
         results = solution.analyses
@@ -92,25 +92,13 @@ def _with_enough_modes(solution: SpatialSolution, watcher: Watcher, interruption
     return replace(solution, mode_choice=search.choice())
 
 
-def _with_bodies(solution: SpatialSolution, spatial: Mapping[str, SpatialBody]) -> SpatialSolution:
-    """The scene with some of its bodies replaced, nothing solved yet; patches serve all modes of their links."""
-    bodies = {name: replace(body, spatial=spatial.get(name, body.spatial)) for name, body in solution.bodies.items()}
-    seconds = {"bodies": solution.seconds["bodies"]}
-    model = _model(solution.scene, bodies, solution.patches)
-    return replace(solution, bodies=bodies, model=model, analyses={}, seconds=seconds)
-
-
-def _model(
-    scene: SpatialScene, bodies: Mapping[str, LoadedSpatialBody], patches: Mapping[str, LinkPatches]
-) -> SpatialModel:
-    """The equations, with the voltages that the scene gives to patches."""
-    model = build_spatial_model(scene, [body.spatial for body in bodies.values()])
-    return replace(model, modal_loads=tuple(given_voltages(model, patches)))
-
-
-def _with_scene(solution: SpatialSolution, scene: SpatialScene) -> SpatialSolution:
-    """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
-    return replace(solution, scene=scene, model=_model(scene, solution.bodies, solution.patches))
+def _with_enough_pieces(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
+    """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
+    solution = _run_all(solution, watcher, interruption)
+    given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
+    while solution.failure is None and not interruption.requested and (wanted := wanted_pieces_in_space(solution)):
+        solution = _run_all(with_pieces_in_space(solution, given | wanted, watcher), watcher, interruption)
+    return solution
 
 
 def _judged(
@@ -118,7 +106,7 @@ def _judged(
 ) -> Feasibility | None:
     """What the one analysis of a scene asks of motors and patches; None where it fails."""
     try:
-        (result,) = _run_all(_with_scene(solution, trial), watcher, interruption).analyses.values()
+        (result,) = _run_all(with_scene_in_space(solution, trial), watcher, interruption).analyses.values()
     except SolveError:
         return None
     return None if result.run.failed or result.actuation is None else result.actuation.feasibility
@@ -167,8 +155,9 @@ def _context(
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     """What is read off a run."""
-    motion = SpatialMotion(
-        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied
+    motion = MotionOfLinks(
+        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied,
+        divided_links(solution),
     )  # fmt: skip
     actuation = None
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.patches.spatial_patches import LinkPatches
@@ -15,6 +15,7 @@ from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_energy import Energies, Momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..scene.pieces import BodyInPieces
 from ..scene.spatial import SpatialScene
 from .mode_search import ModeChoice
 from .spatial_actuation import SpatialActuation
@@ -63,6 +64,7 @@ class SpatialSolution:
         failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
         path_notes: what was found of paths before the analyses, one line each.
         mode_choice: where `modes = "auto"`.
+        divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`.
     """
 
     scene: SpatialScene
@@ -74,6 +76,8 @@ class SpatialSolution:
     failure: Exception | None = None
     path_notes: tuple[str, ...] = ()
     mode_choice: ModeChoice | None = None
+    divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
+    parts: Mapping[str, LoadedSpatialBody] = field(default_factory=dict)
 
     @property
     def links(self) -> dict[str, ModalBody]:

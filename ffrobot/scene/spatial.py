@@ -30,7 +30,6 @@ APPLICABLE = ("joints", "joints+pzt", "trajectory")  # values of `apply`
 # Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
 UNAVAILABLE = {
     "": ("geometric_stiffening", "actuation_points"),
-    "body": ("pieces",),
     "load": ("force",),
 }
 

@@ -93,6 +93,10 @@ def _chosen(path: Path, scene: SpatialScene, name: str | None) -> Forward:
 def _check(path: Path, scene: SpatialScene) -> None:
     if scene.load:
         raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs, found some")
+    for body in scene.body:
+        if body.pieces is not None:
+            key = f'{path}: body "{body.name}": pieces'
+            raise InputError(f"{key}: expected none of a scene for an FMU, found {body.pieces}")
     if scene.motors == "frame":
         raise InputError(f'{path}: motors: expected "section" of a scene for an FMU, found "frame"')
 

@@ -73,6 +73,9 @@ class BodyInSpace(BodyKeys):
     `modes` of a flexible body: how many of the lowest, of all families; the others are represented by their static
     flexibility. Patches serve all modes of the file. "auto" takes as many as the tolerances of the analyses need; the
     default is all.
+
+    `pieces` of a beam link: into how many it is divided for large deflections, in both planes, and twist, "auto": as
+    many as these need. Results are those of the one link.
     """
 
     rigid: SpatialRigidBody | None = None
