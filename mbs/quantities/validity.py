@@ -128,7 +128,7 @@ def enough_pieces(shortening: float, count: int) -> int:
 def shortening_in_space(link: ModalBody, p: Array) -> Array:
     """½∫(v'² + w'²) dx (T,) in the frame of a link in space, of its length; p (T, n) of the modes of its file."""
     stations, x = link.stations, link.stations.position[:, 0]
-    squares = sum((p @ stations.rotation[:, axis].T) ** 2 for axis in (1, 2))
+    squares = (p @ stations.rotation[:, 1].T) ** 2 + (p @ stations.rotation[:, 2].T) ** 2
     found: Array = 0.25 * (squares[:, 1:] + squares[:, :-1]) @ np.diff(x) / link.length
     return found
 
