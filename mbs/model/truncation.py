@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array
 from . import spatial_body
 from .planar_body import PlanarBody, Reduction, transformed
 from .spatial_body import SpatialBody
@@ -36,11 +36,12 @@ def with_fewer_modes(body: PlanarBody, lowest: int, loaded: Sequence[str]) -> Pl
     lowest = min(lowest, body.n_eigenmodes)
     if lowest >= body.n_modes:
         return body
-    B_T, others = interface_loads(body, loaded), np.arange(lowest, body.n_modes)
-    static, squares = _static_modes(body.stiffness[others], B_T[others])
+    B_T = interface_loads(body, loaded)
+    static, squares = _static_modes(body.stiffness[lowest:], B_T[lowest:])
     if lowest + len(squares) >= body.n_modes:
         return body
-    T = _joined(np.arange(lowest), others, static)
+    T = np.eye(body.n_modes, lowest + len(squares))
+    T[lowest:, lowest:] = static
     reduced = transformed(body, T, np.concatenate([body.stiffness[:lowest], squares]))
     static_shapes = len(squares) if body.attachment_modes else 0
     return replace(reduced, reduction=Reduction(body, lowest, T, _lift(T, B_T)), attachment_modes=static_shapes)
@@ -62,7 +63,8 @@ def with_fewer_modes_in_space(body: SpatialBody, lowest: int, loaded: Sequence[s
         if not others.size:
             continue
         static, of_block = _static_modes(body.stiffness[others], B_T[others])
-        shapes.append(_joined(np.zeros(0, dtype=int), others, static, body.n_modes))
+        shapes.append(np.zeros((body.n_modes, len(of_block))))
+        shapes[-1][others] = static
         squares.append(of_block)
     stiffness = np.concatenate([body.stiffness[kept], *squares])
     if len(stiffness) >= body.n_modes:
@@ -72,14 +74,6 @@ def with_fewer_modes_in_space(body: SpatialBody, lowest: int, loaded: Sequence[s
     static_shapes = len(stiffness) - lowest if body.attachment_modes else 0
     reduction = spatial_body.Reduction(body, lowest, T, _lift(T, B_T))
     return replace(reduced, reduction=reduction, attachment_modes=static_shapes)
-
-
-def _joined(kept: Indices, others: Indices, static: Array, n: int | None = None) -> Array:
-    """(n, m): the modes `kept` as they are, and combinations `static` of the `others`."""
-    T = np.zeros((len(kept) + len(others) if n is None else n, len(kept) + static.shape[1]))
-    T[kept, np.arange(len(kept))] = 1.0
-    T[others, len(kept) :] = static
-    return T
 
 
 def _lift(T: Array, B_T: Array) -> Array:
