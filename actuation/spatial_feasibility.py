@@ -77,13 +77,14 @@ def _whoever(with_patches: bool) -> str:
     return "motors and patches do what they can" if with_patches else "motors act alone"
 
 
-def links_in_motion(motion: SpatialMotion, bodies: Mapping[str, ModalBody]) -> dict[str, LinkInMotion]:
-    """The links of a motion by name; `bodies` are their modal bodies."""
+def links_in_motion(
+    motion: SpatialMotion, bodies: Mapping[str, tuple[ModalBody, SpatialBody]]
+) -> dict[str, LinkInMotion]:
+    """The links of a motion by name; `bodies` are their modal bodies and equations."""
     forces, found = motion.motor_forces, {}
     assert forces is not None
-    for name, modal in bodies.items():
-        p, F_p = motion.body(name).modal, forces.modal[name]
-        found[name] = LinkInMotion(modal, motion.node(name).body, p, F_p)
+    for name, (modal, spatial) in bodies.items():
+        found[name] = LinkInMotion(modal, spatial, motion.body(name).modal, forces.modal[name])
     return found
 
 
@@ -156,7 +157,8 @@ def unsupplied_in_space(
 
 def _largest_shift(link: LinkInMotion, left: Array) -> tuple[float, float]:
     """Of the points of a link over time, by modal forces (T, n): m, rad."""
-    p = left @ link.spatial.modal_transform / link.spatial.stiffness
-    shifts = [(p @ at.translation.T, p @ at.rotation.T) for at in link.spatial.points.values()]
+    body = link.spatial.whole
+    p = left @ body.modal_transform / body.stiffness
+    shifts = [(p @ at.translation.T, p @ at.rotation.T) for at in body.points.values()]
     deflection, rotation = (max(float(np.linalg.norm(shift[k], axis=1).max()) for shift in shifts) for k in range(2))
     return deflection, rotation

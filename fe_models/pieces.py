@@ -1,22 +1,24 @@
 """A beam link cut into pieces of equal length, each a link of its own: for deflections too large for one frame.
 
-Deflections within a piece are 1/N² of those within the link. Pieces are held simply supported, with one eigenmode and
-the static shapes of what their neighbours do to them: a frame between the ends of a piece turns with it, and leaves
-small deflections and few steps (docs/theory.md, Links in pieces).
+Deflections within a piece are 1/N² of those within the link. Pieces are held simply supported, with one eigenmode (in
+space one of each plane of bending) and the static shapes of what their neighbours do to them: a frame between the ends
+of a piece turns with it, and leaves small deflections and few steps (docs/theory.md, Links in pieces).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 from typing import Any
 
 from ..common.errors import InputError
+from ..common.validation import quoted
 from .link_file import LinkSource, LinkTable, link_path, read_link
-from .link_records import BeamLink, Link
+from .link_records import BeamLink, Family, Link
 
+BENDING: tuple[Family, ...] = ("in-plane-bending", "out-of-plane-bending")
 ON_A_CUT = 1e-9  # of the length
 
 
@@ -35,28 +37,38 @@ class CutLink:
     places: Mapping[str, tuple[int, str]]
 
 
-def cut(source: LinkSource, count: int) -> CutLink:
-    """The link of `source` in `count` pieces. Raises `InputError` where it cannot be cut."""
+IN_PLANE: tuple[Family, ...] = ("in-plane-bending", "axial")
+"""The families of pieces of planar scenes."""
+
+
+def cut(source: LinkSource, count: int, families: Sequence[Family] = IN_PLANE) -> CutLink:
+    """The link of `source` in `count` pieces, with those of the `families` that the link has itself.
+
+    Raises `InputError` where it cannot be cut.
+    """
     link, path = read_link(source), link_path(source)
-    beam = _beam(link, path)
+    beam = _beam(link, path, families)
     length = beam.geometry.length / count
     starts = tuple(k * length for k in range(count))
     positions = beam.places | {"mid": beam.geometry.length / 2}
     places = {name: _place(x, length, count) for name, x in positions.items()}
     places |= {name: (k, label or name) for name, (k, label) in places.items()}
     tables = tuple(
-        LinkTable(_piece(beam, path, k, count, places), path.with_name(f"{path.name}: piece {k + 1} of {count}"))
+        LinkTable(
+            _piece(beam, path, k, count, places, families), path.with_name(f"{path.name}: piece {k + 1} of {count}")
+        )
         for k in range(count)
     )
     return CutLink(tables, starts, places)
 
 
-def _beam(link: Link, path: Path) -> BeamLink:
+def _beam(link: Link, path: Path, families: Sequence[Family]) -> BeamLink:
     if not isinstance(link, BeamLink):
         raise InputError(f'{path}: geometry.kind: expected "beam" of a body in pieces, found "solid"')
-    if "in-plane-bending" not in link.families:
+    bending = [family for family in families if family in BENDING]
+    if not set(bending) & set(link.families):
         raise InputError(
-            f'{path}: modes.family: expected "in-plane-bending" among those of a body in pieces, found'
+            f"{path}: modes.family: expected {quoted(bending)} among those of a body in pieces, found"
             f" {', '.join(link.families)}"
         )
     if link.measured is not None:
@@ -76,11 +88,19 @@ def _place(x: float, length: float, count: int) -> tuple[int, str]:
     return k, ""
 
 
-def _piece(link: BeamLink, path: Path, k: int, count: int, places: Mapping[str, tuple[int, str]]) -> dict[str, Any]:
+def _piece(
+    link: BeamLink,
+    path: Path,
+    k: int,
+    count: int,
+    places: Mapping[str, tuple[int, str]],
+    allowed: Sequence[Family],
+) -> dict[str, Any]:
     """The keys of the link file of piece k."""
     record = link.model_dump(mode="json", exclude_none=True)
     length, start = link.geometry.length / count, k * link.geometry.length / count
-    families = [family for family in link.families if family in ("in-plane-bending", "axial")]
+    families = [family for family in link.families if family in allowed]
+    bending = sum(family in BENDING for family in families)
     segments = [
         {"until": min(segment.until, start + length) - start, "section": segment.section.model_dump(mode="json")}
         for segment, before in zip(link.geometry.segment or (), link.geometry.breakpoints, strict=False)
@@ -97,7 +117,7 @@ def _piece(link: BeamLink, path: Path, k: int, count: int, places: Mapping[str, 
         "mesh": {"elements": max(2, len(segments), ceil(elements / count))},
         "model": record["model"],
         "reference": {"condition": "simply-supported"},
-        "modes": {"count": 1, "family": families, "attachment_modes": True},
+        "modes": {"count": bending, "family": families, "attachment_modes": True},
         "damping": {"rayleigh": [0.0, _stiffness_damping(link, path)]},
         "interface": _interfaces(link, k, start, places),
     }

@@ -4,7 +4,8 @@ import pytest
 
 import ffrobot
 from ffrobot.run.modal_error import modal_errors
-from ffrobot.run.mode_choice import difference, reported
+from ffrobot.run.mode_choice import reported
+from ffrobot.run.mode_search import difference
 from ffrobot.run.solve import solve
 
 

@@ -12,7 +12,8 @@ from ffrobot.common.errors import InputError
 from ffrobot.present.summary import print_summary, summary_console
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
-from ffrobot.run.mode_choice import ErrorEstimate, difference, reported
+from ffrobot.run.mode_choice import reported
+from ffrobot.run.mode_search import ErrorEstimate, difference
 from ffrobot.run.solve import solve
 from ffrobot.scene.load import make_scene
 

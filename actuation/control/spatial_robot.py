@@ -19,7 +19,7 @@ from ..patches.voltages import voltage_gain
 from .robot import LinkModes, PatchedLink
 from .spatial_linear import patch_voltages_in_space
 from .spatial_rigid_arm import SpatialRigidArm, rigid_freedom
-from .spatial_signals import check_joint, volts_of_layout
+from .spatial_signals import check_joint, volts_on_file
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,11 @@ class SpatialRobot:
     def _patched(self, name: str, of_link: LinkPatches) -> PatchedLink:
         reached, to_file = of_link.reached, self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
         inputs = [f"pzt/{layout}/{k}" for layout, of in of_link.arrays.items() for k in range(1, len(of.edges) + 1)]
-        volts = np.vstack([volts_of_layout(self.model, self.of_links, name, layout) for layout in of_link.arrays])
+        volts = np.vstack([volts_on_file(of_link, layout) for layout in of_link.arrays])
         own = np.linalg.solve(reached.T, to_file[reached.rows])
         return PatchedLink(
             tuple(inputs), tuple(of_link.arrays), np.sqrt(reached.stiffness[: reached.served]),
-            voltage_gain(of_link.reach), reached.seen(volts @ np.linalg.inv(to_file)), own,
+            voltage_gain(of_link.reach), reached.seen(volts), own,
         )  # fmt: skip
 
     def linear(self, row: int) -> tuple[LinearMechanism, Mapping[str, Array]]:

@@ -108,6 +108,14 @@ def volts_of_layout(
     return found
 
 
+def volts_on_file(of_link: LinkPatches, layout: str) -> Array:
+    """(k, n_file) that the patches of a layout read per unit of the coordinates of the modes of the link's file."""
+    array, reached = of_link.arrays[layout], of_link.modes[layout]
+    found = np.zeros((len(array.edges), len(of_link.Phi_V)))
+    found[:, reached.rows] = np.linalg.solve(reached.T.T, volts_per_modal_coordinate(array).T).T
+    return found
+
+
 def check_joint(model: SpatialModel, joint: str) -> None:
     """Raise `InputError` unless controllers can read and name the coordinates of a joint."""
     scene = model.scene

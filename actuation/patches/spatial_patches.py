@@ -103,7 +103,12 @@ class LinkPatches:
 
 
 def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody, spatial: SpatialBody) -> LinkPatches:
-    """Place the layouts of one link. Raises `InputError` for patches that do not fit it, or weights that do not."""
+    """Place the layouts of one link: they serve all modes of its file, also where the equations have fewer.
+
+    Modal forces on those left out follow from the loads on the link. Raises `InputError` for patches that do not fit
+    it, or weights that do not.
+    """
+    spatial = spatial.whole
     key = _key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body)
     placed = [_placed(path, layout, body) for layout in layouts]
     found = effects(key, placed, body)

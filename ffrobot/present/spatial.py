@@ -13,6 +13,7 @@ from ..results.verdict import Verdict
 from ..run.spatial_solution import SpatialSolution
 from .control import control_lines, control_tables
 from .lines import integrator_lines
+from .modes import chosen_modes, pieces_in_words
 from .stresses import stress_table
 from .tables import plain_table
 from .voltages import voltage_table
@@ -73,6 +74,11 @@ def print_spatial_summary(
         notes.add_row("linear", line)
     for note in solution.path_notes:
         notes.add_row("path", note)
+    if solution.mode_choice is not None:
+        bodies = [body.spatial for body in solution.bodies.values()]
+        notes.add_row("modes", chosen_modes(bodies, solution.mode_choice))
+    if solution.divided:
+        notes.add_row("pieces", pieces_in_words(solution.divided))
     for note in solution.notes:
         notes.add_row("links", note)
     notes.add_row("time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))

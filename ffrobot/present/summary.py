@@ -13,13 +13,13 @@ from rich.table import Table
 from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
 from ..mbs.analysis.outcome import Details, Outcome
 from ..mbs.model.raised_mass import raised_in_words
-from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.validity import deflection_warning
 from ..results.verdict import Verdict
-from ..run.solution import ModeChoice, Solution
+from ..run.solution import Solution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
 from .lines import alike, integrator_lines
+from .modes import chosen_modes, pieces_in_words
 from .stresses import stress_table
 from .tables import plain_table
 from .voltages import voltage_table
@@ -81,9 +81,9 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
         if isinstance(outcome.details, InvertedPath):
             yield "motors only", f"{name}: {_inversion(outcome, outcome.details)}"
     if solution.mode_choice is not None:
-        yield "modes", _modes(solution, solution.mode_choice)
+        yield "modes", chosen_modes(solution.model.bodies, solution.mode_choice)
     if solution.divided:
-        yield "pieces", ", ".join(f"{name}: {len(body.names)}" for name, body in solution.divided.items())
+        yield "pieces", pieces_in_words(solution.divided)
     elif (raised := raised_in_words(solution.model)) and any(one.analysis.is_integrated for one in outcomes.values()):
         yield "modes", raised
     yield "accuracy", "\n".join(error_budget(solution))
@@ -101,30 +101,6 @@ def _warnings(solution: Solution) -> Iterator[str]:
         yield f"{worst}: {bent[worst]}" + (f" (likewise, but less: {', '.join(others)})" if others else "")
     told = ((name, text) for name, result in solution.analyses.items() for text in result.warnings)
     yield from alike((name, text) for name, text in told if text != bent.get(name))
-
-
-def _modes(solution: Solution, choice: ModeChoice) -> str:
-    """How many modes were enough, and what leaving out the others costs and saves."""
-    kept = [f"{body.name}: {modes_kept(body)}" for body in solution.model.bodies if body.n_modes]
-    lines = ["; ".join(kept)]
-    for name, errors in choice.errors.items():
-        if any(errors.values()):
-            found = ", ".join(f"{kind} {error:.0e}" for kind, error in errors.items() if error)
-            lines.append(f"{name}: error of leaving out the others, estimated: {found}")
-        else:
-            lines.append(
-                f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
-            )
-    tried = ", ".join(map(str, choice.tried))
-    fewer = {body.name: body.reduction.lowest for body in solution.model.bodies if body.reduction is not None}
-    if fewer:
-        keys = ", ".join(f"modes = {lowest} for {name}" for name, lowest in fewer.items())
-        lines.append(f"the same without search: {keys}")
-    lines.append(
-        f"solved with {tried} modal coordinates, {choice.seconds:.2f} s before the last; the highest frequency is"
-        f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
-    )
-    return "\n".join(lines)
 
 
 def _inversion(outcome: Outcome, found: InvertedPath) -> str:

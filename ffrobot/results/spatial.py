@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
@@ -11,9 +10,9 @@ import numpy as np
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placing import Placed
-from ..actuation.spatial_points import SpatialPointSet
 from ..common.checksum import sealed
 from ..common.files import write_atomically
+from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial_solution import SpatialResult, SpatialSolution
@@ -24,7 +23,7 @@ from .forces import write_path
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
 from .spatial_resume import write_state_in_space
-from .write import write_check, write_head
+from .write import write_check, write_head, write_mode_errors
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -39,7 +38,9 @@ def spatial_image(solution: SpatialSolution) -> bytes:
         file.attrs["space"] = "spatial"
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
-            _write_analysis(file.create_group(name), result, solution.points)
+            _write_analysis(file.create_group(name), solution, result)
+            if solution.mode_choice is not None:
+                write_mode_errors(file[name], name, solution.mode_choice)
             if isinstance(result.run.details, LinearModels):
                 write_spatial_linear(file[name], result.motion, result.run.details)
             if result.actuation is not None:
@@ -50,7 +51,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
     return image
 
 
-def _write_analysis(group: h5py.Group, result: SpatialResult, points: Mapping[str, SpatialPointSet]) -> None:
+def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     run, motion = result.run, result.motion
     analysis = run.analysis
     group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
@@ -64,10 +65,10 @@ def _write_analysis(group: h5py.Group, result: SpatialResult, points: Mapping[st
         group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     group["time"] = run.time
     write_check(group, result.check)
-    _write_bodies(group, result)
-    _write_joints(group, result)
+    _write_bodies(group, solution, result)
+    _write_joints(group, solution, result)
     for body, forces in result.point_forces.items():
-        write_point_forces(group.create_group(f"actuation_points/{body}"), points[body], forces)
+        write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)
     for body, stress in result.stresses.items():
         write_stress(group.create_group(f"stress/{body}"), stress)
     if isinstance(run.details, LoopRecord):
@@ -88,22 +89,27 @@ def _write_analysis(group: h5py.Group, result: SpatialResult, points: Mapping[st
     violation.attrs["columns"] = ["position", "velocity"]
 
 
-def _write_bodies(group: h5py.Group, result: SpatialResult) -> None:
+def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     motion = result.motion
-    for name in (body.name for body in motion.model.scene.body):
-        node = motion.node(name)
+    for name, points in motion.points.items():
         for key, values in vars(motion.body(name)).items():
             group[f"bodies/{name}/{key}"] = values
         if motion.motor_forces is not None:
             group[f"bodies/{name}/modal_force"] = motion.motor_forces.modal[name]
-        for label in node.body.points:
+        if name in solution.links:
+            kept = modes_kept(solution.bodies[name].spatial)
+            about = {"modal_coordinates": "modes of the modal body file", "modes_kept": kept}
+            group[f"bodies/{name}"].attrs.update(about)
+        if name in solution.divided:
+            group[f"bodies/{name}"].attrs["pieces"] = len(solution.divided[name].names)
+        for label in points:
             for key, values in vars(motion.point(f"{name}.{label}")).items():
                 group[f"points/{name}.{label}/{key}"] = values
 
 
-def _write_joints(group: h5py.Group, result: SpatialResult) -> None:
+def _write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     motion = result.motion
-    for joint in motion.model.scene.joint:
+    for joint in solution.scene.joint:
         entry = group.create_group(f"joints/{joint.name}")
         entry.attrs["type"] = joint.type
         acting = result.reactions[joint.name]

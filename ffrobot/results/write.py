@@ -18,6 +18,7 @@ from ..common.version import program_version
 from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Details, Outcome
 from ..run.loaded_body import Loaded
+from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, FinerCheck, Solution
 from .actuators import write_actuators, write_placement
 from .bodies import write_bending, write_motion, write_stress
@@ -82,9 +83,8 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     if result.mode_error is not None:
         group.attrs["mode_error"] = result.mode_error
     group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
-    if solution.mode_choice is not None and name in solution.mode_choice.errors:
-        for kind, error in solution.mode_choice.errors[name].items():
-            group.attrs[f"mode_error_{kind}"] = error
+    if solution.mode_choice is not None:
+        write_mode_errors(group, name, solution.mode_choice)
     write_check(group, result.check)
     write_motion(group, outcome)
     write_bending(group, result.bending)
@@ -104,6 +104,12 @@ def write_check(group: h5py.Group, found: FinerCheck | None) -> None:
     if found is not None:
         check = vars(found) | {"modes": json.dumps(dict(found.modes))}
         group.attrs.update({f"check_{key}": value for key, value in check.items()})
+
+
+def write_mode_errors(group: h5py.Group, analysis: str, choice: ModeChoice) -> None:
+    """What leaving out modes costs in an analysis, estimated."""
+    for kind, error in choice.errors.get(analysis, {}).items():
+        group.attrs[f"mode_error_{kind}"] = error
 
 
 def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:

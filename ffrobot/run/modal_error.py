@@ -6,9 +6,10 @@ from dataclasses import replace
 from math import ceil
 
 from ..mbs.model.truncation import loaded_points, with_fewer_modes
-from .mode_choice import difference, reported
+from .mode_choice import reported
+from .mode_search import Errors, difference
 from .prepare import with_bodies
-from .solution import Errors, Solution
+from .solution import Solution
 from .solve import run_analyses
 from .watcher import Watcher
 

@@ -19,7 +19,7 @@ from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody, add_patches, load_bodies
 from .divided import patched_pieces, patches_on_pieces, voltage_loads
-from .mode_choice import truncation_levels, whole_bodies
+from .mode_choice import mode_levels
 from .omissions import omissions
 from .solution import Solution
 from .watcher import Watcher
@@ -42,7 +42,7 @@ def _prepared(scene: Scene, watcher: Watcher, began: float) -> Solution:
     bodies = {body.name: loaded for body, loaded in zip(scene.body, load_bodies(scene, watcher.stage), strict=True)}
     seconds = {"links and files": time.perf_counter() - began}
     structure = add_patches(scene, bodies)
-    first = truncation_levels(scene, whole_bodies(bodies))[0]
+    first = mode_levels(scene, bodies)[0]
     bodies = {name: replace(body, planar=first.get(name, body.planar)) for name, body in bodies.items()}
     counts = {body.name: 1 if body.pieces == "auto" else body.pieces for body in scene.body if body.pieces is not None}
     is_stiffened = bool(counts) or scene.geometric_stiffening is True

@@ -19,29 +19,7 @@ from ..mbs.quantities.validity import Bending
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody
-
-Errors = Mapping[str, Mapping[str, float]]
-"""By analysis and kind of quantity, relative to peaks."""
-
-
-@dataclass(frozen=True)
-class ModeChoice:
-    """What the search for the number of modes found.
-
-    Attributes:
-        errors: estimated error that leaving out modes makes of the largest quantity of each kind, relative to its peak,
-            by analysis and kind; 0 where all modes of the files were needed.
-        before: likewise, how much the last solve differs from the one before it.
-        tried: numbers of modal coordinates of all bodies together in the solves; the last is the one kept.
-        seconds: of the solves before the last.
-        highest: ω (rad/s) of the highest mode kept, and of the highest there is.
-    """
-
-    errors: Errors
-    before: Errors
-    tried: tuple[int, ...]
-    seconds: float
-    highest: tuple[float, float]
+from .mode_search import ModeChoice
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,8 @@ from ..scene.scene import Scene
 from .divided import as_divided
 from .evaluation import evaluated
 from .finer import check_on, finer_scene
-from .mode_choice import ModeSearch
+from .mode_choice import mode_levels, reported
+from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths
 from .pieces import as_one_link, wanted_pieces, with_advice, worst_of_pieces
 from .prepare import prepare, stiffened, with_bodies, with_pieces
@@ -128,13 +129,18 @@ def _checked(solution: Solution, watcher: Watcher) -> Solution:
 
 
 def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
-    """The scene solved with as many modes as its tolerances need: see `mode_choice`."""
-    search = ModeSearch(solution)
+    """The scene solved with as many modes as its tolerances need: see `mode_search`."""
+    search = ModeSearch(error_tolerances(solution.scene), mode_levels(solution.scene, solution.bodies))
     while (bodies := search.next_bodies()) is not None:
         solution = _completed(with_bodies(solution, bodies), watcher, interruption)
         if solution.failure is not None:
             return solution
-        search.add(solution, last=interruption.requested)
+        results = solution.analyses
+        completed = len(results) == len(solution.scene.analysis) and all(
+            result.outcome.status == "completed" for result in results.values()
+        )
+        found = {name: reported(solution.scene, result) for name, result in results.items()} if completed else None
+        search.add(found, last=interruption.requested)
     return replace(solution, mode_choice=search.choice())
 
 

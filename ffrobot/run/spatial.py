@@ -11,27 +11,23 @@ from pathlib import Path
 
 from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.feasibility import Feasibility
-from ..actuation.patches.spatial_patches import LinkPatches
 from ..actuation.spatial_context import ActuatedSpatialContext
 from ..actuation.spatial_points import forces_at_points, solve_spatial_points, spatial_point_set, with_spatial_points
 from ..common.errors import SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.spatial_run import SpatialRun
-from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ..mbs.quantities.spatial_energy import energies, momentum
-from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
+from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
-from .spatial_actuation import (
-    actuated_in_space,
-    given_voltages,
-    patches_in_space,
-    supplied_by_patches,
-)
-from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
+from .spatial_actuation import actuated_in_space, patches_in_space, supplied_by_patches
+from .spatial_bodies import load_spatial_bodies
 from .spatial_finer import checked_in_space
+from .spatial_mode_choice import mode_levels_in_space, reported_in_space
+from .spatial_pieces import MotionOfLinks, divided_links, wanted_pieces_in_space
+from .spatial_prepare import made_solution, with_bodies_in_space, with_pieces_in_space, with_scene_in_space
 from .spatial_solution import SpatialResult, SpatialSolution
 from .spatial_stresses import stresses_in_space
 from .watcher import Interruption, Watcher
@@ -46,6 +42,7 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     """Run every analysis of a scene, or of a scene file, in space; stage 1 runs first for links that are out of date.
 
     Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
+    With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run (`SpatialRun.check_completed`).
     So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
@@ -69,8 +66,10 @@ def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher) -> SpatialSolu
     }
     for name, chosen in points.items():
         bodies[name] = replace(bodies[name], spatial=with_spatial_points(bodies[name].spatial, chosen))
-    model = _model(scene, bodies, patches)
-    return SpatialSolution(scene, model, bodies, patches, {}, seconds, points=points)
+    counts = {body.name: 1 if body.pieces == "auto" else body.pieces for body in scene.body if body.pieces is not None}
+    solution = made_solution(scene, bodies, patches, seconds, points)
+    solution = with_bodies_in_space(solution, mode_levels_in_space(scene, bodies)[0])
+    return with_pieces_in_space(solution, counts, watcher)
 
 
 def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None = None) -> SpatialSolution:
@@ -78,8 +77,14 @@ def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None =
     with Interruption(watcher.stopping) as interruption:
         judge = partial(_judged, replace(solution, earlier={}), watcher, interruption)
         scene, notes = with_paths_in_space(solution.scene, solution.model, judge, watcher.stage)
-        solution = replace(_with_scene(solution, scene) if notes else solution, path_notes=notes)
-        solution = checked_in_space(_run_all(solution, watcher, interruption), prepare_spatial, watcher)
+        solution = replace(with_scene_in_space(solution, scene) if notes else solution, path_notes=notes)
+        if any(body.modes == "auto" for body in scene.body):
+            solution = _with_enough_modes(solution, watcher, interruption)
+        elif any(body.pieces == "auto" for body in scene.body):
+            solution = _with_enough_pieces(solution, watcher, interruption)
+        else:
+            solution = _run_all(solution, watcher, interruption)
+        solution = checked_in_space(solution, prepare_spatial, watcher)
         if keep is not None and solution.analyses:
             keep(solution)
     if solution.failure is not None:
@@ -87,17 +92,29 @@ def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None =
     return solution
 
 
-def _model(
-    scene: SpatialScene, bodies: Mapping[str, LoadedSpatialBody], patches: Mapping[str, LinkPatches]
-) -> SpatialModel:
-    """The equations, with the voltages that the scene gives to patches."""
-    model = build_spatial_model(scene, [body.spatial for body in bodies.values()])
-    return replace(model, modal_loads=tuple(given_voltages(model, patches)))
+def _with_enough_modes(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
+    """The scene solved with as many modes as its tolerances need: see `mode_search`."""
+    search = ModeSearch(error_tolerances(solution.scene), mode_levels_in_space(solution.scene, solution.bodies))
+    while (bodies := search.next_bodies()) is not None:
+        solution = _run_all(with_bodies_in_space(solution, bodies), watcher, interruption)
+        if solution.failure is not None:
+            return solution
+        results = solution.analyses
+        completed = len(results) == len(solution.scene.analysis) and all(
+            result.run.status == "completed" for result in results.values()
+        )
+        found = {name: reported_in_space(result) for name, result in results.items()} if completed else None
+        search.add(found, last=interruption.requested)
+    return replace(solution, mode_choice=search.choice())
 
 
-def _with_scene(solution: SpatialSolution, scene: SpatialScene) -> SpatialSolution:
-    """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
-    return replace(solution, scene=scene, model=_model(scene, solution.bodies, solution.patches))
+def _with_enough_pieces(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
+    """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
+    solution = _run_all(solution, watcher, interruption)
+    given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
+    while solution.failure is None and not interruption.requested and (wanted := wanted_pieces_in_space(solution)):
+        solution = _run_all(with_pieces_in_space(solution, given | wanted, watcher), watcher, interruption)
+    return solution
 
 
 def _judged(
@@ -105,7 +122,7 @@ def _judged(
 ) -> Feasibility | None:
     """What the one analysis of a scene asks of motors and patches; None where it fails."""
     try:
-        (result,) = _run_all(_with_scene(solution, trial), watcher, interruption).analyses.values()
+        (result,) = _run_all(with_scene_in_space(solution, trial), watcher, interruption).analyses.values()
     except SolveError:
         return None
     return None if result.run.failed or result.actuation is None else result.actuation.feasibility
@@ -157,8 +174,9 @@ def _context(
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     """What is read off a run."""
-    motion = SpatialMotion(
-        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied
+    motion = MotionOfLinks(
+        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied,
+        divided_links(solution),
     )  # fmt: skip
     actuation = None
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
@@ -166,7 +184,8 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
         actuation = actuated_in_space(solution.scene, motion, solution.bodies, solution.patches)
         if actuation.unsupplied is not None and set(actuation.unsupplied.bodies) <= solution.points.keys():
             actuation = replace(actuation, unsupplied=None)  # forces at actuation points supply it
-    stresses = stresses_in_space(motion, solution.bodies, solution.patches)
+    whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}
+    stresses = stresses_in_space(motion, whole, solution.patches)
     at_points = {}
     if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
         at_points = {name: solve_spatial_points(points, run) for name, points in solution.points.items()}

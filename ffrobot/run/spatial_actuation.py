@@ -78,7 +78,8 @@ def actuated_in_space(
     scene: SpatialScene, motion: SpatialMotion, bodies: Bodies, patches: Mapping[str, LinkPatches]
 ) -> SpatialActuation:
     """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it."""
-    links = links_in_motion(motion, {name: body.modal for name, body in bodies.items() if body.modal is not None})
+    flexible = {name: (body.modal, body.spatial) for name, body in bodies.items() if body.modal is not None}
+    links = links_in_motion(motion, flexible)
     voltages: dict[str, Voltages] = {}
     unmet = {}
     for name, of_link in patches.items():

@@ -15,10 +15,13 @@ from ..mbs.analysis.spatial_earlier import EarlierSpatialRun
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_wrench import Wrench
+from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_energy import Energies, Momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.stress import BodyStress
+from ..scene.pieces import BodyInPieces
 from ..scene.spatial import SpatialScene
+from .mode_search import ModeChoice
 from .solution import FinerCheck
 from .spatial_actuation import SpatialActuation
 from .spatial_bodies import LoadedSpatialBody
@@ -73,6 +76,8 @@ class SpatialSolution:
         path_notes: what was found of paths before the analyses, one line each.
         points: actuation points, by body.
         earlier: runs of analyses to go on with, from a results file: see `results.spatial_resume`.
+        mode_choice: where `modes = "auto"`.
+        divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`.
     """
 
     scene: SpatialScene
@@ -85,6 +90,9 @@ class SpatialSolution:
     path_notes: tuple[str, ...] = ()
     points: Mapping[str, SpatialPointSet] = field(default_factory=dict)
     earlier: Mapping[str, EarlierSpatialRun] = field(default_factory=dict)
+    mode_choice: ModeChoice | None = None
+    divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
+    parts: Mapping[str, LoadedSpatialBody] = field(default_factory=dict)
 
     @property
     def outcomes(self) -> dict[str, SpatialRun]:
@@ -98,10 +106,11 @@ class SpatialSolution:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What patches do to the stiffness of their links, and what links cannot do, one line each."""
-        stiffness = (array.stiffness_in_words for of in self.patches.values() for array in of.arrays.values())
-        return tuple(stiffness) + tuple(
-            f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"
-            for name, body in self.bodies.items()
-            if body.rigid_in
-        )
+        """What patches do to the stiffness of their links, what links cannot do, modes left out, one line each."""
+        found = [array.stiffness_in_words for of in self.patches.values() for array in of.arrays.values()]
+        for name, body in self.bodies.items():
+            if body.rigid_in:
+                found.append(f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes")
+            if body.spatial.reduction is not None:
+                found.append(f"{name}: all modes but {modes_kept(body.spatial)}")
+        return tuple(found)

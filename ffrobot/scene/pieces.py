@@ -55,12 +55,17 @@ def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyI
 def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
     """The scene in which each piece is a body; points that the scene names are those of the pieces."""
     places = places_on_pieces(divided)
-    keys = {name: _renamed(getattr(scene, name), places) for name in ("joint", "trajectory", "load", "payload")}
+    keys = {name: renamed(getattr(scene, name), places) for name in ("joint", "trajectory", "load", "payload")}
     initial = scene.initial.model_copy(
         update={"angles": _of_each(scene.initial.angles, divided), "rates": _of_each(scene.initial.rates, divided)}
     )
     bodies = tuple(piece for body in scene.body for piece in _pieces(body, divided))
-    joints = (*keys["joint"], *(weld for name, body in divided.items() for weld in _welds(name, body)))
+    welds = (
+        WeldJoint(name=weld, type="weld", between=between)
+        for name, body in divided.items()
+        for weld, between in welds_between(name, body)
+    )
+    joints = (*keys["joint"], *welds)
     alone = {"pzt": (), "analysis": ()}  # of the whole links
     return scene.model_copy(update=keys | alone | {"body": bodies, "joint": joints, "initial": initial})
 
@@ -79,9 +84,10 @@ def _pieces(body: Body, divided: Mapping[str, BodyInPieces]) -> Iterator[Body]:
         yield body.model_copy(update={"name": name, "link": link, "pieces": None})
 
 
-def _welds(name: str, body: BodyInPieces) -> Iterator[WeldJoint]:
+def welds_between(name: str, body: BodyInPieces) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Names of the welds between the pieces of a body, and what each joins."""
     for k, (first, second) in enumerate(zip(body.names, body.names[1:], strict=False), 1):
-        yield WeldJoint(name=f"{name}, cut {k}", type="weld", between=(f"{first}.tip", f"{second}.root"))
+        yield f"{name}, cut {k}", (f"{first}.tip", f"{second}.root")
 
 
 def _of_each(guesses: Mapping[str, float], divided: Mapping[str, BodyInPieces]) -> dict[str, float]:
@@ -96,15 +102,15 @@ def _of_each(guesses: Mapping[str, float], divided: Mapping[str, BodyInPieces]) 
 T = TypeVar("T")
 
 
-def _renamed(value: T, places: Mapping[str, str]) -> T:
-    """A record, or several, with names of points replaced."""
+def renamed(value: T, places: Mapping[str, str]) -> T:
+    """A record, or several of them, with names of points replaced."""
     new: Any = value
     if isinstance(value, str):
         new = places.get(value, value)
     elif isinstance(value, tuple):
-        new = tuple(_renamed(entry, places) for entry in value)
+        new = tuple(renamed(entry, places) for entry in value)
     elif isinstance(value, Record):
-        new = value.model_copy(update={key: _renamed(getattr(value, key), places) for key in value.model_fields_set})
+        new = value.model_copy(update={key: renamed(getattr(value, key), places) for key in value.model_fields_set})
     return new  # type: ignore[no-any-return]
 
 

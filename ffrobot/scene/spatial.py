@@ -29,7 +29,6 @@ from .kinds import KINDS, AnalysisInSpace
 # Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
 UNAVAILABLE = {
     "": ("geometric_stiffening",),
-    "body": ("modes", "pieces"),
     "load": ("force",),
 }
 

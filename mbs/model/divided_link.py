@@ -70,3 +70,25 @@ def _strains(modal: ModalBody, planar: PlanarBody, x: Array) -> Array:
     places = [modal.interpolate(at) for at in x]
     rows = np.array([[at.rotation[2] for at in places], [at.translation[0] for at in places]])
     return np.asarray(np.diff(rows, axis=1).reshape(2 * INTERVALS, -1) @ planar.modal_transform)
+
+
+def spread_in_space(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Array:
+    """(N, n) p of the pieces where a link in space bends, twists and stretches in its modes, both of the files' modes.
+
+    Pieces are given by where they begin, m from the root, from the root to the tip. Planes of bending, twist and
+    stretch do not couple, so that their rigidities are of no account.
+    """
+    return np.vstack([_shape_in_piece_in_space(link, start, piece) for start, piece in pieces])
+
+
+def _shape_in_piece_in_space(link: ModalBody, start: float, piece: ModalBody) -> Array:
+    x = as_floats(np.linspace(0.0, piece.length, INTERVALS + 1))
+    of_link = _changes(link, np.minimum(start + x, link.length))
+    return np.asarray(np.linalg.lstsq(_changes(piece, x), of_link, rcond=None)[0])
+
+
+def _changes(modal: ModalBody, x: Array) -> Array:
+    """(4 · intervals, n) changes of section rotation about all axes, and of axial displacement, between places x."""
+    places = [modal.interpolate(at) for at in x]
+    rows = np.array([[*at.rotation, at.translation[0]] for at in places])  # (places, 4, n)
+    return np.diff(rows, axis=0).reshape(4 * (len(x) - 1), -1)

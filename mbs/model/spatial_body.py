@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
@@ -45,6 +45,8 @@ class SpatialBody:
         points: its sections by name.
         modal_transform: (n_file, n) p of the modal file is this times p.
         length: of a link in m; None of a rigid body.
+        reduction: where it has fewer modes than its file.
+        attachment_modes: how many of the n, after all others, are static shapes of loads at interfaces.
     """
 
     name: str
@@ -62,11 +64,33 @@ class SpatialBody:
     points: Mapping[str, SpatialPoint]
     modal_transform: Array
     length: float | None = None
+    reduction: Reduction | None = None
+    attachment_modes: int = 0
 
     @property
     def n_modes(self) -> int:
         """Number n of modal coordinates in the equations."""
         return len(self.stiffness)
+
+    @property
+    def n_eigenmodes(self) -> int:
+        """How many of them count as modes of the link: for `modes = k`."""
+        return self.n_modes - self.attachment_modes
+
+    @property
+    def whole(self) -> SpatialBody:
+        """With all modes of its file."""
+        return self if self.reduction is None else self.reduction.whole
+
+    @property
+    def on_file(self) -> Array:
+        """(n, n_file): forces (…, n) on p times this are those on the modes of the file that do the same work on them.
+
+        Of a body with fewer modes they are those of loads at its loaded points, which act on all modes.
+        """
+        if self.reduction is not None:
+            return as_floats(self.reduction.lift.T @ self.whole.on_file)
+        return as_floats(np.linalg.pinv(self.modal_transform))
 
     @property
     def inertia(self) -> Array:
@@ -93,6 +117,45 @@ class SpatialBody:
         """H (3, n, n), skew: H_a = ε_abc S̄_bc, so that h_a(p) = h0_a + pᵀH_a."""
         S: Array = self.S_bar_kl
         return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """How a body came by fewer modes: see `truncation.with_fewer_modes_in_space`.
+
+    Attributes:
+        whole: the body with all n modes of its file.
+        lowest: how many of these it kept; the other coordinates stand for the rest.
+        T: (n, m) coordinates of `whole` from the m that it has, TᵀT = 1.
+        lift: (n, m) modal forces on all modes from those on the m coordinates, Tᵀ lift = 1: exact for forces that come
+            from loads at the loaded points.
+    """
+
+    whole: SpatialBody
+    lowest: int
+    T: Array
+    lift: Array
+
+
+def transformed(body: SpatialBody, T: Array, stiffness: Array) -> SpatialBody:
+    """The body in coordinates p' with p = T p', T (n, m), in which m_ff is the identity and K_ff diag(stiffness)."""
+    return replace(
+        body,
+        stiffness=stiffness,
+        damping=T.T @ body.damping @ T,
+        S_bar=body.S_bar @ T,
+        I_bar=body.I_bar @ T,
+        S_bar_kl=T.T @ body.S_bar_kl @ T,
+        h_spin=body.h_spin @ T,
+        S_spin=T.T @ body.S_spin @ T,
+        points=MappingProxyType(
+            {
+                label: SpatialPoint(section.position, section.translation @ T, section.rotation @ T)
+                for label, section in body.points.items()
+            }
+        ),
+        modal_transform=body.modal_transform @ T,
+    )
 
 
 def from_modal_body(name: str, body: ModalBody) -> SpatialBody:
@@ -125,6 +188,7 @@ def from_modal_body(name: str, body: ModalBody) -> SpatialBody:
         ),
         modal_transform=np.eye(len(omega)),
         length=body.length,
+        attachment_modes=int(body.residual.sum()),
     )
 
 

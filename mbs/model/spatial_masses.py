@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.rotations import skew
 from ...fe_models.modal_body.lumped_masses import attached_integrals
-from .spatial_body import SpatialBody, SpatialPoint
+from .spatial_body import SpatialBody, SpatialPoint, transformed
 
 UNCOUPLED = 1e-12  # of the geometric mean of two modes' own terms: what couples them less is rounding
 
@@ -57,23 +56,7 @@ def _uncoupled(body: SpatialBody, m_ff: Array, added: Array | None = None) -> Sp
     if not body.n_modes:
         return body
     T, stiffness = uncoupling(m_ff, np.diag(body.stiffness) + (0.0 if added is None else added))
-    return replace(
-        body,
-        stiffness=stiffness,
-        damping=T.T @ body.damping @ T,
-        S_bar=body.S_bar @ T,
-        I_bar=body.I_bar @ T,
-        S_bar_kl=T.T @ body.S_bar_kl @ T,
-        h_spin=body.h_spin @ T,
-        S_spin=T.T @ body.S_spin @ T,
-        points=MappingProxyType(
-            {
-                label: SpatialPoint(section.position, section.translation @ T, section.rotation @ T)
-                for label, section in body.points.items()
-            }
-        ),
-        modal_transform=body.modal_transform @ T,
-    )
+    return transformed(body, T, stiffness)
 
 
 def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
@@ -84,7 +67,7 @@ def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
     in the places that they had.
     """
     T, stiffness = np.zeros_like(M), np.zeros(len(M))
-    for block in _coupled_blocks(M, K):
+    for block in coupled_blocks(M, K):
         square = np.ix_(block, block)
         L_inverse = np.linalg.inv(np.linalg.cholesky(M[square]))
         stiffness[block], vectors = np.linalg.eigh(L_inverse @ K[square] @ L_inverse.T)
@@ -92,7 +75,7 @@ def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
     return T, stiffness
 
 
-def _coupled_blocks(*matrices: Array) -> list[Indices]:
+def coupled_blocks(*matrices: Array) -> list[Indices]:
     """Numbers of the modes that feel each other in any of the matrices (n, n), set by set."""
     # Loaded here: only links with patches of mass pay for it.
     from scipy.sparse.csgraph import connected_components

@@ -64,9 +64,7 @@ def split_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: A
 def motor_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array) -> MotorForces:
     """The same, modal forces by body and in the modes of the modal body files."""
     moments, left, _ = split_forces(model, q, frames, C_v, wanted)
-    stored = {
-        node.body.name: left[:, node.p_v] @ np.linalg.pinv(node.body.modal_transform) for node in model.tree.nodes
-    }
+    stored = {node.body.name: left[:, node.p_v] @ node.body.on_file for node in model.tree.nodes}
     return MotorForces(moments, stored)
 
 

@@ -8,12 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...common.arrays import Array
-from ..scene.mechanism import MechanismKeys
+from . import spatial_body
 from .planar_body import PlanarBody, Reduction, transformed
+from .spatial_body import SpatialBody
+from .spatial_masses import coupled_blocks
+
+if TYPE_CHECKING:
+    from ..scene.mechanism import MechanismKeys
+    from ..scene.spatial.mechanism import SpatialMechanismKeys
 
 IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is rounding
 DEPENDENT = 1e-8  # static shapes below this fraction of the first one, in energy, say nothing new
@@ -35,14 +42,48 @@ def with_fewer_modes(body: PlanarBody, lowest: int, loaded: Sequence[str]) -> Pl
         return body
     T = np.eye(body.n_modes, lowest + len(squares))
     T[lowest:, lowest:] = static
-    lift = T + (B_T - T @ (T.T @ B_T)) @ np.linalg.pinv(T.T @ B_T)
     reduced = transformed(body, T, np.concatenate([body.stiffness[:lowest], squares]))
     static_shapes = len(squares) if body.attachment_modes else 0
-    return replace(reduced, reduction=Reduction(body, lowest, T, lift), attachment_modes=static_shapes)
+    return replace(reduced, reduction=Reduction(body, lowest, T, _lift(T, B_T)), attachment_modes=static_shapes)
 
 
-def modes_kept(body: PlanarBody) -> str:
-    """How many of the modes that move in the plane a body has, in words."""
+def with_fewer_modes_in_space(body: SpatialBody, lowest: int, loaded: Sequence[str]) -> SpatialBody:
+    """The same in space, where the modes of a file are ordered by frequency within their families alone.
+
+    Static shapes are found apart for modes that no load couples: they keep to the plane of bending, or to torsion.
+    """
+    lowest = min(lowest, body.n_eigenmodes)
+    if lowest >= body.n_modes:
+        return body
+    kept = np.sort(np.argsort(body.stiffness[: body.n_eigenmodes], kind="stable")[:lowest])
+    B_T = interface_loads(body, loaded)
+    shapes, squares = [np.zeros((body.n_modes, 0))], [np.zeros(0)]
+    for block in coupled_blocks(B_T @ B_T.T):
+        others = np.setdiff1d(block, kept)
+        if not others.size:
+            continue
+        static, of_block = _static_modes(body.stiffness[others], B_T[others])
+        shapes.append(np.zeros((body.n_modes, len(of_block))))
+        shapes[-1][others] = static
+        squares.append(of_block)
+    stiffness = np.concatenate([body.stiffness[kept], *squares])
+    if len(stiffness) >= body.n_modes:
+        return body
+    T = np.hstack([np.eye(body.n_modes)[:, kept], *shapes])
+    reduced = spatial_body.transformed(body, T, stiffness)
+    static_shapes = len(stiffness) - lowest if body.attachment_modes else 0
+    reduction = spatial_body.Reduction(body, lowest, T, _lift(T, B_T))
+    return replace(reduced, reduction=reduction, attachment_modes=static_shapes)
+
+
+def _lift(T: Array, B_T: Array) -> Array:
+    """(n, m) modal forces on all modes from those on the m coordinates, exact for forces of the loads Bᵀ."""
+    lift: Array = T + (B_T - T @ (T.T @ B_T)) @ np.linalg.pinv(T.T @ B_T)
+    return lift
+
+
+def modes_kept(body: PlanarBody | SpatialBody) -> str:
+    """How many of its modes (in the plane: of those that move there) a body has, in words."""
     if body.reduction is None:
         attachment = f" and {body.attachment_modes} attachment modes" if body.attachment_modes else ""
         return f"all {body.n_eigenmodes} modes{attachment}"
@@ -51,14 +92,14 @@ def modes_kept(body: PlanarBody) -> str:
     return f"{lowest} of {body.reduction.whole.n_eigenmodes} modes{shapes}"
 
 
-def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
+def loaded_points(scene: MechanismKeys | SpatialMechanismKeys, body: str) -> list[str]:
     """Points of a body at which joints, trajectories and loads of the scene act."""
     found = [reference.body_and_point for reference in scene.references() if reference.loaded]
     return list(dict.fromkeys(part[1] for part in found if part is not None and part[0] == body))
 
 
-def interface_loads(body: PlanarBody, loaded: Sequence[str]) -> Array:
-    """Bᵀ (n, loads): modal forces of forces along x and y and a moment at each point, scaled to size 1.
+def interface_loads(body: PlanarBody | SpatialBody, loaded: Sequence[str]) -> Array:
+    """Bᵀ (n, loads): modal forces of forces and moments along all axes at each point, scaled to size 1.
 
     Left out are loads under which nothing moves: forces on a support, along a link without axial modes.
     """

@@ -90,6 +90,11 @@ class SpatialMotion:
             off[:, 1] = np.abs(rate).max(axis=1, initial=0.0)
         return off
 
+    @property
+    def points(self) -> dict[str, tuple[str, ...]]:
+        """By body that is reported, in the scene's order: names of its sections."""
+        return {body.name: tuple(self.node(body.name).body.points) for body in self.model.scene.body}
+
     def node(self, body: str) -> Node:
         """The node of a body."""
         return self.model.tree.nodes[self.model.tree.index[body]]
@@ -157,6 +162,9 @@ class SpatialMotion:
 
         Moments behind gears that give are what motors must do there.
         """
+        return self._found_motor_forces()
+
+    def _found_motor_forces(self) -> MotorForces | None:
         if not self.is_prescribed:
             return None
         rigid = self._with_rigid_gears

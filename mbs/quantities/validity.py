@@ -125,6 +125,14 @@ def enough_pieces(shortening: float, count: int) -> int:
     return max(2, ceil(count * sqrt(shortening / ENOUGH)))
 
 
+def shortening_in_space(link: ModalBody, p: Array) -> Array:
+    """½∫(v'² + w'²) dx (T,) in the frame of a link in space, of its length; p (T, n) of the modes of its file."""
+    stations, x = link.stations, link.stations.position[:, 0]
+    squares = (p @ stations.rotation[:, 1].T) ** 2 + (p @ stations.rotation[:, 2].T) ** 2
+    found: Array = 0.25 * (squares[:, 1:] + squares[:, :-1]) @ np.diff(x) / link.length
+    return found
+
+
 def bending(
     outcome: Outcome, links: Mapping[str, ModalBody], stiffness_changes: Mapping[str, float], is_stiffened: bool
 ) -> dict[str, Bending]:

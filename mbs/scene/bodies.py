@@ -51,6 +51,9 @@ def _link(value: object, info: ValidationInfo) -> LinkSource:
 LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | BeamLink | SolidLink)]
 
 
+ModeCount = Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)]
+
+
 class BodyKeys(Record):
     """What bodies in the plane and in space have in common; beside it each has the record of a rigid one, `rigid`."""
 
@@ -61,9 +64,20 @@ class BodyKeys(Record):
     modal: InputFile | None = None
     """Modal body file, as stage 1 writes it."""
 
+    modes: ModeCount | None = None
+    """How many of the lowest modes; "auto": as many as the tolerances need; all where it is left out. In a planar scene
+    those that move in its plane count, in space all, of whatever family."""
+    pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
+    """Of a beam link that bends far: how many welded pieces stand for it; "auto": as many as it needs."""
+
     @model_validator(mode="after")
     def _is_one_of_three(self) -> Self:
         one_of(self, ("link", "modal", "rigid"))
+        if self.modes is not None and self.link is None and self.modal is None:
+            raise ValueError(f'expected the key "modes" only in flexible bodies, found it in a rigid one: {self.modes}')
+        if self.pieces is not None and (self.link is None or self.modes is not None):
+            beside = "modes" if self.modes is not None else "modal" if self.modal is not None else "rigid"
+            raise ValueError(f'expected "pieces" beside "link" alone, found "{beside}"')
         return self
 
 
@@ -81,19 +95,6 @@ class Body(BodyKeys):
 
     rigid: RigidBody | None = None
     """A body that does not deform."""
-    modes: Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)] | None = None
-    """How many of the lowest in-plane modes; "auto": as many as the tolerances need; all where it is left out."""
-    pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
-    """Of a beam link that bends far: how many welded pieces stand for it; "auto": as many as it needs."""
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Body:
-        if self.rigid is not None and self.modes is not None:
-            raise ValueError(f'expected the key "modes" only in flexible bodies, found it in a rigid one: {self.modes}')
-        if self.pieces is not None and (self.link is None or self.modes is not None):
-            beside = "modes" if self.modes is not None else "modal" if self.modal is not None else "rigid"
-            raise ValueError(f'expected "pieces" beside "link" alone, found "{beside}"')
-        return self
 
 
 class Payload(Record):

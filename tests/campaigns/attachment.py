@@ -23,7 +23,8 @@ from record import record
 import ffrobot
 from ffrobot.common.arrays import Array
 from ffrobot.run.modal_error import modal_errors
-from ffrobot.run.mode_choice import difference, reported
+from ffrobot.run.mode_choice import reported
+from ffrobot.run.mode_search import difference
 from ffrobot.run.solution import Solution
 from ffrobot.run.solve import solve
 

@@ -18,7 +18,8 @@ from random_robots import random_scene
 from record import record
 
 from ffrobot.common.errors import FfrobotError, InputError
-from ffrobot.run.mode_choice import difference, reported
+from ffrobot.run.mode_choice import reported
+from ffrobot.run.mode_search import difference
 from ffrobot.run.solution import Solution
 from ffrobot.run.solve import solve
 from ffrobot.scene.load import load_scene

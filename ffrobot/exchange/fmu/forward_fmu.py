@@ -18,6 +18,7 @@ from ...mbs.model.spatial_gears import with_compliance_in_space
 from ...mbs.model.spatial_model import build_spatial_model
 from ...run.spatial_actuation import patches_in_space
 from ...run.spatial_bodies import load_spatial_bodies
+from ...run.spatial_mode_choice import mode_levels_in_space
 from ...scene.any_space import load_any_scene
 from ...scene.spatial import SpatialScene
 from .archive import PLATFORMS, identifier_of, zipped
@@ -50,7 +51,9 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str
         raise InputError(f"{path}: --format fmu: FMI 2.0 has no name for {sys.platform} on {platform.machine()}")
     bodies = load_spatial_bodies(scene, lambda stage: logger.info("%s", stage))
     loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
-    model = with_compliance_in_space(without_paths(build_spatial_model(scene, [part.spatial for part in bodies])))
+    fewer = mode_levels_in_space(scene, loaded)[-1]  # "auto": all of them
+    spatial = [fewer.get(name, part.spatial) for name, part in loaded.items()]
+    model = with_compliance_in_space(without_paths(build_spatial_model(scene, spatial)))
     unit = held_unit(model, patches_in_space(scene, loaded), chosen)
     names = "\n".join(each.name for each in (*unit.inputs, *unit.outputs))
     unit.data.guid = f"{{{uuid5(NAMESPACE_URL, unit.data.to_bytes().hex() + names)}}}"
@@ -90,6 +93,10 @@ def _chosen(path: Path, scene: SpatialScene, name: str | None) -> Forward:
 def _check(path: Path, scene: SpatialScene) -> None:
     if scene.load:
         raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs, found some")
+    for body in scene.body:
+        if body.pieces is not None:
+            key = f'{path}: body "{body.name}": pieces'
+            raise InputError(f"{key}: expected none of a scene for an FMU, found {body.pieces}")
     if scene.motors == "frame":
         raise InputError(f'{path}: motors: expected "section" of a scene for an FMU, found "frame"')
 

@@ -69,6 +69,13 @@ class BodyInSpace(BodyKeys):
 
     The `name` in a table of a link's keys is the body's where it is left out. A link moves in the families of modes
     that its file has, and is rigid in the others.
+
+    `modes` of a flexible body: how many of the lowest, of all families; the others are represented by their static
+    flexibility. Patches serve all modes of the file. "auto" takes as many as the tolerances of the analyses need; the
+    default is all.
+
+    `pieces` of a beam link: into how many it is divided for large deflections, in both planes, and twist, "auto": as
+    many as these need. Results are those of the one link.
     """
 
     rigid: SpatialRigidBody | None = None

@@ -1,0 +1,215 @@
+"""How many modes of the links a scene needs for its tolerance, in the plane and in space: more and more are tried.
+
+The first solves are cheap: few modes leave out the high frequencies, which hold the steps down.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+import numpy as np
+
+from ..common.arrays import Array
+from ..mbs.model.planar_body import PlanarBody
+from ..mbs.model.spatial_body import SpatialBody
+from ..mbs.model.truncation import loaded_points
+
+if TYPE_CHECKING:
+    from ..scene.any_space import AnyScene
+
+Errors = Mapping[str, Mapping[str, float]]
+"""By analysis and kind of quantity, relative to peaks."""
+
+
+@dataclass(frozen=True)
+class ModeChoice:
+    """What the search for the number of modes found.
+
+    Attributes:
+        errors: estimated error that leaving out modes makes of the largest quantity of each kind, relative to its peak,
+            by analysis and kind; 0 where all modes of the files were needed.
+        before: likewise, how much the last solve differs from the one before it.
+        tried: numbers of modal coordinates of all bodies together in the solves; the last is the one kept.
+        seconds: of the solves before the last.
+        highest: ω (rad/s) of the highest mode kept, and of the highest there is.
+    """
+
+    errors: Errors
+    before: Errors
+    tried: tuple[int, ...]
+    seconds: float
+    highest: tuple[float, float]
+
+
+Reported = Mapping[str, Mapping[str, Array]]
+"""Quantities of an analysis by kind and name, (T, …)."""
+
+GROWTH = 1.5  # of the number of modes from one solve to the next
+LEAST_RATIO = 0.1  # of two differences one after the other: better ones are luck
+MARGIN = 0.5  # part of the tolerance that an estimate has to meet: it may be too small
+ALIKE = 1e-9  # of ω²: of a round link, both planes of bending
+SMALLEST = 1e-3  # of the largest peak of its kind: quantities below are measured against that
+
+
+@dataclass
+class ErrorEstimate:
+    """Errors of the last of several solves with more and more modes, from the differences of the last three.
+
+    Where these shrink by a ratio ρ from one to the next, the last solve is off by ρ/(1 − ρ) times the last difference.
+    The largest ratio of any kind counts for all kinds of an analysis, and more than the difference is never assumed.
+    """
+
+    last: Mapping[str, Reported] = field(default_factory=dict)
+    differences: Errors = field(default_factory=dict)
+    errors: Errors = field(default_factory=dict)
+    ratio: float | None = None
+
+    def add(self, reported: Mapping[str, Reported]) -> None:
+        """Take in the next solve, by analysis."""
+        before, self.differences = self.differences, {}
+        if self.last:
+            self.differences = {name: difference(of, self.last[name]) for name, of in reported.items()}
+        self.last = reported
+        ratios = {name: _ratio(of, before[name]) for name, of in self.differences.items() if name in before}
+        self.ratio = max(ratios.values(), default=None)
+        self.errors = {
+            name: {kind: d * _remaining(ratios.get(name, 1.0)) for kind, d in of.items()}
+            for name, of in self.differences.items()
+        }
+
+    def meets(self, tolerances: Mapping[str, float]) -> bool:
+        """Whether all errors are well within the tolerances, by analysis; one difference does not tell."""
+        return self.ratio is not None and self._excess(tolerances) <= MARGIN
+
+    def is_hopeless(self, tolerances: Mapping[str, float], more: int) -> bool:
+        """Whether `more` further solves are not expected to meet the tolerances at the pace so far."""
+        return self.ratio is not None and self._excess(tolerances) * self.ratio**more > MARGIN
+
+    def _excess(self, tolerances: Mapping[str, float]) -> float:
+        return max(max(of.values(), default=0.0) / tolerances[name] for name, of in self.errors.items())
+
+
+def _ratio(now: Mapping[str, float], before: Mapping[str, float]) -> float:
+    """Of two differences one after the other, the largest of all kinds."""
+    return max((now[kind] / max(before[kind], 1e-300) for kind in now if now[kind] > 0.0), default=LEAST_RATIO)
+
+
+def _remaining(ratio: float) -> float:
+    """What is left to come, as a part of the last difference: a geometric series."""
+    ratio = max(ratio, LEAST_RATIO)
+    return min(1.0, ratio / (1.0 - ratio)) if ratio < 1.0 else 1.0
+
+
+def difference(now: Reported, before: Reported) -> dict[str, float]:
+    """By kind, the largest difference of two solves relative to the peak of its quantity."""
+    found = {}
+    for kind, quantities in now.items():
+        peaks = {name: np.abs(values).max(initial=0.0) for name, values in quantities.items()}
+        floor = max(SMALLEST * max(peaks.values(), default=0.0), 1e-300)
+        changes = [
+            float(np.abs(values - before[kind][name]).max(initial=0.0) / max(peaks[name], floor))
+            for name, values in quantities.items()
+        ]
+        found[kind] = max(changes, default=0.0)
+    return found
+
+
+B = TypeVar("B", PlanarBody, SpatialBody)
+
+
+class ModeSearch(Generic[B]):
+    """How many modes to solve a scene with next, and when there are enough.
+
+    `tolerances` by analysis; `levels`: bodies with more and more modes, the last with all (`truncation_levels`).
+    """
+
+    def __init__(self, tolerances: Mapping[str, float], levels: Sequence[Mapping[str, B]]) -> None:
+        self._tolerances = tolerances
+        self._levels: Sequence[Mapping[str, B]] = levels
+        self._estimate, self._tried = ErrorEstimate(), list[int]()
+        self._level, self._is_over, self._completed = 0, False, False
+        self._began = self._last = time.perf_counter()
+
+    def next_bodies(self) -> Mapping[str, B] | None:
+        """The bodies to solve with; None where the last solve is the one to keep."""
+        self._last = self._last if self._is_over else time.perf_counter()
+        return None if self._is_over else self._levels[self._level]
+
+    def add(self, reported: Mapping[str, Reported] | None, *, last: bool) -> None:
+        """Take in, by analysis, what a solve with the bodies asked for found; None where not all of them completed.
+
+        It is the `last` one in any case where that is said.
+        """
+        self._tried.append(sum(body.n_modes for body in self._levels[self._level].values()))
+        self._completed = reported is not None
+        if reported is not None:
+            self._estimate.add(reported)
+        enough = self._completed and self._estimate.meets(self._tolerances)
+        self._is_over = not self._more or last or enough
+        if not self._is_over:
+            hopeless = not self._completed or self._estimate.is_hopeless(self._tolerances, self._more - 1)
+            self._level = len(self._levels) - 1 if hopeless else self._level + 1
+
+    @property
+    def _more(self) -> int:
+        """How many levels there are with more modes."""
+        return len(self._levels) - 1 - self._level
+
+    def choice(self) -> ModeChoice:
+        """What was found."""
+        errors = self._estimate.errors if self._completed else {}
+        if not self._more:
+            errors = {name: dict.fromkeys(of, 0.0) for name, of in errors.items()}
+        kept, every = (
+            max(float(np.sqrt(b.stiffness.max(initial=0.0))) for b in level.values())
+            for level in (self._levels[self._level], self._levels[-1])
+        )
+        seconds = self._last - self._began
+        return ModeChoice(errors, self._estimate.differences, tuple(self._tried), seconds, (kept, every))
+
+
+def error_tolerances(scene: AnyScene) -> dict[str, float]:
+    """What the error of each analysis may be; algebraic ones that do not say follow the tightest that is integrated."""
+    tightest = min((analysis.tolerance for analysis in scene.analysis if analysis.is_resumable), default=None)
+    return {
+        analysis.name: tightest
+        if tightest is not None and not analysis.is_resumable and "tolerance" not in analysis.model_fields_set
+        else analysis.tolerance
+        for analysis in scene.analysis
+    }
+
+
+def truncation_levels(
+    scene: AnyScene,
+    bodies: Mapping[str, B],
+    fewer: Callable[[B, int, Sequence[str]], B],
+    counted: Callable[[Sequence[str]], Array],
+) -> list[dict[str, B]]:
+    """The flexible bodies with `modes` given, with more and more modes where that is "auto"; the last have all.
+
+    A level has the modes up to one frequency, of all bodies: 1, 2, 3, 5, 8 … of each on average, of those that are
+    `counted` (their ω², of bodies by name). `bodies` have all, `fewer` leaves some out.
+    """
+    wanted = {body.name: body.modes for body in scene.body if body.modes is not None}
+    loaded = {name: loaded_points(scene, name) for name in wanted}
+    fixed = {name: fewer(bodies[name], modes, loaded[name]) for name, modes in wanted.items() if isinstance(modes, int)}
+    auto = {name: bodies[name] for name, modes in wanted.items() if modes == "auto"}
+    if not auto:
+        return [fixed]
+    found: list[dict[str, B]] = []
+    squares = np.sort(counted(list(auto)))
+    each = 1
+    while each * len(auto) < len(squares):
+        cut = squares[each * len(auto) - 1] * (1 + ALIKE)
+        level = {
+            name: fewer(body, int(np.count_nonzero(body.stiffness <= cut)), loaded[name]) for name, body in auto.items()
+        }
+        if all(body.reduction is None for body in level.values()):
+            break
+        found.append(fixed | level)
+        each = int(np.ceil(GROWTH * each))
+    found.append(fixed | auto)
+    return found

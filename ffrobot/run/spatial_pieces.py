@@ -1,0 +1,201 @@
+"""Links in space in pieces as the one link: what was computed of the pieces, told in frame and modes of the link.
+
+The frame is where the link's reference condition has it: at its root, as the section there (cantilever), or along the
+chord to its tip, turned from the section at the root by no more than that takes (simply supported: no twist there). The
+modal coordinates are those whose shape is nearest to the link's; its points are where the pieces have them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..common.arrays import Array, as_floats
+from ..common.rotations import exponential, left_jacobian, logarithm, of_quaternion, quaternions
+from ..fe_models.link_records import HOLDING_ROOT
+from ..fe_models.modal_body import ModalBody
+from ..mbs.model.divided_link import spread_in_space
+from ..mbs.model.spatial_motors import MotorForces
+from ..mbs.quantities.spatial_motion import BodyMotion, PointMotion, SpatialMotion, continuous
+from ..mbs.quantities.validity import ENOUGH, enough_pieces, shortening_in_space
+from ..scene.pieces import BodyInPieces
+from .spatial_solution import SpatialSolution
+
+MOST = 64
+X = np.array([1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Divided:
+    """A link in pieces: its modal body, how it is cut, and the modal bodies of its pieces from the root to the tip."""
+
+    modal: ModalBody
+    body: BodyInPieces
+    pieces: tuple[ModalBody, ...]
+
+
+@dataclass(frozen=True)
+class SectionMotion:
+    """A section over time: place r (T, 3), axes A (T, 3, 3), their velocity (T, 3) and angular velocity (T, 3)."""
+
+    r: Array
+    A: Array
+    r_dot: Array
+    omega: Array
+
+
+@dataclass(frozen=True)
+class MotionOfLinks(SpatialMotion):
+    """A motion of pieces, in which links in pieces are told as the one link each."""
+
+    divided: Mapping[str, Divided] = field(default_factory=dict)
+
+    @property
+    def points(self) -> dict[str, tuple[str, ...]]:
+        """By body that is reported: names of its sections; links stand where their first pieces do."""
+        own, found = super().points, {}
+        first = {link.body.names[0]: name for name, link in self.divided.items()}
+        others = {name for link in self.divided.values() for name in link.body.names[1:]}
+        for name, points in own.items():
+            if name in first:
+                found[first[name]] = tuple(self.divided[first[name]].body.cut.places)
+            elif name not in others:
+                found[name] = points
+        return found
+
+    def body(self, name: str) -> BodyMotion:
+        """Of a body's frame and modes, or of a link's."""
+        return self._links[name] if name in self.divided else super().body(name)
+
+    def point(self, point: str) -> PointMotion:
+        """Of the section "BODY.POINT": where the piece has it, and how far that is from its place in the link."""
+        name, _, label = point.partition(".")
+        if name not in self.divided:
+            return super().point(point)
+        link, frame = self.divided[name], self._links[name]
+        found = super().point(link.body.point(label))
+        position = link.modal.length / 2 * X if label == "mid" else link.modal.interfaces[label].position
+        in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.quaternion), found.position - frame.position)
+        return replace(found, deflection=in_frame - position)
+
+    @cached_property
+    def _links(self) -> dict[str, BodyMotion]:
+        return {name: _motion_of_link(self, link) for name, link in self.divided.items()}
+
+    def _found_motor_forces(self) -> MotorForces | None:
+        """Modal forces of links by virtual work, from those on their pieces."""
+        found = super()._found_motor_forces()
+        if found is None:
+            return None
+        modal = dict(found.modal)
+        for name, link in self.divided.items():
+            spread = spread_in_space(link.modal, list(zip(link.body.cut.starts, link.pieces, strict=True)))
+            modal[name] = np.hstack([modal.pop(piece) for piece in link.body.names]) @ spread
+        return replace(found, modal=modal)
+
+
+def divided_links(solution: SpatialSolution) -> dict[str, Divided]:
+    """The links in pieces of a solution, by name."""
+    found = {}
+    for name, body in solution.divided.items():
+        modal = solution.bodies[name].modal
+        pieces = [solution.parts[piece].modal for piece in body.names]
+        assert modal is not None
+        found[name] = Divided(modal, body, tuple(piece for piece in pieces if piece is not None))
+    return found
+
+
+def wanted_pieces_in_space(solution: SpatialSolution) -> dict[str, int]:
+    """How many pieces bodies with `pieces = "auto"` want after a solve; empty where they have them.
+
+    What a piece loses of its length goes down with the square of their number. See `pieces.wanted_pieces`.
+    """
+    wanted, now = {}, {}
+    for body in solution.scene.body:
+        if body.pieces == "auto":
+            names = solution.divided[body.name].names if body.name in solution.divided else (body.name,)
+            worst = max((_shortening(solution, name) for name in names), default=0.0)
+            count = enough_pieces(worst, len(names)) if worst > ENOUGH else 1
+            wanted[body.name], now[body.name] = max(min(MOST, count), len(names)), len(names)
+    return {} if wanted == now else wanted
+
+
+def _shortening(solution: SpatialSolution, name: str) -> float:
+    """The largest of a body of the equations over all analyses, of its length."""
+    modal = (solution.parts or solution.bodies)[name].modal
+    assert modal is not None
+    found = [
+        shortening_in_space(modal, SpatialMotion.body(result.motion, name).modal).max(initial=0.0)
+        for result in solution.analyses.values()
+    ]
+    return float(max(found, default=0.0))
+
+
+def _motion_of_link(motion: SpatialMotion, link: Divided) -> BodyMotion:
+    """Of the frame of the one link, and of the modes of its file."""
+    x = link.modal.stations.position[:, 0]
+    sections = [_section(motion, link, at) for at in x]
+    root, tip = sections[int(np.argmin(x))], sections[int(np.argmax(x))]
+    holds_root = link.modal.reference_condition in HOLDING_ROOT
+    A, omega = (root.A, root.omega) if holds_root else _along_chord(root, tip)
+    u, u_dot = (np.zeros((len(x), 4, len(root.r))) for _ in range(2))
+    for k, at in enumerate(sections):
+        arm, rate = at.r - root.r, at.r_dot - root.r_dot
+        phi = logarithm(np.swapaxes(A, -1, -2) @ at.A)
+        spin = _seen_from(A, at.omega - omega)
+        u[k, :3] = (_seen_from(A, arm) - x[k] * X).T
+        u_dot[k, :3] = _seen_from(A, rate - np.cross(omega, arm)).T
+        u[k, 3] = link.modal.length * phi[:, 0]
+        u_dot[k, 3] = link.modal.length * np.linalg.solve(left_jacobian(phi), spin[:, :, None])[:, 0, 0]
+    p, p_dot = (_nearest_shape(link.modal, each) for each in (u, u_dot))
+    return BodyMotion(root.r, continuous(quaternions(A)), root.r_dot, omega, p, p_dot)
+
+
+def _section(motion: SpatialMotion, link: Divided, x: float) -> SectionMotion:
+    """Of the section at x (m from the root of the link)."""
+    starts, names = link.body.cut.starts, link.body.names
+    k = int(np.clip(np.searchsorted(starts, x, side="right") - 1, 0, len(names) - 1))
+    at = link.pieces[k].interpolate(min(x - starts[k], link.pieces[k].length))
+    node, frame = motion.node(names[k]), motion.frames[motion.model.tree.index[names[k]]]
+    Phi, Phi_r = at.translation @ node.body.modal_transform, at.rotation @ node.body.modal_transform
+    p, p_dot = motion.q[:, node.p_q], motion.v[:, node.p_v]
+    velocity = np.einsum("tij,tj->ti", frame.L, motion.v)
+    arm, phi = np.einsum("tij,tj->ti", frame.F, at.position + p @ Phi.T), p @ Phi_r.T
+    turning = np.einsum("tij,tj->ti", left_jacobian(phi), p_dot @ Phi_r.T)
+    r_dot = velocity[:, :3] + np.cross(velocity[:, 3:], arm) + np.einsum("tij,tj->ti", frame.F, p_dot @ Phi.T)
+    omega = velocity[:, 3:] + np.einsum("tij,tj->ti", frame.F, turning)
+    return SectionMotion(frame.r + arm, frame.F @ exponential(phi), r_dot, omega)
+
+
+def _along_chord(root: SectionMotion, tip: SectionMotion) -> tuple[Array, Array]:
+    """Axes (T, 3, 3) with x along the chord, in which the section at the root is not twisted, and their spin (T, 3).
+
+    With the section at exp(φ~) from these axes, φ₁ = 0 at all times: with the spin c × ċ + α c, α follows from φ̇₁ = 0.
+    """
+    d, d_dot = tip.r - root.r, tip.r_dot - root.r_dot
+    size = np.linalg.norm(d, axis=1)[:, None]
+    c = d / size
+    c_dot = (d_dot - c * np.sum(c * d_dot, axis=1)[:, None]) / size
+    across = np.cross(root.A[:, :, 0], c)
+    sine, cosine = np.linalg.norm(across, axis=1), np.sum(root.A[:, :, 0] * c, axis=1)
+    turn = across * np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > 0.0)[:, None]
+    A = as_floats(exponential(turn) @ root.A)
+    J = left_jacobian(-_seen_from(A, turn))
+    swing = np.cross(c, c_dot)
+    left, of_x = (np.linalg.solve(J, b[:, :, None])[:, 0, 0] for b in (_seen_from(A, root.omega - swing), 0 * c + X))
+    return A, as_floats(swing + (left / of_x)[:, None] * c)
+
+
+def _seen_from(A: Array, vectors: Array) -> Array:
+    """Aᵀ times vectors (T, 3)."""
+    return as_floats(np.einsum("tji,tj->ti", A, vectors))
+
+
+def _nearest_shape(modal: ModalBody, u: Array) -> Array:
+    """P (T, n) for which Φp comes nearest to displacements and twists at the length u (stations, 4, T), m."""
+    stations = modal.stations
+    rows = np.concatenate([stations.translation, modal.length * stations.rotation[:, :1]], axis=1)
+    return as_floats(np.linalg.lstsq(rows.reshape(-1, modal.mode_count), u.reshape(-1, u.shape[2]), rcond=None)[0].T)

@@ -1,0 +1,81 @@
+"""Everything of a scene in space but its analyses: equations of its bodies, of links in pieces too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ..actuation.patches.spatial_patches import LinkPatches
+from ..actuation.spatial_points import SpatialPointSet
+from ..mbs.model.spatial_body import SpatialBody
+from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
+from ..scene.pieces import BodyInPieces
+from ..scene.spatial import SpatialScene
+from ..scene.spatial_pieces import bodies_in_pieces_in_space, scene_of_pieces_in_space
+from .spatial_actuation import given_voltages
+from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
+from .spatial_solution import SpatialSolution
+from .watcher import Watcher
+
+Bodies = Mapping[str, LoadedSpatialBody]
+
+
+def made_solution(
+    scene: SpatialScene,
+    bodies: Bodies,
+    patches: Mapping[str, LinkPatches],
+    seconds: Mapping[str, float],
+    points: Mapping[str, SpatialPointSet],
+) -> SpatialSolution:
+    """A solution without analyses."""
+    return SpatialSolution(scene, _model(scene, bodies, patches, {}, {}), bodies, patches, {}, seconds, points=points)
+
+
+def with_bodies_in_space(solution: SpatialSolution, spatial: Mapping[str, SpatialBody]) -> SpatialSolution:
+    """The scene with some of its bodies replaced, nothing solved yet; patches serve all modes of their links."""
+
+    def replaced(bodies: Bodies) -> dict[str, LoadedSpatialBody]:
+        return {name: replace(body, spatial=spatial.get(name, body.spatial)) for name, body in bodies.items()}
+
+    return _unsolved(replace(solution, bodies=replaced(solution.bodies), parts=replaced(solution.parts)))
+
+
+def with_scene_in_space(solution: SpatialSolution, scene: SpatialScene) -> SpatialSolution:
+    """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
+    return _unsolved(replace(solution, scene=scene))
+
+
+def with_pieces_in_space(solution: SpatialSolution, counts: Mapping[str, int], watcher: Watcher) -> SpatialSolution:
+    """The scene with the bodies named in so many pieces each, nothing solved yet: equations are those of the pieces."""
+    divided = bodies_in_pieces_in_space(solution.scene, counts)
+    if not divided and not solution.divided:
+        return solution
+    parts: dict[str, LoadedSpatialBody] = {}
+    if divided:
+        scene = scene_of_pieces_in_space(solution.scene, divided)
+        own = {name: body for name, body in solution.bodies.items() if name not in divided}
+        new = scene.model_copy(update={"body": tuple(body for body in scene.body if body.name not in own)})
+        loaded = load_spatial_bodies(new.model_copy(update={"pzt": ()}), watcher.stage)
+        parts = own | {body.name: part for body, part in zip(new.body, loaded, strict=True)}
+        parts = {body.name: parts[body.name] for body in scene.body}
+    return _unsolved(replace(solution, divided=divided, parts=parts))
+
+
+def _unsolved(solution: SpatialSolution) -> SpatialSolution:
+    model = _model(solution.scene, solution.bodies, solution.patches, solution.divided, solution.parts)
+    seconds = {"bodies": solution.seconds["bodies"]}
+    return replace(solution, model=model, analyses={}, seconds=seconds)
+
+
+def _model(
+    scene: SpatialScene,
+    bodies: Bodies,
+    patches: Mapping[str, LinkPatches],
+    divided: Mapping[str, BodyInPieces],
+    parts: Bodies,
+) -> SpatialModel:
+    """The equations, of pieces in place of their links, with the voltages that the scene gives to patches."""
+    if divided:
+        scene, bodies = scene_of_pieces_in_space(scene, divided), parts
+    model = build_spatial_model(scene, [body.spatial for body in bodies.values()])
+    return replace(model, modal_loads=tuple(given_voltages(model, patches)))

@@ -1,0 +1,263 @@
+"""Links in space in pieces: bent far in both planes and twisted, told as the one link, and in the plane as there."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_bvp
+
+import ffrobot
+from ffrobot.common.errors import InputError
+from ffrobot.common.rotations import of_quaternion, of_rpy
+from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.fe_models.pieces import cut
+
+BENT_AND_TWISTED = ["in-plane-bending", "out-of-plane-bending", "torsion"]
+RPY = (0.3, -0.4, 0.7)
+SIDE = 0.01  # m, of the square section
+SOFT = 1e9
+EI = SOFT * SIDE**4 / 12
+
+
+def link(modulus=SOFT, condition="cantilever", width=SIDE, **keys):
+    section = {"shape": "rectangle", "height": SIDE, "width": width}
+    return {
+        "name": "link",
+        "material": {"youngs_modulus": modulus, "poissons_ratio": 0.3, "density": 2700.0},
+        "geometry": {"kind": "beam", "length": 1.0, "section": section},
+        "mesh": {"elements": 16},
+        "reference": {"condition": condition},
+        "modes": {"count": 8, "family": BENT_AND_TWISTED},
+    } | keys
+
+
+def solved(body, pieces=None, **keys):
+    divided = {} if pieces is None else {"pieces": pieces}
+    bodies = body if isinstance(body, list) else [{"name": "beam", "link": body} | divided]
+    tables = {
+        "name": "pieces",
+        "space": "spatial",
+        "gravity": [0.0, 0.0, 0.0],
+        "body": bodies,
+        "joint": [{"name": "wall", "type": "weld", "between": ["ground", "beam.root"], "rpy": RPY}],
+        "analysis": [{"name": "rest", "kind": "static"}],
+    }
+    return ffrobot.solve(ffrobot.make_scene(**(tables | keys)))
+
+
+def elastica(k):
+    """Tip (2,) m and slope of an inextensible cantilever under a force k EI/L² across, L = 1: θ″ = −k cos θ."""
+
+    def slopes(_s, y):
+        return [y[1], -k * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])]
+
+    def ends(a, b):
+        return [a[0], b[1], a[2], a[3]]
+
+    s = np.linspace(0.0, 1.0, 101)
+    found = solve_bvp(slopes, ends, s, np.array([s, 1 - s, s, 0 * s]), tol=1e-10, max_nodes=100_000)
+    return found.y[2:, -1], found.y[0, -1]
+
+
+@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+def test_elastica_in_an_oblique_plane(condition):
+    """A tip force across that bends the link by half its length: to second order of the pieces, at any angle."""
+    A, angle, k = of_rpy(*RPY), 0.8, 2.0
+    (x, w), theta = elastica(k)
+    across = np.array([0.0, np.cos(angle), np.sin(angle)])
+    exact = A @ (x * np.array([1.0, 0.0, 0.0]) + w * across)
+    tangent = A @ (np.cos(theta) * np.array([1.0, 0.0, 0.0]) + np.sin(theta) * across)
+    force = dict(zip("xyz", map(repr, (A @ across * k * EI).tolist()), strict=True))
+    off, turned = [], []
+    for pieces in (2, 4, 8):
+        with solved(link(condition=condition), pieces, load=[{"point": "beam.tip", **force}]) as results:
+            off.append(np.linalg.norm(results["rest/points/beam.tip/position"][0] - exact))
+            section = of_quaternion(results["rest/points/beam.tip/quaternion"][0])
+            turned.append(np.linalg.norm(section[:, 0] - tangent))
+            assert results.attributes("rest/bodies/beam")["pieces"] == pieces
+    assert off[0] < 1e-2  # one frame is off by a quarter of the length
+    for errors in (off, turned):
+        orders = np.log2(np.array(errors[:-1]) / errors[1:])
+        assert np.all(orders > 1.8)
+        assert np.all(orders < 2.4)
+
+
+def test_a_moment_about_an_oblique_axis_bends_to_a_circle_and_twists():
+    """Torque T along the axis alone: twist T L/GJ as by one link; a moment M across alone: a circle of radius EI/M."""
+    with solved(link(), 3, load=[{"point": "beam.tip", **moment(of_rpy(*RPY) @ [0.02, 0.0, 0.0])}]) as results:
+        section = of_rpy(*RPY).T @ of_quaternion(results["rest/points/beam.tip/quaternion"][0])
+        GJ = (
+            SOFT / 2.6 * 0.1406 * SIDE**4
+        )  # of a square: 0.1406 a⁴ (Roark's Formulas for Stress and Strain, table 10.1)
+        assert np.arctan2(section[2, 1], section[1, 1]) == pytest.approx(0.02 / GJ, rel=1e-3)
+    angle, turn = 0.8, 1.2
+    axis = np.array([0.0, -np.sin(angle), np.cos(angle)])
+    with solved(link(), 12, load=[{"point": "beam.tip", **moment(of_rpy(*RPY) @ axis * turn * EI)}]) as results:
+        tip = of_rpy(*RPY).T @ results["rest/points/beam.tip/position"][0]
+    across = np.array([0.0, np.cos(angle), np.sin(angle)])
+    exact = np.array([np.sin(turn) / turn, 0.0, 0.0]) + across * (1 - np.cos(turn)) / turn
+    assert np.linalg.norm(tip - exact) < 5e-4  # a twelfth of turn²/24 in twelve pieces
+
+
+def moment(vector):
+    return dict(zip(("mx", "my", "mz"), map(repr, np.asarray(vector).tolist()), strict=True))
+
+
+STIFF = 5e11
+LAW = "(10*t**3-15*t**4+6*t**5)"
+
+
+def arm(pieces, **keys):
+    """Two links of which the second turns in a plane that is not the first's, under a load, driven."""
+    divided = {} if pieces is None else {"pieces": pieces}
+    tube = link(STIFF, keys.pop("condition", "cantilever"), 0.02)
+    bodies = [{"name": name, "link": tube | {"name": name}, **divided} for name in ("upper", "fore")]
+    return solved(
+        bodies,
+        gravity=[0.0, 0.0, -9.81],
+        joint=[
+            {"name": "waist", "type": "revolute", "between": ["ground", "upper.root"], "axis": [0.0, 0.0, 1.0]},
+            {"name": "elbow", "type": "revolute", "between": ["upper.tip", "fore.root"], "axis": [0.0, -1.0, 0.0]},
+        ],
+        payload=[{"point": "fore.tip", "mass": 0.2, "center": [0.0, 0.05, 0.0]}],
+        load=[{"point": "upper.mid", "z": "-2.0"}],
+        trajectory=[{"name": "tip", "point": "fore.tip", "y": f"0.4*{LAW}", "z": f"0.3-0.4*{LAW}"}],
+        initial={"state": "static", "joints": {"elbow": 0.3}},
+        **keys,
+    )
+
+
+INVERSE = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.02, "tolerance": 1e-6}
+
+
+def test_a_stiff_arm_in_pieces_is_that_of_the_links():
+    """The same names, shapes and numbers as without, to what bending by 1 % of the length makes."""
+    again = {"name": "again", "kind": "forward", "actuation": "inverse", "apply": "trajectory"}
+    analyses = [INVERSE | {"end": 0.3}, again]
+    with arm(None, analysis=analyses) as one, arm(3, analysis=analyses) as three:
+        assert one.columns("inverse").keys() == three.columns("inverse").keys()
+        assert one.columns("again").keys() == three.columns("again").keys()
+        for key in ("joints/waist/moment", "joints/elbow/moment", "joints/elbow/reaction", "bodies/fore/modal_force"):
+            found, expected = three[f"inverse/{key}"], one[f"inverse/{key}"]
+            assert np.abs(found - expected).max() < 1e-2 * np.abs(expected).max(), key
+        for key in ("bodies/fore/position", "bodies/fore/quaternion", "points/upper.mid/position", "bodies/fore/modal"):
+            found, expected = three[f"inverse/{key}"], one[f"inverse/{key}"]
+            assert np.abs(found - expected).max() < 3e-3, key
+        there, back = (three[f"{name}/points/fore.tip/position"] for name in ("inverse", "again"))
+        assert np.abs(there - back).max() < 1e-5
+        energy = sum(three[f"inverse/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
+        assert np.isfinite(energy).all()
+
+
+@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+def test_rates_of_the_one_link_are_derivatives(condition):
+    """R, e and p of the link as found from the pieces, and the velocities that are told beside them."""
+    fine = INVERSE | {"end": 0.4, "output_step": 0.0005}
+    with arm(2, condition=condition, analysis=[fine]) as results:
+        body = {key: results[f"inverse/bodies/fore/{key}"] for key in results.names("inverse/bodies/fore")}
+        time = results["inverse/time"]
+        deflection = results["inverse/points/fore.mid/deflection"]
+        position = results["inverse/points/fore.mid/position"]
+    step = time[2] - time[0]
+    for key, rate in (("position", "velocity"), ("modal", "modal_velocity")):
+        difference = (body[key][2:] - body[key][:-2]) / step
+        size = np.abs(body[rate]).max()
+        np.testing.assert_allclose(difference, body[rate][1:-1], rtol=0, atol=2e-2 * size, err_msg=key)
+    A = of_quaternion(body["quaternion"])
+    spin = (A[2:] - A[:-2]) / step @ np.swapaxes(A[1:-1], -1, -2)
+    found = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+    size = np.abs(body["angular_velocity"]).max()
+    np.testing.assert_allclose(found, body["angular_velocity"][1:-1], rtol=0, atol=1e-3 * size)
+    again = body["position"] + np.einsum("tij,tj->ti", A, np.array([0.5, 0.0, 0.0]) + deflection)
+    np.testing.assert_allclose(again, position, rtol=0, atol=1e-12)
+
+
+def test_pieces_are_those_of_the_plane():
+    """A double pendulum in pieces in space, and in the plane of links cut by hand and welded, without stiffening.
+
+    At rest the same but for rounding. Where it falls the plane raises the mass of attachment modes, space does not: the
+    links' fast vibrations differ.
+    """
+    soft = link(5e9, modes={"count": 8, "family": "in-plane-bending"})
+    runs = [
+        {"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.05, "tolerance": 1e-6},
+        {"name": "rest", "kind": "static"},
+    ]
+    hinge = {"type": "revolute", "motor": False}
+    joints = [
+        hinge | {"name": "O", "between": ["ground", "first.root"]},
+        hinge | {"name": "A", "between": ["first.tip", "second.root"]},
+    ]
+    in_space = [joint | {"axis": [0.0, 0.0, 1.0]} for joint in joints]
+    bodies = [{"name": name, "link": soft, "pieces": 2} for name in ("first", "second")]
+    tables = cut(LinkTable(soft, Path("link.toml")), 2).tables
+    by_hand = [{"name": f"{name}{k}", "link": dict(tables[k].keys)} for name in ("first", "second") for k in range(2)]
+    welds = [
+        {"name": name, "type": "weld", "between": [f"{name}0.tip", f"{name}1.root"]} for name in ("first", "second")
+    ]
+    planar_joints = [
+        hinge | {"name": "O", "between": ["ground", "first0.root"]},
+        hinge | {"name": "A", "between": ["first1.tip", "second0.root"]},
+    ]
+    angles = {body["name"]: -1.2 for body in by_hand}
+    wind = {"x": "0.4", "y": "-0.1"}
+    planar = ffrobot.make_scene(
+        name="by_hand", gravity=[0.0, -9.81], body=by_hand, joint=planar_joints + welds,
+        load=[{"point": "second1.tip", **wind}], initial={"angles": angles}, analysis=runs,
+    )  # fmt: skip
+    load = [{"point": "second.tip", **wind}]
+    keys = {"load": load, "initial": {"joints": {"O": -1.2}}, "analysis": runs}
+    spatial = solved(bodies, gravity=[0.0, -9.81, 0.0], joint=in_space, **keys)
+    with spatial, ffrobot.solve(planar) as plane:
+        for analysis, share in (("rest", 1e-8), ("fall", 5e-4)):
+            for point, by in (
+                ("first.tip", "first1.tip"),
+                ("second.tip", "second1.tip"),
+                ("second.mid", "second0.tip"),
+            ):
+                found, expected = (of[f"{analysis}/points/{at}/position"] for of, at in ((spatial, point), (plane, by)))
+                np.testing.assert_allclose(found[:, :2], expected, rtol=0, atol=share)
+                assert np.abs(found[:, 2]).max() < 1e-9
+        for joint in "OA":
+            found, expected = (of[f"rest/joints/{joint}/reaction"] for of in (spatial, plane))
+            np.testing.assert_allclose(found[:, :2], expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+
+
+def test_auto_takes_as_many_as_the_deflection_needs():
+    """More for a soft link than for a stiff one, none for one that hardly bends: tips to 1e-3 of the length."""
+    (x, w), _ = elastica(2.0)
+    exact = of_rpy(*RPY) @ [x, w, 0.0]
+    force = dict(zip("xyz", map(repr, (of_rpy(*RPY)[:, 1] * 2.0 * EI).tolist()), strict=True))
+    with solved(link(), "auto", load=[{"point": "beam.tip", **force}]) as results:
+        assert 10 <= results.attributes("rest/bodies/beam")["pieces"] <= 20
+        assert np.linalg.norm(results["rest/points/beam.tip/position"][0] - exact) < 1e-3
+    with solved(link(1e3 * SOFT), "auto", load=[{"point": "beam.tip", **force}]) as results:
+        assert "pieces" not in results.attributes("rest/bodies/beam")
+
+
+MISTAKES = {
+    r'body "beam": expected "pieces" beside "link" alone, found "modes"': {
+        "body": [{"name": "beam", "link": link(), "pieces": 2, "modes": 2}]
+    },
+    r'motors: expected "section" beside bodies in pieces \("beam"\), found "frame"': {"motors": "frame"},
+    r'kind: expected one of "pcid", "forward", "static" beside bodies in pieces \("beam"\) in space, found "linear"': {
+        "analysis": [{"name": "poles", "kind": "linear"}]
+    },
+    r'body: expected one that is not in pieces, found "beam": not available in space yet': {
+        "pzt": [{"body": "beam", "count": 2, "length": 0.05, "width": 0.01, "thickness": 1e-3, "modulus": 6e10,
+                 "d31": 1e-10, "allocation": "least-squares"}]
+    },
+    r"damping: expected none or rayleigh = \[0.0, b\] of a body in pieces": {
+        "body": [{"name": "beam", "link": link(damping={"ratio": 0.01}), "pieces": 2}]
+    },
+    r'modes.family: expected "in-plane-bending", "out-of-plane-bending" among those of a body in pieces': {
+        "body": [{"name": "beam", "link": link(modes={"count": 2, "family": ["torsion"]}), "pieces": 2}]
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message", MISTAKES)
+def test_what_cannot_be_in_pieces_is_refused(message):
+    body = [{"name": "beam", "link": link(), "pieces": 2}]
+    with pytest.raises(InputError, match=message):
+        solved(**({"body": body} | MISTAKES[message]))
