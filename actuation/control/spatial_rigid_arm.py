@@ -113,4 +113,5 @@ def _rigid(body: SpatialBody) -> SpatialBody:
     return replace(
         body, S_bar=none, I_bar=np.zeros((3, 3, 0)), S_bar_kl=np.zeros((3, 3, 0, 0)), h_spin=np.zeros(0),
         S_spin=empty, stiffness=np.zeros(0), damping=empty, points=MappingProxyType(points), modal_transform=empty,
+        stiffening=None,
     )  # fmt: skip

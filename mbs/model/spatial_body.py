@@ -12,6 +12,8 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
+from . import spatial_stiffening
+from .spatial_stiffening import SpatialStiffening
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,7 @@ class SpatialBody:
         points: its sections by name.
         modal_transform: (n_file, n) p of the modal file is this times p.
         length: of a link in m; None of a rigid body.
+        stiffening: what bending does to second order; left out of the equations where None.
     """
 
     name: str
@@ -62,6 +65,7 @@ class SpatialBody:
     points: Mapping[str, SpatialPoint]
     modal_transform: Array
     length: float | None = None
+    stiffening: SpatialStiffening | None = None
 
     @property
     def n_modes(self) -> int:
@@ -95,12 +99,20 @@ class SpatialBody:
         return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
 
 
-def from_modal_body(name: str, body: ModalBody) -> SpatialBody:
-    """All modes of a modal body.
+def from_modal_body(name: str, body: ModalBody, stiffened: bool = False) -> SpatialBody:
+    """All modes of a modal body; `stiffened`: with geometric stiffening.
 
     Raises:
-        InputError: the file of a beam does not say what inertia it has about its own axis.
+        InputError: the file of a beam does not say what inertia it has about its own axis; it has to be stiffened, and
+            the file does not say how.
     """
+    stiffening = spatial_stiffening.from_modal_body(body) if stiffened else None
+    if stiffened and stiffening is None:
+        raise InputError(
+            "geometric_stiffening: expected modal bodies with the geometric stiffness of all accelerations"
+            f' (geometric_stiffness/t_x to omega_yz), found none in that of "{name}": make it again from its link file'
+            " with `ffrobot link`"
+        )
     J_spin, h_spin, S_spin = _spin_inertia(name, body)
     S_bar_kl = body.S_bar_kl.copy()
     S_bar_kl[2, 2] -= S_spin
@@ -125,6 +137,7 @@ def from_modal_body(name: str, body: ModalBody) -> SpatialBody:
         ),
         modal_transform=np.eye(len(omega)),
         length=body.length,
+        stiffening=stiffening,
     )
 
 

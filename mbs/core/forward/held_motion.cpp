@@ -46,7 +46,7 @@ using namespace recursion;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-const std::string head = "ffrobot held motion 1\n"; // another number wherever fields() change
+const std::string head = "ffrobot held motion 2\n"; // another number wherever fields() change
 
 VectorXd joined(const VectorXd &q, const VectorXd &v) {
   VectorXd y(q.size() + v.size());

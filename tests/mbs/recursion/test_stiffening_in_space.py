@@ -111,7 +111,6 @@ def test_energy_and_momentum_of_points():
     np.testing.assert_allclose(found.angular_momentum, angular, rtol=1e-11)
 
 
-
 def test_derivatives_by_differences():
     """Dual numbers through the same equations; quaternions aside, which are turned as without stiffening."""
     rng = np.random.default_rng(8)
@@ -141,4 +140,6 @@ def test_derivatives_by_differences():
         "rate_q": slope(lambda e: model.measure(q + e, v)[1]),
     }
     for key, expected in by.items():
-        np.testing.assert_allclose(getattr(found, key), expected, rtol=0, atol=2e-8 * np.abs(expected).max(), err_msg=key)
+        np.testing.assert_allclose(
+            getattr(found, key), expected, rtol=0, atol=2e-8 * np.abs(expected).max(), err_msg=key
+        )
