@@ -113,5 +113,5 @@ def _rigid(body: SpatialBody) -> SpatialBody:
     return replace(
         body, S_bar=none, I_bar=np.zeros((3, 3, 0)), S_bar_kl=np.zeros((3, 3, 0, 0)), h_spin=np.zeros(0),
         S_spin=empty, stiffness=np.zeros(0), damping=empty, points=MappingProxyType(points), modal_transform=empty,
-        reduction=None, attachment_modes=0,
+        reduction=None, attachment_modes=0, stiffening=None,
     )  # fmt: skip

@@ -36,6 +36,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         write_head(file, solution.scene.name, solution.scene.text, solution.bodies)
         file.attrs["space"] = "spatial"
+        file.attrs["geometric_stiffening"] = solution.scene.geometric_stiffening
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
             _write_analysis(file.create_group(name), solution, result)

@@ -11,6 +11,7 @@ from ..actuation.patches.spatial_patches import by_body, link_patches
 from ..actuation.patches.spatial_records import SpatialPztLayout
 from ..actuation.patches.spatial_structure import structure_effect_in_space, with_patches_in_space
 from ..actuation.patches.structure import StructureEffect
+from ..common.errors import of_file
 from ..fe_models.link_records import FAMILIES
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.model.spatial_body import SpatialBody, from_modal_body, rigid_body
@@ -41,11 +42,13 @@ def load_spatial_bodies(scene: SpatialScene, stage: Callable[[str], None]) -> li
     Raises `InputError` for files that are none, and payloads and patches that do not fit.
     """
     patches = dict(by_body(scene.pzt))
-    bodies = [(body.name, _with_payloads(scene, _loaded(body, stage))) for body in scene.body]
+    with of_file(scene.path):
+        loaded = [_loaded(body, scene.geometric_stiffening, stage) for body in scene.body]
+    bodies = [(body.spatial.name, _with_payloads(scene, body)) for body in loaded]
     return [_patched(scene, loaded, patches[name]) if name in patches else loaded for name, loaded in bodies]
 
 
-def _loaded(body: BodyInSpace, stage: Callable[[str], None]) -> LoadedSpatialBody:
+def _loaded(body: BodyInSpace, stiffened: bool, stage: Callable[[str], None]) -> LoadedSpatialBody:
     if body.rigid is not None:
         rigid = body.rigid
         points = {name: np.array(position) for name, position in rigid.points.items()}
@@ -53,13 +56,14 @@ def _loaded(body: BodyInSpace, stage: Callable[[str], None]) -> LoadedSpatialBod
         return LoadedSpatialBody(spatial=made)
     if body.modal is not None:
         modal = read_modal_body(body.modal)
-        return LoadedSpatialBody(spatial=from_modal_body(body.name, modal), modal=modal, path=body.modal)
+        made = from_modal_body(body.name, modal, stiffened)
+        return LoadedSpatialBody(spatial=made, modal=modal, path=body.modal)
     from ..fe_models.link import cached_modal_body
 
     assert body.link is not None
     outcome = cached_modal_body(body.link, stage)
     return LoadedSpatialBody(
-        spatial=from_modal_body(body.name, outcome.body),
+        spatial=from_modal_body(body.name, outcome.body, stiffened),
         modal=outcome.body, path=outcome.path, computed=outcome.computed, reused=outcome.reused,
     )  # fmt: skip
 

@@ -28,7 +28,6 @@ from .kinds import KINDS, AnalysisInSpace
 
 # Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
 UNAVAILABLE = {
-    "": ("geometric_stiffening",),
     "load": ("force",),
 }
 
@@ -190,6 +189,11 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
         if not joint.units and getattr(joint, "motor", False):
             yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
     for layout in scene.pzt:
+        if layout.adds_mass and scene.geometric_stiffening:
+            yield (
+                'geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link'
+                f' between its interfaces, found those of "{layout.label}"'
+            )
         if layout.coupling != "rotation":
             yield f'pzt "{layout.label}": coupling: expected "rotation", found "surface": not available in space yet'
     for k, load in enumerate(scene.load, 1):

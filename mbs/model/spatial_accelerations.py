@@ -15,6 +15,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.rotations import left_jacobian, left_jacobian_rate
+from .spatial_bending import bent_section, curvature
 from .spatial_model import SpatialModel, SpatialRow
 from .spatial_tree import Motion, Node, Section, SpatialTree
 
@@ -88,13 +89,19 @@ class Accelerated:
         p, p_dot, p_2dot = self.q[:, node.p_q], self.v[:, node.p_v], self.a[:, node.p_v]
         if not section.point:
             return _Bent(*np.zeros((5, len(p), 3)))
-        at = node.body.points[section.point]
-        phi, phi_dot, phi_2dot = (x @ at.rotation.T for x in (p, p_dot, p_2dot))
-        J_l = left_jacobian(phi)
+        at, (bending, turning) = bent_section(node.body, section.point, p), curvature(node.body, section.point, p_dot)
+        u_dot, phi_dot = _times(at.u_p, p_dot), _times(at.phi_p, p_dot)
+        u_2dot, phi_2dot = _times(at.u_p, p_2dot) - bending, _times(at.phi_p, p_2dot) - turning
+        J_l = left_jacobian(at.phi)
         spin = np.einsum("tij,tj->ti", J_l, phi_dot)
-        spin_rate = np.einsum("tij,tj->ti", J_l, phi_2dot) + left_jacobian_rate(phi, phi_dot)
-        u, u_dot, u_2dot = at.position + p @ at.translation.T, p_dot @ at.translation.T, p_2dot @ at.translation.T
-        return _Bent(*(np.einsum("tij,tj->ti", A, x) for x in (u, u_dot, u_2dot, spin, spin_rate)))
+        spin_rate = np.einsum("tij,tj->ti", J_l, phi_2dot) + left_jacobian_rate(at.phi, phi_dot)
+        return _Bent(*(np.einsum("tij,tj->ti", A, x) for x in (at.u, u_dot, u_2dot, spin, spin_rate)))
+
+
+def _times(by_modes: Array, x: Array) -> Array:
+    """Rows (3, n) or (T, 3, n) times x (T, n)."""
+    found: Array = np.einsum("...in,...n->...i", by_modes, x)
+    return found
 
 
 class _Bent(NamedTuple):

@@ -12,6 +12,8 @@ from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
+from . import spatial_stiffening
+from .spatial_stiffening import SpatialStiffening
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class SpatialBody:
         length: of a link in m; None of a rigid body.
         reduction: where it has fewer modes than its file.
         attachment_modes: how many of the n, after all others, are static shapes of loads at interfaces.
+        stiffening: what bending does to second order; left out of the equations where None.
     """
 
     name: str
@@ -66,6 +69,7 @@ class SpatialBody:
     length: float | None = None
     reduction: Reduction | None = None
     attachment_modes: int = 0
+    stiffening: SpatialStiffening | None = None
 
     @property
     def n_modes(self) -> int:
@@ -155,15 +159,24 @@ def transformed(body: SpatialBody, T: Array, stiffness: Array) -> SpatialBody:
             }
         ),
         modal_transform=body.modal_transform @ T,
+        stiffening=body.stiffening and body.stiffening.transformed(T),
     )
 
 
-def from_modal_body(name: str, body: ModalBody) -> SpatialBody:
-    """All modes of a modal body.
+def from_modal_body(name: str, body: ModalBody, stiffened: bool = False) -> SpatialBody:
+    """All modes of a modal body; `stiffened`: with geometric stiffening.
 
     Raises:
-        InputError: the file of a beam does not say what inertia it has about its own axis.
+        InputError: the file of a beam does not say what inertia it has about its own axis; it has to be stiffened, and
+            the file does not say how.
     """
+    stiffening = spatial_stiffening.from_modal_body(body) if stiffened else None
+    if stiffened and stiffening is None:
+        raise InputError(
+            "geometric_stiffening: expected modal bodies with the geometric stiffness of all accelerations"
+            f' (geometric_stiffness/t_x to omega_yz), found none in that of "{name}": make it again from its link file'
+            " with `ffrobot link`"
+        )
     J_spin, h_spin, S_spin = _spin_inertia(name, body)
     S_bar_kl = body.S_bar_kl.copy()
     S_bar_kl[2, 2] -= S_spin
@@ -189,6 +202,7 @@ def from_modal_body(name: str, body: ModalBody) -> SpatialBody:
         modal_transform=np.eye(len(omega)),
         length=body.length,
         attachment_modes=int(body.residual.sum()),
+        stiffening=stiffening,
     )
 
 

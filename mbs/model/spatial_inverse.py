@@ -13,6 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from .spatial_accelerations import Accelerated, Acceleration
+from .spatial_bending import affine_motions
 from .spatial_body import SpatialBody
 from .spatial_model import SpatialModel
 from .spatial_transmission import gear_forces, resistance, rotor_forces
@@ -41,6 +42,7 @@ def body_forces(node: Node, state: Accelerated, of_frame: Acceleration, gravity:
 
     m R̈ + A (ω̇ × s + ω × (ω × s) + 2 ω × S̄ṗ + S̄p̈) − m g; s × Aᵀ(R̈ − g) + J ω̇ + h p̈ + J̇ ω + ω × (J ω + h ṗ);
     p̈ + S̄ᵀAᵀ(R̈ − g) + hᵀω̇ − ½ ω_i ω_j ∂J_ij/∂p − 2 ω_a H_a ṗ + K p + D ṗ. But for m R̈, all in axes of the body.
+    With geometric stiffening, less what affine fields have of this, and with what they have to second order.
     """
     body, frame = node.body, state.frames[state.tree.index[node.body.name]]
     A, omega = frame.F, state.velocity(frame)[1]
@@ -57,6 +59,10 @@ def body_forces(node: Node, state: Accelerated, of_frame: Acceleration, gravity:
     modal = p_2dot + pull @ body.S_bar + np.einsum("tin,ti->tn", h, w_dot) + body.stiffness * p
     modal = modal + p_dot @ body.damping.T - 0.5 * np.einsum("ti,tj,tijn->tn", w, w, slope)
     modal = modal - 2 * np.einsum("ta,tan->tn", w, Hp_dot)
+    if body.stiffening is not None:
+        for sign, motion in zip((1.0, -1.0), affine_motions(body, p), strict=True):
+            along, about, on_modes = motion.forces(motion.accelerations(pull, w_dot, w, p_dot, p_2dot))
+            force, moment, modal = force + sign * along, moment + sign * about, modal + sign * on_modes
     return BodyForces(np.einsum("tij,tj->ti", A, force), np.einsum("tij,tj->ti", A, moment), modal)
 
 

@@ -27,6 +27,9 @@ def with_payload(body: SpatialBody, point: str, mass: float, center: Array, iner
     E = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     added = attached_integrals(mass, x, E, Phi, phi)
     loaded = _with_integrals(body, added)
+    if body.stiffening is not None:
+        stiffening = body.stiffening.with_payload(point, at.position, phi, mass, center, E)
+        loaded = replace(loaded, stiffening=stiffening)
     return _uncoupled(loaded, np.eye(body.n_modes) + mass * Phi.T @ Phi + phi.T @ inertia @ phi)
 
 

@@ -232,3 +232,10 @@ def _check_points(scene: SpatialMechanismScene, bodies: dict[str, SpatialBody]) 
                 f'{scene.path}: {reference.key}: expected a point of "{body}" ({quoted(known)}), found'
                 f' "{reference.name}"{did_you_mean(point, known)}'
             )
+        stiffening = bodies[body].stiffening
+        if stiffening is not None and point not in stiffening.K_points:
+            raise InputError(
+                f"{scene.path}: {reference.key}: expected, with geometric_stiffening, a point whose loads' geometric"
+                f" stiffness is in the modal body file ({quoted(stiffening.K_points)}), found"
+                f' "{reference.name}"'
+            )

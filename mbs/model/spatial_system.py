@@ -26,7 +26,8 @@ MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
 
 def _moves(node: Node) -> bool:
     """Whether modes move the section of the body at its joint."""
-    return bool(np.any(_rows_of(node.body, node.outer)[0]))
+    Phi, _, K = _rows_of(node.body, node.outer)
+    return bool(np.any(Phi)) or any(bool(np.any(of_row)) for of_row in K)
 
 
 class Derivatives(NamedTuple):
@@ -84,7 +85,7 @@ class SpatialSystem:
             body.rotor_inertia, body.gear_ratio = _rotor(node)
             body.data = _data(node.body, self._markers[number])
             bodies.append(body)
-        ground = [_marker(section, np.zeros((6, 0)), section.position) for section in self._ground]
+        ground = [_marker(section, np.zeros((6, 0)), section.position, []) for section in self._ground]
         for number, _ in self._turning:
             ground[number].turns = True
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
@@ -286,20 +287,24 @@ def _data(body: SpatialBody, markers: list[Section]) -> _core.SpatialData:
         booked[2, 2] += body.S_spin
         data.S_bar_kl = [np.array(booked[k, l]) for k in range(3) for l in range(3)]  # noqa: E741
         data.h_spin, data.S_spin = np.array(body.h_spin), np.array(body.S_spin)
+    if body.stiffening is not None:
+        data.K_s = list(body.stiffening.K_s)
+        data.K_x = list(body.stiffening.K_x.reshape(9, body.n_modes, body.n_modes))
     data.J_spin = body.J_spin
     data.markers = [_marker(section, *_rows_of(body, section)) for section in markers]
     return data
 
 
-def _rows_of(body: SpatialBody, section: Section) -> tuple[Array, Array]:
-    """Φ over Φ_r (6, n) and the position (3,) of a section."""
+def _rows_of(body: SpatialBody, section: Section) -> tuple[Array, Array, list[Array]]:
+    """Φ over Φ_r (6, n) and the position (3,) of a section; six K (n, n) where it moves to second order."""
     if not section.point:
-        return np.zeros((6, body.n_modes)), np.zeros(3)
+        return np.zeros((6, body.n_modes)), np.zeros(3), []
     at = body.points[section.point]
-    return np.vstack([at.translation, at.rotation]), at.position
+    K = [] if body.stiffening is None else list(body.stiffening.K_points.get(section.point, []))
+    return np.vstack([at.translation, at.rotation]), at.position, K
 
 
-def _marker(section: Section, Phi: Array, position: Array) -> _core.SpatialMarker:
+def _marker(section: Section, Phi: Array, position: Array, K: list[Array]) -> _core.SpatialMarker:
     marker = _core.SpatialMarker()
-    marker.position, marker.triad, marker.Phi = np.array(position), np.array(section.triad), Phi
+    marker.position, marker.triad, marker.Phi, marker.K = np.array(position), np.array(section.triad), Phi, K
     return marker

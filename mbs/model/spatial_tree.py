@@ -18,6 +18,7 @@ from ..fields.field_types import GROUND, split_point
 from ..joints.spatial.free import SpatialFree
 from ..joints.spatial.joint import SpatialJoint
 from ..scene.topology import Topology
+from .spatial_bending import bent_section
 from .spatial_body import SpatialBody
 
 
@@ -194,13 +195,12 @@ class SpatialTree:
 
 
 def _bent(body: SpatialBody, section: Section, p: Array) -> tuple[Array, Array, Array, Array]:
-    """In body axes: u (…, 3), E (…, 3, 3) = exp φ~, Φ (3, n), and J_l Φ_r (…, 3, n), which gives the spin by ṗ."""
+    """In body axes: u (…, 3), E (…, 3, 3) = exp φ~, Φ (…, 3, n), and J_l Φ_r (…, 3, n), which gives the spin by ṗ."""
     if not section.point:
         zero, none = np.zeros((*p.shape[:-1], 3)), np.zeros((3, body.n_modes))
         return zero, np.broadcast_to(np.eye(3), (*p.shape[:-1], 3, 3)), none, none
-    at = body.points[section.point]
-    phi = p @ at.rotation.T
-    return at.position + p @ at.translation.T, exponential(phi), at.translation, left_jacobian(phi) @ at.rotation
+    at = bent_section(body, section.point, p)
+    return at.u, exponential(at.phi), at.u_p, left_jacobian(at.phi) @ at.phi_p
 
 
 def _free(body: str) -> SpatialFree:

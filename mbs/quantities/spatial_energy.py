@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array
+from ..model.spatial_bending import affine_motions, first_moment
 from ..model.spatial_inverse import bent_inertia
 from ..model.spatial_transmission import gear_energy, resistance, rotors
 from .spatial_motion import SpatialMotion
@@ -33,7 +34,8 @@ class Momentum:
 def energies(motion: SpatialMotion) -> Energies:
     """Of all bodies: ½ (m Ṙ² + ωᵀJω + ṗᵀṗ) + Ṙ·(ω × s + S̄ṗ) + ω·hṗ, in axes of the body; ½ pᵀKp; −g·(mR + As).
 
-    Gears that give store ½ k δ² beside.
+    Gears that give store ½ k δ² beside. With geometric stiffening, less what affine fields have of the kinetic energy,
+    and with what they have to second order.
     """
     count, gravity = len(motion.time), np.array(motion.model.scene.gravity)
     kinetic, strain, gravitational, dissipated = np.zeros((4, count))
@@ -44,6 +46,10 @@ def energies(motion: SpatialMotion) -> Energies:
         spin = np.einsum("tij,tj->ti", J, omega) + 2 * np.einsum("tin,tn->ti", h, p_dot)
         kinetic += 0.5 * np.sum(omega * spin, axis=1) + 0.5 * np.sum(p_dot * p_dot, axis=1)
         kinetic += np.sum(u * (0.5 * body.mass * u + np.cross(omega, s) + p_dot @ body.S_bar.T), axis=1)
+        if body.stiffening is not None:
+            bent, linear = (np.square(m.velocities(u, omega, p_dot)).sum(axis=(1, 2)) for m in affine_motions(body, p))
+            kinetic += 0.5 * (bent - linear)
+            s = first_moment(body, p)[0]
         strain += 0.5 * np.square(p) @ body.stiffness
         gravitational -= (body.mass * frame.r + np.einsum("tij,tj->ti", frame.F, s)) @ gravity
         dissipated += np.einsum("ti,ij,tj->t", p_dot, body.damping, p_dot)
@@ -64,6 +70,10 @@ def momentum(motion: SpatialMotion) -> Momentum:
         s, J, _, h = bent_inertia(body, p)
         own = body.mass * u + np.cross(omega, s) + p_dot @ body.S_bar.T
         spin = np.cross(s, u) + np.einsum("tij,tj->ti", J, omega) + np.einsum("tin,tn->ti", h, p_dot)
+        if body.stiffening is not None:
+            for sign, affine in zip((1.0, -1.0), affine_motions(body, p), strict=True):
+                along, about, _ = affine.forces(affine.velocities(u, omega, p_dot))
+                own, spin = own + sign * along, spin + sign * about
         own, spin = (np.einsum("tij,tj->ti", frame.F, x) for x in (own, spin))
         linear += own
         angular += spin + np.cross(frame.r, own)

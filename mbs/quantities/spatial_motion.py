@@ -15,6 +15,7 @@ from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import gears_of_motion
 from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_bending import bent_section
 from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
@@ -39,7 +40,7 @@ class BodyMotion:
 
 @dataclass(frozen=True)
 class PointMotion:
-    """Of a section: position (T, 3) m, deflection Φp (T, 3) m in body axes, quaternion (T, 4) of continuous sign."""
+    """Of a section: position (T, 3) m, deflection (T, 3) m in body axes, quaternion (T, 4) of continuous sign."""
 
     position: Array
     deflection: Array
@@ -117,7 +118,7 @@ class SpatialMotion:
         """Of the section "BODY.POINT"."""
         found, (body, _, label) = self.section(point), point.partition(".")
         node = self.node(body)
-        deflection = self.q[:, node.p_q] @ node.body.points[label].translation.T
+        deflection = bent_section(node.body, label, self.q[:, node.p_q]).u - node.body.points[label].position
         return PointMotion(found.r, deflection, continuous(quaternions(found.F)))
 
     def joint(self, name: str) -> tuple[Array, Array] | None:

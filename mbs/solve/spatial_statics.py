@@ -6,6 +6,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
+from ..model.spatial_bending import first_moment
 from ..model.spatial_inverse import given_forces
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_transmission import gear_forces
@@ -24,10 +25,12 @@ def forces_at_rest(model: SpatialModel, q: Array, t: float = 0.0) -> Array:
     frames, found = tree.frames(q), np.zeros((len(q), tree.n_v))
     for node, frame in zip(tree.nodes, frames, strict=True):
         p = q[:, node.p_q]
-        s = np.einsum("tij,tj->ti", frame.F, node.body.first_moment + p @ node.body.S_bar.T)
+        s_body, s_p = first_moment(node.body, p)
+        s = np.einsum("tij,tj->ti", frame.F, s_body)
         found += frame.L[:, :3].transpose(0, 2, 1) @ (node.body.mass * gravity)
         found += np.einsum("tij,ti->tj", frame.L[:, 3:], np.cross(s, gravity))
-        found[:, node.p_v] += np.einsum("tji,j->ti", frame.F, gravity) @ node.body.S_bar - node.body.stiffness * p
+        pull = np.einsum("tji,j->ti", frame.F, gravity)
+        found[:, node.p_v] += np.einsum("tin,ti->tn", s_p, pull) - node.body.stiffness * p
     found += gear_forces(tree, q, np.zeros_like(found))
     return found + given_forces(model, q, frames, np.full(len(q), t))
 

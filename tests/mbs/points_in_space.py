@@ -100,7 +100,10 @@ def quaternion_matrix(e):
 
 @dataclass
 class Body:
-    """Points (mass (k,), x (k, 3), Phi (k, 3, n)), markers, the joint; quantities as `SpatialBody` has them."""
+    """Points (mass (k,), x (k, 3), Phi (k, 3, n)), markers, the joint; quantities as `SpatialBody` has them.
+
+    With G (4, 3, n, n), points move by −½ pᵀ(G_0 + x G_1 + y G_2 + z G_3) p besides, and markers by −½ pᵀK p.
+    """
 
     mass: np.ndarray
     x: np.ndarray
@@ -113,10 +116,26 @@ class Body:
     parent_marker: int = 0
     inboard_marker: int = 0
     lead: float = 0.0
+    G: np.ndarray | None = None
+    K: list | None = None  # (6, n, n) by marker
 
     @property
     def n(self):
         return len(self.stiffness)
+
+    @property
+    def G_at_points(self):
+        fields = np.hstack([np.ones((len(self.x), 1)), self.x])
+        return np.einsum("if,flmn->ilmn", fields, self.G)
+
+    def marker(self, number, p, still=False):
+        """Where a marker is in the body's frame, and its axes; `still`: as if modes left it alone."""
+        position, triad, Phi = self.markers[number]
+        if not self.n or still:
+            return as_series(position), as_series(triad)
+        K = np.zeros((6, self.n, self.n)) if self.K is None else self.K[number]
+        moved = Phi_times(Phi, p) + curvature(K, p)
+        return moved[:3] + position, exponential(moved[3:]) @ triad
 
     def core(self, name):
         m, x, Phi, n = self.mass, self.x, self.Phi, self.n
@@ -127,10 +146,14 @@ class Body:
         data.S_bar = np.einsum("i,ikn->kn", m, Phi)
         data.I_bar = np.einsum("i,ik,iln->kln", m, x, Phi).reshape(9, n)
         data.S_bar_kl = list(np.einsum("i,ikm,iln->klmn", m, Phi, Phi).reshape(9, n, n))
+        if self.G is not None:
+            data.K_s = list(np.einsum("i,ilmn->lmn", m, self.G_at_points))
+            data.K_x = list(np.einsum("i,ik,ilmn->klmn", m, x, self.G_at_points).reshape(9, n, n))
         markers = []
-        for position, triad, rows in self.markers:
+        for k, (position, triad, rows) in enumerate(self.markers):
             marker = r.SpatialMarker()
             marker.position, marker.triad, marker.Phi = position, triad, rows
+            marker.K = [] if self.K is None else list(self.K[k])
             markers.append(marker)
         data.markers = markers
         body = r.SpatialBody()
@@ -171,16 +194,16 @@ class Mechanism:
             at = at + (R @ way if way is not None else 0.0)
             R = R @ turn
             p = stacked([z[p_v + k] + q[p_q + k] for k in range(body.n)]) if body.n else None
-            position, triad, Phi = body.markers[body.inboard_marker]
-            if body.joint == J.free:  # its coordinates are those of the frame, wherever the section is
-                Phi = 0 * Phi
-            local = exponential(Phi_times(Phi[3:], p)) @ triad if body.n else Series.constant(triad)
+            # Coordinates of a free body are those of its frame, wherever the section is.
+            position, local = body.marker(body.inboard_marker, p, still=body.joint == J.free)
             frame = R @ local.T
-            origin = at - frame @ (Phi_times(Phi[:3], p) + position if body.n else position)
+            origin = at - frame @ position
             frames.append((frame, origin, p))
             u = as_series(body.x)
             if body.n:
                 u = u + Series([np.tensordot(body.Phi, c, 1) for c in p.c])
+            if body.G is not None:
+                u = u + curvature(body.G_at_points, p)
             points.append(u @ frame.T + Series(origin.c[:, None]))
         return frames, points
 
@@ -190,10 +213,8 @@ class Mechanism:
             position, triad = self.ground[marker]
             return Series.constant(triad), Series.constant(position)
         frame, origin, p = frames[body]
-        position, triad, Phi = self.bodies[body].markers[marker]
-        if p is None:
-            return frame @ triad, origin + frame @ position
-        return frame @ exponential(Phi_times(Phi[3:], p)) @ triad, origin + frame @ (Phi_times(Phi[:3], p) + position)
+        position, triad = self.bodies[body].marker(marker, p)
+        return frame @ triad, origin + frame @ position
 
     def place(self, body, q, z):
         """Rotation and way of a joint."""
@@ -272,3 +293,9 @@ class Mechanism:
 
 def Phi_times(Phi, p):
     return Series([Phi @ c for c in p.c])
+
+
+def curvature(K, p):
+    """−½ pᵀK p, K (…, n, n)."""
+    square = p[:, None] * p[None]
+    return Series([-0.5 * np.tensordot(K, c, 2) for c in square.c])

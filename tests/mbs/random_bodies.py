@@ -9,10 +9,15 @@ def rotation(rng):
     return Q * np.linalg.det(Q)
 
 
-def random_body(rng, modes, joint, clamped=False, **keys):
-    """Points with random modes, dense damping, a root and two outer sections; `clamped`: modes leave the root alone."""
+def random_body(rng, modes, joint, clamped=False, curved=False, line=False, **keys):
+    """Points with random modes, dense damping, a root and two outer sections; `clamped`: modes leave the root alone.
+
+    `curved`: they move to second order besides, all but a clamped root; `line`: they are on a line.
+    """
     points = 10
     mass, x = rng.uniform(0.1, 0.4, points), rng.uniform([0, -0.1, -0.1], [1, 0.1, 0.1], (points, 3))
+    if line:
+        x = x[:, :1] * rotation(rng)[:, 0] + rng.standard_normal(3)
     Phi = rng.standard_normal((points, 3, modes)) * 0.5
     if modes:
         flat = Phi.reshape(3 * points, modes)
@@ -27,7 +32,17 @@ def random_body(rng, modes, joint, clamped=False, **keys):
         )
         for k in range(3)
     ]
-    return Body(mass, x, Phi, np.sort(rng.uniform(1, 60, modes)), C @ C.T, markers, joint, lead=0.13, **keys)
+    stiffness = np.sort(rng.uniform(1, 60, modes))
+    if curved and modes:
+        keys["G"] = symmetric(rng, 4, 3, modes) / modes
+        keys["K"] = [symmetric(rng, 6, modes) * (0 if clamped and k == 0 else 1 / modes) for k in range(3)]
+    return Body(mass, x, Phi, stiffness, C @ C.T, markers, joint, lead=0.13, **keys)
+
+
+def symmetric(rng, *shape):
+    """Matrices (*shape, n), n the last of `shape`, of numbers of order one."""
+    K = rng.standard_normal((*shape, shape[-1]))
+    return (K + K.swapaxes(-1, -2)) / 2
 
 
 def ground(rng, count=1):

@@ -13,26 +13,6 @@ from spatial_rows import Coordinates, RowState
 
 
 @dataclass
-class Stiffening:
-    """Second-order shapes u = x + Φp − ½pᵀGp by their integrals (section 4 of the formulation in space).
-
-    K_s (3, n, n) = ∫ρ G dV, K_omega (3, 3, n, n) symmetric in its first two, K_r (3, n, n); `points`: (6, n, n) of
-    forces and moments at a section, by its name.
-    """
-
-    K_s: np.ndarray
-    K_omega: np.ndarray
-    K_r: np.ndarray
-    points: dict
-
-
-def no_stiffening(body):
-    n = body.n_modes
-    zero = np.zeros((3, n, n))
-    return Stiffening(zero, np.zeros((3, 3, n, n)), zero, {label: np.zeros((6, n, n)) for label in body.points})
-
-
-@dataclass
 class Inertia:
     """s (3,), s_p (3, n), J (3, 3), J_p (3, 3, n) and h (3, n) of a bent body, in body axes."""
 
@@ -49,21 +29,23 @@ def coupling(body):
     return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
 
 
-def inertia(body, p, stiffening):
+def inertia(body, p):
     S = body.S_bar_kl
-    G = np.einsum("ij,kkmn->ijmn", np.eye(3), S) - 0.5 * (S + S.transpose(1, 0, 2, 3)) - stiffening.K_omega
+    G = np.einsum("ij,kkmn->ijmn", np.eye(3), S) - 0.5 * (S + S.transpose(1, 0, 2, 3))
     return Inertia(
-        s=body.first_moment + body.S_bar @ p - 0.5 * p @ stiffening.K_s @ p,
-        s_p=body.S_bar - stiffening.K_s @ p,
+        s=body.first_moment + body.S_bar @ p,
+        s_p=body.S_bar,
         J=body.inertia + body.inertia_slope @ p + p @ G @ p,
         J_p=body.inertia_slope + 2 * G @ p,
-        h=body.spin + p @ (coupling(body) - stiffening.K_r),
+        h=body.spin + p @ coupling(body),
     )
 
 
-def body_mass_matrix(body, A, p, stiffening):
+def body_mass_matrix(body, A, p):
     """M (6 + n, 6 + n): m_RR = mI, m_Rθ = −A s~, m_Rf = A S̄, m_θθ = J, m_θf = h, m_ff = I."""
-    at, n = inertia(body, p, stiffening), body.n_modes
+    if body.stiffening is not None:
+        return stiffened_mass_matrix(body, A, p)
+    at, n = inertia(body, p), body.n_modes
     coupled = -A @ skew(at.s)
     return np.block(
         [
@@ -74,18 +56,98 @@ def body_mass_matrix(body, A, p, stiffening):
     )
 
 
-def body_forces(body, A, p, omega, p_dot, g, stiffening):
+def body_forces(body, A, p, omega, p_dot, g):
     """Q (6 + n,): quadratic velocity forces, elastic forces, damping and gravity."""
-    at = inertia(body, p, stiffening)
-    K_s, K_r = stiffening.K_s, stiffening.K_r
+    if body.stiffening is not None:
+        return stiffened_forces(body, A, p, omega, p_dot, g)
+    at = inertia(body, p)
     s_dot, J_dot = at.s_p @ p_dot, at.J_p @ p_dot
-    Q_R = -A @ (np.cross(omega, np.cross(omega, at.s)) + 2 * np.cross(omega, s_dot) - p_dot @ K_s @ p_dot)
-    Q_theta = -J_dot @ omega - np.cross(omega, at.J @ omega + at.h @ p_dot) + p_dot @ K_r @ p_dot
+    Q_R = -A @ (np.cross(omega, np.cross(omega, at.s)) + 2 * np.cross(omega, s_dot))
+    Q_theta = -J_dot @ omega - np.cross(omega, at.J @ omega + at.h @ p_dot)
     Q_f = 0.5 * np.einsum("i,j,ijn->n", omega, omega, at.J_p)
     Q_f += 2 * np.einsum("a,amn,n->m", omega, coupling(body), p_dot)
     Q_f -= body.stiffness * p + body.damping @ p_dot
     pull = A.T @ g
     return np.concatenate([Q_R + body.mass * g, Q_theta + np.cross(at.s, pull), Q_f + at.s_p.T @ pull])
+
+
+# With geometric stiffening: u = x + Φp − ½ pᵀG p, G taken by its projection on affine fields. All motion of the body
+# along an axis is made of the shapes 1, x, y, z and Φ_c of axis c, whose products H are constant: M = TᵀHT.
+
+
+def products_of_shapes(body):
+    """H (3, 3, 4 + n, 4 + n) at [c, d]: ∫ρ of products of 1, x, y, z, Φ_c with 1, x, y, z, Φ_d."""
+    N = np.block([[np.array([[body.mass]]), body.first_moment[None]], [body.first_moment[:, None], body.second_moment]])
+    F = np.concatenate([body.S_bar[None], body.I_bar])  # (4, 3, n)
+    return np.array([[np.block([[N, F[:, d]], [F[:, c].T, body.S_bar_kl[c, d]]]) for d in range(3)] for c in range(3)])
+
+
+def affine_part(body):
+    """(4, 3, n, n): the affine field nearest to G under the mass, which has the integrals ∫ρG dV, ∫ρx_k G dV."""
+    N = products_of_shapes(body)[0, 0, :4, :4]
+    K = np.concatenate([body.stiffening.K_s[None], body.stiffening.K_x])
+    return np.einsum("ef,fcmn->ecmn", np.linalg.pinv(N, rcond=1e-12, hermitian=True), K)
+
+
+def position_by_shapes(body, p):
+    """U (3, 4 + n) at [c]: how much of 1, x, y, z, Φ_c there is in the position along c."""
+    second = -0.5 * np.einsum("m,ecmn,n->ce", p, affine_part(body), p)
+    straight = np.hstack([np.zeros((3, 1)), np.eye(3)])
+    return np.hstack([straight + second, np.tile(p, (3, 1))])
+
+
+def rates_by_shapes(body, p):
+    """(3, 4 + n, n): the derivatives of these by p."""
+    n = body.n_modes
+    first = -np.einsum("ecmn,n->cem", affine_part(body), p)
+    return np.concatenate([first, np.broadcast_to(np.eye(n), (3, n, n))], axis=1)
+
+
+def turned_shapes(omega, U):
+    """(3, 3, …) at [b, c]: ω × u along axis b by shapes of axis c."""
+    return np.einsum("bc,c...->bc...", skew(omega), U)
+
+
+def velocity_map(body, A, p):
+    """T (3, 3, 4 + n, 6 + n) at [b, c]: velocity along axis b of the body by shapes of axis c, from (Ṙ, ω̄, ṗ)."""
+    n = body.n_modes
+    U, T = position_by_shapes(body, p), np.zeros((3, 3, 4 + n, 6 + n))
+    for k, e in enumerate(np.eye(3)):
+        T[..., 3 + k] = turned_shapes(e, U)
+    for b, rates in enumerate(rates_by_shapes(body, p)):
+        T[b, b, 0, :3] = A[:, b]
+        T[b, b, :, 6:] = rates
+    return T
+
+
+def spinning(body):
+    """Matrix (6 + n, 6 + n) of the energy ½∫ρI_p (ω̄_x + φ̇)² dx that a line of mass has besides."""
+    M, n = np.zeros((6 + body.n_modes, 6 + body.n_modes)), body.n_modes
+    M[3, 3], M[3, 6:], M[6:, 3] = body.J_spin, body.h_spin, body.h_spin
+    M[6:, 6:] = body.S_spin if n else 0.0
+    return M
+
+
+def stiffened_mass_matrix(body, A, p):
+    T, H = velocity_map(body, A, p), products_of_shapes(body)
+    missing = np.eye(body.n_modes) - np.einsum("ccmn->mn", body.S_bar_kl) - body.S_spin  # nothing, but for rounding
+    assert np.abs(missing).max(initial=0.0) < 1e-9
+    return np.einsum("bcim,cdij,bdjk->mk", T, H, T) + spinning(body)
+
+
+def stiffened_forces(body, A, p, omega, p_dot, g):
+    """−TᵀH c, c what of the acceleration less gravity is by velocities: ω × (ω × u) + 2 ω × u̇ − ṗᵀG ṗ."""
+    T, H = velocity_map(body, A, p), products_of_shapes(body)
+    U, U_dot = position_by_shapes(body, p), rates_by_shapes(body, p) @ p_dot
+    c = np.einsum("ab,bc...->ac...", skew(omega), turned_shapes(omega, U)) + 2 * turned_shapes(omega, U_dot)
+    for b in range(3):
+        c[b, b, :4] -= np.einsum("m,emn,n->e", p_dot, affine_part(body)[:, b], p_dot)
+        c[b, b, 0] -= A[:, b] @ g
+    Q = -np.einsum("bcim,cdij,bdj->m", T, H, c)
+    spin = body.J_spin * omega[0] + body.h_spin @ p_dot
+    Q[3:6] -= np.cross(omega, [spin, 0.0, 0.0])
+    Q[6:] -= body.stiffness * p + body.damping @ p_dot
+    return Q
 
 
 @dataclass
@@ -108,8 +170,7 @@ class Mechanism:
     """Bodies under constraints.
 
     constraints: (row, target), target(t) = (d, ḋ, d̈) or None where the row is kept at zero; loads: (row, size(t));
-    modal_loads: (body name, vector (n,), size(t)); rotors: (row, inertia); frictions: (row, Friction). `stiffening` by
-    body name where it is in the equations.
+    modal_loads: (body name, vector (n,), size(t)); rotors: (row, inertia); frictions: (row, Friction).
     """
 
     bodies: list
@@ -119,13 +180,11 @@ class Mechanism:
     modal_loads: list = field(default_factory=list)
     rotors: list = field(default_factory=list)
     frictions: list = field(default_factory=list)
-    stiffening: dict = field(default_factory=dict)
 
     def __post_init__(self):
         self.gravity = np.array(self.gravity, dtype=float)
         self.coordinates = Coordinates([(body.name, body.n_modes) for body in self.bodies])
         self.size = self.coordinates.n_v
-        self.stiffening = {body.name: self.stiffening.get(body.name) or no_stiffening(body) for body in self.bodies}
 
     def body(self, name):
         return next(body for body in self.bodies if body.name == name)
@@ -146,7 +205,7 @@ class Mechanism:
         for body in self.bodies:
             i = self.coordinates.columns(body.name)
             _, e, p = self.coordinates.parts(q, body.name)
-            M[i, i] = body_mass_matrix(body, rotation(e), p, self.stiffening[body.name])
+            M[i, i] = body_mass_matrix(body, rotation(e), p)
         for row, J in self.rotors:
             gradient = self.row(row, q, np.zeros(self.size)).gradient
             M += J * np.outer(gradient, gradient)
@@ -158,7 +217,7 @@ class Mechanism:
         for body in self.bodies:
             _, e, p = self.coordinates.parts(q, body.name)
             _, omega, p_dot = self.coordinates.rates(v, body.name)
-            own = body_forces(body, rotation(e), p, omega, p_dot, self.gravity, self.stiffening[body.name])
+            own = body_forces(body, rotation(e), p, omega, p_dot, self.gravity)
             Q[self.coordinates.columns(body.name)] += own
         for row, size in self.loads:
             Q += self.row(row, q, v, t).gradient * size(t)
@@ -182,7 +241,8 @@ class Mechanism:
         (R, e, p), (_, omega, p_dot) = self.coordinates.parts(q, at.body), self.coordinates.rates(v, at.body)
         A, n = rotation(e), body.n_modes
         if at.point:
-            section, K = body.points[at.point], self.stiffening[at.body].points[at.point]
+            section = body.points[at.point]
+            K = np.zeros((6, n, n)) if body.stiffening is None else body.stiffening.at(at.point)
             x, Phi, Phi_r = section.position, section.translation, section.rotation
         else:
             x, Phi, Phi_r, K = np.zeros(3), np.zeros((3, n)), np.zeros((3, n)), np.zeros((6, n, n))
@@ -264,7 +324,9 @@ class Mechanism:
         strain = gravitational = 0.0
         for body in self.bodies:
             R, e, p = self.coordinates.parts(q, body.name)
-            s = inertia(body, p, self.stiffening[body.name]).s
+            s = inertia(body, p).s
+            if body.stiffening is not None:
+                s = s - 0.5 * p @ body.stiffening.K_s @ p
             strain += 0.5 * p @ (body.stiffness * p)
             gravitational -= (body.mass * R + rotation(e) @ s) @ self.gravity
         return np.array([0.5 * v @ self.mass_matrix(q) @ v, strain, gravitational])
@@ -274,10 +336,7 @@ class Mechanism:
         total = np.zeros(6)
         for body in self.bodies:
             R, e, p = self.coordinates.parts(q, body.name)
-            P = (
-                body_mass_matrix(body, rotation(e), p, self.stiffening[body.name])
-                @ v[self.coordinates.columns(body.name)]
-            )
+            P = body_mass_matrix(body, rotation(e), p) @ v[self.coordinates.columns(body.name)]
             total[:3] += P[:3]
             total[3:] += np.cross(R, P[:3]) + rotation(e) @ P[3:6]
         return total

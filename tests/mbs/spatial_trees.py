@@ -14,6 +14,7 @@ from spatial_oracle import Mechanism
 from spatial_rows import Ground, Joint, Section
 
 from ffrobot.mbs.model.spatial_body import SpatialBody, SpatialPoint, from_modal_body, rigid_body
+from ffrobot.mbs.model.spatial_stiffening import SpatialStiffening
 
 TYPES = ("revolute", "prismatic", "screw", "cylindrical", "universal", "spherical", "planar", "weld", "free")
 G = np.array([0.4, -1.1, -9.5])
@@ -75,6 +76,25 @@ def random_beam(rng, name, modes=(2, 2, 1, 1), condition="cantilever"):
         modal_transform=np.eye(n),
         length=length,
     )
+
+
+def symmetric(rng, *shape):
+    """Matrices (*shape, n), n the last of `shape`, of numbers of order one."""
+    K = rng.standard_normal((*shape, shape[-1]))
+    return (K + K.swapaxes(-1, -2)) / 2
+
+
+def stiffened(rng, body):
+    """With terms of second order that its mass can have: of an affine field, and any of its sections but the root's.
+
+    Sections that modes leave alone to first order stay where they are.
+    """
+    n = body.n_modes
+    N = np.block([[np.array([[body.mass]]), body.first_moment[None]], [body.first_moment[:, None], body.second_moment]])
+    K = np.einsum("ef,flmn->elmn", N, 0.3 * symmetric(rng, 4, 3, n)) if n else np.zeros((4, 3, 0, 0))
+    moved = {label: np.any(at.translation) or np.any(at.rotation) for label, at in body.points.items()}
+    points = {label: 0.3 * symmetric(rng, 6, n) * moves if n else np.zeros((6, 0, 0)) for label, moves in moved.items()}
+    return replace(body, stiffening=SpatialStiffening(K[0], K[1:], MappingProxyType(points)))
 
 
 class _shapes:  # noqa: N801 (reads as a function of x/length)
@@ -148,6 +168,9 @@ def random_body(rng, name, kinds=("rigid", "solid", "beam", "supported beam")):
         "solid": lambda: random_solid(rng, name),
         "beam": lambda: random_beam(rng, name),
         "supported beam": lambda: random_beam(rng, name, (2, 1, 0, 1), "simply-supported"),
+        "stiffened solid": lambda: stiffened(rng, random_solid(rng, name)),
+        "stiffened beam": lambda: stiffened(rng, random_beam(rng, name)),
+        "stiffened supported beam": lambda: stiffened(rng, random_beam(rng, name, (2, 1, 0, 1), "simply-supported")),
     }[kind]()
 
 

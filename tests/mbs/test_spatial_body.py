@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from spatial_checkpoints import modal_body
-from spatial_oracle import body_mass_matrix, no_stiffening
+from spatial_oracle import body_mass_matrix
+from spatial_trees import random_beam, stiffened
 
 from ffrobot.common.errors import InputError
+from ffrobot.common.rotations import exponential
+from ffrobot.mbs.model.spatial_bending import bent_section
 from ffrobot.mbs.model.spatial_body import from_modal_body, rigid_body
 from ffrobot.mbs.model.spatial_masses import with_payload
 
@@ -62,7 +65,7 @@ def test_payload_has_the_energy_of_a_body_on_the_section():
     A = np.eye(3)
 
     def energy(body, v):
-        return 0.5 * v @ body_mass_matrix(body, A, np.zeros(body.n_modes), no_stiffening(body)) @ v
+        return 0.5 * v @ body_mass_matrix(body, A, np.zeros(body.n_modes)) @ v
 
     at = bare.points["tip"]
     Omega = v[3:6] + at.rotation @ p_dot
@@ -72,3 +75,28 @@ def test_payload_has_the_energy_of_a_body_on_the_section():
     K = loaded.modal_transform.T @ np.diag(bare.stiffness) @ loaded.modal_transform
     np.testing.assert_allclose(K, np.diag(loaded.stiffness), atol=1e-9 * loaded.stiffness.max())
     assert np.all(loaded.stiffness < bare.stiffness * (1 + 1e-12))
+
+
+def test_payload_of_a_stiffened_body_moves_to_second_order():
+    """Integrals of G over points that turn with the section, from where they are at ±p: exp φ~ is not 1 + φ~."""
+    rng = np.random.default_rng(6)
+    bare = stiffened(rng, random_beam(rng, "b"))
+    m, d = rng.uniform(0.1, 0.4, 5), 0.1 * rng.standard_normal((5, 3))
+    center = m @ d / m.sum()
+    spread = np.einsum("i,ik,il->kl", m, d - center, d - center)
+    loaded = with_payload(bare, "tip", m.sum(), center, np.trace(spread) * np.eye(3) - spread)
+    T, h, x = loaded.modal_transform, 1e-4, bare.points["tip"].position
+
+    def points(p):
+        at = bent_section(bare, "tip", p)
+        return at.u + d @ exponential(at.phi).T
+
+    for p in rng.standard_normal((4, bare.n_modes)):
+        second = -(points(h * p) + points(-h * p) - 2 * points(0 * p)) / h**2  # pᵀG p of the points
+        p_loaded = np.linalg.solve(T, p)
+        for found, given, weights in (
+            (loaded.stiffening.K_s, bare.stiffening.K_s, m[None]),
+            (loaded.stiffening.K_x, bare.stiffening.K_x, m * (x + d).T),
+        ):
+            more = p_loaded @ found @ p_loaded - p @ given @ p
+            np.testing.assert_allclose(more.reshape(-1, 3), weights @ second, atol=1e-5 * np.abs(second).max())

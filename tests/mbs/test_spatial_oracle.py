@@ -1,15 +1,18 @@
 """The oracle in space against what it does not know: sums over points, differences, closed forms, turned scenes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import spatial_trees
 from mechanisms import relative
 from rotations import exponential, left_jacobian, left_jacobian_rate, logarithm, quaternion, random_rotation, rotation
-from spatial_oracle import Mechanism, Stiffening, body_forces, body_mass_matrix, no_stiffening
+from spatial_oracle import Mechanism, body_forces, body_mass_matrix
 from spatial_rows import UNIT, About, Along, Driven, Ground, Joint, Section, Spinning
-from spatial_trees import TYPES, G, Tree, random_solid, random_tree
+from spatial_trees import TYPES, G, Tree, random_solid, random_tree, stiffened, symmetric
 
 from ffrobot.mbs.model.spatial_body import from_modal_body, rigid_body
+from ffrobot.mbs.model.spatial_stiffening import SpatialStiffening
 
 MIXED = list(TYPES)
 
@@ -62,49 +65,54 @@ def test_equations_are_newtons_of_every_point(rng):
         force = m * (A.T @ (a[:3] - G) + own)
         residual += np.concatenate([A @ force, np.cross(u, force), Phi.T @ force])
     elastic = np.concatenate([np.zeros(6), body.stiffness * p + body.damping @ p_dot])
-    none = no_stiffening(body)
-    found = body_mass_matrix(body, A, p, none) @ a - body_forces(body, A, p, omega, p_dot, G, none) - elastic
+    found = body_mass_matrix(body, A, p) @ a - body_forces(body, A, p, omega, p_dot, G) - elastic
     assert relative(found, residual) < 1e-13
 
 
-def test_stiffened_equations_are_lagranges(rng):
-    """With shapes of second order: d/dt (∂T/∂v) against ∂T/∂q, in quasi-velocities, by differences of T alone."""
-    body, n = random_solid(rng, "b", 3), 3
+def test_stiffened_equations_are_newtons_of_every_point(rng):
+    """Of points that move by −½ pᵀG p besides, with G affine in x: its projection is itself."""
+    n = 4
+    cloud = spatial_trees.random_cloud(rng, "b", n=n)
+    G_fields = symmetric(rng, 4, 3, n) / n
+    fields = np.hstack([np.ones((len(cloud.x), 1)), cloud.x])
+    G_points = np.einsum("if,flmn->ilmn", fields, G_fields)
+    K = np.einsum("i,if,ilmn->flmn", cloud.mass, fields, G_points)
+    body = replace(from_modal_body("b", cloud.modal_body()), stiffening=SpatialStiffening(K[0], K[1:], {}))
+    A, p, omega, p_dot = random_rotation(rng), *(rng.standard_normal(k) for k in (n, 3, n))
+    a = rng.standard_normal(6 + n)
+    alpha, p_2dot = a[3:6], a[6:]
+    residual, energy = np.zeros(6 + n), 0.0
+    for m, x, Phi, K_x in zip(cloud.mass, cloud.x, cloud.Phi, G_points, strict=True):
+        u, Phi_p = x + Phi @ p - 0.5 * p @ K_x @ p, Phi - K_x @ p
+        u_dot = Phi_p @ p_dot
+        own = np.cross(omega, np.cross(omega, u)) + 2 * np.cross(omega, u_dot) + np.cross(alpha, u)
+        own = own + Phi_p @ p_2dot - p_dot @ K_x @ p_dot
+        force = m * (A.T @ (a[:3] - G) + own)
+        residual += np.concatenate([A @ force, np.cross(u, force), Phi_p.T @ force])
+        energy += 0.5 * m * np.sum((A.T @ a[:3] + np.cross(omega, u) + u_dot) ** 2)
+    elastic = np.concatenate([np.zeros(6), body.stiffness * p + body.damping @ p_dot])
+    M = body_mass_matrix(body, A, p)
+    assert relative(M @ a - body_forces(body, A, p, omega, p_dot, G) - elastic, residual) < 1e-13
+    v = np.concatenate([a[:3], omega, p_dot])
+    assert 0.5 * v @ M @ v == pytest.approx(energy, rel=1e-13)
 
-    def symmetric(*shape):
-        K = 0.05 * rng.standard_normal((*shape, n, n))
-        return K + K.swapaxes(-1, -2)
 
-    K_omega = symmetric(3, 3)
-    stiffening = Stiffening(symmetric(3), 0.5 * (K_omega + K_omega.transpose(1, 0, 2, 3)), symmetric(3), {})
-    e, p = quaternion(random_rotation(rng)), rng.standard_normal(n)
-    v, a, h = rng.standard_normal(6 + n), rng.standard_normal(6 + n), 1e-5
+@pytest.mark.parametrize("make", [random_solid, spatial_trees.random_beam], ids=["solid", "beam"])
+def test_stiffened_equations_with_nothing_of_second_order_are_the_plain_ones(rng, make):
+    plain = make(rng, "b")
+    n = plain.n_modes
+    zero = replace(plain, stiffening=SpatialStiffening(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), {}))
+    A, p, omega, p_dot = random_rotation(rng), *(rng.standard_normal(k) for k in (n, 3, n))
+    assert relative(body_mass_matrix(zero, A, p), body_mass_matrix(plain, A, p)) < 1e-13
+    assert relative(body_forces(zero, A, p, omega, p_dot, G), body_forces(plain, A, p, omega, p_dot, G)) < 1e-13
 
-    def state(s):  # along a motion with v and a at s = 0
-        turn = s * v[3:6] + s**2 / 2 * a[3:6]
-        return rotation(e) @ exponential(turn), p + s * v[6:] + s**2 / 2 * a[6:], v + s * a
 
-    def momentum(s):
-        A, p, v = state(s)
-        return body_mass_matrix(body, A, p, stiffening) @ v
-
-    def energy(turn, dp):
-        M = body_mass_matrix(body, rotation(e) @ exponential(turn), p + dp, stiffening)
-        return 0.5 * v @ M @ v
-
-    P, dP = momentum(0.0), (momentum(h) - momentum(-h)) / (2 * h)
-    slope = [
-        *((energy(h * k, np.zeros(n)) - energy(-h * k, np.zeros(n))) / (2 * h) for k in np.eye(3)),
-        *((energy(np.zeros(3), h * k) - energy(np.zeros(3), -h * k)) / (2 * h) for k in np.eye(n)),
-    ]
-    # Boltzmann–Hamel: in quasi-velocities ω̄ the moment of momentum turns with the body.
-    inertial = (
-        dP - np.concatenate([np.zeros(3), slope]) + np.concatenate([np.zeros(3), np.cross(v[3:6], P[3:6]), np.zeros(n)])
-    )
-    elastic = np.concatenate([np.zeros(6), body.stiffness * p + body.damping @ v[6:]])
-    A = rotation(e)
-    M, Q = body_mass_matrix(body, A, p, stiffening), body_forces(body, A, p, v[3:6], v[6:], np.zeros(3), stiffening)
-    assert relative(M @ a - Q - elastic, inertial) < 1e-8
+@pytest.mark.parametrize("make", [random_solid, spatial_trees.random_beam], ids=["solid", "beam"])
+def test_mass_matrices_stay_positive_definite_however_far_bodies_bend(rng, make):
+    body = stiffened(rng, make(rng, "b"))
+    for size in (0.1, 1.0, 10.0):
+        M = body_mass_matrix(body, np.eye(3), size * rng.standard_normal(body.n_modes))
+        assert np.linalg.eigvalsh(M).min() > 0
 
 
 # Rows.

@@ -76,6 +76,31 @@ def test_modes_accelerate_as_the_oracle_says(joint):
     assert compared
 
 
+STIFFENED = ("stiffened solid", "stiffened beam", "stiffened supported beam")
+
+
+@pytest.mark.parametrize("joint", TYPES)
+def test_stiffened_modes_accelerate_as_the_oracle_says(joint):
+    """Free bodies hang on sections that do not move: beams alone."""
+    kinds = ("stiffened beam",) if joint == "free" else STIFFENED
+    rng = np.random.default_rng(TYPES.index(joint))
+    for _ in range(4):
+        found, nodes, _ = systems(random_tree(rng, [joint] * 2, kinds, chain=True, size=SMALL))
+        assert_same(found, nodes)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_trees_of_stiffened_bodies(seed):
+    """Beside plain and rigid ones."""
+    rng = np.random.default_rng(seed)
+    types = [joint for joint in TYPES if joint != "free"]
+    chosen = [types[k] for k in rng.integers(len(types), size=4)]
+    tree = random_tree(rng, chosen, ("rigid", "solid", *STIFFENED), size=SMALL)
+    found, nodes, (mechanism, q, v) = systems(tree)
+    np.testing.assert_allclose(found.energy[0], mechanism.energies(q, v), rtol=1e-11)
+    assert_same(found, nodes)
+
+
 def test_forces_and_moments_at_points_over_time():
     """Along global axes, two loads on one section, where modes move and turn it."""
     rng = np.random.default_rng(11)

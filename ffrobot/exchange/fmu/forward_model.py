@@ -9,6 +9,8 @@ import numpy as np
 
 from ...actuation.patches.spatial_patches import LinkPatches
 from ...common.arrays import Array
+from ...common.errors import InputError
+from ...common.validation import quoted
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
 from ...mbs.model.spatial_model import SpatialModel, modal_direction
@@ -36,6 +38,11 @@ def held_unit(model: SpatialModel, patches: Mapping[str, LinkPatches], analysis:
 
     Raises `InputError` and `SolveError` as the analysis itself does.
     """
+    if stiffened := [node.body.name for node in model.tree.nodes if node.body.stiffening is not None]:
+        raise InputError(
+            f"{model.scene.path}: geometric_stiffening: expected false of a scene exported as an FMU, whose points move"
+            f" by the modes alone, found true, with {quoted(stiffened)}: not available yet"
+        )
     data, start = SpatialSystem(model).held_model(), initial_state(model)
     data.q, data.v = start.q, start.v
     data.method = METHODS[integrator_of(model, analysis.integrator)]

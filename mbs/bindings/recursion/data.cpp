@@ -24,6 +24,7 @@ void bind_data(nb::module_ &m) {
       .def_rw("position", &SpatialMarker::position)
       .def_rw("triad", &SpatialMarker::triad)
       .def_rw("Phi", &SpatialMarker::Phi)
+      .def_rw("K", &SpatialMarker::K)
       .def_rw("turns", &SpatialMarker::turns);
   nb::class_<PlanarData>(m, "PlanarData")
       .def(nb::init<>())
@@ -48,6 +49,8 @@ void bind_data(nb::module_ &m) {
       .def_rw("S_bar", &SpatialData::S_bar)
       .def_rw("I_bar", &SpatialData::I_bar)
       .def_rw("S_bar_kl", &SpatialData::S_bar_kl)
+      .def_rw("K_s", &SpatialData::K_s)
+      .def_rw("K_x", &SpatialData::K_x)
       .def_rw("J_spin", &SpatialData::J_spin)
       .def_rw("h_spin", &SpatialData::h_spin)
       .def_rw("S_spin", &SpatialData::S_spin)

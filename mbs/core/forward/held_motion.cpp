@@ -10,11 +10,11 @@ namespace ffrobot {
 namespace recursion {
 
 template <class Archive> void fields(Archive &a, SpatialMarker &x) {
-  archived_all(a, x.position, x.triad, x.Phi, x.turns);
+  archived_all(a, x.position, x.triad, x.Phi, x.K, x.turns);
 }
 template <class Archive> void fields(Archive &a, SpatialData &x) {
-  archived_all(a, x.mass, x.first_moment, x.J2, x.stiffness, x.damping, x.S_bar, x.I_bar, x.S_bar_kl, x.J_spin,
-               x.h_spin, x.S_spin, x.spin_axis, x.spin_booked, x.markers);
+  archived_all(a, x.mass, x.first_moment, x.J2, x.stiffness, x.damping, x.S_bar, x.I_bar, x.S_bar_kl, x.K_s, x.K_x,
+               x.J_spin, x.h_spin, x.S_spin, x.spin_axis, x.spin_booked, x.markers);
 }
 template <class Archive> void fields(Archive &a, BodyModel<SpatialData> &x) {
   archived_all(a, x.name, x.parent, x.parent_marker, x.inboard_marker, x.joint, x.lead, x.rotor_inertia, x.gear_ratio,
@@ -46,7 +46,7 @@ using namespace recursion;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-const std::string head = "ffrobot held motion 1\n"; // another number wherever fields() change
+const std::string head = "ffrobot held motion 2\n"; // another number wherever fields() change
 
 VectorXd joined(const VectorXd &q, const VectorXd &v) {
   VectorXd y(q.size() + v.size());

@@ -28,6 +28,13 @@ Eigen::MatrixXd section_rows(const SpatialMarker &marker) {
   return rows;
 }
 
+// Whether they have terms of second order along one of them
+bool is_curved(const PlanarData &, const PlanarMarker &, int) { return false; }
+bool is_curved(const SpatialData &data, const SpatialMarker &marker, int row) {
+  const std::vector<Eigen::MatrixXd> K = spatial::section_K(marker);
+  return !K.empty() && K[static_cast<std::size_t>(row)].cwiseAbs().maxCoeff() > spatial::negligible_K(data);
+}
+
 PlanarData at_marker(const PlanarData &data, const PlanarMarker &m) { return planar::moved(data, m.position, m.angle); }
 SpatialData at_marker(const SpatialData &data, const SpatialMarker &m) {
   return spatial::moved(data, m.position, m.triad);
@@ -55,10 +62,27 @@ template <class Space> bool frame_sits_at_joint(const BodyModel<typename Space::
     const bool counts = !is_free || asked || (body.joint == JointKind::universal && c == 3) ||
                         (body.joint == JointKind::screw && c == 5); // turns and slides together
     const double scale = 1 / std::sqrt(std::max(body.data.mass, 1e-300));
-    if (counts && rows.row(c).cwiseAbs().maxCoeff() > 1e-12 * scale)
+    if (counts && (rows.row(c).cwiseAbs().maxCoeff() > 1e-12 * scale || is_curved(body.data, marker, c)))
       return false;
   }
   return true;
+}
+
+void check_stiffening(const std::string &, const PlanarData &) {}
+void check_stiffening(const std::string &name, const SpatialData &data) {
+  const auto n = data.modes();
+  const auto check = [&](const char *key, const std::vector<Eigen::MatrixXd> &all, std::size_t count) {
+    bool fits = all.size() == count;
+    for (const Eigen::MatrixXd &K : all)
+      fits = fits && K.rows() == n && K.cols() == n;
+    if (!fits)
+      refuse(name + ": " + key + ": expected " + std::to_string(count) + " matrices (" + std::to_string(n) + ", " +
+             std::to_string(n) + ")");
+  };
+  const bool stiffened = spatial::is_stiffened(data);
+  check("K_s", data.K_s, stiffened ? 3 : 0), check("K_x", data.K_x, stiffened ? 9 : 0);
+  for (const SpatialMarker &marker : data.markers)
+    check("K of a marker", marker.K, stiffened && !marker.K.empty() ? 6 : 0);
 }
 
 template <class Data>
@@ -80,6 +104,7 @@ void check(const BodyModel<Data> &body, std::size_t index, std::size_t ground_ma
     if (body.data.modes() && (marker.Phi.rows() != dim || marker.Phi.cols() != body.data.modes()))
       refuse(name + ": Phi of a marker: expected (" + std::to_string(dim) + ", " + std::to_string(body.data.modes()) +
              ")");
+  check_stiffening(name, body.data);
   if (body.rotor_inertia > 0 && body.joint != JointKind::revolute)
     refuse(name + ": rotor_inertia: expected a revolute joint under a rotor");
 }

@@ -22,7 +22,8 @@ struct SpatialMarker {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Matrix3d triad = Eigen::Matrix3d::Identity(); // columns: its axes
   Eigen::MatrixXd Phi;                                 // (6, n)
-  bool turns = false; // of the ground: its axes follow an orientation in time; rows alone may attach there
+  std::vector<Eigen::MatrixXd> K; // six (n, n): it moves and turns by -1/2 p^T K p besides; empty: it does not
+  bool turns = false;             // of the ground: its axes follow an orientation in time; rows alone may attach there
 };
 
 // Empty matrices are zero; an empty m_xy is the identity.
@@ -46,6 +47,9 @@ struct SpatialData {
   Eigen::MatrixXd S_bar;                        // (3, n)
   Eigen::MatrixXd I_bar;                        // (9, n), row 3 k + l: integral of x_k S_l dm
   std::array<Eigen::MatrixXd, 9> S_bar_kl;      // (n, n), 3 k + l
+  // Geometric stiffening, empty without: points move by -1/2 p^T G p besides. Integrals of G_l dm (3) and, at 3 k + l,
+  // of x_k G_l dm (9), each (n, n) and symmetric.
+  std::vector<Eigen::MatrixXd> K_s, K_x;
   // Rotary inertia that a line of mass has not, of spin about `spin_axis`: J_s, h_s (n), S_s (n, n), with S_s booked in
   // S_bar_kl as motion along `spin_booked` (formulation of Euler-Bernoulli links).
   double J_spin = 0;

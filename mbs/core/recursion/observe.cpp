@@ -25,15 +25,19 @@ Matrix3d axes(const Pose<double> &frame) {
 std::pair<Vector3d, Vector3d> parts(const planar::State<double> &s) { return {{s.A[0], s.A[1], 0}, {0, 0, s.A[2]}}; }
 std::pair<Vector3d, Vector3d> parts(const spatial::State<double> &s) { return {vector(s.A), vector(s.A + 3)}; }
 
-// Of one body: s and M_rr of the frame (translation, rotation; body axes), m p_dot (linear, angular)
+// Of one body: s and M_rr of the frame (translation, rotation; body axes), m p_dot (linear, angular), 1/2 p_dot^T m_ff
+// p_dot
 struct Inertia {
   double mass;
   Vector3d s, S_p_dot, h_p_dot;
   Matrix3d J;
+  double modal;
 };
 
+double half_square(int n, const double *v) { return 0.5 * Eigen::Map<const Eigen::VectorXd>(v, n).squaredNorm(); }
+
 Inertia inertia_of(const planar::Body &b, const double *p, const double *v, planar::State<double> &s) {
-  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero()};
+  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
   inertia(b, p, v, s);
   to.s << b.sx, b.sy, 0;
   to.J(2, 2) = b.J;
@@ -46,8 +50,8 @@ Inertia inertia_of(const planar::Body &b, const double *p, const double *v, plan
   return to;
 }
 
-Inertia inertia_of(const spatial::Body &b, const double *, const double *, spatial::State<double> &s) {
-  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero()};
+Inertia inertia_of(const spatial::Body &b, const double *, const double *v, spatial::State<double> &s) {
+  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
   spatial::FrameTerms<double> frame;
   inertia(b, s, frame);
   to.s = vector(s.s);
@@ -56,6 +60,8 @@ Inertia inertia_of(const spatial::Body &b, const double *, const double *, spati
       to.J(i, j) = frame.J[i][3 + j];
   if (b.n) {
     to.S_p_dot = vector(s.u_dot.data()), to.h_p_dot = vector(s.h_rate);
+    if (b.stiffening)
+      to.modal += spatial::bending_energy(b, s);
   }
   return to;
 }
@@ -109,11 +115,10 @@ Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Works
                    omega = R.transpose() * vector(w.frames[i].omega);
     const Vector3d linear = body.mass * u + omega.cross(body.s) + body.S_p_dot;
     const Vector3d angular = body.s.cross(u) + body.J * omega + body.h_p_dot;
-    sum.kinetic += 0.5 * (u.dot(linear) + omega.dot(angular) + u.dot(body.S_p_dot) + omega.dot(body.h_p_dot));
-    for (int k = 0; k < node.n(); ++k) {
-      sum.kinetic += 0.5 * p_dot[k] * p_dot[k];
+    sum.kinetic +=
+        0.5 * (u.dot(linear) + omega.dot(angular) + u.dot(body.S_p_dot) + omega.dot(body.h_p_dot)) + body.modal;
+    for (int k = 0; k < node.n(); ++k)
       sum.strain += 0.5 * node.body.K[static_cast<std::size_t>(k)] * p[k] * p[k];
-    }
     sum.gravitational -= g.dot(body.mass * r + R * body.s);
     sum.momentum += R * linear;
     sum.angular_momentum += R * angular + r.cross(R * linear);

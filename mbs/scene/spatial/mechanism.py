@@ -30,6 +30,8 @@ class SpatialMechanismKeys(Record):
     """Acceleration of gravity, m/s², global axes."""
     motors: Literal["section", "frame"] = "section"
     """What motors turn: the sections at the joint, or the frames of the bodies."""
+    geometric_stiffening: bool = False
+    """Loads change the stiffness of links."""
     redundancy: Literal["least-torque", "least-motion"] | None = None
     """What settles the freedom that trajectories leave to joints, found with undeformed links: from the state at t = 0
     on the least integral of the squares of motor moments over the whole motion, or at every time the least sum of

@@ -31,7 +31,42 @@ MatrixXd complete_I_bar(const SpatialData &data) {
   return I_bar;
 }
 
+// x_k = R_kl y_l of matrices
+std::vector<MatrixXd> turned(const Matrix3d &R, const MatrixXd *y) {
+  std::vector<MatrixXd> x;
+  for (int k = 0; k < 3; ++k)
+    x.push_back(R(k, 0) * y[0] + R(k, 1) * y[1] + R(k, 2) * y[2]);
+  return x;
+}
+
+std::vector<MatrixXd> turned_K(const Matrix3d &R, const SpatialMarker &marker) {
+  if (marker.K.empty())
+    return {};
+  std::vector<MatrixXd> K = turned(R, marker.K.data()), moments = turned(R, marker.K.data() + 3);
+  K.insert(K.end(), moments.begin(), moments.end());
+  return K;
+}
+
+// Integrals with G about another point, along other axes
+void move_stiffening(const SpatialData &data, const Vector3d &position, const Matrix3d &R, SpatialData &to) {
+  to.K_s = turned(R, data.K_s.data());
+  std::vector<MatrixXd> about_axes; // x_k along R, G along the old axes
+  for (int k = 0; k < 3; ++k)
+    for (std::size_t l = 0; l < 3; ++l) {
+      MatrixXd sum = MatrixXd::Zero(data.modes(), data.modes());
+      for (std::size_t i = 0; i < 3; ++i)
+        sum += R(k, static_cast<Index>(i)) * (data.K_x[3 * i + l] - position[static_cast<Index>(i)] * data.K_s[l]);
+      about_axes.push_back(sum);
+    }
+  to.K_x.clear();
+  for (std::size_t k = 0; k < 3; ++k)
+    for (MatrixXd &K : turned(R, about_axes.data() + 3 * k))
+      to.K_x.push_back(std::move(K));
+}
+
 } // namespace
+
+std::vector<MatrixXd> section_K(const SpatialMarker &marker) { return turned_K(marker.triad.transpose(), marker); }
 
 SpatialData moved(const SpatialData &data, const Vector3d &position, const Matrix3d &triad) {
   SpatialData to = data;
@@ -62,7 +97,10 @@ SpatialData moved(const SpatialData &data, const Vector3d &position, const Matri
         to.S_bar_kl[static_cast<std::size_t>(3 * k + l)] = sum;
       }
   }
+  if (is_stiffened(data))
+    move_stiffening(data, position, R, to);
   for (SpatialMarker &marker : to.markers) {
+    marker.K = turned_K(R, marker);
     marker.position = R * (marker.position - position);
     marker.triad = R * marker.triad;
     if (n) {
@@ -78,11 +116,21 @@ Body::Body(const SpatialData &data, const std::vector<int> &used) : n(static_cas
   for (int i = 0; i < 3; ++i)
     s0[i] = data.first_moment[i];
   width = lanes * (1 + static_cast<int>(used.size()));
+  if (n && is_stiffened(data))
+    stiffening = std::make_shared<const Stiffening>(data, used);
   fill_rows(data, used, complete_I_bar(data));
   fill_residuals(data, used);
   fill_damping(data);
   if (n)
     fill_tensors(moved(data, Vector3d::Zero(), data.axes), data.axes);
+}
+
+// Whether rows from this one on, of a port, have terms of second order
+bool Body::is_curved(int row) const {
+  for (int r = row; stiffening && r < row + 6; ++r)
+    if (stiffening->at_ports[static_cast<std::size_t>(r - lanes)].kind != ModeMatrix::Kind::zero)
+      return true;
+  return false;
 }
 
 // Rows of W, and ports
@@ -105,7 +153,7 @@ void Body::fill_rows(const SpatialData &data, const std::vector<int> &used, cons
     if (n) {
       all.middleRows<3>(port.row) = marker.triad.transpose() * marker.Phi.topRows<3>();
       all.middleRows<3>(port.row + 3) = marker.triad.transpose() * marker.Phi.bottomRows<3>();
-      port.is_soft = marker.Phi.cwiseAbs().maxCoeff() > negligible / std::sqrt(mass);
+      port.is_soft = marker.Phi.cwiseAbs().maxCoeff() > negligible / std::sqrt(mass) || is_curved(port.row);
     }
     ports.push_back(port);
   }
@@ -147,7 +195,7 @@ void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used)
     X << R, -R * tilde(marker.position), Matrix3d::Zero(), R;
     for (int r = 0; r < 6; ++r)
       for (int c = 0; c < 6; ++c)
-        ports[i].T[r][c] = static_cast<double>(X(r, c) - gram_(ports[i].row + r, c));
+        ports[i].T[r][c] = stiffening ? X(r, c) : static_cast<double>(X(r, c) - gram_(ports[i].row + r, c));
   }
 }
 

@@ -15,18 +15,19 @@
 #include "core/recursion/model.h"
 #include "core/recursion/small.h"
 #include "core/recursion/spatial/mode_matrix.h"
+#include "core/recursion/spatial/stiffening.h"
+
+#include <memory>
 
 namespace ffrobot::recursion::spatial {
 
 using Matrix = double[3][3];
 
-constexpr int lanes = 8; // that rows of six take in memory
-
 struct Port {
   double r[3] = {};              // undeformed, body axes
   Matrix R = {};                 // its axes, undeformed: columns
   int row = 8;                   // its first in W
-  double T[6][lanes] = {};       // X - P m^T of the undeformed body
+  double T[6][lanes] = {};       // X - P m^T of the undeformed body; with geometric stiffening, X
   double turning[3][lanes] = {}; // axes of the section, in the place of alpha
   bool is_soft = false;          // some row of Phi is not zero
 };
@@ -61,14 +62,16 @@ struct Body {
   bool is_damped = false;
   Eigen::MatrixXd D_full; // damping where it is not diagonal
   std::vector<Port> ports;
-  std::vector<Stretch> stretches; // at most six
-  double tension[6][lanes] = {};  // of w_x^2, w_y^2, w_z^2, w_x w_y, w_y w_z, w_z w_x: by stretches
-  std::vector<Twist> twists;      // at most three; none: m_thetaf does not change
+  std::vector<Stretch> stretches;               // at most six
+  double tension[6][lanes] = {};                // of w_x^2, w_y^2, w_z^2, w_x w_y, w_y w_z, w_z w_x: by stretches
+  std::vector<Twist> twists;                    // at most three; none: m_thetaf does not change
+  std::shared_ptr<const Stiffening> stiffening; // null without
 
   int row_count() const { return width; }
   const double *gram(int r, int c) const { return G.data() + r * width + c; }
 
 private:
+  bool is_curved(int row) const;
   void fill_rows(const SpatialData &data, const std::vector<int> &used, const Eigen::MatrixXd &I_bar);
   void fill_residuals(const SpatialData &data, const std::vector<int> &used);
   void fill_damping(const SpatialData &data);
@@ -77,5 +80,8 @@ private:
 
 // The same body with its frame at `position`, its axes the columns of `triad`.
 SpatialData moved(const SpatialData &data, const Eigen::Vector3d &position, const Eigen::Matrix3d &triad);
+
+// K of a marker along its axes, six or none
+std::vector<Eigen::MatrixXd> section_K(const SpatialMarker &marker);
 
 } // namespace ffrobot::recursion::spatial

@@ -1,7 +1,7 @@
 // The inertia of a spatial body with its modes eliminated, and the forces on it.
 #pragma once
 
-#include "core/recursion/spatial/state.h"
+#include "core/recursion/spatial/bent.h"
 
 namespace ffrobot::recursion::spatial {
 
@@ -35,6 +35,8 @@ template <class T> inline void project(const Body &b, const T *p, const T *v, co
     s.p[k] = p[k], s.v[k] = v[k];
   apply_W<2, T>(b, {s.p.data(), s.v.data()}, {s.u.data(), s.u_dot.data()});
   modal_forces(b, force, s);
+  if (b.stiffening)
+    bend(b, s);
   for (std::size_t i = 0; i < b.ports.size(); ++i)
     if (b.ports[i].is_soft) {
       PortMotion<T> &m = s.ports[i];
@@ -44,12 +46,6 @@ template <class T> inline void project(const Body &b, const T *p, const T *v, co
       turn_section(m);
     }
 }
-
-// What becomes of a body in its frame's six equations: J (in the place of alpha), M_rr - m m^T, -(Q_r - m Q_f)
-template <class T> struct FrameTerms {
-  Pack<T, 6> J[3], M[6];
-  T bias[6];
-};
 
 // J and M are sums over stretches of T_s' = (tr T) I - T: J grows by T_s' (2 g_s + G_s p).p, at twice the rate of
 // F = sum of T_s' b_s.p_dot; centrifugal forces on modes are (w.T_s' w) b_s.
@@ -181,7 +177,6 @@ template <class T> inline void inertia(const Body &b, State<T> &s, FrameTerms<T>
     for (int i = 0; i < 3; ++i)
       s.s[i] += s.u[i], s.h_rate[i] = s.u_dot[Body::h + i];
     stretch(b, s, E, F), twist(b, s);
-    apply_W<1, T>(b, {s.Q_f.data()}, {s.Q.data()});
     const T w2[3] = {2. * s.omega[0], 2. * s.omega[1], 2. * s.omega[2]};
     int i = 0;
     for (const Stretch &of : b.stretches) {
@@ -189,6 +184,9 @@ template <class T> inline void inertia(const Body &b, State<T> &s, FrameTerms<T>
         add_scaled(E[i], of.inertia[r], to.J[r]), add_scaled(F[i] * w2[r], of.inertia[r], Fw);
       ++i;
     }
+    if (b.stiffening)
+      return bent_inertia(b, s, Fw, to);
+    apply_W<1, T>(b, {s.Q_f.data()}, {s.Q.data()});
   }
   frame_inertia(b, s, to), frame_bias(b, s, Fw, to);
   if (b.n)

@@ -13,6 +13,7 @@
 
 namespace ffrobot::recursion::spatial {
 
+constexpr int lanes = 8; // that rows of six take in memory
 constexpr int modes_at_once = 8;
 constexpr int padded(int n) { return (n + modes_at_once - 1) / modes_at_once * modes_at_once; }
 

@@ -56,9 +56,12 @@ template <class T> FFROBOT_INLINE void port_by_frame(const Body &b, int i, const
     add_scaled(du[i3], port.turning[i2], X[i1]), add_scaled(T(-1.) * du[i2], port.turning[i3], X[i1]);
   }
   Pack<T, 6> P[3]; // Phi_r m^T
-  for (int r = 0; r < 3; ++r)
-    P[r] = constant_row<6, T>(b.gram(port.row + 3 + r, 0));
-  for (std::size_t c = 0; c < b.twists.size(); ++c) {
+  if (b.stiffening)
+    bent_port(b, s, port.row, X, P);
+  else
+    for (int r = 0; r < 3; ++r)
+      P[r] = constant_row<6, T>(b.gram(port.row + 3 + r, 0));
+  for (std::size_t c = 0; c < b.twists.size() && !b.stiffening; ++c) {
     const double *z = b.twists[c].axis;
     const T *Wh = s.Wh[c].data() + port.row;
     for (int r = 0; r < 6; ++r)
@@ -82,7 +85,8 @@ template <class T> FFROBOT_APART void port_gram(const Body &b, const State<T> &s
       columns[k].set(3 + c, R[c][k]);
   }
   for (int r = 0; r < 6; ++r)
-    G[r] = constant_row<6, T>(b.gram(b.ports[i].row + r, b.ports[j].row));
+    G[r] = b.stiffening ? Pack<T, 6>::read(s.bent.gram.data() + (b.ports[i].row + r) * b.width + b.ports[j].row)
+                        : constant_row<6, T>(b.gram(b.ports[i].row + r, b.ports[j].row));
   for (int r = 0; r < 3; ++r)
     left[r] = L[r][0] * G[3] + L[r][1] * G[4] + L[r][2] * G[5];
   for (int r = 0; r < 3; ++r)
@@ -115,6 +119,8 @@ template <class T> FFROBOT_INLINE void put_force(const Body &b, const State<T> &
 // zeros elsewhere
 template <bool by_multipliers, class T>
 inline void modal_accelerations(const Body &b, const T *z, const State<T> &s, T *a) {
+  if (b.stiffening)
+    return bent_accelerations<by_multipliers>(b, z, s, a);
   T along[3];
   for (std::size_t c = 0; c < b.twists.size(); ++c) {
     const double *axis = b.twists[c].axis + 3;

@@ -6,10 +6,29 @@
 
 namespace ffrobot::recursion::spatial {
 
+// Of a body with geometric stiffening; names as in stiffening.h. Rows over modes are padded.
+template <class T> struct Bent {
+  explicit Bent(const Body &b)
+      : F(b.stiffening ? 3 * b.stiffening->fields * padded(b.n) : 0, T(0.)),
+        rows(b.stiffening ? b.width * padded(b.n) : 0, T(0.)), gram(b.stiffening ? b.width * b.width : 0, T(0.)),
+        factor(b.stiffening ? b.n * padded(b.n) : 0, T(0.)), curvature(b.stiffening ? b.width : 0, T(0.)) {}
+
+  struct Affine { // of the fields, by axis and field
+    T g[3][most_fields], g_dot[3][most_fields];
+  };
+  Affine linear, all;        // without and with terms of second order
+  T bending[3][most_fields]; // p_dot^T K p_dot
+  Aligned<T> F;              // (3 fields, n) F(p)
+  Aligned<T> rows;           // (width, n) W(p); then W(p) L^-T
+  Aligned<T> gram;           // (width, width) W(p) m_ff^-1 W(p)^T
+  Aligned<T> factor;         // (n, n) m_ff = L L^T
+  Aligned<T> curvature;      // (width) p_dot^T K p_dot of rows of ports
+};
+
 template <class T> struct State {
   explicit State(const Body &b)
       : p(padded(b.n), T(0.)), v(p), Q_f(p), b(p), h_change{p, p, p}, u(b.width, T(0.)), u_dot(u), Q(u), Wh{u, u, u},
-        ports(b.ports.size()) {}
+        ports(b.ports.size()), bent(b) {}
 
   T absolute[3][3];       // body axes to global ones
   T omega[3];             // body axes
@@ -23,6 +42,13 @@ template <class T> struct State {
   Aligned<T> u, u_dot, Q; // W p, W p_dot, W Q_f with the undeformed m_thetaf
   Aligned<T> Wh[3];       // W A_c p
   std::vector<PortMotion<T>> ports;
+  Bent<T> bent; // empty without geometric stiffening
+};
+
+// What becomes of a body in its frame's six equations: J (in the place of alpha), M_rr - m m^T, -(Q_r - m Q_f)
+template <class T> struct FrameTerms {
+  Pack<T, 6> J[3], M[6];
+  T bias[6];
 };
 
 } // namespace ffrobot::recursion::spatial

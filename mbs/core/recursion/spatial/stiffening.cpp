@@ -1,0 +1,129 @@
+#include "core/recursion/spatial/stiffening.h"
+
+#include "core/recursion/spatial/body.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ffrobot::recursion::spatial {
+
+using Eigen::Matrix4d;
+using Eigen::MatrixXd;
+
+namespace {
+
+constexpr double negligible = 1e-12; // of the largest of its kind
+
+// N = L L^T (4, rank), columns in the order 1, x, y, z, without those that depend on others before; and which ones
+struct Orthonormal {
+  Matrix4d L = Matrix4d::Zero();
+  std::vector<int> pivot;
+};
+
+Orthonormal orthonormal(const SpatialData &data) {
+  Matrix4d N;
+  N << data.mass, data.first_moment.transpose(), data.first_moment, data.J2;
+  Orthonormal found;
+  const double longest = N.diagonal().tail<3>().maxCoeff();
+  for (int k = 0; k < 4; ++k) {
+    const int count = static_cast<int>(found.pivot.size());
+    const Eigen::Vector4d left = N.col(k) - found.L.leftCols(count) * found.L.row(k).head(count).transpose();
+    if (!(left[k] > (k == 0 ? 0 : negligible * longest)))
+      continue;
+    found.L.col(count) = left / std::sqrt(left[k]);
+    found.pivot.push_back(k);
+  }
+  return found;
+}
+
+// Products with phi_f from those with 1, x, y, z: forward substitution
+template <class X> std::vector<X> by_fields(const Orthonormal &fields, const std::array<X, 4> &products) {
+  std::vector<X> found;
+  for (std::size_t f = 0; f < fields.pivot.size(); ++f) {
+    const int k = fields.pivot[f];
+    X left = products[static_cast<std::size_t>(k)];
+    for (std::size_t e = 0; e < f; ++e)
+      left -= fields.L(k, static_cast<Eigen::Index>(e)) * found[e];
+    found.push_back(left / fields.L(k, static_cast<Eigen::Index>(f)));
+  }
+  return found;
+}
+
+MatrixXd without_rounding(const MatrixXd &K, double limit) { return (K.array().abs() > limit).select(K, 0.0); }
+
+double largest_of(const std::vector<MatrixXd> &all) {
+  double largest = 0;
+  for (const MatrixXd &K : all)
+    largest = std::max(largest, K.size() ? K.cwiseAbs().maxCoeff() : 0.0);
+  return largest;
+}
+
+} // namespace
+
+bool is_stiffened(const SpatialData &data) { return !data.K_s.empty(); }
+
+double negligible_K(const SpatialData &data) {
+  double largest = largest_of(data.K_s) / data.mass; // the mean of all points
+  for (const SpatialMarker &marker : data.markers)
+    largest = std::max(largest, largest_of(marker.K));
+  return negligible * largest;
+}
+
+Stiffening::Stiffening(const SpatialData &data, const std::vector<int> &used) {
+  project(data);
+  fill_ports(data, used);
+}
+
+void Stiffening::project(const SpatialData &data) {
+  const auto n = data.modes();
+  const int stride = padded(static_cast<int>(n));
+  const Orthonormal orthonormal_fields = orthonormal(data);
+  fields = static_cast<int>(orthonormal_fields.pivot.size());
+  root_mass = std::sqrt(data.mass);
+  std::vector<MatrixXd> all_K;
+  F.assign(static_cast<std::size_t>(3 * fields * stride), 0.0);
+  for (int c = 0; c < 3; ++c) {
+    std::array<Eigen::RowVectorXd, 4> with_modes;
+    std::array<MatrixXd, 4> with_G;
+    with_modes[0] = data.S_bar.row(c), with_G[0] = data.K_s[static_cast<std::size_t>(c)];
+    for (int k = 0; k < 3; ++k) {
+      const auto slot = static_cast<std::size_t>(3 * k + c);
+      with_modes[slot / 3 + 1] = data.I_bar.size() ? Eigen::RowVectorXd(data.I_bar.row(3 * k + c))
+                                                   : Eigen::RowVectorXd(Eigen::RowVectorXd::Zero(n));
+      with_G[slot / 3 + 1] = data.K_x[slot];
+    }
+    const auto F_c = by_fields(orthonormal_fields, with_modes);
+    const auto K_c = by_fields(orthonormal_fields, with_G);
+    for (int f = 0; f < fields; ++f) {
+      g[c][f] = orthonormal_fields.L(1 + c, f);
+      for (Eigen::Index j = 0; j < n; ++j)
+        F[static_cast<std::size_t>((c * fields + f) * stride + j)] = F_c[static_cast<std::size_t>(f)][j];
+      all_K.push_back(K_c[static_cast<std::size_t>(f)]);
+    }
+  }
+  MatrixXd rest = MatrixXd::Identity(n, n);
+  const double limit = negligible * largest_of(all_K);
+  for (std::size_t i = 0; i < all_K.size(); ++i) {
+    K.emplace_back(without_rounding(all_K[i], limit));
+    const Eigen::Map<const Eigen::VectorXd> F_i(row(static_cast<int>(i), static_cast<int>(n)), n);
+    if (K.back().kind != ModeMatrix::Kind::zero)
+      rest -= F_i * F_i.transpose();
+  }
+  m_ff_rest.assign(static_cast<std::size_t>(n * stride), 0.0);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j)
+      m_ff_rest[static_cast<std::size_t>(i * stride + j)] = rest(i, j);
+}
+
+void Stiffening::fill_ports(const SpatialData &data, const std::vector<int> &used) {
+  const auto n = data.modes();
+  const double limit = negligible_K(data);
+  for (const int index : used) {
+    const std::vector<MatrixXd> K_section = section_K(data.markers[static_cast<std::size_t>(index)]);
+    for (std::size_t r = 0; r < lanes; ++r)
+      at_ports.emplace_back(r < K_section.size() ? without_rounding(K_section[r], limit)
+                                                 : MatrixXd(MatrixXd::Zero(n, n)));
+  }
+}
+
+} // namespace ffrobot::recursion::spatial

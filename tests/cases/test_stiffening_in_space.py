@@ -1,0 +1,193 @@
+"""Geometric stiffening in space: blades that spin, links that bend far, planar scenes put there, bad input."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import planar_in_space
+import pytest
+from checkpoints import CASES
+from rod_chain import falling_tip
+from test_planar_scenes_in_space import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
+
+import ffrobot
+from ffrobot.fe_models.link import computed_modal_body
+from ffrobot.fe_models.modal_body_file import write_modal_body
+from ffrobot.mbs.model.planar_body import from_modal_body as planar_body
+from ffrobot.mbs.model.spatial_body import from_modal_body as spatial_body
+
+LINK = """
+name = "blade"
+material = {{ youngs_modulus = {E}, poissons_ratio = 0.3, density = 2700.0 }}
+geometry = {{ kind = "beam", length = 1.0, section = {{ shape = "rectangle", height = {height}, width = {width} }} }}
+mesh = {{ elements = 40 }}
+reference = {{ condition = "cantilever" }}
+modes = {{ count = {count}, family = {family} }}
+damping = {{ ratio = 0.0 }}
+"""
+BOTH = '["in-plane-bending", "out-of-plane-bending"]'
+
+
+def write_link(folder, E=7e10, height=0.01, width=0.01, count=24, family=BOTH):
+    path = folder / "blade.toml"
+    path.write_text(LINK.format(E=E, height=height, width=width, count=count, family=family))
+    return str(path)
+
+
+def blade(folder, **keys):
+    """A link on a hub that turns about z."""
+    tables = {
+        "name": "blade",
+        "space": "spatial",
+        "gravity": [0.0, 0.0, 0.0],
+        "geometric_stiffening": True,
+        "body": [{"name": "blade", "link": write_link(folder)}],
+        "joint": [{"name": "hub", "type": "revolute", "between": ["ground", "blade.root"], "axis": [0.0, 0.0, 1.0]}],
+        "trajectory": [{"name": "spin", "joint": "hub", "value": "1.0*t"}],
+        "analysis": [
+            {"name": "turning", "kind": "pcid", "end": 1e-3, "output_step": 1e-3},
+            {"name": "about", "kind": "linear", "about": "turning", "times": [0.0]},
+        ],
+    }
+    return tables | keys
+
+
+# Spin and frequencies over √(EI/ρAL⁴), hub radius 0: first and second flap (Wright, Smith, Thresher, Wang, Vibration
+# modes of centrifugally stiffened beams, J. Appl. Mech. 49, 1982).
+FLAP = {
+    1: (3.6816, 22.181),
+    2: (4.1373, 22.615),
+    3: (4.7973, 23.320),
+    6: (7.3604, 26.809),
+    12: (13.1702, 37.603),
+}
+
+
+@pytest.mark.parametrize("spin", FLAP)
+def test_frequencies_of_a_rotating_cantilever(spin, tmp_path):
+    """Across the plane (flap), and in it with the hub held (lag): ω_lag² = ω_flap² − Ω²."""
+    unit = np.sqrt(7e10 * 0.01**4 / 12 / (2700 * 0.01**2))
+    path = [{"name": "spin", "joint": "hub", "value": f"{spin * unit!r}*t"}]
+    scene = planar_in_space.write(blade(tmp_path, trajectory=path), tmp_path / "scene.toml")
+    with ffrobot.solve(scene) as results:
+        flap = 2 * np.pi * results["about/linear/frequency"][0] / unit
+        zeros = np.sort(np.abs(results["about/linear/zeros/1"][0]).max(axis=-1)) / unit  # from the hub's motor to it
+    expected = np.array(FLAP[spin])
+    for flapping in expected:  # with twelve shapes; the numbers have five digits
+        assert np.abs(flap / flapping - 1).min() < 3e-5
+        lag = np.sqrt(flapping**2 - spin**2)
+        assert np.abs(zeros / lag - 1).min() < 1e-4
+
+
+def test_links_that_bend_far_across_the_plane(tmp_path):
+    """Two cantilevers of eight shapes each fall about y: a chain of rigid rods, and their energy, which stays."""
+    E = 7e9
+    link = write_link(tmp_path, E, 0.02, 0.01, 8, '"out-of-plane-bending"')
+    joints = [("O", "ground", "link1.root"), ("A", "link1.tip", "link2.root")]
+    scene = {
+        "name": "falling",
+        "space": "spatial",
+        "gravity": [0.0, 0.0, -9.81],
+        "geometric_stiffening": True,
+        "body": [{"name": name, "link": link} for name in ("link1", "link2")],
+        "joint": [
+            {"name": name, "type": "revolute", "between": [a, b], "axis": [0.0, 1.0, 0.0]} for name, a, b in joints
+        ],
+        "analysis": [{"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.05, "tolerance": 1e-7}],
+    }
+    with ffrobot.solve(planar_in_space.write(scene, tmp_path / "scene.toml")) as results:
+        tip = results["fall/points/link2.tip/position"]
+        energy = sum(results[f"fall/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
+        exchanged = np.ptp(results["fall/energy/gravitational"])
+    expected = falling_tip(E, 20, np.linspace(0, 0.5, 11))
+    assert np.abs(tip[:, [0, 2]] - expected).max() < 2e-4
+    assert np.abs(tip[:, 1]).max() < 1e-9
+    assert np.abs(energy - energy[0]).max() < 1e-6 * exchanged
+
+
+def both(case, analyses, guess, folder, payload=None):
+    """Results of a planar scene with geometric stiffening, and of the same in space."""
+    planar = planar_in_space.read(CASES / case / "scene.toml") | {"geometric_stiffening": True, "analysis": analyses}
+    planar.pop("pzt", None)
+    spatial = planar_in_space.in_space(planar) | {"initial": {"joints": guess}, "analysis": analyses}
+    spatial["geometric_stiffening"] = True
+    if payload is not None:
+        planar["payload"] = spatial["payload"] = [payload]
+    return [
+        ffrobot.solve(planar_in_space.write(tables, folder / f"{name}.toml"))
+        for name, tables in (("planar", planar), ("spatial", spatial))
+    ]
+
+
+GRIPPER = {"point": "link2.tip", "mass": 0.3}
+
+
+@pytest.mark.parametrize("payload", [None, GRIPPER], ids=["bare", "loaded"])
+def test_two_links_of_the_plane(payload, tmp_path):
+    """A point mass at the tip loads the link as well. (What turns with a section turns exactly in the plane alone.)"""
+    planar, spatial = both("two_link", [TIGHT, STRAIGHT, REST], TWO_LINK, tmp_path, payload)
+    with planar, spatial:
+        for analysis, share in (("inverse", 1e-8), ("straight", 1e-11), ("rest", 1e-9)):
+            compare_two_links(planar, spatial, analysis, share)
+        for key in ("kinetic", "strain", "gravitational"):
+            close(spatial[f"inverse/energy/{key}"], planar[f"inverse/energy/{key}"], 1e-8)
+
+
+def test_linear_model_of_two_links_of_the_plane(tmp_path):
+    moving = {"name": "moving", "kind": "linear", "about": "inverse", "times": [0.0, 0.1, 0.2]}
+    planar, spatial = both("two_link", [TIGHT, moving], TWO_LINK, tmp_path)
+    with planar, spatial:
+        found, expected = (results["moving/linear/frequency"] for results in (spatial, planar))
+        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-6)
+
+
+def test_slider_crank_of_the_plane(tmp_path):
+    planar, spatial = both("slider_crank", [TIGHT | {"end": 0.05}], CRANK, tmp_path)
+    with planar, spatial:
+        close(spatial["inverse/trajectories/slider/force"], planar["inverse/trajectories/slider/force"], 1e-8)
+        close(spatial["inverse/bodies/rod/modal"], planar["inverse/bodies/rod/modal"], 1e-8)
+        name = "inverse/points/rod.mid/deflection"
+        close(spatial[name][:, :2], planar[name], 1e-8)
+
+
+def test_what_a_file_of_a_beam_says_of_the_plane_and_of_space(tmp_path):
+    """∫ρxG_x is K_omega of the plane, ∫ρG_x its K_s; nothing else, in the plane or across it, of a straight beam."""
+    modal = computed_modal_body(Path(write_link(tmp_path)))
+    in_plane, in_space = planar_body("b", modal).stiffening, spatial_body("b", modal, stiffened=True).stiffening
+    chosen = np.ix_(*[np.flatnonzero(np.array(modal.family) == "in-plane-bending")] * 2)
+    peak = np.abs(in_plane.K_omega).max()
+    np.testing.assert_allclose(in_space.K_x[0, 0][chosen], in_plane.K_omega, atol=1e-12 * peak)
+    np.testing.assert_allclose(in_space.K_s[0][chosen], in_plane.K_s[0], atol=1e-12 * peak)
+    rest = in_space.K_x.copy()
+    rest[0, 0] = 0.0
+    assert np.abs(rest).max() < 1e-12 * peak
+    assert np.abs(in_space.K_s[1:]).max() < 1e-12 * peak
+
+
+REFUSED = {
+    "point between interfaces": (
+        {"load": [{"point": "blade.mid", "y": 1.0}]},
+        r'load no. 1: point: expected, with geometric_stiffening, a point .* \("root", "tip"\), found "blade.mid"',
+    ),
+    "neither true nor false": (
+        {"geometric_stiffening": "auto"},
+        "geometric_stiffening: expected true or false",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_input(case, tmp_path):
+    keys, says = REFUSED[case]
+    scene = planar_in_space.write(blade(tmp_path, **keys), tmp_path / "scene.toml")
+    with pytest.raises(ffrobot.InputError, match=says):
+        ffrobot.solve(scene)
+
+
+def test_files_without_geometric_stiffness_are_named(tmp_path):
+    scene = blade(tmp_path)
+    bare = replace(computed_modal_body(tmp_path / "blade.toml"), geometric_stiffness={})
+    write_modal_body(tmp_path / "blade.h5", bare)
+    scene["body"] = [{"name": "blade", "modal": "blade.h5"}]
+    with pytest.raises(ffrobot.InputError, match=r'geometric_stiffening: expected modal bodies .* of "blade"'):
+        ffrobot.solve(planar_in_space.write(scene, tmp_path / "scene.toml"))
