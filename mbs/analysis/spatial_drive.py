@@ -16,7 +16,7 @@ from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.integrators import METHODS
 from ..solve.spatial_limits import left_ranges
-from ..solve.spatial_posture import SINGULAR, robot_size, told_posture
+from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
 from ..solve.state import State
 from .drive import STATUS, Progress
 from .spatial_run import SpatialRun
@@ -82,8 +82,9 @@ def spatial_drive(
     run = _integrated(system, times, start, controls, control, progress)
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
     multipliers = run.multipliers * system.row_signs
-    posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture)
-    cause = f"{posture}: move the path, or start in another posture" if run.least_ratio < SINGULAR else ""
+    in_posture = _ends_in_posture(run)
+    posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
+    cause = f"{posture}: move the path, or start in another posture" if in_posture else ""
     told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q))
 
     def again(others: Array) -> SpatialRun:
@@ -91,10 +92,17 @@ def spatial_drive(
 
     return SpatialRun(
         analysis, model, times[: len(q)], q, v, run.accelerations, multipliers, applied=drives.at_points,
-        status=STATUS[run.status], integrator=integrator, steps=run.steps, evaluations=run.evaluations,
-        wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
+        status="diverged" if in_posture else STATUS[run.status], integrator=integrator, steps=run.steps,
+        evaluations=run.evaluations, wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
         again=again if control is None else None,
     )  # fmt: skip
+
+
+def _ends_in_posture(run: _core.TreeRun) -> bool:
+    """Whether a posture ended the run: joints cannot follow there, or steps vanish next to it as none leads across."""
+    if STATUS[run.status] == "step underflow" and run.singular_at == run.time_reached:
+        return run.least_ratio < NEARLY_SINGULAR
+    return STATUS[run.status] == "diverged" and run.least_ratio < SINGULAR
 
 
 def _integrated(

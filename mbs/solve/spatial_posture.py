@@ -183,8 +183,11 @@ def mobility(model: SpatialModel, q: Array) -> Mobility:
     return Mobility(free.shape[1], followed, ratio, tuple(dict.fromkeys(names[moving].tolist())), loop_rank)
 
 
-def told_posture(model: SpatialModel, ratio: float, t: float, q: Array) -> str:
-    """What to say of the worst posture q (n_q,) on a path, at time t, where its ratio is that; "" where it is fine."""
+def told_posture(model: SpatialModel, ratio: float, t: float, q: Array, *, is_end: bool) -> str:
+    """What to say of the worst posture q (n_q,) on a path, at time t, where its ratio is that; "" where it is fine.
+
+    Of one in which the run ends it is said to be singular.
+    """
     if not ratio < NEARLY_SINGULAR:
         return ""
     joints, is_loop = model.tree.joint_columns, model.loop_rows
@@ -195,7 +198,7 @@ def told_posture(model: SpatialModel, ratio: float, t: float, q: Array) -> str:
     least = np.abs(free @ np.linalg.svd(J[~is_loop] @ free)[2][-1])
     names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
     moving = quoted(dict.fromkeys(names[least > MOVING * least.max()].tolist()))
-    how = "a singular posture" if ratio < SINGULAR else f"nearly a singular posture (ratio {ratio:.1e})"
+    how = "a singular posture" if is_end else f"nearly a singular posture (ratio {ratio:.1e})"
     return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
 
 

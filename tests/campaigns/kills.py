@@ -16,6 +16,7 @@ import signal
 import sys
 import tempfile
 import time
+import zipfile
 from collections import Counter
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
@@ -50,10 +51,33 @@ analysis = [
     { name = "linear", kind = "linear", about = "inverse", times = [0.05] },
 ]
 """
+SPACE = """
+name = "space"
+space = "spatial"
+gravity = [0.0, 0.0, -9.81]
+body = [{ name = "arm", link = "arm.toml" }]
+joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"], axis = [0, 1, 0] }]
+payload = [{ point = "arm.tip", mass = 0.1 }]
+trajectory = [{ name = "swing", joint = "shoulder", value = "0.1 + 0.08*(1 - cos(10*pi*t))" }]
+analysis = [
+    { name = "inverse", kind = "pcid", end = 0.5, output_step = 2e-5 },
+    { name = "again", kind = "pcid", end = 0.5, output_step = 2e-5 },
+]
+"""
+ROBOT = """<robot name="two">
+<link name="base"/>
+<link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="10" velocity="2"/></joint>
+</robot>
+"""
+GIVEN = {"arm.toml": LINK, "scene.toml": SCENE, "space.toml": SPACE, "robot.urdf": ROBOT}
 SWEEP = ["--vary", "payload.0.mass=0.1,0.2", "-j", "2"]
 COMMANDS = {
     "link": ["link", "arm.toml"],
     "solve": ["solve", "scene.toml", "--log-file", "log"],
+    "solve in space": ["solve", "space.toml", "--log-file", "log"],
     "sweep": ["sweep", "scene.toml", *SWEEP],
     "info": ["info", "scene.results.h5"],
     "feasibility": ["feasibility", "scene.results.h5"],
@@ -62,8 +86,13 @@ COMMANDS = {
     "plot": ["plot", "scene.results.h5", "--format", "png"],
     "view": ["view", "scene.results.h5", "--frames", "20", "--no-pictures"],
     "schema": ["schema", "scene"],
+    "import": ["import", "robot.urdf", "-o", "robot", "--force"],
+    "export csv": ["export", "scene.results.h5", "--format", "csv"],
+    "export sid": ["export", "arm.h5", "--format", "sid"],
+    "export fmu": ["export", "scene.results.h5", "--analysis", "linear", "--format", "fmu"],
 }
-OFTEN = {"link": 4, "solve": 4, "sweep": 2}
+OFTEN = {"link": 4, "solve": 4, "solve in space": 4, "sweep": 2}
+BEGIN = ("link", "solve", "solve in space", "sweep")  # with nothing but what the user wrote
 OURS = re.compile(rf'File "{Path(__file__).parents[2]}/(ffrobot|common|mesh|fe_models|mbs|actuation)/')
 BEFORE_US = "traceback while Python itself starts"  # nobody can change that
 KINDS = ("half-written file", "next run fails", "lost analysis", "traceback", BEFORE_US, "slow to stop")
@@ -84,8 +113,8 @@ class Campaign:
 
     def prepare(self, place: Path) -> None:
         place.mkdir()
-        (place / "arm.toml").write_text(LINK, encoding="utf-8")
-        (place / "scene.toml").write_text(SCENE, encoding="utf-8")
+        for name, text in GIVEN.items():
+            (place / name).write_text(text, encoding="utf-8")
 
     def start(self, name: str, place: Path, cache: Path) -> Popen[str]:
         environment = os.environ | {"XDG_CACHE_HOME": str(cache), "OMP_NUM_THREADS": "1"}
@@ -105,11 +134,11 @@ class Campaign:
         part = self.chance.random()
         place, cache = self.folder / f"{number}", self.folder / f"cache{number}"
         self.prepare(place)
-        fresh = name in ("link", "solve") and self.chance.random() < 0.5  # forms and links not in the cache
+        fresh = name in BEGIN[:3] and self.chance.random() < 0.5  # forms and links not in the cache
         if not fresh:
             shutil.copytree(self.cache, cache)
-        if name not in ("link", "solve", "sweep"):
-            shutil.copy(self.ready / "scene.results.h5", place)
+        for file in ("scene.results.h5", "arm.h5") if name not in BEGIN else ():
+            shutil.copy(self.ready / file, place)
         label = f"{number}: {name}, {kind.name} after {part:.2f}, {'empty' if fresh else 'filled'} cache"
         process = self.start(name, place, cache)
         time.sleep(part * self.seconds[name] * (3.0 if fresh else 1.0))
@@ -123,8 +152,8 @@ class Campaign:
         if took > 1.0 and kind != signal.SIGKILL and "stopping, and keeping" not in told:
             self.note("slow to stop", f"{label}: {took:.1f} s, load average {os.getloadavg()[0]:.1f}")
         self.look(place, label)
-        if name == "solve" and kind != signal.SIGKILL:
-            self.kept(place, label)
+        if name.startswith("solve") and kind != signal.SIGKILL:
+            self.kept(place, COMMANDS[name][1], label)
         again = self.start(name, place, cache)
         _, told = again.communicate(timeout=PATIENCE)
         if again.returncode != 0:
@@ -138,12 +167,12 @@ class Campaign:
             if path.is_file() and not _is_whole(path):
                 self.note("half-written file", f"{label}: {path.name}")
 
-    def kept(self, place: Path, label: str) -> None:
-        """What the log calls completed is in the results file."""
+    def kept(self, place: Path, scene: str, label: str) -> None:
+        """What the log calls completed is in the results file of the scene."""
         log = place / "log"
         lines = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
         done = {line.split('"')[1] for line in lines if 'analysis "' in line and ": completed" in line}
-        path = place / "scene.results.h5"
+        path = (place / scene).with_suffix(".results.h5")
         have = set(Results(path).analyses) if path.exists() else set()
         if done - have:
             self.note("lost analysis", f"{label}: {done - have}")
@@ -159,6 +188,8 @@ def _is_whole(path: Path) -> bool:
             read_modal_body(path) if is_modal_body_file(path) else Results(path).close()
         elif path.suffix == ".npz":
             np.load(path).close()
+        elif path.suffix == ".fmu":
+            zipfile.ZipFile(path).testzip()
         content = path.read_bytes()
         ends = {".html": b"</html>", ".png": b"IEND\xaeB`\x82", ".xdmf": b"</Xdmf>"}
         return ".tmp" not in path.name and content.rstrip().endswith(ends.get(path.suffix, b""))

@@ -1,12 +1,11 @@
 """Random scenes of flexible arms, chains and closed loops by seed and number; lengths in m, angles in rad."""
 
 import numpy as np
+from drawn_robot import DrawnRobot
 
 import ffrobot
 
-STEEL, ALUMINIUM = (2.07e11, 7850.0), (7.0e10, 2700.0)
 PATCHES = {"length": 0.05, "width": 0.015, "thickness": 5e-4, "modulus": 63e9, "d31": 1.1e-10}
-SHAPES = {"quintic": "(10*{s}**3-15*{s}**4+6*{s}**5)", "cosine": "0.5*(1-cos(pi*{s}))", "jolt": "{s}**2"}
 
 
 def random_scene(seed, number):
@@ -17,19 +16,12 @@ def random_scene(seed, number):
     return kind, ffrobot.make_scene(name=f"robot{number}", **keys, **robot.common("trajectory" in keys))
 
 
-class Robot:
-    """What all kinds have in common, drawn from `rng`."""
+class Robot(DrawnRobot):
+    """What all kinds have in common."""
 
     def __init__(self, rng):
-        self.rng = rng
-        self.end = self.between(0.1, 0.5)
-        self.damping = float(rng.choice([0.0, rng.uniform(0.001, 0.02)], p=[0.4, 0.6]))
-        self.shape = str(rng.choice(list(SHAPES), p=[0.5, 0.25, 0.25]))
-        self.start = str(rng.choice(["static", "undeformed"], p=[0.6, 0.4]))
+        super().__init__(rng, 0.1, 0.5)
         self.modes = {}  # of each link
-
-    def between(self, low, high):
-        return float(self.rng.uniform(low, high))
 
     def common(self, follows_path):
         """Keys of the scene that do not depend on its kind."""
@@ -44,31 +36,11 @@ class Robot:
         }
 
     def link(self, name, length):
-        """A steel or aluminium beam of one to five modes."""
-        E, density = STEEL if self.rng.random() < 0.5 else ALUMINIUM
-        height = length * self.between(0.012, 0.03)
-        if self.rng.random() < 0.5:
-            section = {"shape": "rectangle", "height": height, "width": 2 * height}
-        else:
-            section = {"shape": "tube", "outer": height, "inner": 0.8 * height}
+        """With one to five modes in the plane."""
+        table = self.beam(length, 2.0)
         self.modes[name] = int(self.rng.integers(1, 6))
-        table = {
-            "material": {"youngs_modulus": E, "density": density},
-            "geometry": {"kind": "beam", "length": length, "section": section},
-            "mesh": {"elements": 14},
-            "reference": {"condition": str(self.rng.choice(["simply-supported", "cantilever"]))},
-            "modes": {"count": self.modes[name], "family": "in-plane-bending", "attachment_modes": False},
-            "damping": {"ratio": self.damping},
-        }
-        return {"name": name, "link": table}
-
-    def path(self, start, change):
-        """An expression in t that goes `change` from `start`."""
-        return f"{float(start)!r}+({float(change)!r})*{SHAPES[self.shape].format(s=f'(t/{self.end!r})')}"
-
-    def reach(self):
-        """How far something may move in the time of the run: accelerations stay below some g."""
-        return self.between(5.0, 40.0) * self.end**2 / 6
+        modes = {"count": self.modes[name], "family": "in-plane-bending", "attachment_modes": False}
+        return {"name": name, "link": table | {"reference": self.reference(), "modes": modes}}
 
     def serial(self, count):
         """Keys of links hinged one to the next, the first to the ground; their turns, angles, and where the tip is."""

@@ -4,7 +4,7 @@ Lengths in m, angles in rad; steel and aluminium beams with bending in two plane
 """
 
 import numpy as np
-from random_robots import ALUMINIUM, SHAPES, STEEL
+from drawn_robot import DrawnRobot
 from scipy.spatial.transform import Rotation
 
 import ffrobot
@@ -27,18 +27,11 @@ def random_spatial_scene(seed, number, runs, most_steps):
     return kind, scene
 
 
-class Robot:
-    """What all kinds have in common, drawn from `rng`."""
+class Robot(DrawnRobot):
+    """What all kinds have in common."""
 
     def __init__(self, rng):
-        self.rng = rng
-        self.end = self.between(0.03, 0.15)
-        self.damping = float(rng.choice([0.0, rng.uniform(0.001, 0.02)], p=[0.4, 0.6]))
-        self.shape = str(rng.choice(list(SHAPES), p=[0.5, 0.25, 0.25]))
-        self.start = str(rng.choice(["static", "undeformed"], p=[0.6, 0.4]))
-
-    def between(self, low, high):
-        return float(self.rng.uniform(low, high))
+        super().__init__(rng, 0.03, 0.15)
 
     def axis(self):
         """A unit vector of any direction."""
@@ -46,31 +39,12 @@ class Robot:
         return vector / np.linalg.norm(vector)
 
     def link(self, name, length):
-        E, density = STEEL if self.rng.random() < 0.5 else ALUMINIUM
-        height = length * self.between(0.012, 0.03)
-        if self.rng.random() < 0.5:
-            section = {"shape": "rectangle", "height": height, "width": 1.5 * height}
-        else:
-            section = {"shape": "tube", "outer": height, "inner": 0.8 * height}
-        table = {
-            "material": {"youngs_modulus": E, "poissons_ratio": 0.3, "density": density},
-            "geometry": {"kind": "beam", "length": length, "section": section},
-            "mesh": {"elements": 14},
-            "reference": {"condition": str(self.rng.choice(["simply-supported", "cantilever"]))},
-            "modes": {"count": int(self.rng.integers(2, 8)), "family": "all", "attachment_modes": False},
-            "damping": {"ratio": self.damping},
-        }
-        return {"name": name, "link": table}
+        """With two to seven modes of all families."""
+        table = self.beam(length, 1.5) | {"reference": self.reference()}
+        modes = {"count": int(self.rng.integers(2, 8)), "family": "all", "attachment_modes": False}
+        return {"name": name, "link": table | {"modes": modes}}
 
-    def path(self, start, change):
-        """An expression in t that goes `change` from `start`."""
-        return f"{float(start)!r}+({float(change)!r})*{SHAPES[self.shape].format(s=f'(t/{self.end!r})')}"
-
-    def reach(self):
-        """How far something may move in the time of the run: accelerations stay below some g."""
-        return self.between(5.0, 40.0) * self.end**2 / 6
-
-    def serial(self, count, kind="revolute"):
+    def serial(self, count):
         """Keys of links one after the other, their joint angles, and where the tip is."""
         names = [f"b{k + 1}" for k in range(count)]
         lengths = [self.between(0.3, 0.7) for _ in names]

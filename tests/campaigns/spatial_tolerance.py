@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from judging import largest_errors, nothing_of_rounding, peaks, record_of_run, with_body_velocity, with_slow_rates
 from spatial_robots import random_spatial_scene
 
 import ffrobot
@@ -20,9 +21,6 @@ RUNS = {  # powers of ten between which tolerances are drawn, and how many
     "auto": (-7, -2, 2),
 }
 MOST_STEPS = 60_000
-NEGLIGIBLE = 1e-3  # of the largest peak of a kind
-NOTHING = 1e-9  # modal forces over forces
-SLOW = 0.01  # rad in the time of a run: what the rate of a joint counts relative to at least
 KINDS = {
     "bodies": ("position", "modal", "modal_velocity", "modal_force"),
     "points": ("position", "deflection"),
@@ -42,41 +40,19 @@ def histories(file, name):
     return found
 
 
-def largest(values):
-    return float(np.abs(values).max())
-
-
 def scales(file, exact, duration):
     """What the error of each history counts relative to, by kind and owner."""
-    found = {}
-    for kind, members in exact.items():
-        peaks = {owner: largest(values) for owner, values in members.items()}
-        found[kind] = {owner: max(peak, NEGLIGIBLE * max(peaks.values())) for owner, peak in peaks.items()}
+    found = peaks(exact)
     files = json.loads(file.attrs["modal_bodies"])
     for owner, own in found.get("bodies/modal_velocity", {}).items():
         with h5py.File(files[owner]["path"]) as body:
             mass, length = float(body["mass"][()]), float(body["length"][()])
         moving = file["exact/bodies"][owner]
         velocity, turning = (np.linalg.norm(moving[key], axis=1).max() for key in ("velocity", "angular_velocity"))
-        fastest = max(velocity, turning * length)
-        found["bodies/modal_velocity"][owner] = max(own, np.sqrt(mass) * fastest)
-    forces = max(found["joints/reaction"].values())
-    if max(found.get("bodies/modal_force", {}).values(), default=0.0) < NOTHING * forces:  # motors alone do it
-        found["bodies/modal_force"] = dict.fromkeys(found.get("bodies/modal_force", {}), 0.0)
-    rates = found.get("joints/rate", {})
-    found["joints/rate"] = {owner: max(size, SLOW / duration) for owner, size in rates.items()}
+        found["bodies/modal_velocity"][owner] = with_body_velocity(own, mass, max(velocity, turning * length))
+    nothing_of_rounding(found, ("bodies/modal_force",), max(found["joints/reaction"].values()))
+    found["joints/rate"] = with_slow_rates(found.get("joints/rate", {}), duration)
     return found
-
-
-def errors(found, exact, scale):
-    """By kind, the largest error at any output, in parts of `scale`, and which history it is of."""
-    return {
-        kind: max(
-            (largest(found[kind][owner] - values) / scale[kind][owner], owner) for owner, values in members.items()
-        )
-        for kind, members in exact.items()
-        if max(scale[kind].values(), default=0.0) > 0
-    }
 
 
 def try_spatial_robot(seed, number, integrators=tuple(RUNS)):
@@ -96,11 +72,10 @@ def try_spatial_robot(seed, number, integrators=tuple(RUNS)):
         exact = histories(file, "exact")
         scale = scales(file, exact, scene.analysis[0].end)
         for name, tolerance, by in runs:
-            attributes = file[name].attrs
-            run = {"integrator": by, "ran": attributes["integrator"], "tolerance": tolerance}
-            run |= {"status": attributes["status"], "evaluations": int(attributes["evaluations"])}
-            if run["status"] == "completed":
-                of = errors(histories(file, name), exact, scale)
-                run["errors"] = {kind: (float(f"{e / tolerance:.3g}"), owner) for kind, (e, owner) in of.items()}
+            done = file[name].attrs
+            run = record_of_run(
+                by, done["integrator"], tolerance, done["status"], done["evaluations"],
+                lambda name=name: largest_errors(histories(file, name), exact, scale),
+            )  # fmt: skip
             found["runs"].append(run)
     return found

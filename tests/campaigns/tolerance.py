@@ -15,6 +15,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from judging import (
+    largest,
+    largest_errors,
+    nothing_of_rounding,
+    peaks,
+    record_of_run,
+    with_body_velocity,
+    with_slow_rates,
+)
 from random_robots import random_scene
 from record import record
 from spatial_tolerance import EXACT as EXACT_IN_SPACE
@@ -44,9 +53,6 @@ RUNS = {  # powers of ten between which tolerances are drawn, those that an inte
 }
 MOST_RADIANS = 1_500.0  # of the highest vibration in a run: keeps it short
 MOST_STEPS_EXACT = 60_000
-NEGLIGIBLE = 1e-3  # of the largest peak of a kind
-SLOW = 0.01  # rad in the time of a run: what the rate of a joint counts relative to at least
-NOTHING = 1e-9  # modal forces over forces
 
 
 def solved(prepared, **keys):
@@ -109,43 +115,18 @@ def histories(prepared, outcome):
     return found
 
 
-def largest(values):
-    return float(np.abs(values).max())
-
-
 def scales(outcome, exact):
     """What the error of each history counts relative to, by kind and name; zero where it is but rounding."""
-    found = {}
-    for kind, members in exact.items():
-        peaks = {name: largest(values) for name, values in members.items()}
-        found[kind] = {name: max(peak, NEGLIGIBLE * max(peaks.values())) for name, peak in peaks.items()}
+    found = peaks(exact)
     for body in outcome.assembly.model.bodies:
         v = outcome.v[:, outcome.coordinates(body.name)]
         fastest = max(largest(np.hypot(v[:, 0], v[:, 1])), largest(v[:, 2]) * (body.length or 0.0))
         if body.n_modes:
             own = found["modal velocity"][body.name]
-            found["modal velocity"][body.name] = max(own, float(np.sqrt(body.mass)) * fastest)
-    duration = float(outcome.time[-1] - outcome.time[0])
-    found["joint rate"] = {name: max(peak, SLOW / duration) for name, peak in found.get("joint rate", {}).items()}
-    forces = max(found["reaction"].values())
-    if max(found.get("modal force", {}).values(), default=0.0) < NOTHING * forces:
-        for kind in ("modal force", "voltage"):  # motors alone do it
-            found[kind] = dict.fromkeys(found.get(kind, {}), 0.0)
+            found["modal velocity"][body.name] = with_body_velocity(own, body.mass, fastest)
+    found["joint rate"] = with_slow_rates(found.get("joint rate", {}), float(outcome.time[-1] - outcome.time[0]))
+    nothing_of_rounding(found, ("modal force", "voltage"), max(found["reaction"].values()))
     return found
-
-
-def largest_errors(found, exact, scale):
-    """By kind, the largest error at any output, in parts of `scale`, and which history it is of."""
-    errors = {}
-    for kind, members in exact.items():
-        of = {
-            name: largest(found[kind][name] - values) / scale[kind][name]
-            for name, values in members.items()
-            if scale[kind][name] > 0
-        }
-        if of:
-            errors[kind] = max((error, name) for name, error in of.items())
-    return errors
 
 
 def try_robot(seed, number, integrators=tuple(RUNS)):
@@ -166,13 +147,11 @@ def try_robot(seed, number, integrators=tuple(RUNS)):
         for power in powers if integrator in integrators else ():
             tolerance = float(f"{10**power:.2g}")
             outcome = solved(prepared, tolerance=tolerance, integrator=integrator, max_steps=most_steps)
-            run = {"integrator": integrator, "ran": outcome.statistics.integrator.name, "tolerance": tolerance}
-            run |= {"status": outcome.status, "evaluations": outcome.statistics.evaluations}
-            if outcome.status == "completed":
-                errors = largest_errors(histories(prepared, outcome), exact, scale)
-                run["errors"] = {
-                    kind: (float(f"{error / tolerance:.3g}"), name) for kind, (error, name) in errors.items()
-                }
+            run = record_of_run(
+                integrator, outcome.statistics.integrator.name, tolerance, outcome.status,
+                outcome.statistics.evaluations,
+                lambda outcome=outcome: largest_errors(histories(prepared, outcome), exact, scale),
+            )  # fmt: skip
             found["runs"].append(run)
     return found
 

@@ -5,8 +5,9 @@ Many more robots, others each time: tests/campaigns/tolerance.py --space.
 
 import h5py
 import pytest
+from judging import largest_errors
 from space import write_scene
-from spatial_tolerance import errors, histories, scales
+from spatial_tolerance import histories, scales
 
 # Reactions that were outside before they were judged, by that many tolerances
 OUTSIDE = {"stanford, radau": ("stanford", 1e-6, "radau"),  # 3.4
@@ -27,5 +28,5 @@ def test_reactions_of_joints_of_the_tree(name, tolerance, integrator, tmp_path, 
     with h5py.File(scene.with_suffix(".results.h5")) as file:
         expected = histories(file, "exact")
         scale = scales(file, expected, file["exact/time"][-1])
-        worst = errors(histories(file, "found"), expected, scale)
+        worst = largest_errors(histories(file, "found"), expected, scale)
     assert max(worst.values())[0] <= tolerance, worst

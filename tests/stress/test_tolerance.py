@@ -4,10 +4,11 @@ Many more robots, others each time: tests/campaigns/tolerance.py.
 """
 
 import pytest
+from judging import largest_errors
 from links import ANGLES, TIP, arm, arm_links
 from mechanisms import relative
 from robots import inverse
-from tolerance import histories, largest_errors, scales, solved, try_robot
+from tolerance import histories, scales, solved, try_robot
 
 import ffrobot
 from ffrobot.run.prepare import prepare

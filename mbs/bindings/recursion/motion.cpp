@@ -27,18 +27,7 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
   const nb::gil_scoped_release unlocked;
   RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data());
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data());
-  TreeRun run(model, times.size());
-  run.last << q, v;
-  run.report = integrate(
-      motion, times, run.last, controls,
-      [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
-      [&](double t) {
-        const nb::gil_scoped_acquire locked;
-        return carry_on(t);
-      },
-      nullptr);
-  run.finish(motion);
-  return run;
+  return integrated(model, motion, reader, times, q, v, controls, carry_on);
 }
 
 // The same of states (T, n_q + n_v) that are known

@@ -69,18 +69,7 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
                             return controller(k, t, state);
                           }};
   const SampledLoop loop(plant, sampling, times.back());
-  TreeRun run(model, times.size());
-  run.last << q, v;
-  run.report = integrate(
-      motion, times, run.last, controls,
-      [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
-      [&](double t) {
-        const nb::gil_scoped_acquire locked;
-        return carry_on(t);
-      },
-      nullptr, &loop.breaks());
-  run.finish(motion);
-  return run;
+  return integrated(model, motion, reader, times, q, v, controls, carry_on, &loop.breaks());
 }
 
 template <class Space> void bind_sampled_motion(nb::module_ &m) {

@@ -5,6 +5,7 @@
 #include "core/integrate/integrate.h"
 #include "core/recursion/observe.h"
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -86,12 +87,33 @@ struct TreeRun {
   }
 
   // What only the end of an integration tells
-  template <class Space> void finish(const RecursiveMotion<Space> &motion) {
+  template <class Space> void finish(RecursiveMotion<Space> &motion) {
+    motion.watch_posture(report.time, last.data());
     least_ratio = motion.least_ratio(), singular_at = motion.singular_at();
     singular_posture = motion.singular_posture();
     for (auto *x : {&states, &accelerations, &lambda, &frames, &energy})
       x->conservativeResize(static_cast<Eigen::Index>(report.outputs), Eigen::NoChange);
   }
 };
+
+// The motion from (q, v) at the first of `times`, with outputs at all of them, which `reader` evaluates
+template <class Space>
+TreeRun integrated(const Model<Space> &model, RecursiveMotion<Space> &motion, RecursiveMotion<Space> &reader,
+                   const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
+                   const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
+                   const Breaks *breaks = nullptr) {
+  TreeRun run(model, times.size());
+  run.last << q, v;
+  run.report = integrate(
+      motion, times, run.last, controls,
+      [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
+      [&](double t) {
+        const nanobind::gil_scoped_acquire locked;
+        return carry_on(t);
+      },
+      nullptr, breaks);
+  run.finish(motion);
+  return run;
+}
 
 } // namespace ffrobot::recursion

@@ -144,13 +144,10 @@ template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z)
   return left < 1e-11;
 }
 
-// Of a state: what smaller errors change of forces is rounding, which grows without bounds near singular postures.
-constexpr double rounding = 1e-13;
-
 template <class Space> double RecursiveMotion<Space>::error_size(double t, const double *z, const double *e) {
   const double size = norm_.of_state(e);
   norm_.observe(workspace_);
-  if (!norm_.observes() || !(size > rounding)) // also NaN
+  if (!norm_.observes())
     return size;
   // Multipliers amplify errors of the state (stiffness times the error of a
   // fast mode): measure what e does to them.
@@ -168,12 +165,14 @@ template <class Space> void RecursiveMotion<Space>::accepted(double t, const dou
   if (accepted_ == 0)
     norm_.observe(workspace_);
   norm_.take(z, z_dot, workspace_);
-  if (scene_.watch && accepted_ % steps_between_postures_ == 0)
+  if (accepted_ % steps_between_postures_ == 0)
     watch_posture(t, local().state(z));
   ++accepted_;
 }
 
 template <class Space> void RecursiveMotion<Space>::watch_posture(double t, const double *q) {
+  if (!scene_.watch)
+    return;
   update_targets(t);
   Posture posture = posture_at(mechanism_, *scene_.watch, q, measured_);
   double at = t;

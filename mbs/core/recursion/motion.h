@@ -117,8 +117,9 @@ public:
   // left, relative to 1 m, 1 rad, 1 m/s
   double project(double t, double *q, double *v);
 
-  // Of the scene's watch: the smallest ratio of posture_at() so far, when, and
-  // q there; 1 before the first.
+  // Of the scene's watch, which looks at some of the accepted steps and where it is told to: the smallest ratio of
+  // posture_at() so far, when, and q there; 1 before the first.
+  void watch_posture(double t, const double *q);
   double least_ratio() const { return least_ratio_; }
   double singular_at() const { return singular_at_; }
   const Eigen::VectorXd &singular_posture() const { return singular_posture_; }
@@ -131,7 +132,6 @@ private:
   void residuals(double t, const double *q, const double *v);
   void find_stiff_terms();
   void find_compliance();
-  void watch_posture(double t, const double *q);
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
