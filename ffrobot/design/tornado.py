@@ -37,6 +37,8 @@ def draw_tornado(found: Sensitivity, g: int) -> Figure:
     axes.barh(range(len(known)), values, color=[COLORS[0] if value >= 0.0 else COLORS[1] for value in values])
     axes.set_yticks(range(len(known)), [found.keys[k] for k in known])
     axes.invert_yaxis()
+    axes.grid(visible=False, axis="y")
+    axes.set_axisbelow(True)
     axes.axvline(0.0, color="black", linewidth=0.6)
     axes.set_xlabel("change of the goal (%) with +1 % of the key")
     return picture
