@@ -14,13 +14,14 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
+from ..common.arrays import Array
 from ..common.errors import FfrobotError, SolveError, of_file
 from ..common.files import check_output
 from ..common.interrupts import deferred_interrupts, ending_at_once
 from ..common.parallel import on_first, processes, without_daemon
 from ..mesh.kept_parts import kept_path
 from .link_file import LinkSource, link_path, read_link
-from .link_records import BeamLink, Link, SolidLink
+from .link_records import BeamLink, Family, Link, SolidLink
 from .modal_body import ModalBody
 from .modal_body.measured import with_measured
 from .modal_body_file import FORMAT, read_modal_body, write_modal_body
@@ -108,6 +109,18 @@ def computed_modal_body(source: LinkSource) -> ModalBody:
     with of_file(path), ending_at_once():
         body: ModalBody = compute(link, path, _silent)
     return body
+
+
+def held_mode_frequencies(links: Sequence[BeamLink], family: Family, number: int) -> Array | None:
+    """Frequencies of beams that differ a little by a mode of the first one, held: see `beam.rayleigh`.
+
+    Raises `SolveError` where the modes cannot be computed.
+    """
+    without_daemon()
+    with ending_at_once(), deferred_interrupts():
+        from .beam.rayleigh import held_mode_frequencies
+
+        return held_mode_frequencies(links, family, number)
 
 
 def _beside(source: LinkSource) -> list[Path]:

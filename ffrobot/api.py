@@ -5,11 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
+    from .design.record import Sensitivity
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
     from .fit import Fit
@@ -155,6 +157,36 @@ def fit_measured(
 
     where = None if output is None else Path(output)
     return fit_measured(Path(file), Path(measured), vary, where, motors=motors, force=force)
+
+
+def sensitivity(
+    scene: AnyPath,
+    of: Sequence[str],
+    to: Sequence[str],
+    output: AnyPath | None = None,
+    *,
+    processes: int = 1,
+    step: float = 0.01,
+    tolerance: float = 1e-9,
+    allow_python: Sequence[AnyPath] = (),
+) -> Sensitivity:
+    """Derivatives of scalar results `of` a scene file by the numbers at keys `to`: `ffrobot sensitivity`.
+
+    Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.sensitivity`.
+    """
+    from contextlib import nullcontext
+    from tempfile import TemporaryDirectory
+
+    from .common.outputs import protected
+    from .common.python_files import python_allowed
+    from .design.sensitivity import sensitivity
+    from .run.inputs import files_of
+
+    path = Path(scene)
+    where = TemporaryDirectory() if output is None else nullcontext(str(output))
+    with where as folder, protected(files_of(path)), python_allowed(Path(place) for place in allow_python):
+        found = sensitivity(path, of, to, Path(folder), processes=processes, step=step, tolerance=tolerance)
+    return found if output is not None else replace(found, table=None)
 
 
 def read_modal_body(path: AnyPath) -> ModalBody:

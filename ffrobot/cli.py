@@ -16,6 +16,7 @@ from .bench.command import bench
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first, on_first
+from .design.command import sensitivity
 from .exchange.command import export, import_
 from .present.failures import describe, ready_streams, without_output
 from .present.logs import FILE, LOGGER, logging_options, python_option
@@ -436,6 +437,7 @@ def schema(kind: str) -> None:
 cli.add_command(bench)
 cli.add_command(import_)
 cli.add_command(export)
+cli.add_command(sensitivity)
 
 
 def _protect(paths: Iterable[Path]) -> None:

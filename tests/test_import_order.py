@@ -20,7 +20,7 @@ FLOORS = {
     "fe_models": ("link_records", "modal_body", "beam", "solid", "."),
     "mbs": ("fields", "joints", "scene", "model", "solve", "analysis", "quantities", "."),
     "actuation": ("patches", ".", "control"),
-    "ffrobot": ("scene", "run", "results", "present", "exchange", "pictures", "sweep", "fit", "bench", "."),
+    "ffrobot": ("scene", "run", "results", "present", "exchange", "pictures", "sweep", "fit", "design", "bench", "."),
 }
 
 

@@ -53,15 +53,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
     """
     length = link.geometry.length
     named = link.places
-    nodes = _element_boundaries(link)
-    mesh = interval_mesh(nodes)
-    # The fields are read on a mesh of their own: there also the middle and the interfaces are vertices.
-    station_mesh = interval_mesh(with_points(nodes, [0.5 * length, *named.values()]))
-    stations = station_space(station_mesh)
-    models: dict[Family, FamilyModel] = {}
-    for family in link.families:
-        progress(f"{link.name}: assembling {family}")
-        models[family] = _loaded(family_model(link, family, mesh, stations.x), link, stations.x)
+    models, stations = loaded_models(link, link.families, progress)
     progress(f"{link.name}: solving for the modes")
     places = [int(np.argmin(np.abs(stations.x - place))) for place in named.values()]
     modes, static = _modes(link, models, places, path)
@@ -100,6 +92,22 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         ffrobot_version=program_version(),
     )
+
+
+def loaded_models(
+    link: BeamLink, families: Sequence[Family], progress: Progress = lambda _: None
+) -> tuple[dict[Family, FamilyModel], StationSpace]:
+    """The eigenproblems of `families` with the masses on interfaces, and the stations at which they are read."""
+    nodes = _element_boundaries(link)
+    mesh = interval_mesh(nodes)
+    # The fields are read on a mesh of their own: there also the middle and the interfaces are vertices.
+    station_mesh = interval_mesh(with_points(nodes, [0.5 * link.geometry.length, *link.places.values()]))
+    stations = station_space(station_mesh)
+    models: dict[Family, FamilyModel] = {}
+    for family in families:
+        progress(f"{link.name}: assembling {family}")
+        models[family] = _loaded(family_model(link, family, mesh, stations.x), link, stations.x)
+    return models, stations
 
 
 def _with_sections(

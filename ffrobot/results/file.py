@@ -324,14 +324,21 @@ class Results:
         `points/link2.tip/position[0]`.
         """
         found: dict[str, Array] = {}
+        for name in self.histories(analysis):
+            values = self[f"{analysis}/{name}"]
+            columns = values.reshape(len(values), -1)
+            labels = [name] if values.ndim == 1 else [f"{name}[{k}]" for k in range(columns.shape[1])]
+            found.update(zip(labels, columns.T, strict=True))
+        return found
+
+    def histories(self, analysis: str) -> list[str]:
+        """Names, inside an analysis, of its datasets with a row for each output."""
+        found: list[str] = []
         outputs = len(self.time(analysis))
 
         def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
-            if not isinstance(item, h5py.Dataset) or item.shape[:1] != (outputs,) or name.startswith("resume/"):
-                return
-            values = numbers(item, f"{self.path}: {name}").reshape(outputs, -1)
-            labels = [name] if item.ndim == 1 else [f"{name}[{k}]" for k in range(values.shape[1])]
-            found.update(zip(labels, values.T, strict=True))
+            if isinstance(item, h5py.Dataset) and item.shape[:1] == (outputs,) and not name.startswith("resume/"):
+                found.append(name)
 
         self._file[analysis].visititems(collect)
         return found

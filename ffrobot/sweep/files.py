@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,7 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
         if key[0] == LINKS:
             set_key(_link_of(scene_path, scene, key, links), key[2:], value, key)
         else:
-            set_key(scene, key, value, key)
+            set_key(scene, key, deepcopy(value), key)  # of which later keys may change a part
     inputs = fingerprints(scene, scene_path.absolute())
     copies = {}
     for body, link in links.items():
@@ -68,14 +69,46 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
     return RunFiles(scene, copies, inputs)
 
 
-def _link_of(scene_path: Path, scene: Table, key: tuple[str, ...], links: dict[str, Table]) -> Table:
+def number_at(scene_path: Path, key: tuple[str, ...], option: str) -> float:
+    """The number that the scene, or for `links.BODY.…` the link file, has at `key`.
+
+    Raises `InputError`, with the `option` of the command that names the key, where there is none.
+    """
+    scene = load_toml(scene_path, "scene file")
+    _resolve(scene, scene_path.absolute().parent)
+    inner = key[2:] if key[0] == LINKS else key
+    tables = _link_of(scene_path, scene, key, {}, option) if key[0] == LINKS else scene
+    value = value_of(tables, inner, key, option)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        found = "none" if value is None else repr(value)
+        raise InputError(
+            f"{scene_path}: {option}: expected a number at {'.'.join(key)}, found {found}{_near(tables, inner)}"
+            + (", and no default counts: write its value into the file" if value is None else "")
+        )
+    return float(value)
+
+
+def _near(data: Node, key: tuple[str, ...]) -> str:
+    """What the first part of `key` that a table does not have may have been meant to be."""
+    for part in key:
+        if isinstance(data, dict) and part not in data:
+            return did_you_mean(part, data)
+        if not isinstance(data, dict | list):
+            return ""
+        data = data[_index(data, part, key)]  # type: ignore[index]
+    return ""
+
+
+def _link_of(
+    scene_path: Path, scene: Table, key: tuple[str, ...], links: dict[str, Table], option: str = "--vary"
+) -> Table:
     """The content of the link file that `links.BODY.…` means, read once, or the table in the scene itself."""
     with_links = [body["name"] for body in _bodies(scene) if "link" in body]
     if len(key) < 3 or key[1] not in with_links:
         found = ".".join(key)
         raise InputError(
-            f"{scene_path}: --vary: expected {LINKS}.BODY.KEY with a body that has a link file ({quoted(with_links)}),"
-            f' found "{found}"' + (did_you_mean(key[1], with_links) if len(key) > 1 else "")
+            f"{scene_path}: {option}: expected {LINKS}.BODY.KEY with a body that has a link file"
+            f' ({quoted(with_links)}), found "{found}"' + (did_you_mean(key[1], with_links) if len(key) > 1 else "")
         )
     if key[1] not in links:
         link = _body(scene, key[1])["link"]
@@ -109,14 +142,14 @@ def _resolve(data: Node, folder: Path) -> None:
             data[key] = str(folder / name) + colon + function  # type: ignore[call-overload]
 
 
-def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = ()) -> Value:
-    """data[key], entries of a list as in `set_key`; None where there is none."""
+def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = (), option: str = "--vary") -> Value:
+    """data[key], entries of a list as in `set_key`; None where there is none. `option`: of the command, in messages."""
     if isinstance(data, dict) and key[0] not in data:
         return None
-    value = data[_index(data, key[0], whole or key)]  # type: ignore[index]
+    value = data[_index(data, key[0], whole or key, option)]  # type: ignore[index]
     if len(key) == 1 or value is None:
         return value
-    return value_of(value, key[1:], whole or key) if isinstance(value, dict | list) else None
+    return value_of(value, key[1:], whole or key, option) if isinstance(value, dict | list) else None
 
 
 def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ...] = ()) -> None:
@@ -136,7 +169,7 @@ def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ..
     set_key(inner, key[1:], value, whole)
 
 
-def _index(data: Node, part: str, whole: tuple[str, ...]) -> str | int:
+def _index(data: Node, part: str, whole: tuple[str, ...], option: str = "--vary") -> str | int:
     if isinstance(data, dict):
         return part
     names = [str(entry.get("name", entry.get("body", k))) for k, entry in _tables(data)]
@@ -146,7 +179,7 @@ def _index(data: Node, part: str, whole: tuple[str, ...]) -> str | int:
         return int(part)
     known = names or [str(k) for k in range(len(data))]
     raise InputError(
-        f'--vary: expected one of {quoted(known)} in "{".".join(whole)}", found "{part}"{did_you_mean(part, known)}'
+        f'{option}: expected one of {quoted(known)} in "{".".join(whole)}", found "{part}"{did_you_mean(part, known)}'
     )
 
 

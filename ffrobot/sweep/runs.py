@@ -146,13 +146,18 @@ def _reduce(results: Results, name: str, reduction: str) -> float:
         values = results.data(name)
     except InputError:
         return float("nan")
-    parts = name.split("/")
-    dimension = 3 if results.scene.get("space") == "spatial" else 2
-    is_vector = values.shape[1] == dimension and "pzt" not in parts and parts[-1] not in PER_COORDINATE
-    history = np.linalg.norm(values, axis=1) if is_vector else values[:, 0]
-    if values.shape[1] > 1 and not is_vector:
+    vector = is_vector(results, name, values)
+    history = np.linalg.norm(values, axis=1) if vector else values[:, 0]
+    if values.shape[1] > 1 and not vector:
         history = np.abs(values).max(axis=1)
     return float(REDUCTIONS[reduction](history))
+
+
+def is_vector(results: Results, name: str, values: Array) -> bool:
+    """Whether columns of the dataset `name`, `values` (T, columns), are components of one vector."""
+    parts = name.split("/")
+    dimension = 3 if results.scene.get("space") == "spatial" else 2
+    return values.shape[1] == dimension and "pzt" not in parts and parts[-1] not in PER_COORDINATE
 
 
 def collected(request: str) -> tuple[str, str]:

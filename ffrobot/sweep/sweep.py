@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import signal
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +26,18 @@ from .variation import Value, Variation, grid, latin_hypercube, parse_variation
 
 PLAN = "plan.json"
 
+Key = tuple[str, ...]
+"""Parts of a key, `("payload", "0", "mass")`."""
+
 
 @dataclass(frozen=True)
 class Sweep:
     """The runs of a scene: `points` are the combinations of the `variations`' values, one run each.
 
-    `collect` names histories whose reductions become columns beside the standard ones; see `runs.REDUCTIONS`.
+    `collect` names histories whose reductions become columns beside the standard ones; see `runs.REDUCTIONS`. `fixed`
+    are changes that all points share, `own` the values that the scene has itself, which change nothing. `growing`:
+    points may be added later, by a search; folders of runs are then named by what their scenes have changed, and their
+    results stay, to be read.
     """
 
     scene: Path
@@ -39,6 +46,9 @@ class Sweep:
     folder: Path
     collect: tuple[str, ...] = ()
     allow_python: tuple[Path, ...] = ()
+    fixed: Mapping[Key, Value] = field(default_factory=dict)
+    own: tuple[Value, ...] = ()
+    growing: bool = False
 
     @property
     def keys(self) -> list[str]:
@@ -58,11 +68,22 @@ class Sweep:
     @property
     def runs(self) -> list[Run]:
         """In the order of the table."""
-        folders = (self.folder / "runs" / f"{k:04d}" for k in range(len(self.points)))
         return [
-            Run(k, values, folder, self.collect, {}, self.allow_python)
-            for k, (values, folder) in enumerate(zip(self.points, folders, strict=True))
+            Run(k, values, self.folder / "runs" / self._name(k, values), self.collect, {}, self.allow_python)
+            for k, values in enumerate(self.points)
         ]
+
+    def changes(self, values: Sequence[Value]) -> dict[Key, Value]:
+        """What is changed in the scene of one run, by key."""
+        points = zip(self.variations, values, self.own or (None,) * len(values), strict=True)
+        return {**self.fixed, **{v.key: value for v, value, own in points if value != own}}
+
+    def _name(self, number: int, values: Sequence[Value]) -> str:
+        """Of the run's folder."""
+        if not self.growing:
+            return f"{number:04d}"
+        changes = {".".join(key): value for key, value in self.changes(values).items()}
+        return hashlib.sha256(json.dumps(changes, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def plan_sweep(
@@ -85,8 +106,8 @@ def plan_sweep(
     points = tuple(grid(variations) if sample is None else latin_hypercube(variations, sample, seed))
     allowed = (scene.absolute().parent, *allowed_python())  # runs have folders of their own
     sweep = Sweep(scene, variations, points, folder, tuple(collect), allowed)
-    _check_first(sweep)
-    _claim_folder(sweep)
+    check_point(sweep, points[0])
+    claim_folder(sweep)
     return sweep
 
 
@@ -140,12 +161,17 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, Run]]:
     rows, waiting = {}, {}
     for run in sweep.runs:
         files, row = _files(sweep, run), finished_row(run.folder)
-        if row is not None and row.inputs == files.inputs:
-            rows[run.number] = row
+        if row is not None and row.inputs == files.inputs and _is_whole(sweep, run, row):
+            rows[run.number] = replace(row, number=run.number, values=run.values)
         else:
             files.write(run.folder)
             waiting[run.number] = replace(run, inputs=files.inputs)
     return rows, waiting
+
+
+def _is_whole(sweep: Sweep, run: Run, row: Row) -> bool:
+    """Whether all that the row stands for is there still."""
+    return not sweep.growing or row.status != "completed" or (run.folder / RESULTS).exists()
 
 
 @contextmanager
@@ -168,19 +194,21 @@ def _performed(runs: Sequence[Run], side_by_side: int) -> Iterator[Iterable[Row 
 
 
 def _files(sweep: Sweep, run: Run) -> RunFiles:
-    changes = {v.key: value for v, value in zip(sweep.variations, run.values, strict=True)}
-    return run_files(sweep.scene, changes, run.folder)
+    return run_files(sweep.scene, sweep.changes(run.values), run.folder)
 
 
-def _check_first(sweep: Sweep) -> None:
-    """A key that does not exist is told before hundreds of runs fail of it."""
+def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
+    """Raise `InputError` where the scene or a link file is wrong with these values, before hundreds of runs fail of it.
+
+    What needs the whole scene, or its results, is not seen.
+    """
     from tempfile import TemporaryDirectory
 
     from ..fe_models.link_file import read_link
     from ..scene.any_space import load_any_scene
 
     with TemporaryDirectory() as folder:
-        run = Run(0, sweep.points[0], Path(folder))
+        run = Run(0, values, Path(folder))
         try:
             with python_allowed(sweep.allow_python):
                 scene = load_any_scene(_files(sweep, run).write(run.folder))
@@ -196,16 +224,14 @@ def _describe(sweep: Sweep, run: Run) -> str:
     return ", ".join(f"{v.name} = {value}" for v, value in zip(sweep.variations, run.values, strict=True))
 
 
-def _claim_folder(sweep: Sweep) -> None:
-    """Start the folder of a sweep, or take up the same one; a folder of another sweep is left alone."""
-    plan = json.dumps(
-        {
-            "scene": str(sweep.scene.absolute()),
-            "keys": sweep.keys,
-            "points": sweep.points,
-            "collect": sweep.collect,
-        }
-    )
+def claim_folder(sweep: Sweep) -> None:
+    """Start the folder of a sweep, or take up the same one; a folder of another sweep is left alone.
+
+    One that grows is the same with whatever keys and points.
+    """
+    scene = str(sweep.scene.absolute())
+    of_points = {"keys": sweep.keys, "points": sweep.points, "collect": sweep.collect}
+    plan = json.dumps({"scene": scene, **({"growing": True} if sweep.growing else of_points)})
     path = sweep.folder / PLAN
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") != plan:
         raise InputError(f"{sweep.folder}: output: expected a new folder or one of this very sweep, found another's")

@@ -1,0 +1,126 @@
+"""Derivatives of goals by keys from runs beside the scene's own, with what there is to mind about each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..sweep.sweep import Key
+from .designs import Design, Point
+from .differences import LEVELS, derivative
+from .goals import Followed, Goal, Reading
+
+SIZES = (1.0, 0.5, 0.25)  # of the first steps
+AIM = 1e-6  # error of percent per percent that needs no smaller steps
+ROUGH = 1e-2  # of a derivative: beyond, the goal is hardly smooth
+
+
+@dataclass(frozen=True)
+class Base:
+    """The place where derivatives are taken: k `keys` with their values `point`, and g `goals` with their `readings`.
+
+    `steps` (k) are the largest ones.
+    """
+
+    goals: tuple[Goal, ...]
+    readings: tuple[Reading, ...]
+    keys: tuple[Key, ...]
+    point: Point
+    steps: tuple[float, ...]
+
+    def moved(self, k: int, offset: float) -> Point:
+        """The point with one value changed."""
+        return (*self.point[:k], self.point[k] + offset, *self.point[k + 1 :])
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Key number `k` changed by `offset`: the goals there, none where the run failed, and why it did."""
+
+    k: int
+    offset: float
+    goals: tuple[Followed, ...]
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """∂goal/∂key with the estimate of its error, both in SI units, NaN where there is none.
+
+    `method`: "differences", "one-sided", "exact" or "none"; `step`: the largest that was taken; `notes`: what to mind.
+    """
+
+    derivative: float
+    error: float
+    step: float
+    method: Literal["differences", "one-sided", "exact", "none"]
+    notes: tuple[str, ...] = ()
+
+
+def sample(base: Base, k: int, offset: float, design: Design) -> Sample:
+    """The goals of a design beside the base."""
+    if not design.completed:
+        return Sample(k, offset, (), f"{design.row.status}: {design.row.message}")
+    with design.results() as results:
+        pairs = zip(base.goals, base.readings, strict=True)
+        return Sample(k, offset, tuple(goal.follow(results, reading) for goal, reading in pairs))
+
+
+Exact = Mapping[tuple[int, int], Entry]
+"""Entries that are known without runs, by numbers of goal and key."""
+
+
+def entries(base: Base, samples: Sequence[Sample], exact: Exact) -> tuple[tuple[Entry, ...], ...]:
+    """[goal][key]: `exact` ones, and the others by differences."""
+    of_keys = [[one for one in samples if one.k == k] for k in range(len(base.keys))]
+    return tuple(
+        tuple(exact.get((g, k)) or _entry(base, g, k, of_key) for k, of_key in enumerate(of_keys))
+        for g in range(len(base.goals))
+    )
+
+
+def wants_smaller_steps(base: Base, samples: Sequence[Sample], exact: Exact) -> list[int]:
+    """Keys by number with an entry whose error is above `AIM` and least with the smallest steps there are."""
+    found, rows = [], entries(base, samples, exact)
+    for k in range(len(base.keys)):
+        sizes = sorted({abs(one.offset) for one in samples if one.k == k and one.goals}, reverse=True)
+        if sizes and any(
+            _relative(row[k].error, base, g, k) > AIM and np.isclose(row[k].step, sizes[-LEVELS:][0])
+            for g, row in enumerate(rows)
+        ):
+            found.append(k)
+    return found
+
+
+def _entry(base: Base, g: int, k: int, samples: Sequence[Sample]) -> Entry:
+    whole = [one for one in samples if one.goals and np.isfinite(one.goals[g].value)]
+    offsets = np.array([0.0, *(one.offset for one in whole)])
+    found = derivative(offsets, np.array([base.readings[g].value, *(one.goals[g].value for one in whole)]))
+    both = offsets.min() < 0.0 < offsets.max()
+    method: Literal["differences", "one-sided", "none"] = "differences" if both else "one-sided"
+    notes = tuple(_notes(base, g, k, samples, found.error, found.value))
+    return Entry(*found, "none" if np.isnan(found.value) else method, notes)
+
+
+def _notes(base: Base, g: int, k: int, samples: Sequence[Sample], error: float, value: float) -> Iterator[str]:
+    """What to mind: runs that failed, peaks that another overtakes, goals that are not smooth."""
+    nearest = sorted(samples, key=lambda one: abs(one.offset))
+    name = ".".join(base.keys[k])
+
+    def at(one: Sample) -> str:
+        return f"with {name} = {base.point[k] + one.offset:.6g}"
+
+    if failed := next((one for one in nearest if one.failure), None):
+        yield f"{at(failed)}: {failed.failure}"
+    if jump := next((one for one in nearest if one.goals and one.goals[g].elsewhere), None):
+        yield f"a kink: {at(jump)} the largest value is {jump.goals[g].elsewhere}"
+    if _relative(error, base, g, k) > ROUGH and error > ROUGH * abs(value):
+        yield "not smooth, or noisy: half of the step gives another derivative"
+
+
+def _relative(error: float, base: Base, g: int, k: int) -> float:
+    """Of percent per percent; of a goal or a key that is 0 in its unit."""
+    return error * (abs(base.point[k]) or 1.0) / (abs(base.readings[g].value) or 1.0)

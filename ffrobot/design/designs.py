@@ -1,0 +1,100 @@
+"""Designs of one scene: keys with numbers, a run for each, kept and taken up as those of sweeps, and goals by them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..common.errors import InputError
+from ..common.files import check_folder
+from ..common.python_files import allowed_python
+from ..common.tables import DEEPEST
+from ..results.file import Results
+from ..run.watcher import Watcher
+from ..sweep import Sweep, forget_failures, run_sweep
+from ..sweep.runs import RESULTS, Row
+from ..sweep.sweep import Key, check_point, claim_folder
+from ..sweep.variation import Variation
+
+Point = tuple[float, ...]
+"""A value for each key."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """One run: its point, its row in the table, and where its results are."""
+
+    point: Point
+    row: Row
+    folder: Path
+
+    @property
+    def completed(self) -> bool:
+        """Whether its results are whole."""
+        return self.row.status == "completed"
+
+    @contextmanager
+    def results(self) -> Iterator[Results]:
+        """To be read."""
+        with Results(self.folder / RESULTS) as results:
+            yield results
+
+
+class Designs:
+    """All designs so far of the scene at `path`, by the values of `keys`, which the scene has `own` ones of.
+
+    `fixed` are changes that they share. `retry`: whether what failed in an earlier command is run again.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        keys: Sequence[Key],
+        own: Point,
+        folder: Path,
+        fixed: Mapping[Key, Any],
+        *,
+        processes: int,
+        watcher: Watcher,
+        retry: bool = False,
+    ) -> None:
+        check_folder(folder)
+        allowed = (path.absolute().parent, *allowed_python())
+        variations = tuple(Variation(key, ()) for key in keys)
+        self._sweep = Sweep(path, variations, (), folder, (), allowed, fixed, own, growing=True)
+        self._processes, self._watcher, self._retry = processes, watcher, retry
+
+    @property
+    def table(self) -> Path:
+        """The file with a row for every design."""
+        return self._sweep.table
+
+    def problem(self, point: Point) -> str:
+        """What is wrong with the scene or a link file at a point, before any run; empty where nothing is seen."""
+        try:
+            check_point(self._sweep, point)
+        except InputError as error:
+            return str(error)
+        return ""
+
+    def run(self, points: Sequence[Point]) -> list[Design]:
+        """The designs at `points`, failed ones too; what earlier calls or commands have run is not run again."""
+        claim_folder(self._sweep)
+        if self._retry:
+            forget_failures(replace(self._sweep, points=tuple(set(points) - set(self._sweep.points))))
+        known = dict.fromkeys((*self._sweep.points, *points))
+        self._sweep = replace(self._sweep, points=tuple(known))
+        rows = {row.values: row for row in run_sweep(self._sweep, self._processes, self._watcher)}
+        folders = {run.values: run.folder for run in self._sweep.runs}
+        return [Design(point, rows[point], folders[point]) for point in points]
+
+
+def parse_key(text: str, option: str) -> Key:
+    """`payload.0.mass` in parts. Raises `InputError` where that is no key."""
+    parts = tuple(text.strip().split("."))
+    if not all(parts) or len(parts) > DEEPEST:
+        raise InputError(f'{option}: expected a key such as payload.0.mass, found "{text[:100]}"')
+    return parts

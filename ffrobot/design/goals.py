@@ -1,0 +1,283 @@
+"""Scalars that a design is judged by: what `--of` and `--minimise` may say, and their values by results.
+
+A peak belongs to a time and a column: its derivative by a parameter is that of the history there (envelope theorem,
+Danskin 1966), as long as no other time overtakes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..common.arrays import Array
+from ..common.errors import InputError
+from ..common.validation import did_you_mean, either, quoted
+from ..fe_models.modal_body import ModalBody
+from ..results.file import Results
+from .histories import POWER, History, read_history
+
+FORMS = (
+    "peak HISTORY", "rms HISTORY", "mean HISTORY", "integral HISTORY", "at TIME HISTORY", "energy joints.NAME",
+    "frequency NUMBER BODY", "mass", "mass BODY",
+)  # fmt: skip
+
+NOISE = 1e-6  # of a peak: a valley that is less deep lies between no two peaks
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A goal's value by results. Of a peak also where it is.
+
+    Attributes:
+        value: of the goal.
+        unit: empty where it is not known.
+        time: of a peak, s; NaN of all else.
+        edge: "first" or "last" where that is an end of the run, which may move.
+        column, sign: of its history, and of the value there.
+        mode: of a frequency, the family and its number in it.
+    """
+
+    value: float
+    unit: str = ""
+    time: float = float("nan")
+    edge: Literal["", "first", "last"] = ""
+    column: int = 0
+    sign: float = 1.0
+    mode: str = ""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The value of a goal by other results, a peak at its own place; `elsewhere`: where the largest value is now."""
+
+    value: float
+    elsewhere: str = ""
+
+
+class Goal:
+    """One scalar; `text` is what the user calls it."""
+
+    text: str
+    analysis: str | None = None
+    """Name that its history begins with, where that may be one of an analysis."""
+    needs_motion = True
+    """Whether an analysis has to be run for it."""
+
+    def read(self, results: Results) -> Reading:
+        """Its value. Raises `InputError` where the results do not have it."""
+        raise NotImplementedError
+
+    def follow(self, results: Results, nominal: Reading) -> Followed:
+        """Its value by results of a changed scene."""
+        return Followed(self.read(results).value)
+
+
+@dataclass(frozen=True)
+class OfHistory(Goal):
+    """A mean of some kind of a history of one column, or its value at a time."""
+
+    text: str
+    reduce: Callable[[History], float]
+    name: str
+    times: str = ""  # what its unit is that of the history times
+
+    @property
+    def analysis(self) -> str:  # type: ignore[override]
+        """The first part of the name."""
+        return self.name.replace("/", ".").partition(".")[0]
+
+    def read(self, results: Results) -> Reading:
+        """Of the history's only column."""
+        history = read_history(results, self.name, f'"{self.text}"')
+        if history.values.shape[1] > 1:
+            raise InputError(
+                f'"{self.text}": expected one column, such as "{self.name}[0]", found {history.values.shape[1]}'
+            )
+        joined = " ".join(part for part in (history.unit, self.times) if part) if history.unit else ""
+        return Reading(self.reduce(history), {"W s": "J"}.get(joined, joined))
+
+
+@dataclass(frozen=True)
+class Peak(Goal):
+    """The largest absolute value of a history, of any of its columns; of vectors their length."""
+
+    text: str
+    name: str
+
+    @property
+    def analysis(self) -> str:  # type: ignore[override]
+        """The first part of the name."""
+        return self.name.replace("/", ".").partition(".")[0]
+
+    def read(self, results: Results) -> Reading:
+        """The value, when it is reached, and in which column."""
+        history = self._history(results)
+        k, column = _largest(history.values)
+        value = history.values[k, column]
+        edge: Literal["", "first", "last"] = "first" if k == 0 else "last" if k == history.time.size - 1 else ""
+        return Reading(
+            float(abs(value)), history.unit, float(history.time[k]), edge, column, -1.0 if value < 0.0 else 1.0
+        )
+
+    def follow(self, results: Results, nominal: Reading) -> Followed:
+        """At the time, in the column and with the sign of the `nominal` peak."""
+        history = self._history(results)
+        time = {"first": history.time[0], "last": history.time[-1]}.get(nominal.edge, nominal.time)
+        if not history.time[0] <= time <= history.time[-1]:
+            return Followed(float("nan"), f"the run ends at t = {history.time[-1]:g} s")
+        value = nominal.sign * history.at(float(time), nominal.column)
+        return Followed(value, _overtaken(history, nominal, float(time), value))
+
+    def _history(self, results: Results) -> History:
+        return read_history(results, self.name, f'"{self.text}"')
+
+
+@dataclass(frozen=True)
+class Frequency(Goal):
+    """Of an eigenmode of a link, Hz, by its number from 1 in the order of the modal body."""
+
+    text: str
+    number: int
+    body: str
+    needs_motion = False
+
+    def read(self, results: Results) -> Reading:
+        """Of the modal body that the results rest on."""
+        body = self._body(results)
+        if not 1 <= self.number <= body.eigenmode_count:
+            raise InputError(
+                f'"{self.text}": expected the number of a mode of {self.body}, 1 to {body.eigenmode_count}, found'
+                f" {self.number}"
+            )
+        return Reading(float(body.frequency[self.number - 1]), "Hz", mode=_modes(body)[self.number - 1])
+
+    def follow(self, results: Results, nominal: Reading) -> Followed:
+        """Of the same mode of its family, whatever its number now."""
+        body = self._body(results)
+        modes = _modes(body)
+        if nominal.mode not in modes:
+            return Followed(float("nan"), f"the link file asks for too few modes to have {nominal.mode}")
+        return Followed(float(body.frequency[modes.index(nominal.mode)]))
+
+    def _body(self, results: Results) -> ModalBody:
+        return results.modal_body(_flexible(results, self.text, self.body))
+
+
+@dataclass(frozen=True)
+class Mass(Goal):
+    """Of a body, or of all bodies, kg: payloads and patches are not counted."""
+
+    text: str
+    body: str = ""
+    needs_motion = False
+
+    def read(self, results: Results) -> Reading:
+        """By modal bodies, and what the scene says of rigid ones."""
+        bodies = {str(body["name"]): body for body in results.scene["body"]}
+        if self.body and self.body not in bodies:
+            raise InputError(
+                f'"{self.text}": expected a body ({quoted(bodies)}), found "{self.body}"'
+                + did_you_mean(self.body, bodies)
+            )
+        wanted = [self.body] if self.body else list(bodies)
+        return Reading(sum(_mass(results, bodies[name]) for name in wanted), "kg")
+
+
+def parse_goal(text: str, option: str = "--of") -> Goal:
+    """What `text` asks for, one of `FORMS`. Raises `InputError` where it is none of them."""
+    word, *rest = text.split() or [""]
+    match word, rest:
+        case "peak", [name]:
+            return Peak(text, name)
+        case "at", [time, name] if (t := _number(time)) is not None:
+            return OfHistory(text, lambda history: _value_at(history, t, text), name)
+        case "energy", [joint]:
+            return OfHistory(text, _integral, f"{joint}.{POWER}", "s")
+        case (("rms" | "mean" | "integral"), [name]):
+            return OfHistory(text, REDUCTIONS[word], name, "s" if word == "integral" else "")
+        case "frequency", [number, body] if number.isdecimal():
+            return Frequency(text, int(number), body)
+        case "mass", []:
+            return Mass(text)
+        case "mass", [body]:
+            return Mass(text, body)
+    raise InputError(f'{option}: expected {either(FORMS)}, found "{text}"')
+
+
+def _integral(history: History) -> float:
+    """By the trapezoidal rule."""
+    f = history.values[:, 0]
+    return float(0.5 * np.sum((f[1:] + f[:-1]) * np.diff(history.time)))
+
+
+def _mean(history: History) -> float:
+    """Over time."""
+    duration = history.time[-1] - history.time[0]
+    return _integral(history) / float(duration) if duration > 0.0 else float(history.values[0, 0])
+
+
+def _rms(history: History) -> float:
+    """Over the outputs, as in tables of sweeps."""
+    return float(np.sqrt(np.mean(history.values[:, 0] ** 2)))
+
+
+REDUCTIONS: Mapping[str, Callable[[History], float]] = {"rms": _rms, "mean": _mean, "integral": _integral}
+
+
+def _value_at(history: History, t: float, text: str) -> float:
+    if not history.time[0] <= t <= history.time[-1]:
+        raise InputError(f'"{text}": expected a time from {history.time[0]:g} to {history.time[-1]:g} s, found {t:g}')
+    return history.at(t, 0)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _largest(values: Array) -> tuple[int, int]:
+    """Output and column of the largest absolute value, the first one."""
+    k, column = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    return int(k), int(column)
+
+
+def _overtaken(history: History, nominal: Reading, time: float, value: float) -> str:
+    """Where the largest value is, if that is another peak: in another column, of the other sign, or past a valley."""
+    k, column = _largest(history.values)
+    now = history.values[k, column]
+    if abs(now) <= value * (1.0 + NOISE):
+        return ""
+    between = (history.time - time) * (history.time - history.time[k]) <= 0.0
+    same = column == nominal.column and now * nominal.sign > 0.0
+    if same and np.min(nominal.sign * history.values[between, column]) >= value * (1.0 - NOISE):
+        return ""  # the same peak, which moves
+    where = f", column {column}" if history.values.shape[1] > 1 else ""
+    return f"{abs(now):.6g} at t = {history.time[k]:g} s{where}"
+
+
+def _modes(body: ModalBody) -> list[str]:
+    """Family and number in it, from 1, of the eigenmodes."""
+    families = body.family[: body.eigenmode_count]
+    return [f"{family} {families[: k + 1].count(family)}" for k, family in enumerate(families)]
+
+
+def _flexible(results: Results, text: str, body: str) -> str:
+    known = results.modal_files
+    if body not in known:
+        raise InputError(
+            f'"{text}": expected a body with a link ({quoted(known)}), found "{body}"{did_you_mean(body, known)}'
+        )
+    return body
+
+
+def _mass(results: Results, body: Mapping[str, object]) -> float:
+    name = str(body["name"])
+    if name in results.modal_files:
+        return float(results.modal_body(name).mass)
+    rigid = body.get("rigid")
+    return float(rigid.get("mass", 0.0)) if isinstance(rigid, Mapping) else 0.0

@@ -1,0 +1,53 @@
+"""The scene that designs are judged by: the user's, with the analyses that goals need, and a tolerance of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from ..fe_models.link_file import LinkTable, read_link
+from ..fe_models.link_records import Link
+from ..scene.any_space import AnyScene, load_any_scene
+from ..sweep.files import run_files
+from ..sweep.sweep import Key
+from .goals import Goal
+
+
+def changes_for(path: Path, goals: Sequence[Goal], tolerance: float | None) -> dict[Key, Any]:
+    """Changes of the scene at `path`: analyses that no goal needs are left out, the others have at most `tolerance`.
+
+    Replays of inverse analyses on finer links, which change no result, are left out too.
+    """
+    scene = load_any_scene(path)
+    needed = _needed(scene, goals)
+    whole = run_files(path, {}, path.parent).scene["analysis"]
+    tables = deepcopy([table for table in whole if table["name"] in needed])
+    for table, record in zip(tables, (one for one in scene.analysis if one.name in needed), strict=True):
+        table.pop("check", None)
+        if tolerance is not None:
+            table["tolerance"] = min(tolerance, record.tolerance)
+    return {("analysis",): tables}
+
+
+def link_with(path: Path, body: str, changes: Mapping[Key, float]) -> Link | None:
+    """The link of a body of the scene at `path` with some values changed; None where it comes from a modal body."""
+    files = run_files(path, changes, path.parent)
+    source = next(entry.get("link") for entry in files.scene["body"] if entry["name"] == body)
+    if source is None or (isinstance(source, str) and not source.endswith(".toml")):
+        return None
+    if isinstance(source, dict):
+        return read_link(LinkTable(source, path))
+    changed = files.links.get(Path(source))
+    return read_link(Path(source) if changed is None else LinkTable(changed, Path(source)))
+
+
+def _needed(scene: AnyScene, goals: Sequence[Goal]) -> set[str]:
+    """Names of the analyses that goals name, by default the first, and of those that they rest on."""
+    names = [one.name for one in scene.analysis]
+    found = {goal.analysis if goal.analysis in names else names[0] for goal in goals} or {names[0]}
+    for one in reversed(scene.analysis):  # each rests on earlier ones only
+        if one.name in found and one.source is not None:
+            found.add(one.source)
+    return {str(name) for name in found}

@@ -1,0 +1,111 @@
+"""Derivatives of goals by numbers of a scene and its links: `ffrobot sensitivity`.
+
+Every key takes steps of three sizes to both sides, h, h/2 and h/4 with h one percent, in runs that are integrated with
+a tighter tolerance than the scene's; `differences` has the extrapolation. Where errors are above `AIM` and still fall
+with smaller steps, as where vibrations pass through many periods, steps of a quarter follow, twice at most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..common.errors import InputError, SolveError
+from ..common.parallel import processes as of_mpi
+from ..run.watcher import Watcher
+from ..sweep.files import number_at
+from .derivatives import SIZES, Base, Exact, Sample, entries, sample, wants_smaller_steps
+from .designs import Designs, Point, parse_key
+from .frequencies import exact_entries
+from .goals import Goal, Reading, parse_goal
+from .record import Sensitivity
+from .scenes import changes_for
+
+STEP = 0.01  # of a key's value, the largest; of keys that are 0, in their unit
+FINER = ((0.125, 0.0625), (0.03125, 0.015625))  # of those that follow where these are too large
+TOLERANCE = 1e-9  # of the runs: below, rounding in forces of stiff links is not far
+
+
+def sensitivity(
+    path: Path,
+    of: Sequence[str],
+    to: Sequence[str],
+    folder: Path,
+    *,
+    processes: int = 1,
+    step: float = STEP,
+    tolerance: float = TOLERANCE,
+    retry: bool = False,
+    watcher: Watcher | None = None,
+) -> Sensitivity:
+    """Derivatives of the goals `of` the scene file at `path` by the numbers at its keys `to`; runs stay in `folder`.
+
+    `step`: the largest, of the keys' values. `tolerance`: of the runs, where the scene has a larger one. `processes`:
+    runs side by side. `retry`: whether designs that failed before are run again.
+
+    Raises:
+        InputError: goals or keys that mean nothing, or keys that may take no other value.
+        SolveError: the scene itself cannot be solved.
+    """
+    if of_mpi() > 1:
+        raise InputError("sensitivity: expected one process, found several under mpirun: -j runs designs side by side")
+    goals = tuple(parse_goal(text) for text in dict.fromkeys(of))
+    keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
+    if not goals or not keys:
+        raise InputError("sensitivity: expected at least one goal (--of) and one key (--to)")
+    point = tuple(number_at(path, key, "--to") for key in keys)
+    steps = tuple(step * (abs(value) or 1.0) for value in point)
+    fixed = changes_for(path, goals, tolerance)
+    designs = Designs(path, keys, point, folder, fixed, processes=processes, watcher=watcher or Watcher(), retry=retry)
+    base = Base(goals, _nominal(path, designs, goals, point), keys, point, steps)
+    _check_steps(designs, base)
+    exact = exact_entries(path, base)
+    samples = _samples(designs, base, exact)
+    failures = tuple(
+        f"{'.'.join(keys[one.k])} = {point[one.k] + one.offset:.6g}: {one.failure}" for one in samples if one.failure
+    )
+    return Sensitivity(
+        path, tuple(goal.text for goal in goals), base.readings, tuple(map(".".join, keys)), np.array(point),
+        entries(base, samples, exact), failures, tolerance, 1 + len(samples), designs.table,
+    )  # fmt: skip
+
+
+def _nominal(path: Path, designs: Designs, goals: Sequence[Goal], point: Point) -> tuple[Reading, ...]:
+    """The goals of the scene's own design."""
+    (design,) = designs.run([point])
+    if not design.completed:
+        error = InputError if design.row.status == "wrong input" else SolveError
+        raise error(f"{path}: {design.row.status}: {design.row.message}")
+    with design.results() as results:
+        return tuple(goal.read(results) for goal in goals)
+
+
+def _check_steps(designs: Designs, base: Base) -> None:
+    """Raise `InputError` for a key that may be neither larger nor smaller, such as a count, before any run."""
+    for k, key in enumerate(base.keys):
+        problems = [designs.problem(base.moved(k, offset)) for offset in (base.steps[k], -base.steps[k])]
+        if all(problems):
+            name = ".".join(key)
+            raise InputError(
+                f"--to: expected keys that may be a little larger or smaller, found {name}:\n{problems[0]}"
+            )
+
+
+def _samples(designs: Designs, base: Base, exact: Exact) -> list[Sample]:
+    """All that derivatives need which are not `exact`, with smaller steps where the first ones are too large."""
+    wanted = [k for k in range(len(base.keys)) if any((g, k) not in exact for g in range(len(base.goals)))]
+    samples = _beside(designs, base, wanted, SIZES)
+    for sizes in FINER:
+        if not (rough := wants_smaller_steps(base, samples, exact)):
+            break
+        samples += _beside(designs, base, rough, sizes)
+    return samples
+
+
+def _beside(designs: Designs, base: Base, which: Sequence[int], sizes: Sequence[float]) -> list[Sample]:
+    """Runs with one key changed to both sides."""
+    places = [(k, sign * size * base.steps[k]) for k in which for size in sizes for sign in (1.0, -1.0)]
+    found = designs.run([base.moved(k, offset) for k, offset in places])
+    return [sample(base, k, offset, design) for (k, offset), design in zip(places, found, strict=True)]

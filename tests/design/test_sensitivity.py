@@ -1,0 +1,286 @@
+"""`ffrobot sensitivity`: closed forms, differences by hand, peaks with kinks, failed designs, mistakes."""
+
+import csv
+from copy import deepcopy
+
+import numpy as np
+import pytest
+import tomli_w
+
+import ffrobot
+from ffrobot.sweep.files import set_key, value_of
+
+LINK = {
+    "name": "arm",
+    "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
+    "mesh": {"elements": 6},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
+    "damping": {"ratio": 0.02},
+}
+PLANE = {
+    "name": "arm",
+    "gravity": [0.0, -9.81],
+    "body": [{"name": "arm", "link": LINK}],
+    "joint": [
+        {
+            "name": "shoulder",
+            "type": "revolute",
+            "between": ["ground", "arm.root"],
+            "gear_ratio": 40.0,
+            "rotor_inertia": 2e-5,
+            "viscous_friction": 0.2,
+        }
+    ],
+    "payload": [{"point": "arm.tip", "mass": 0.5}],
+    "initial": {"state": "static"},
+    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005}],
+}
+SPACE_LINK = LINK | {"modes": {"count": 4, "family": ["in-plane-bending", "out-of-plane-bending"]}}
+SPACE = {
+    "name": "arm",
+    "space": "spatial",
+    "gravity": [0.0, 0.0, -9.81],
+    "body": [{"name": "arm", "link": SPACE_LINK}],
+    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0.3, 0.8, 0.5]}],
+    "payload": [{"point": "arm.tip", "mass": 0.5, "center": [0.02, 0.0, 0.01], "inertia": [1e-3, 2e-3, 2e-3]}],
+    "initial": {"state": "static"},
+    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005}],
+}
+
+
+@pytest.fixture
+def write(tmp_path):
+    def scene(keys):
+        path = tmp_path / "scene.toml"
+        path.write_text(tomli_w.dumps(keys), encoding="utf-8")
+        return path
+
+    return scene
+
+
+def changed(scene, key, value):
+    """The scene with the value at a key of its own or of the link in it."""
+    new = deepcopy(scene)
+    parts = key.split(".")
+    set_key(new, ("body", parts[1], "link", *parts[2:]) if parts[0] == "links" else tuple(parts), value)
+    return new
+
+
+def value_at(scene, key):
+    parts = key.split(".")
+    return (
+        value_of(scene["body"][0]["link"], tuple(parts[2:])) if parts[0] == "links" else value_of(scene, tuple(parts))
+    )
+
+
+def by_hand(scene, key, quantity):
+    """The derivative by four values in memory, of order h⁴, from runs of the tightest tolerance."""
+    theta = value_at(scene, key)
+    h = 5e-4 * theta  # the second mode passes through 40 periods, whose number goes by 1/length²
+    f = {}
+    for n in (-2, -1, 1, 2):
+        new = changed(scene, key, theta + n * h)
+        new["analysis"][0]["tolerance"] = 1e-10
+        with ffrobot.solve(ffrobot.make_scene(**new)) as results:
+            f[n] = quantity(results)
+    return (8 * (f[1] - f[-1]) - (f[2] - f[-2])) / (12 * h)
+
+
+def rms(results):
+    return np.sqrt(np.mean(results["inverse/joints/shoulder/moment"] ** 2))
+
+
+def deflection(results):
+    return np.linalg.norm(results["inverse/points/arm.tip/deflection"][20])
+
+
+def energy(results):
+    power = results["inverse/joints/shoulder/moment"] * results["inverse/joints/shoulder/rate"]
+    return np.sum(0.5 * (power[1:] + power[:-1])) * 0.005
+
+
+GOALS = {
+    "rms joints.shoulder.moment": rms,
+    "at 0.1 points.arm.tip.deflection": deflection,
+    "energy joints.shoulder": energy,
+}
+
+
+@pytest.mark.parametrize(
+    ("scene", "keys"),
+    [
+        (
+            PLANE,
+            (
+                "payload.0.mass",
+                "gravity.1",
+                "joint.shoulder.gear_ratio",
+                "joint.shoulder.viscous_friction",
+                "links.arm.geometry.length",
+                "links.arm.material.density",
+            ),
+        ),
+        (
+            SPACE,
+            (
+                "payload.0.center.0",
+                "joint.shoulder.axis.2",
+                "links.arm.geometry.section.inner",
+                "links.arm.material.youngs_modulus",
+                "links.arm.damping.ratio",
+            ),
+        ),
+    ],
+    ids=["plane", "space"],
+)
+def test_against_differences_by_hand(write, scene, keys):
+    """Eleven kinds of key: 1e-6 of a percent per percent, for errors are of the goal where it hardly depends on a key.
+
+    The estimate is worth its name: it is off by no more than that either.
+    """
+    found = ffrobot.sensitivity(write(scene), list(GOALS), keys, processes=2)
+    for k, key in enumerate(keys):
+        for g, quantity in enumerate(GOALS.values()):
+            expected = by_hand(scene, key, quantity)
+            scale = found.value[g] / value_at(scene, key)
+            assert abs(found.derivative[g, k] - expected) <= 1e-6 * max(abs(expected), abs(scale)), (key, g)
+            assert found.error[g, k] <= 1e-6 * abs(scale), (key, g)
+    assert {entry.method for row in found.entries for entry in row} == {"differences"}
+    assert found.failures == ()
+
+
+def test_frequencies_of_a_cantilever(write):
+    """f ∝ h/L² √(E/ρ), whatever the width, also on the mesh: to 1e-9, without a run beside the scene's own."""
+    section = {"shape": "rectangle", "height": 0.02, "width": 0.03}
+    link = LINK | {"geometry": {"kind": "beam", "length": 0.6, "section": section}}
+    scene = PLANE | {"body": [{"name": "arm", "link": link}], "analysis": [{"name": "still", "kind": "static"}]}
+    keys = {
+        "links.arm.geometry.section.height": 1.0,
+        "links.arm.geometry.section.width": 0.0,
+        "links.arm.geometry.length": -2.0,
+        "links.arm.material.youngs_modulus": 0.5,
+        "links.arm.material.density": -0.5,
+        "payload.0.mass": 0.0,
+    }
+    found = ffrobot.sensitivity(write(scene), ["frequency 1 arm", "frequency 2 arm"], list(keys))
+    np.testing.assert_allclose(found.logarithmic, [list(keys.values())] * 2, atol=1e-9)
+    assert found.runs == 1
+    assert {entry.method for row in found.entries for entry in row} == {"exact"}
+    beta = 1.875104068711961  # of cos β cosh β = −1
+    frequency = beta**2 / (2 * np.pi * 0.6**2) * np.sqrt(70e9 * 0.02**2 / 12 / 2700.0)
+    assert found.value[0] == pytest.approx(frequency, rel=1e-5)
+
+
+RIGID = {"mass": 2.0, "center": [0.3, 0.0], "inertia": 0.05, "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
+ARM = {
+    "name": "arm",
+    "gravity": [0.0, -9.81],
+    "body": [{"name": "arm", "rigid": RIGID}],
+    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+    "payload": [{"point": "arm.tip", "mass": 0.5}],
+    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.05}],
+}
+
+
+def test_moment_of_a_rigid_arm(write):
+    """M = 2 (J + m c² + m_p a²) + (m c + m_p a) g cos t²: largest at the start, where its angle is 0."""
+    keys = ["payload.0.mass", "body.arm.rigid.center.0", "body.arm.rigid.inertia"]
+    found = ffrobot.sensitivity(write(ARM), ["peak joints.shoulder.moment", "mass"], keys, processes=2)
+    expected = [2 * 0.36 + 0.6 * 9.81, 2 * 2.0 * 2 * 0.3 + 2.0 * 9.81, 2.0]
+    np.testing.assert_allclose(found.derivative, [expected, [0.0, 0.0, 0.0]], rtol=1e-9, atol=1e-9)
+    assert found.readings[0].time == 0.0
+    assert found.value[0] == pytest.approx(2 * (0.05 + 0.18 + 0.18) + (0.6 + 0.3) * 9.81, rel=1e-9)
+    assert found.value[1] == pytest.approx(2.0)
+
+
+def test_a_kink_is_told(write):
+    """Peaks of ± J A at opposite times are equal without gravity, and either is overtaken as gravity sets in."""
+    scene = ARM | {
+        "gravity": [0.0, 0.0],
+        "trajectory": [{"name": "swing", "joint": "shoulder", "value": "-0.01*sin(4*pi*t)"}],
+    }
+    found = ffrobot.sensitivity(write(scene), ["peak joints.shoulder.moment"], ["gravity.1"], processes=2)
+    (entry,) = found.entries[0]
+    assert any("a kink: with gravity.1 = " in note for note in entry.notes)
+    time = found.readings[0].time
+    J = 0.05 + 2.0 * 0.09 + 0.5 * 0.36
+    assert found.value[0] == pytest.approx(0.01 * 16 * np.pi**2 * J * abs(np.sin(4 * np.pi * time)), rel=1e-9)
+    sign = np.sign(np.sin(4 * np.pi * time))
+    arm = (2.0 * 0.3 + 0.5 * 0.6) * np.cos(0.01 * np.sin(4 * np.pi * time))
+    assert entry.derivative == pytest.approx(-sign * arm, rel=1e-9)
+    assert "a kink" in str(found)
+
+
+def test_a_design_that_fails_is_kept_and_told(write, tmp_path):
+    """Friction of nothing has no smaller one: wrong input on that side, a derivative by the other."""
+    scene = deepcopy(ARM)
+    scene["joint"][0] |= {"viscous_friction": 0.0}
+    folder = tmp_path / "designs"
+    of, to = ["at 0.25 joints.shoulder.moment"], ["joint.shoulder.viscous_friction"]
+    found = ffrobot.sensitivity(write(scene), of, to, folder, processes=2)
+    (entry,) = found.entries[0]
+    assert entry.method == "one-sided"
+    assert entry.derivative == pytest.approx(0.5, rel=1e-9)  # the rate, 2 t
+    assert len(found.failures) == 3
+    assert "expected a number of at least 0, found -0.01" in found.failures[0]
+    assert any("viscous_friction = -" in note for note in entry.notes)
+    with (folder / "table.csv").open(encoding="utf-8") as file:
+        assert sorted(row["status"] for row in csv.DictReader(file)) == ["completed"] * 4 + ["wrong input"] * 3
+    rows = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")}
+    again = ffrobot.sensitivity(write(scene), of, to, folder)  # nothing is run again
+    assert {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")} == rows
+    assert again.derivative == found.derivative
+
+
+def test_command(ffrobot, write):
+    """The table on the screen, the file with all numbers, the picture; another key later runs only what is new."""
+    scene = write(ARM)
+    arguments = ("sensitivity", scene, "--of", "peak joints.shoulder.moment")
+    done = ffrobot(*arguments, "--to", "payload.0.mass", "-j", 2)
+    assert done.returncode == 0, done.stderr
+    assert "payload.0.mass" in done.stdout
+    assert "7 runs" in done.stdout
+    folder = scene.with_suffix(".sensitivity")
+    with (folder / "sensitivity.csv").open(encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert float(row["derivative"]) == pytest.approx(2 * 0.36 + 0.6 * 9.81, rel=1e-9)
+    assert float(row["percent_per_percent"]) == pytest.approx(0.5 * float(row["derivative"]) / float(row["value"]))
+    assert (folder / "tornado_peak_joints_shoulder_moment.png").exists()
+    runs = set(folder.glob("runs/*"))
+    assert ffrobot(*arguments, "--to", "payload.0.mass,gravity.1", "-j", 2).returncode == 0
+    assert len(set(folder.glob("runs/*")) - runs) == 6
+
+
+@pytest.mark.parametrize(
+    ("of", "message"),
+    [
+        ("peak joints.sholder.moment", 'did you mean "joints.shoulder.moment"?'),
+        ("rms joints.shoulder.reaction[2]", "expected a column below 2"),
+        ("at 0.7 joints.shoulder.moment", "expected a time from 0 to 0.5 s, found 0.7"),
+        ("rms constraint_violation", 'expected one column, such as "constraint_violation[0]", found 3'),
+        ("frequency 1 arm", "expected a body with a link (none)"),
+        ("mass leg", 'expected a body ("arm"), found "leg"'),
+    ],
+)
+def test_goals_that_are_none_are_told_by_the_first_run(write, tmp_path, of, message):
+    with pytest.raises(ffrobot.InputError) as told:
+        ffrobot.sensitivity(write(ARM), [of], ["payload.0.mass"], tmp_path / "designs")
+    assert message in str(told.value)
+
+
+def test_a_count_has_no_derivative(write):
+    with pytest.raises(ffrobot.InputError, match="expected keys that may be a little larger or smaller") as told:
+        ffrobot.sensitivity(write(PLANE), ["rms joints.shoulder.moment"], ["links.arm.mesh.elements"])
+    assert "expected a whole number" in str(told.value)
+
+
+def test_a_scene_that_cannot_be_solved(write):
+    scene = deepcopy(ARM)
+    scene["trajectory"][0]["value"] = "log(0.2 - t)"
+    with pytest.raises(ffrobot.FfrobotError, match=r"scene\.toml"):
+        ffrobot.sensitivity(write(scene), ["peak joints.shoulder.moment"], ["payload.0.mass"])
