@@ -17,6 +17,7 @@ constexpr double small_force = 2e-4; // of the largest: forces below count like 
 constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
 constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
+constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
 constexpr double nothing = 1e-12;
 
 template <class Space> bool is_moment(const Mechanism<Space> &m, const Row &row) {
@@ -145,6 +146,7 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const Workspa
     }
   for (std::size_t g = 0; g < size_.size(); ++g)
     peak_[g] = std::max({peak_[g], std::sqrt(size_[g]), std::sqrt(of_forces[g])});
+  take_accelerations(w);
   // Rotation vectors start at zero in every step: an angle is compared with one radian at least, a way with a length.
   peak_[0] = std::max(peak_[0], length_), peak_[1] = std::max(peak_[1], 1.0);
   // At rest, as in equilibrium, all rates are zero: their errors are then compared with rates that would be slow.
@@ -153,13 +155,24 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const Workspa
   sizes_of_forces(observed_, force_now_);
   for (std::size_t g = 0; g < force_peak_.size(); ++g)
     force_peak_[g] = std::max(force_peak_[g], force_now_[g]);
+}
+
+template <class Space> void MotionNorm<Space>::take_accelerations(const Workspace<Space, double> &w) {
   double inertial = 0;
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
+    const Node<Space> &node = mechanism_.nodes[i];
     const auto &A = w.bodies[i].A;
     double square = 0;
     for (int k = 0; k < Space::linear; ++k)
       square += A[k] * A[k];
-    inertial += mechanism_.nodes[i].body.mass * std::sqrt(square);
+    const double acceleration = std::sqrt(square), mass = node.body.mass;
+    inertial += mass * acceleration;
+    if (node.n() > 0) {
+      // where nothing has happened yet, or what acts holds the link straight
+      const auto g = static_cast<std::size_t>(group_[static_cast<std::size_t>(node.p_v())]);
+      const double force = std::sqrt(mass) * std::max(acceleration, mechanism_.gravity.norm());
+      peak_[g] = std::max(peak_[g], small_bend * force / (pace_[g] * pace_[g]));
+    }
   }
   inertial_ = std::max(inertial_, inertial);
 }

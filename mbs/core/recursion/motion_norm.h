@@ -34,6 +34,7 @@ public:
 
 private:
   void forces(const Workspace<Space, double> &w, Eigen::VectorXd &values) const;
+  void take_accelerations(const Workspace<Space, double> &w);
   void sizes_of_forces(const Eigen::VectorXd &values, std::vector<double> &size) const;
 
   const Mechanism<Space> &mechanism_;
