@@ -29,6 +29,7 @@ def problems(scene: SceneKeys) -> Iterator[str]:
         yield from _duplicates(kind, (layout.body for layout in getattr(scene, kind)))
     yield from _body_problems(scene)
     yield from _joint_problems(scene)
+    yield from _guess_problems(scene)
     yield from _flexible_body_problems(scene)
     yield from _patch_problems(scene)
     yield from _stiffening_problems(scene)
@@ -108,6 +109,23 @@ def _joint_problems(scene: SceneKeys) -> Iterator[str]:
         elif reference.kind == "joint" and name not in moving:
             found = f'"{name}", a {joints[name].type}'
             yield f"{key}: expected a joint that moves ({quoted(moving)}), found {found}"
+
+
+def _guess_problems(scene: SceneKeys) -> Iterator[str]:
+    """Guesses of joints between bodies whose own guesses say the same."""
+    initial = scene.initial
+    for key, of_joints, bodies, of_bodies in (
+        ("joints", initial.joints, "angles", initial.angles),
+        ("joint_rates", initial.joint_rates, "rates", initial.rates),
+    ):
+        for joint in scene.joint:
+            turns = joint.name in of_joints and joint.type == "revolute"
+            known = [body for body in joint.bodies if body in of_bodies]
+            if turns and known and all(body in (GROUND, *known) for body in joint.bodies):
+                yield (
+                    f"initial.{key}.{joint.name}: expected no guess where initial.{bodies} has {quoted(known)},"
+                    " found one"
+                )
 
 
 def _flexible_body_problems(scene: SceneKeys) -> Iterator[str]:

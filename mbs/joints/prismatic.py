@@ -41,19 +41,20 @@ class PrismaticJoint(MovingJoint):
 
     def constraints(self, angle: float) -> tuple[Measure, ...]:
         """The way across the axis, m, and the change of the angle, rad."""
-        (x, y), (a, b) = self._unit_axis, self.markers
+        (x, y), (a, b) = self.unit_axis, self.markers
         return slide(f"{self.label}, across the axis", a, b, (-y, x)), relative_angle(self.label, a, b, angle)
 
     def coordinate(self, motors: MotorSide) -> Measure:
         """The way along the axis, m."""
-        return slide(f"{self.label}, along the axis", *self.markers, self._unit_axis)
+        return slide(f"{self.label}, along the axis", *self.markers, self.unit_axis)
 
     def rotor_measure(self, motors: MotorSide) -> Rotor:
         """The way along the axis with the mass J N², kg; that the first body turns is left out."""
         return Rotor(self.coordinate(motors), self.rotor_inertia * self.gear_ratio**2)
 
     @property
-    def _unit_axis(self) -> tuple[float, float]:
+    def unit_axis(self) -> tuple[float, float]:
+        """Direction of motion, axes of the first body."""
         assert self.axis is not None
         x, y = np.array(self.axis) / np.hypot(*self.axis)
         return float(x), float(y)

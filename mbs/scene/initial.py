@@ -13,7 +13,11 @@ from ..fields.references import Reference
 
 
 class Initial(Record):
-    """State at t = 0; `angles` (rad) and `rates` (rad/s) of body frames are guesses that the constraints correct."""
+    """State at t = 0; what is said of bodies and joints are guesses that the constraints correct.
+
+    With `joints` or `joint_rates`, frames without an angle or rate of their own are turned against the body that
+    carries them by the coordinate of that joint, 0 where it is left out; without them they have 0.
+    """
 
     state: Literal["undeformed", "static"] = "undeformed"
     """Undeformed links, or the static equilibrium under gravity and loads."""
@@ -21,9 +25,16 @@ class Initial(Record):
     """Guess of each body frame's absolute angle, against the global x axis, rad (or such as "60*deg")."""
     rates: dict[str, Quantity] = Field(default_factory=dict)
     """Guess of their rates, rad/s."""
+    joints: dict[str, Quantity] = Field(default_factory=dict)
+    """Guess of joint coordinates, rad or m (or such as "60*deg"), in place of angles of bodies."""
+    joint_rates: dict[str, Quantity] = Field(default_factory=dict)
+    """Guess of their rates, rad/s or m/s."""
 
     def references(self) -> Iterator[Reference]:
-        """The bodies with guesses."""
+        """The bodies and joints with guesses."""
         for table, guesses in (("angles", self.angles), ("rates", self.rates)):
             for body in guesses:
                 yield Reference(table, body)
+        for table, guesses in (("joints", self.joints), ("joint_rates", self.joint_rates)):
+            for joint in guesses:
+                yield Reference(table, joint, "joint")

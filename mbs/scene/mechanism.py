@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -71,8 +71,31 @@ class MechanismKeys(Record):
 
     def constraints(self, joint: Joint) -> tuple[Measure, ...]:
         """The constraints C_m of a joint; the angle that some of them keep is that of the initial guess."""
-        first, second = (self.initial.angles.get(body, 0.0) for body in joint.bodies)
+        angles = self.guessed_angles
+        first, second = (angles.get(body, 0.0) for body in joint.bodies)
         return joint.constraints(second - first)
+
+    @property
+    def guessed_angles(self) -> dict[str, float]:
+        """Of body frames, rad; 0 of those left out."""
+        return self._along_tree(self.initial.angles, self.initial.joints)
+
+    @property
+    def guessed_rates(self) -> dict[str, float]:
+        """Of body frames, rad/s; 0 of those left out."""
+        return self._along_tree(self.initial.rates, self.initial.joint_rates)
+
+    def _along_tree(self, of_bodies: Mapping[str, float], of_joints: Mapping[str, float]) -> dict[str, float]:
+        """By body, where not given what the one that carries it has and the joint between them adds."""
+        found = dict(of_bodies)
+        if not of_joints:
+            return found
+        for body, carrier in self.topology.carriers.items():
+            if carrier is not None and body not in found:
+                joint = self.joint[carrier.joint]
+                turn = of_joints.get(joint.name, 0.0) if joint.type == "revolute" else 0.0
+                found[body] = found.get(carrier.parent, 0.0) + (turn if joint.between[1] == carrier.own else -turn)
+        return found
 
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""

@@ -9,6 +9,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.plane import perpendicular, rotated
 from ..fields.field_types import GROUND, split_point
+from ..joints.joints import Joint
 from ..model.system import MechanismSystem
 from .position import rank_ratio, solve_positions
 from .state import State
@@ -19,8 +20,8 @@ REGULAR = 1e-3  # ratio of singular values of the constraints: less is next to a
 
 def initial_guess(assembly: MechanismSystem) -> State:
     """Frames with the guessed angles and rates, each where the joint that carries it puts it; loops stay open."""
-    initial = assembly.model.scene.initial
-    return _placed(assembly, initial.angles, initial.rates)
+    scene = assembly.model.scene
+    return _placed(assembly, scene.guessed_angles, scene.guessed_rates)
 
 
 def working_guess(assembly: MechanismSystem) -> dict[str, float] | None:
@@ -30,7 +31,8 @@ def working_guess(assembly: MechanismSystem) -> dict[str, float] | None:
     """
     model, random = assembly.model, np.random.default_rng(0)
     names = [body.name for body in model.links]
-    given = np.array([model.scene.initial.angles.get(name, 0.0) for name in names])
+    guessed = model.scene.guessed_angles
+    given = np.array([guessed.get(name, 0.0) for name in names])
     found = []
     for _ in range(TRIES):
         met = _met(assembly, dict(zip(names, random.uniform(-np.pi, np.pi, len(names)), strict=True)))
@@ -60,12 +62,29 @@ def _placed(assembly: MechanismSystem, angles: Mapping[str, float], rates: Mappi
         q[assembly.first[i] + 2] = angles.get(name, 0.0)
         v[assembly.first[i] + 2] = rates.get(name, 0.0)
     for name, carrier in model.scene.topology.grounded.items():
-        at, rate = _motion(assembly, q, v, carrier.other, model.scene.joint[carrier.joint].at)
+        joint = model.scene.joint[carrier.joint]
+        at, rate = _motion(assembly, q, v, carrier.other, joint.at)
         arm = _arm(assembly, q, carrier.own)
         i = assembly.first[assembly.index[name]]
-        q[i : i + 2] = at - arm
-        v[i : i + 2] = rate - v[i + 2] * perpendicular(arm)
+        slid, sliding = _slid(assembly, q, v, joint)
+        outwards = 1.0 if joint.between[1] == carrier.own else -1.0
+        q[i : i + 2] = at + outwards * slid - arm
+        v[i : i + 2] = rate + outwards * sliding - v[i + 2] * perpendicular(arm)
     return State(q, v)
+
+
+def _slid(assembly: MechanismSystem, q: Array, v: Array, joint: Joint) -> tuple[Array, Array]:
+    """How far (2,) the second side of a joint has slid from the first, global axes, m; and its rate, m/s."""
+    if joint.type != "prismatic":
+        return np.zeros(2), np.zeros(2)
+    initial, first = assembly.model.scene.initial, joint.bodies[0]
+    theta, theta_dot = 0.0, 0.0
+    if first != GROUND:
+        i = assembly.first[assembly.index[first]] + 2
+        theta, theta_dot = q[i], v[i]
+    axis = rotated(theta, np.array(joint.unit_axis))
+    way, rate = initial.joints.get(joint.name, 0.0), initial.joint_rates.get(joint.name, 0.0)
+    return way * axis, rate * axis + way * theta_dot * perpendicular(axis)
 
 
 def _arm(assembly: MechanismSystem, q: Array, side: str) -> Array:

@@ -146,10 +146,13 @@ def _chain(model: Model, point: str) -> _Chain | None:
 
 
 def turned_guesses(scene: MechanismKeys) -> list[str]:
-    """Guesses of `initial.angles` beyond a whole turn, which are degrees as a rule; a text each."""
+    """Guesses of angles beyond a whole turn, which are degrees as a rule; a text each."""
+    turning = {joint.name for joint in scene.joint if joint.type == "revolute"}
+    joints = {name: angle for name, angle in scene.initial.joints.items() if name in turning}
     return [
-        f'initial.angles: {name} = {angle:g} rad is more than a turn (degrees are written "{angle:g}*deg")'
-        for name, angle in scene.initial.angles.items()
+        f'initial.{table}: {name} = {angle:g} rad is more than a turn (degrees are written "{angle:g}*deg")'
+        for table, guesses in (("angles", scene.initial.angles), ("joints", joints))
+        for name, angle in guesses.items()
         if abs(angle) > 2 * np.pi
     ]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, ritz_link
 from mechanisms import always, assemble, make_model, pcid, revolute
-from rods import slider_crank
+from rods import rod, slider_crank
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.drive import initial_state
@@ -13,6 +13,7 @@ from ffrobot.mbs.analysis.static import Static, run_static
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.mbs.solve.initial_state import undeformed_state
+from ffrobot.mbs.solve.reach import turned_guesses
 
 HOLD = {"name": "tip", "point": "link2.tip", "x": repr(TIP[0]), "y": repr(TIP[1])}
 
@@ -153,3 +154,46 @@ def test_robot_without_equilibrium_is_refused():
     model = make_model(arm_links()[:1], joint=[rail], initial={"state": "static"})
     with pytest.raises(SolveError, match="no static equilibrium"):
         initial_state(assemble(model))
+
+
+def test_guesses_of_joints_are_those_of_bodies():
+    """The same configuration; the second joint is named from the outside in."""
+    sides = {"O": ("ground", "crank.root"), "A": ("rod.root", "crank.tip")}
+    joints = [revolute(name, *between) for name, between in sides.items()]
+    rods = [rod("crank", 0.2, 1.0), rod("rod", 0.5, 1.5)]
+    of_bodies = {"angles": {"crank": 0.9, "rod": -0.3}, "rates": {"crank": 2.0, "rod": -1.0}}
+    of_joints = {
+        "joints": {"O": 0.9, "A": 1.2},
+        "joint_rates": {"O": 2.0, "A": 3.0},
+    }
+    mixed = {"angles": {"crank": 0.9}, "joints": {"A": 1.2}, "rates": {"crank": 2.0}, "joint_rates": {"A": 3.0}}
+    states = [
+        undeformed_state(assemble(make_model(rods, joint=joints, initial=initial)))
+        for initial in (of_bodies, of_joints, mixed)
+    ]
+    for state in states[1:]:
+        np.testing.assert_allclose(state.q, states[0].q, atol=1e-14)
+        np.testing.assert_allclose(state.v, states[0].v, atol=1e-14)
+
+
+def test_a_guess_of_a_way_places_what_slides():
+    """Along the axis of a rod that turns, forwards and backwards named; bodies that joints leave out follow on."""
+    rods = [rod("arm", 1.0, 1.0), rod("slide", 0.5, 1.5)]
+    for between, way in ((("arm.tip", "slide.root"), 0.3), (("slide.root", "arm.tip"), -0.3)):
+        joints = [
+            revolute("O", "ground", "arm.root"),
+            {"name": "S", "type": "prismatic", "between": between, "axis": (1.0, 0.0)},
+        ]
+        initial = {"joints": {"O": 0.5, "S": way}, "joint_rates": {"O": 2.0, "S": way / 0.3}}
+        state = undeformed_state(assemble(make_model(rods, joint=joints, initial=initial)))
+        along, across = np.array([np.cos(0.5), np.sin(0.5)]), np.array([-np.sin(0.5), np.cos(0.5)])
+        np.testing.assert_allclose(state.q[3:], [*(1.3 * along), 0.5], atol=1e-12)
+        np.testing.assert_allclose(state.v[3:], [*(along + 2.6 * across), 2.0], atol=1e-12)
+
+
+def test_guesses_of_joints_beyond_a_turn_are_told():
+    model = make_model(
+        [rod("arm", 1.0, 1.0)], joint=[revolute("O", "ground", "arm.root")], initial={"joints": {"O": 60}}
+    )
+    (told,) = turned_guesses(model.scene)
+    assert told.startswith("initial.joints: O = 60 rad is more than a turn")

@@ -199,6 +199,9 @@ MISTAKES = [
     ("link2 = 1.04", "link3 = 1.04", 'initial.angles: expected one of the bodies "link1", "link2", "hand"', 'found "link3"'),
     ("link1 = 0,", 'link1 = "t",', 'initial.angles.link1: expected a number or an expression without t', 'found "t"'),
     ("link1 = 0,", "link1 = nan,", "initial.angles.link1: expected a finite number", "found nan"),
+    ("angles = { link1 = 0,", "joints = { Q = 0.1 }\nangles = { link1 = 0,", 'initial.joints: expected one of the joints "O"', 'found "Q"'),
+    ("angles = { link1 = 0,", "joints = { W = 0.1 }\nangles = { link1 = 0,", "initial.joints: expected a joint that moves", "a weld"),
+    ("angles = { link1 = 0,", "joints = { A = 0.1 }\nangles = { link1 = 0,", "initial.joints.A: expected no guess where initial.angles has", '"link1", "link2"'),
     # trajectories
     ("1.5*cos(", "1.5*csh(", 'trajectory "tip": x: expected an expression in t, found', "at character 5 (did you mean"),
     ("1.5*cos(pi*t/4)", "1/(t - 0.25)", 'trajectory "tip": x: expected a finite value', "found none at t = 0.25 s"),
