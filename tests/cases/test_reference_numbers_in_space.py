@@ -271,3 +271,31 @@ def test_free_flexible_body_keeps_momentum_and_energy_for_100_s(tmp_path, ffrobo
         for kind in ("linear", "angular"):
             H = group[f"momentum/{kind}"][after]
             np.testing.assert_allclose(H, np.tile(H[0], (len(H), 1)), atol=1e-6 * np.abs(H).max())
+
+
+def test_rod_that_spins_is_stretched(tmp_path):
+    """About its root at Ω: u = sin αL/(α cos αL) − L at its tip, α² = ρΩ²/E (Code_Aster V3.04.105), by axial modes."""
+    E, density, length, Omega = 7e9, 2700.0, 1.0, 500.0
+    text = LINK.format(
+        name="shaft", E=E, length=length, section=BAR, damping=0.0, condition="cantilever",
+        modes='count = 8\nfamily = "axial"',
+    )  # fmt: skip
+    (tmp_path / "shaft.toml").write_text(text.replace("elements = 20", "elements = 80"))
+    (tmp_path / "scene.toml").write_text(SHAFT)
+    scene = load_spatial_scene(tmp_path / "scene.toml")
+    model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
+    (node,) = model.tree.nodes
+    n, step = node.body.n_modes, 1e-3
+    q, v, a = np.tile(model.tree.at_rest({}), (n + 1, 1)), *np.zeros((2, n + 1, model.tree.n_v))
+    v[:, node.v] = [0.0, 0.0, 0.0, 0.0, 0.0, Omega]
+    q[1:, node.p_q] = step * np.eye(n)
+    a[:, node.v] = 0.0
+    state = Accelerated(model.tree, q, v, a, model.tree.frames(q))
+    forces = required_forces(model, state, np.zeros(n + 1))[:, node.p_v]
+    K = (forces[1:] - forces[0]).T / step  # forces on modes are affine in p
+    p = np.linalg.solve(K, -forces[0])
+    alpha = Omega * np.sqrt(density / E)
+    expected = np.tan(alpha * length) / alpha - length
+    stretched = float(node.body.points["tip"].translation[0] @ p)
+    np.testing.assert_allclose(stretched, expected, rtol=2e-4)
+    assert expected > 1.01 * density * Omega**2 * length**3 / (3 * E)  # more than of the load at rest
