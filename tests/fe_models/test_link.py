@@ -154,7 +154,7 @@ except FfrobotError as error:
     print(error.exit_code, error)
 """
     for folder in tmp_path.parents:
-        if folder.owner() == "root" and folder.name.startswith("pytest-"):
+        if folder.owner() == "root" and folder.name.startswith(("pytest-", "popen-")):
             folder.chmod(0o755)
     try:
         result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
