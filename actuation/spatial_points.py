@@ -162,7 +162,9 @@ def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: SpatialRun) -> 
 def driving_forces_in_space(run: SpatialRun) -> dict[str, Array]:
     """Q_a by body, (T, 6 + n): force and moment on its frame, both in its axes, and on its modes."""
     model, frames = run.model, run.model.tree.frames(run.q)
-    found = {node.body.name: np.zeros((len(run.time), 6 + node.body.n_modes)) for node in model.tree.nodes}
+    found: dict[str, Array] = {
+        node.body.name: np.zeros((len(run.time), 6 + node.body.n_modes)) for node in model.tree.nodes
+    }
     for k, row in enumerate(model.rows):
         if row.is_trajectory:
             wrenches = row_wrenches(model.tree, row, -run.multipliers[:, k], run.q, run.time, frames)

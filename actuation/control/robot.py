@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...mbs.solve.linearisation import LinearMechanism
 
 
@@ -110,5 +110,4 @@ def input_names(robot: Robot) -> tuple[str, ...]:
 
 def estimate(volts: Array, count: int) -> Array:
     """(count, k) of coordinates from what patches read of them, volts (k, m): as many as patches are told apart."""
-    found: Array = np.linalg.pinv(volts[:, : min(volts.shape)])[:count]
-    return found
+    return as_floats(np.linalg.pinv(volts[:, : min(volts.shape)])[:count])

@@ -156,7 +156,7 @@ def _feed_forward(
         moments = np.hstack([*forces.moments.values(), np.zeros((len(run.time), 0))])
         if analysis.feed_forward == "none":
             moments[:] = 0.0
-        voltages = [np.zeros((len(run.time), of.Phi_V.shape[1])) for of in context.patches.values()]
+        voltages: list[Array] = [np.zeros((len(run.time), of.Phi_V.shape[1])) for of in context.patches.values()]
         if analysis.feed_forward == "joints+pzt":
             voltages = [
                 np.hstack([one.required if analysis.unlimited else one.within_limit for one in volts.values()])

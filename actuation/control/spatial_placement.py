@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...common.arrays import as_floats
 from ...common.errors import InputError
 from ...mbs.analysis.spatial_replay import motor_forces_of
 from ...mbs.analysis.spatial_run import SpatialRun, without_paths
@@ -59,5 +60,5 @@ def _link(context: ActuatedSpatialContext, name: str) -> PatchableLink:
             raise InputError(f'{path}: placement.body: expected patches that reach the modes of "{label}"')
         return found.arrays[label]
 
-    own = np.linalg.solve(reached.T, spatial.modal_transform[reached.rows])
+    own = as_floats(np.linalg.solve(reached.T, spatial.modal_transform[reached.rows]))
     return PatchableLink(name, body.length, layout, reached.stiffness, reached.served, own, patches)

@@ -55,7 +55,7 @@ class SpatialRigidArm:
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
         """Coordinates q (n_q,) and C_v at motor angles gamma, by Newton from the last place."""
-        q = self._q
+        q: Array = self._q
         for _ in range(MOST_ITERATIONS):
             values, gradients = row_values(self._model, q[None], np.zeros(1))
             C, C_v = values[0], gradients[0]

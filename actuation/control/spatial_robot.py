@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...mbs.analysis.spatial_run import SpatialRun
 from ...mbs.model.spatial_model import SpatialModel
 from ...mbs.solve.linearisation import LinearMechanism
@@ -70,7 +70,7 @@ class SpatialRobot:
         reached, to_file = of_link.reached, self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
         inputs = [f"pzt/{layout}/{k}" for layout, of in of_link.arrays.items() for k in range(1, len(of.edges) + 1)]
         volts = np.vstack([volts_on_file(of_link, layout) for layout in of_link.arrays])
-        own = np.linalg.solve(reached.T, to_file[reached.rows])
+        own = as_floats(np.linalg.solve(reached.T, to_file[reached.rows]))
         return PatchedLink(
             tuple(inputs), tuple(of_link.arrays), np.sqrt(reached.stiffness[: reached.served]),
             voltage_gain(of_link.reach), reached.seen(volts), own,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..common.arrays import Array
+from ..common.arrays import Array, as_floats
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.truncation import with_fewer_modes_in_space
 from ..scene.spatial import SpatialScene
@@ -24,9 +24,9 @@ def reported_in_space(result: SpatialResult) -> Reported:
     for trajectory in motion.followed:
         found, places = motion.path_force(trajectory.name), len(trajectory.components)
         forces[f"trajectory {trajectory.name}"] = found[:, :places]
-        forces[f"trajectory {trajectory.name}, moment"] = found[:, places:] / size
+        forces[f"trajectory {trajectory.name}, moment"] = as_floats(found[:, places:] / size)
     for joint, acting in result.reactions.items():
-        forces[f"joint {joint}"], forces[f"joint {joint}, moment"] = acting.force, acting.moment / size
+        forces[f"joint {joint}"], forces[f"joint {joint}, moment"] = acting.force, as_floats(acting.moment / size)
     found_by_kind = {
         "deflections": {
             f"{node.body.name}.{label}": motion.point(f"{node.body.name}.{label}").deflection

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from .spatial_body import SpatialBody
 from .spatial_stiffening import SpatialStiffening
 
@@ -131,5 +131,4 @@ def affine_motions(body: SpatialBody, p: Array) -> tuple[AffineMotion, AffineMot
 
 def _cross(w: Array, x: Array) -> Array:
     """ω × x of w (T, 3) and x (T, 3, r)."""
-    found: Array = np.cross(w[:, :, None], x, axis=1)
-    return found
+    return as_floats(np.cross(w[:, :, None], x, axis=1))

@@ -57,7 +57,8 @@ def with_fewer_modes_in_space(body: SpatialBody, lowest: int, loaded: Sequence[s
         return body
     kept = np.sort(np.argsort(body.stiffness[: body.n_eigenmodes], kind="stable")[:lowest])
     B_T = interface_loads(body, loaded)
-    shapes, squares = [np.zeros((body.n_modes, 0))], [np.zeros(0)]
+    shapes: list[Array] = [np.zeros((body.n_modes, 0))]
+    squares: list[Array] = [np.zeros(0)]
     for block in coupled_blocks(B_T @ B_T.T):
         others = np.setdiff1d(block, kept)
         if not others.size:
