@@ -69,8 +69,12 @@ class PatchFeasibility:
 
     @property
     def mode_factor(self) -> Array:
-        """(n,) required over available modal force: above 1 no voltages within the limits reach it, even alone."""
-        return self.mode_required / self.mode_available
+        """(n,) required over available modal force: above 1 no voltages within the limits reach it, even alone.
+
+        Infinite where no patch reaches the mode, 0 where nothing is required of it.
+        """
+        without = np.where(self.mode_required > 0, np.inf, 0.0)
+        return np.divide(self.mode_required, self.mode_available, out=without, where=self.mode_available > 0)
 
 
 @dataclass(frozen=True)

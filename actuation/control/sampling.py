@@ -52,5 +52,6 @@ def _held(A: Array, B: Array, T: float) -> tuple[Array, Array]:
     from scipy.linalg import expm
 
     n, m = B.shape
-    block = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * T)
-    return block[:n, :n], block[:n, n:]
+    scale = float(np.abs(B).max(initial=0.0)) or 1.0  # of inputs: the unit of a command must not decide on the powers
+    block = expm(np.block([[A, B / scale], [np.zeros((m, n + m))]]) * T)
+    return block[:n, :n], block[:n, n:] * scale

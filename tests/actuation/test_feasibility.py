@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ffrobot
+from ffrobot.actuation.feasibility import PatchFeasibility, Remedies
 from ffrobot.actuation.motors import judge_motors, path_jump
 from ffrobot.actuation.patches.patches import patch_array, with_patch_count
 from ffrobot.actuation.patches.voltages import solve_voltages
@@ -289,3 +290,12 @@ def three_links(law):
         ],
         analysis=[{"name": "motors", "kind": "motors-only", "end": 0.5, "output_step": 0.0005}],
     )
+
+
+def test_modes_that_no_patch_reaches():
+    """Without a division by zero: nothing is asked of one, the other cannot be had."""
+    blank = np.zeros(1)
+    required, available = np.array([2.0, 0.0, 3.0]), np.array([4.0, 0.0, 0.0])
+    found = PatchFeasibility(*[blank] * 6, required, available, Remedies(*[0] * 6))
+    with np.errstate(all="raise"):
+        assert found.mode_factor.tolist() == [0.5, 0.0, np.inf]
