@@ -67,7 +67,7 @@ FLAP = {
 def test_frequencies_of_a_rotating_cantilever(spin, tmp_path):
     """Across the plane (flap), and in it with the hub held (lag): ω_lag² = ω_flap² − Ω²."""
     unit = np.sqrt(7e10 * 0.01**4 / 12 / (2700 * 0.01**2))
-    path = [{"name": "spin", "joint": "hub", "value": f"{spin * unit!r}*t"}]
+    path = [{"name": "spin", "joint": "hub", "value": f"{float(spin * unit)!r}*t"}]
     scene = planar_in_space.write(blade(tmp_path, trajectory=path), tmp_path / "scene.toml")
     with ffrobot.solve(scene) as results:
         flap = 2 * np.pi * results["about/linear/frequency"][0] / unit
