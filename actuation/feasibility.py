@@ -74,7 +74,8 @@ class PatchFeasibility:
         Infinite where no patch reaches the mode, 0 where nothing is required of it.
         """
         without = np.where(self.mode_required > 0, np.inf, 0.0)
-        return np.divide(self.mode_required, self.mode_available, out=without, where=self.mode_available > 0)
+        found: Array = np.divide(self.mode_required, self.mode_available, out=without, where=self.mode_available > 0)
+        return found
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class SpatialRigidArm:
         self._model = replace(free, rows=(*free.rows, *motors))
         self._motors = np.arange(len(free.rows), len(free.rows) + len(motors))
         self._system = SpatialSystem(self._model)
-        self._q = np.zeros(free.tree.n_q)
+        self._q: Array = np.zeros(free.tree.n_q)
         for own, node in zip(free.tree.nodes, model.tree.nodes, strict=True):
             self._q[own.q] = q[node.q]
 
@@ -55,7 +55,7 @@ class SpatialRigidArm:
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
         """Coordinates q (n_q,) and C_v at motor angles gamma, by Newton from the last place."""
-        q: Array = self._q
+        q = self._q
         for _ in range(MOST_ITERATIONS):
             values, gradients = row_values(self._model, q[None], np.zeros(1))
             C, C_v = values[0], gradients[0]
