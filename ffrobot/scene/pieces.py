@@ -6,13 +6,14 @@ Everything that computes motions gets the scene of pieces, everything that repor
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from ..common.errors import InputError
 from ..common.validation import Record
 from ..fe_models.pieces import CutLink, cut
+from ..mbs.fields.references import Reference
 from ..mbs.joints.weld import WeldJoint
 from ..mbs.scene.bodies import Body
 from ..mbs.scene.mechanism import MechanismKeys
@@ -119,10 +120,7 @@ def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str
     if not divided:
         return
     first = next(iter(divided))
-    for points in scene.actuation_points:
-        yield f'actuation_points "{points.body}": expected none beside bodies in pieces ("{first}"), found these'
-    if scene.motors == "frame":
-        yield f'motors: expected "section" beside bodies in pieces ("{first}"), found "frame"'
+    yield from unfit_actuators((points.body for points in scene.actuation_points), scene.motors, first)
     for analysis in scene.analysis:
         if analysis.kind not in KINDS:
             yield (
@@ -134,8 +132,25 @@ def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str
     for joint in scene.joint:
         if joint.elastic_gear("section") is not None:
             yield f'joint "{joint.name}": stiffness: expected none beside bodies in pieces ("{first}"), found one'
-    for reference in MechanismKeys.references(scene):
-        if reference.kind == "body" and reference.name in divided and not reference.key.startswith("initial."):
+    references = MechanismKeys.references(scene)
+    yield from unfit_references((each for each in references if not each.key.startswith("initial.")), divided)
+
+
+def unfit_actuators(pointed: Iterable[str], motors: str, first: str) -> Iterator[str]:
+    """What acts and cannot do so beside bodies in pieces, of which `first` is one; in the plane and in space.
+
+    `pointed` are bodies with actuation points.
+    """
+    for body in pointed:
+        yield f'actuation_points "{body}": expected none beside bodies in pieces ("{first}"), found these'
+    if motors == "frame":
+        yield f'motors: expected "section" beside bodies in pieces ("{first}"), found "frame"'
+
+
+def unfit_references(references: Iterable[Reference], divided: Container[str]) -> Iterator[str]:
+    """References to frames of bodies in pieces; in the plane and in space."""
+    for reference in references:
+        if reference.kind == "body" and reference.name in divided:
             yield (
                 f"{reference.key}: expected a point or a joint where a body is in pieces, whose frame no piece has,"
                 f' found "{reference.name}"'

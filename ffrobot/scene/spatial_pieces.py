@@ -14,7 +14,7 @@ from ..fe_models.link_records import FAMILIES
 from ..fe_models.pieces import cut
 from ..mbs.joints.spatial.weld import SpatialWeld
 from ..mbs.scene.spatial.bodies import BodyInSpace
-from .pieces import BodyInPieces, places_on_pieces, renamed, welds_between
+from .pieces import BodyInPieces, places_on_pieces, renamed, unfit_actuators, unfit_references, welds_between
 from .spatial import SpatialScene
 
 KINDS = ("pcid", "forward", "static")
@@ -71,10 +71,7 @@ def _problems(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> Itera
                 f'pzt "{layout.label}": body: expected one that is not in pieces, found "{layout.body}": not available'
                 " in space yet"
             )
-    for points in scene.actuation_points:
-        yield f'actuation_points "{points.body}": expected none {beside}, found these'
-    if scene.motors == "frame":
-        yield f'motors: expected "section" {beside}, found "frame"'
+    yield from unfit_actuators((points.body for points in scene.actuation_points), scene.motors, first)
     for analysis in scene.analysis:
         if analysis.kind not in KINDS:
             yield (
@@ -86,9 +83,4 @@ def _problems(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> Itera
     for joint in scene.joint:
         if getattr(joint, "stiffness", None) is not None:
             yield f'joint "{joint.name}": stiffness: expected none {beside}, found one'
-    for reference in scene.references():
-        if reference.kind == "body" and reference.name in divided:
-            yield (
-                f"{reference.key}: expected a point or a joint where a body is in pieces, whose frame no piece has,"
-                f' found "{reference.name}"'
-            )
+    yield from unfit_references(scene.references(), divided)
