@@ -43,7 +43,7 @@ void make_controls(IntegrationControls *c, double tolerance, unsigned long max_s
                    const std::vector<std::tuple<MethodKind, double, double>> &methods, double spectral_radius) {
   if (methods.empty() || methods.size() > 2)
     throw std::invalid_argument("methods: expected one or two, found " + std::to_string(methods.size()));
-  new (c) IntegrationControls{tolerance, max_steps, {}};
+  new (c) IntegrationControls{.tolerance = tolerance, .max_steps = max_steps, .methods = {}};
   for (const auto &[kind, cost, pace] : methods)
     c->methods.push_back({{kind, spectral_radius}, cost, pace});
 }
@@ -103,7 +103,12 @@ void bind_integrate(nb::module_ &m) {
   nb::class_<IntegrationControls>(m, "IntegrationControls", "What an integration is made with; max_steps 0: no limit.")
       .def("__init__", &make_controls, nb::kw_only(), "tolerance"_a, "max_steps"_a, "methods"_a, "spectral_radius"_a,
            "methods: one, or two of which the faster is found out, each with the cost of a step and the pace that is\n"
-           "expected of it, in s of the run per cost.");
+           "expected of it, in s of the run per cost.")
+      .def_rw("keep_steps", &IntegrationControls::keep_steps,
+              "Whether ends of steps are reported, if they can be repeated.")
+      .def_rw("repeated_steps", &IntegrationControls::repeated_steps,
+              "Ends (s) of the steps to take, with the first method and whatever their error; none: as the tolerance\n"
+              "wants them.");
   nb::class_<Recording>(m, "Recording", "The accepted steps of a run, from which its dense output can be made again.")
       .def(nb::init<>())
       .def("__init__", &make_recording, "times"_a, "states"_a, "methods"_a, "spectral_radius"_a, "tolerance"_a,

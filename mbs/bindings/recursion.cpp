@@ -96,6 +96,7 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
       .def_rw("rotor_inertia", &Body::rotor_inertia)
       .def_rw("gear_ratio", &Body::gear_ratio)
       .def_rw("driven", &Body::driven)
+      .def_rw("of_section", &Body::of_section)
       .def_rw("data", &Body::data);
   return nb::class_<Model<Space>>(m, name, text)
       .def(nb::init<const std::vector<Body> &, const std::vector<typename Space::Marker> &,

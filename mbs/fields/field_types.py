@@ -20,6 +20,7 @@ from ...common.validation import Record, existing_file, quoted
 from .._core import TimeFunction
 from .expressions import parse_expression
 from .functions import user_function
+from .steps import Steps, load_steps
 from .waypoints import Waypoints, load_waypoints
 
 GROUND = "ground"
@@ -46,6 +47,12 @@ def _time_function(value: object, info: ValidationInfo) -> TimeFunction:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return parse_expression(repr(float(value)))
     raise ValueError(f"expected an expression in t, found {value!r}")
+
+
+def _time_functions(value: object, info: ValidationInfo) -> TimeFunction | tuple[TimeFunction, ...]:
+    if isinstance(value, list | tuple):
+        return tuple(_time_function(one, info) for one in value)
+    return _time_function(value, info)
 
 
 def _quantity(value: object) -> float:
@@ -80,6 +87,14 @@ def _waypoints(value: object, info: ValidationInfo) -> Waypoints:
     return load_waypoints(existing_file(Path(value), info))
 
 
+def _steps(value: object, info: ValidationInfo) -> Steps:
+    if isinstance(value, Steps):
+        return value
+    if not isinstance(value, str):
+        raise ValueError(f"expected the name of a results file in quotes, found {value!r}")
+    return load_steps(existing_file(Path(value), info), info.data.get("name", "?"))
+
+
 def _not_empty(entries: tuple[T, ...]) -> tuple[T, ...]:
     # Not a min_length: pydantic would complain about that, too, whenever an entry is wrong.
     if not entries:
@@ -112,5 +127,10 @@ PointReference = Annotated[str, AfterValidator(_point)]
 Side = Annotated[str, AfterValidator(_side)]
 Quantity = Annotated[float, PlainValidator(_quantity, json_schema_input_type=str | float)]
 Expression = Annotated[TimeFunction, PlainValidator(_time_function, json_schema_input_type=str | float)]
+Expressions = Annotated[
+    TimeFunction | tuple[TimeFunction, ...],
+    PlainValidator(_time_functions, json_schema_input_type=str | float | list[str | float]),
+]
 WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints, json_schema_input_type=str)]
+KeptSteps = Annotated[Steps, PlainValidator(_steps, json_schema_input_type=str)]
 NotEmpty = AfterValidator(_not_empty)

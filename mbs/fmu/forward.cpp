@@ -214,25 +214,52 @@ NO_STATUS(fmi2GetIntegerStatus, fmi2Integer)
 NO_STATUS(fmi2GetBooleanStatus, fmi2Boolean)
 NO_STATUS(fmi2GetStringStatus, fmi2String)
 
+// ---- states that are kept ----
+
+FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+  try {
+    HeldState now = static_cast<Instance *>(c)->motion->state();
+    if (*state) // of an earlier call, to be written over
+      *static_cast<HeldState *>(*state) = std::move(now);
+    else
+      *state = new HeldState(std::move(now));
+    return fmi2OK;
+  } catch (const std::exception &error) {
+    return fail(c, std::string("fmi2GetFMUstate: ") + error.what());
+  }
+}
+
+FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+  if (!state)
+    return fail(c, "fmi2SetFMUstate: expected a state of fmi2GetFMUstate, found none");
+  try {
+    static_cast<Instance *>(c)->motion->bring_back(*static_cast<const HeldState *>(state));
+    return fmi2OK;
+  } catch (const std::exception &error) {
+    return fail(c, std::string("fmi2SetFMUstate: ") + error.what());
+  }
+}
+
+FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component, fmi2FMUstate *state) {
+  if (state) {
+    delete static_cast<HeldState *>(*state);
+    *state = nullptr;
+  }
+  return fmi2OK;
+}
+
 // ---- what modelDescription.xml says that there is not ----
 
 FMI2_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference[], size_t,
                                                     const fmi2ValueReference[], size_t, const fmi2Real[], fmi2Real[]) {
   return fail(c, "fmi2GetDirectionalDerivative: there are none");
 }
-FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *) {
-  return fail(c, "fmi2GetFMUstate: states are not kept");
-}
-FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate) {
-  return fail(c, "fmi2SetFMUstate: states are not kept");
-}
-FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component, fmi2FMUstate *) { return fmi2OK; }
 FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate, size_t *) {
-  return fail(c, "fmi2SerializedFMUstateSize: states are not kept");
+  return fail(c, "fmi2SerializedFMUstateSize: states are kept in memory alone");
 }
 FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate, fmi2Byte[], size_t) {
-  return fail(c, "fmi2SerializeFMUstate: states are not kept");
+  return fail(c, "fmi2SerializeFMUstate: states are kept in memory alone");
 }
 FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte[], size_t, fmi2FMUstate *) {
-  return fail(c, "fmi2DeSerializeFMUstate: states are not kept");
+  return fail(c, "fmi2DeSerializeFMUstate: states are kept in memory alone");
 }

@@ -80,6 +80,9 @@ void bind_outputs(nb::module_ &m) {
       .def_prop_ro(
           "changes", [](const Run &r) { return changes_of(r.report); },
           "Of integrators: (time, from, to, mean step before) of each.")
+      .def_prop_ro(
+          "step_ends", [](const Run &r) { return r.report.step_ends; },
+          "Times (s) where steps ended, as controls ask for them; none where they cannot be repeated.")
       // references: the arrays are views that keep their Run alive
       .def_prop_ro("q", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.q; })
       .def_prop_ro("v", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.v; })

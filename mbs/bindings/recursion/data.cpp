@@ -78,8 +78,9 @@ void bind_rows(nb::module_ &m) {
       .value("coordinate", RowKind::coordinate);
   nb::class_<MarkerAt>(m, "MarkerAt", "A marker of a body, or of the ground: body -1.")
       .def(
-          "__init__", [](MarkerAt *at, int body, int marker) { new (at) MarkerAt{body, marker}; }, "body"_a,
-          "marker"_a);
+          "__init__", [](MarkerAt *at, int body, int marker) { new (at) MarkerAt{body, marker}; }, "body"_a, "marker"_a)
+      .def_ro("body", &MarkerAt::body)
+      .def_ro("marker", &MarkerAt::marker);
   nb::class_<RowModel>(m, "RowModel", "A constraint row between markers a and b; see mbs/core/recursion/model.h.")
       .def(nb::init<>())
       .def_rw("name", &RowModel::name)

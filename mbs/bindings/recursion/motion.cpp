@@ -131,6 +131,9 @@ void bind_run_and_laws(nb::module_ &m) {
       .def_prop_ro(
           "changes", [](const TreeRun &r) { return changes_of(r.report); },
           "Of integrators: (time, from, to, mean step before) of each.")
+      .def_prop_ro(
+          "step_ends", [](const TreeRun &r) { return r.report.step_ends; },
+          "Times (s) where steps ended, as controls ask for them; none where they cannot be repeated.")
       .def_ro("least_ratio", &TreeRun::least_ratio,
               "Of the scene's watch: 1 without; see mbs/core/recursion/posture.h.")
       .def_ro("singular_at", &TreeRun::singular_at, "When that was, s.")
@@ -181,11 +184,11 @@ void bind_tree_motion(nb::module_ &m) {
           "direction"_a, "magnitude"_a, "Generalized forces magnitude(t) direction (n_v).")
       .def(
           "add_point_load",
-          [](Scene &s, int wrench, int component, const TimeFunction &magnitude) {
-            s.point_loads.push_back({wrench, component, magnitude});
+          [](Scene &s, int wrench, int component, const TimeFunction &magnitude, double share) {
+            s.point_loads.push_back({wrench, component, magnitude, share});
           },
-          "wrench"_a, "component"_a, "magnitude"_a,
-          "Along a component of (force, moment), global axes, on a wrench of the model.")
+          "wrench"_a, "component"_a, "magnitude"_a, "share"_a = 1.0,
+          "share magnitude(t) along a component of (force, moment), global axes, on a wrench of the model.")
       .def(
           "add_joint_force",
           [](Scene &s, int q, int v, double stiffness, double rest, double viscous, double coulomb, double speed) {

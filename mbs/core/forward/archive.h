@@ -4,9 +4,9 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstring>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -33,7 +33,7 @@ public:
   void raw(void *data, std::size_t size) {
     if (size > left())
       throw std::runtime_error("expected more data, found the end of the file");
-    std::memcpy(data, bytes_.data() + at_, size);
+    std::copy_n(bytes_.data() + at_, size, static_cast<char *>(data)); // data is null for matrices without entries
     at_ += size;
   }
   std::size_t left() const { return bytes_.size() - at_; }

@@ -18,7 +18,7 @@ template <class Archive> void fields(Archive &a, SpatialData &x) {
 }
 template <class Archive> void fields(Archive &a, BodyModel<SpatialData> &x) {
   archived_all(a, x.name, x.parent, x.parent_marker, x.inboard_marker, x.joint, x.lead, x.rotor_inertia, x.gear_ratio,
-               x.driven, x.data);
+               x.driven, x.of_section, x.data);
 }
 template <class Archive> void fields(Archive &a, MarkerAt &x) { archived_all(a, x.body, x.marker); }
 template <class Archive> void fields(Archive &a, RowModel &x) {
@@ -46,7 +46,7 @@ using namespace recursion;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-const std::string head = "ffrobot held motion 2\n"; // another number wherever fields() change
+const std::string head = "ffrobot held motion 3\n"; // another number wherever fields() change
 
 VectorXd joined(const VectorXd &q, const VectorXd &v) {
   VectorXd y(q.size() + v.size());
@@ -83,9 +83,10 @@ HeldModel held_model_of(const std::string &bytes) {
 
 HeldMotion::HeldMotion(HeldModel model)
     : model_(std::move(model)), mechanism_(model_.bodies, model_.ground, model_.rows, {}, model_.gravity),
-      scene_(scene_of(model_)), y_(joined(model_.q, model_.v)),
-      motion_(mechanism_, scene_, 0, model_.q.data(), model_.v.data()), inputs_(model_.inputs.size(), 0.0),
-      outputs_(output_count(), 0.0) {}
+      scene_(scene_of(model_)), y_(joined(model_.q, model_.v)), inputs_(model_.inputs.size(), 0.0),
+      outputs_(output_count(), 0.0) {
+  motion_.emplace(mechanism_, scene_, 0, model_.q.data(), model_.v.data());
+}
 
 // Checked before anything reads the state.
 Scene HeldMotion::scene_of(const HeldModel &model) {
@@ -124,9 +125,17 @@ IntegrationStatus HeldMotion::step(double t, double h) {
     history_.time = t, history_.outputs = 1;
   outputs_are_old_ = true;
   const IntegrationReport report = integrate(
-      motion_, {t, t + h}, y_, controls, [](std::size_t, double, const double *) {}, [](double) { return true; },
+      *motion_, {t, t + h}, y_, controls, [](std::size_t, double, const double *) {}, [](double) { return true; },
       nullptr, nullptr, &history_);
   return report.status;
+}
+
+// Begun anew, since implicit methods keep matrices of the steps after it.
+void HeldMotion::bring_back(const HeldState &state) {
+  motion_.emplace(mechanism_, scene_, 0, model_.q.data(), model_.v.data());
+  motion_->go_on(state.motion);
+  y_ = state.y, history_ = state.steps, inputs_ = state.inputs;
+  outputs_are_old_ = true;
 }
 
 const std::vector<double> &HeldMotion::outputs() {
@@ -144,8 +153,8 @@ const std::vector<double> &HeldMotion::outputs() {
     return outputs_;
   const double *q = y_.data(), *v = q + mechanism_.n_q;
   VectorXd a(mechanism_.n_v);
-  motion_.evaluate(0, q, v, a.data());
-  const auto frames = frame_motions(mechanism_, q, v, motion_.workspace());
+  motion_->evaluate(0, q, v, a.data());
+  const auto frames = frame_motions(mechanism_, q, v, motion_->workspace());
   for (const PlaceOutput &output : model_.places) {
     const Eigen::Vector3d r = place(output, frames);
     std::copy_n(r.data(), 3, outputs_.begin() + static_cast<std::ptrdiff_t>(i));

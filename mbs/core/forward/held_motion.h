@@ -5,6 +5,7 @@
 #include "core/recursion/motion.h"
 #include "core/recursion/observe.h"
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,14 @@ std::string bytes_of(const HeldModel &model);
 // Throws std::runtime_error for bytes that are none of bytes_of().
 HeldModel held_model_of(const std::string &bytes);
 
+// Where a motion is, and how its integration came there.
+struct HeldState {
+  Eigen::VectorXd y; // (q, v)
+  IntegrationCheckpoint steps;
+  recursion::MotionHistory motion;
+  std::vector<double> inputs;
+};
+
 class HeldMotion {
 public:
   // Throws std::invalid_argument where the model does not fit together.
@@ -63,6 +72,10 @@ public:
 
   const std::vector<double> &outputs(); // now: evaluated when first asked for after a step
 
+  // What was kept of this model is brought back: explicit methods go on with the very steps that they took from there.
+  HeldState state() const { return {y_, history_, motion_->history(), inputs_}; }
+  void bring_back(const HeldState &state);
+
 private:
   static recursion::Scene scene_of(const HeldModel &model);
   Eigen::Vector3d place(const PlaceOutput &at, const std::vector<recursion::FrameMotion> &frames) const;
@@ -70,9 +83,9 @@ private:
   HeldModel model_;
   recursion::Mechanism<recursion::Spatial> mechanism_;
   recursion::Scene scene_;
-  Eigen::VectorXd y_; // (q, v)
-  recursion::RecursiveMotion<recursion::Spatial> motion_;
-  IntegrationCheckpoint history_; // of the step before
+  Eigen::VectorXd y_;                                                    // (q, v)
+  std::optional<recursion::RecursiveMotion<recursion::Spatial>> motion_; // there from the constructor on
+  IntegrationCheckpoint history_;                                        // of the step before
   std::vector<double> inputs_, outputs_;
   bool outputs_are_old_ = true;
 };

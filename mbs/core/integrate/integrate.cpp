@@ -10,6 +10,7 @@
 #include <iterator>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 
 namespace ffrobot {
 
@@ -79,6 +80,7 @@ public:
         methods_(controls.methods, times.front(), times.back()), method_(make_method(methods_.at_work(), system)),
         control_(method_->error_order()), t_(times.front()), t_asked_(t_), end_(times.back()),
         duration_(times.back() - times.front()), z_(system.size()), error_(system.size()), z_output_(system.size()) {
+    is_repeatable_ = !breaks && !method_->lands_on_outputs();
     system_.local().set_centre(y.data());
     system_.local().from_state(y.data(), z_.data());
   }
@@ -106,6 +108,32 @@ public:
   }
 
   IntegrationReport run() {
+    if (controls_.repeated_steps.empty())
+      choose_steps();
+    else
+      repeat_steps();
+    report_.time = t_;
+    report_.evaluations = system_.evaluations();
+    if (!is_repeatable_ || report_.status != IntegrationStatus::completed)
+      report_.step_ends.clear();
+    return report_;
+  }
+
+  Eigen::VectorXd final_state() const {
+    return Eigen::Map<const Eigen::VectorXd>(state(z_.data()), system_.local().state_size());
+  }
+
+  IntegrationCheckpoint checkpoint() const {
+    StepHistory steps = steps_;
+    steps.previous_step = control_.previous_step();
+    steps.previous_error = control_.previous_error();
+    return {t_, final_state(), steps, report_.outputs, methods_.history()};
+  }
+
+private:
+  const double *state(const double *z) const { return system_.local().state(z); }
+
+  void choose_steps() {
     while (report_.outputs < times_.size() && may_go_on()) {
       if (jump_ && jump_->before <= at_once()) {
         pass_jump();
@@ -128,26 +156,31 @@ public:
       if (report_.outputs < times_.size() && methods_.takes_over(t_, method_->damps()))
         change_method();
     }
-    report_.time = t_;
-    report_.evaluations = system_.evaluations();
-    return report_;
   }
 
-  Eigen::VectorXd final_state() const {
-    return Eigen::Map<const Eigen::VectorXd>(state(z_.data()), system_.local().state_size());
+  void repeat_steps() {
+    if (breaks_ || method_->lands_on_outputs())
+      throw std::invalid_argument("repeated steps: expected an explicit method and no breaks, found others");
+    const std::vector<double> &ends = controls_.repeated_steps;
+    for (auto end = std::upper_bound(ends.begin(), ends.end(), t_); end != ends.end(); ++end) {
+      const Attempt attempt{*end, *end - t_, *end, false};
+      steps_.next_step = report_.last_step = attempt.step;
+      if (!may_go_on())
+        return;
+      if (!method_->step(t_, z_.data(), attempt.step, rounding) || !method_->correct(attempt.end)) {
+        report_.last_error = NAN;
+        report_.status = IntegrationStatus::step_underflow;
+        return;
+      }
+      system_.slope(attempt.end, method_->end(), method_->last_slope());
+      if (report_.outputs < times_.size() && times_[report_.outputs] < attempt.end)
+        method_->prepare_dense(t_, z_.data(), attempt.step);
+      take(attempt);
+    }
   }
-
-  IntegrationCheckpoint checkpoint() const {
-    StepHistory steps = steps_;
-    steps.previous_step = control_.previous_step();
-    steps.previous_error = control_.previous_error();
-    return {t_, final_state(), steps, report_.outputs, methods_.history()};
-  }
-
-private:
-  const double *state(const double *z) const { return system_.local().state(z); }
 
   void make_method_at_work() {
+    is_repeatable_ = false;
     method_ = make_method(methods_.at_work(), system_);
     control_ = StepControl(method_->error_order());
   }
@@ -247,14 +280,9 @@ private:
   }
 
   void accept(const Attempt &attempt, const Allowance &allowance, double size) {
-    ++report_.steps;
     size = take_from_reserve(attempt.step, allowance, size);
-    deliver_outputs(attempt);
-    move_to_end(attempt);
-    if (!system_.is_sensible(z_.data())) {
-      report_.status = IntegrationStatus::diverged;
+    if (!take(attempt))
       return;
-    }
     // A step that was shortened to land on an output tells what the step asked for would have cost. One that was
     // shortened much, to end at a break or a jump or by what is prescribed, tells nothing: the next step stays as long
     // as the control had asked for.
@@ -266,6 +294,18 @@ private:
       system_.slope(t_, z_.data(), method_->first_slope());
       method_->restart();
     }
+  }
+
+  // False where the run ends with the step just made.
+  bool take(const Attempt &attempt) {
+    ++report_.steps;
+    deliver_outputs(attempt);
+    move_to_end(attempt);
+    if (controls_.keep_steps)
+      report_.step_ends.push_back(t_);
+    if (!system_.is_sensible(z_.data()))
+      report_.status = IntegrationStatus::diverged;
+    return report_.status == IntegrationStatus::completed;
   }
 
   // The size of the error for the control of the next step, which should do without the reserve.
@@ -320,6 +360,7 @@ private:
 
   // The state is the same on both sides.
   void pass_jump() {
+    is_repeatable_ = false;
     t_ = jump_->after;
     jump_.reset();
     record();
@@ -369,6 +410,7 @@ private:
   double t_, t_asked_, end_, duration_;
   std::chrono::steady_clock::time_point asked_ = std::chrono::steady_clock::now();
   std::size_t next_break_ = 0;
+  bool is_repeatable_;                   // by the ends of steps alone
   std::optional<Jump> jump_;             // the next one that is known
   double searched_until_ = t_;           // there is no other before
   Eigen::VectorXd z_, error_, z_output_; // local coordinates (ode.h)

@@ -65,12 +65,20 @@ struct IntegrationReport {
   double last_step = 0;    // s, tried
   double last_error = 0;   // of it, relative to the largest one allowed; NaN where its equations could not be solved
   std::vector<MethodChange> changes;
+  std::vector<double> step_ends; // s, as controls ask for them; empty where the run cannot be repeated by them
 };
 
 struct IntegrationControls {
   double tolerance = 1e-6;
   unsigned long max_steps = 0;        // 0: no limit
   std::vector<Candidate> methods{{}}; // one, or two of which the faster is found out
+
+  // Whether ends of steps are reported, if one explicit method makes the whole run without breaks and jumps; and those
+  // of such a run, whose steps are taken again with the first method: no step is rejected, no error estimated. Then the
+  // result depends on parameters of the system as smoothly as its slopes do, and differences of such runs have no noise
+  // but rounding (internal numerical differentiation: H. G. Bock, Springer Series in Chemical Physics 18, 1981).
+  bool keep_steps = false;
+  std::vector<double> repeated_steps; // s, ascending; empty: steps are as the tolerance wants them
 };
 
 using StateFunctionOfTime = std::function<void(std::size_t, double, const double *)>; // of number, time and (q, v)

@@ -35,6 +35,8 @@ struct Dual {
   FFROBOT_INLINE friend Dual operator*(const Dual &a, double b) { return b * a; }
 };
 
+FFROBOT_INLINE double value_of(const Dual &x) { return x.value; }
+
 FFROBOT_INLINE void sine_and_cosine(const Dual &x, Dual &s, Dual &c) {
   const double sine = std::sin(x.value), cosine = std::cos(x.value);
   s = {sine, cosine * x.rate}, c = {cosine, -sine * x.rate};

@@ -49,12 +49,12 @@ Eigen::Vector3d origin_from(const SpatialMarker &m) { return -(m.triad.transpose
 
 // Whether a frame fixed at the inboard marker is where the joint holds the section: modes move the section at most in
 // ways that the joint leaves free, and nothing asks for the joint's coordinate.
-template <class Space> bool frame_sits_at_joint(const BodyModel<typename Space::Data> &body, const JointShape &shape) {
+template <class Space>
+bool frame_sits_at_joint(const BodyModel<typename Space::Data> &body, const JointShape &shape, bool asked) {
   if (body.data.modes() == 0 || body.joint == JointKind::free) // coordinates of a free body are those of its frame
     return true;
   const auto &marker = body.data.markers[static_cast<std::size_t>(body.inboard_marker)];
   const Eigen::MatrixXd rows = section_rows(marker);
-  const bool asked = body.driven || body.rotor_inertia > 0;
   for (int c = 0; c < Space::dim; ++c) {
     const int *first = shape.freedoms.component;
     const bool is_free = std::find(first, first + shape.freedoms.count, c) != first + shape.freedoms.count;
@@ -173,9 +173,27 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
   for (const MarkerAt &at : loaded)
     wrenches.push_back(attach(at, used));
 
+  // Which bodies pass moments at a port: to joints that do more than turn, by rows and wrenches
+  std::vector<char> passes_moment(count);
+  int first = 0;
+  for (BodyModel<Data> &body : bodies) {
+    const int own = Space::shape(body.joint).v_count;
+    for (const Row &row : rows)
+      if (row.model.kind == RowKind::coordinate && row.model.coordinate >= first && row.model.coordinate < first + own)
+        body.driven = true;
+    first += own + static_cast<int>(body.data.modes());
+    if (body.parent >= 0 && (body.joint != JointKind::revolute || body.driven || body.rotor_inertia > 0))
+      passes_moment[static_cast<std::size_t>(body.parent)] = 1;
+  }
+  for (const Row &row : rows)
+    for (const Attachment &at : {row.a, row.b})
+      if (at.node >= 0 && row.model.kind != RowKind::point)
+        passes_moment[static_cast<std::size_t>(at.node)] = 1;
+  for (const Attachment &at : wrenches)
+    if (at.node >= 0)
+      passes_moment[static_cast<std::size_t>(at.node)] = 1;
+
   // Coordinates, ports, columns
-  std::vector<char> is_driven(count);
-  int coordinate_rows = 0;
   for (std::size_t i = 0; i < count; ++i) {
     BodyModel<Data> &model = bodies[i];
     Node<Space> &node = nodes[i];
@@ -186,21 +204,30 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
       if (row.model.kind == RowKind::coordinate && row.model.coordinate >= n_v &&
           row.model.coordinate < n_v + node.shape.v_count) {
         row.node = static_cast<int>(i), row.freedom = row.model.coordinate - n_v;
-        node.has_rows = model.driven = true;
-        ++coordinate_rows;
+        node.has_rows = true;
       }
-    is_driven[i] = model.driven;
-    const bool sits = frame_sits_at_joint<Space>(model, node.shape);
+    const bool asked = model.driven || model.of_section || model.rotor_inertia > 0;
+    const bool sits = frame_sits_at_joint<Space>(model, node.shape, asked);
     const Marker inboard = model.data.markers[static_cast<std::size_t>(model.inboard_marker)];
     node.outboard = static_cast<int>(used[i].size());
-    if (sits)
+    bool tilts = false; // modes turn the section, and nothing but that
+    if constexpr (in_plane) {
+      node.is_pin = node.joint == JointKind::revolute && node.rotor_inertia == 0 && node.outboard <= 1 &&
+                    !passes_moment[i] && !(node.has_rows && !sits) &&
+                    frame_sits_at_joint<Space>(model, node.shape, false);
+      tilts = node.is_pin && !sits;
+    }
+    if (sits || tilts)
       model.data = at_marker(model.data, inboard), node.origin = origin_from(inboard);
     else
       node.inboard = node.outboard, used[i].push_back(model.inboard_marker);
     node.is_weightless = is_weightless(model.data) && node.outboard == 0;
     if (is_weightless(model.data) && (node.rotor_inertia <= 0 || node.outboard > 0))
       refuse("body " + model.name + ": mass: expected one above 0 of a body that is more than the output of a rotor");
-    node.body = typename Space::Body(model.data, used[i]);
+    if constexpr (in_plane)
+      node.body = planar::Body(model.data, used[i], tilts ? model.inboard_marker : -1);
+    else
+      node.body = spatial::Body(model.data, used[i]);
     node.first_port = ports, ports += node.ports();
     const int n_ports = node.ports();
     node.first_cross = crosses, crosses += n_ports * (n_ports - 1) / 2;
@@ -218,10 +245,9 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
       refuse("row " + row.model.name + ": expected a joint coordinate, got " + std::to_string(row.model.coordinate) +
              " of " + std::to_string(n_v) + " velocities");
 
-  // Ports: who hangs there, and whether moments pass
+  // Ports: who hangs there, and what acts
   children.assign(static_cast<std::size_t>(ports), -1);
   cleared.assign(static_cast<std::size_t>(ports), 0);
-  std::vector<char> passes_moment(static_cast<std::size_t>(ports), 0);
   for (std::size_t i = 0; i < count; ++i) {
     Node<Space> &node = nodes[i];
     if (node.parent < 0)
@@ -229,28 +255,23 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     node.parent_port += nodes[static_cast<std::size_t>(node.parent)].first_port;
     const auto port = static_cast<std::size_t>(node.parent_port);
     children[port] = static_cast<int>(i);
-    if (node.joint != JointKind::revolute || is_driven[i] || node.rotor_inertia > 0)
-      passes_moment[port] = 1;
   }
-  const auto finish = [&](Attachment &at, bool moment) {
+  const auto finish = [&](Attachment &at) {
     if (at.node < 0)
       return;
     at.global_port = nodes[static_cast<std::size_t>(at.node)].first_port + at.port;
     cleared[static_cast<std::size_t>(at.global_port)] = 1;
-    if (moment)
-      passes_moment[static_cast<std::size_t>(at.global_port)] = 1;
   };
   for (Row &row : rows)
     if (row.model.kind != RowKind::coordinate) {
-      const bool moment = row.model.kind != RowKind::point;
       row.moves = row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
       if (row.model.kind == RowKind::point)
         row.lift = gravity.dot(row.model.f.head(Space::linear)) * ((row.a.node < 0) - (row.b.node < 0));
       needs_positions = needs_positions || row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
-      finish(row.a, moment), finish(row.b, moment);
+      finish(row.a), finish(row.b);
     }
   for (Attachment &at : wrenches)
-    finish(at, true);
+    finish(at);
   for (std::size_t port = 0; port < children.size(); ++port)
     if (children[port] < 0)
       cleared[port] = 1;
@@ -271,13 +292,6 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
             found.list.push_back({-1, static_cast<int>(k_wrench), -1, false, {}});
         actions.push_back(found);
       }
-  if constexpr (in_plane)
-    for (std::size_t i = 0; i < count; ++i) {
-      Node<Space> &node = nodes[i];
-      node.is_pin = node.joint == JointKind::revolute && node.inboard < 0 && node.rotor_inertia == 0 &&
-                    node.outboard <= 1 &&
-                    (node.outboard == 0 || !passes_moment[static_cast<std::size_t>(node.first_port)]);
-    }
 }
 
 template struct Mechanism<Planar>;

@@ -27,7 +27,7 @@ template <class Space> struct Node {
   int first_slot =
       0; // of columns: the joint's freedoms; 2 dim where it has an inboard port; dim for each outboard port
   int first_cross = 0;        // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
-  bool is_pin = false;        // plane: a revolute joint at the frame, at most one port, which passes forces only
+  bool is_pin = false;        // plane: a revolute joint, at most one port, which passes forces only (planar/pins.h)
   bool has_rows = false;      // constraint rows that are coordinates of the joint
   bool is_weightless = false; // nothing but a rotor's inertia, nothing hangs on it: what carries it feels no inertia
   Eigen::Vector3d origin = Eigen::Vector3d::Zero(); // of the body's data, in axes of the frame

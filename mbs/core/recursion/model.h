@@ -69,7 +69,8 @@ template <class Data> struct BodyModel {
   double lead = 0;          // m/rad, of a screw
   double rotor_inertia = 0; // kg m^2, of a rotor on the inner section about z that turns `gear_ratio` times
   double gear_ratio = 1;    // as fast as the joint
-  bool driven = false;      // forces, rows or motors act along the joint's coordinates
+  bool driven = false;      // forces or rows act along the joint's coordinates
+  bool of_section = false;  // these are the section's even where modes turn it and nothing acts along them
   Data data;
 };
 

@@ -82,7 +82,7 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
   if (!scene_.point_loads.empty()) {
     wrench_.setZero();
     for (const PointLoad &load : scene_.point_loads)
-      wrench_[Space::dim * load.wrench + load.component] += load.magnitude(t).value;
+      wrench_[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
     forces.wrench = wrench_.data();
   }
   accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);

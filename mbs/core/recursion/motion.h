@@ -29,11 +29,12 @@ struct Load {
   TimeFunction magnitude;
 };
 
-// `magnitude`(t) along a component of the force (N), then the moment (N m),
-// global axes, on a wrench of the mechanism.
+// `share` times `magnitude`(t) along a component of the force (N), then the
+// moment (N m), global axes, on a wrench of the mechanism.
 struct PointLoad {
   int wrench = 0, component = 0;
   TimeFunction magnitude;
+  double share = 1;
 };
 
 // How a marker of the ground turns.

@@ -5,37 +5,49 @@
 
 namespace ffrobot::recursion {
 
-// Columns C of forces (port axes) and numbers D with Lambda = sum of D c c^T, `rank` of them
+FFROBOT_INLINE double value_of(double x) { return x; }
+
+// What is left of a diagonal of Lambda by rounding where the body has no inertia there, of that diagonal
+constexpr double no_inertia = 1e-13;
+
+// Columns C of forces (port axes) and numbers D with Lambda = sum of D c c^T, `rank` of them; fewer where what hangs
+// there has no inertia in some direction (a point mass, a thin rod): its row and column in Lambda are zero by then.
 template <class Space, class T>
 FFROBOT_APART int factors(const Node<Space> &child, const Hinge<Space, T> &hinge, Pack<T, Space::dim> *C, T *D) {
   constexpr int d = Space::dim;
-  int kept[d], rank = 0;
+  int kept[d], count = 0, rank = 0;
   const bool full = child.rotor_inertia > 0;
   for (int i = 0, k = 0; i < d; ++i)
     if (!full && k < child.shape.freedoms.count && child.shape.freedoms.component[k] == i)
       ++k;
     else
-      kept[rank++] = i;
+      kept[count++] = i;
   T L[d][d];
-  for (int j = 0; j < rank; ++j) {
-    for (int i = j; i < rank; ++i)
-      L[i][j] = hinge.Lambda[kept[i]][kept[j]];
-    for (int k = 0; k < j; ++k) {
+  for (int j = 0; j < count; ++j) { // column j of Lambda becomes column `rank` of L
+    for (int i = j; i < count; ++i)
+      L[i][rank] = hinge.Lambda[kept[i]][kept[j]];
+    const T whole = L[j][rank];
+    for (int k = 0; k < rank; ++k) {
       const T x = L[j][k] * D[k];
-      for (int i = j; i < rank; ++i)
-        L[i][j] -= L[i][k] * x;
+      for (int i = j; i < count; ++i)
+        L[i][rank] -= L[i][k] * x;
     }
-    D[j] = L[j][j];
-    const T inverse = T(1.) / D[j];
-    for (int i = j + 1; i < rank; ++i)
-      L[i][j] *= inverse;
-    L[j][j] = T(1.);
+    if (value_of(L[j][rank]) <= no_inertia * value_of(whole))
+      continue;
+    D[rank] = L[j][rank];
+    const T inverse = T(1.) / D[rank];
+    for (int i = j + 1; i < count; ++i)
+      L[i][rank] *= inverse;
+    L[j][rank] = T(1.);
+    for (int i = 0; i < j; ++i)
+      L[i][rank] = T(0.);
+    ++rank;
   }
   for (int j = 0; j < rank; ++j) {
     T c[d], turned[d];
     for (int i = 0; i < d; ++i)
       c[i] = T(0.);
-    for (int i = j; i < rank; ++i)
+    for (int i = 0; i < count; ++i)
       c[kept[i]] = L[i][j];
     if (child.joint == JointKind::screw && !full)
       c[d - 1] = -(child.lead * c[2]);

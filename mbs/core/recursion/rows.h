@@ -93,12 +93,14 @@ template <class T> FFROBOT_INLINE void frame_axes(const spatial::State<T> &s, Po
       to.R[i][j] = s.absolute[i][j];
 }
 
-template <class T> FFROBOT_INLINE T joint_angle(const Node<Planar> &node, const T *q) {
+template <class T> FFROBOT_INLINE T joint_angle(const Node<Planar> &node, const T *q, const planar::State<T> &s) {
   if (node.joint == JointKind::revolute)
-    return q[node.q];
+    return node.body.is_tilted ? T(q[node.q] - s.u[planar::Body::TILT]) : q[node.q];
   return node.joint == JointKind::free ? q[node.q + 2] : T(0.);
 }
-template <class T> FFROBOT_INLINE T joint_angle(const Node<Spatial> &, const T *) { return T(0.); }
+template <class T> FFROBOT_INLINE T joint_angle(const Node<Spatial> &, const T *, const spatial::State<T> &) {
+  return T(0.);
+}
 
 // Of all frames: w.frames
 template <class Space, class T>
@@ -115,7 +117,7 @@ FFROBOT_APART void locate(const Mechanism<Space> &m, const T *q, Workspace<Space
     Pose<T> &frame = w.frames[i];
     frame_axes(w.bodies[i], frame);
     // origin and velocity of the outer section; its axes are those of the frame, or of the inboard port
-    frame.angle = inner.angle + joint_angle(node, q);
+    frame.angle = inner.angle + joint_angle(node, q, w.bodies[i]);
     T r[3] = {T(0.), T(0.), T(0.)}, r_dot[3] = {T(0.), T(0.), T(0.)}, arm[3], rate[3], swept[3];
     for (int k = 0; k < 3; ++k)
       at.r[k] = at.v[k] = T(0.);

@@ -4,27 +4,14 @@ Their second-order field is affine, so that the projection in the core is exact.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from points_in_space import J, Mechanism, Series, r
-from random_bodies import ground, random_body, random_state, row, three_links
+from random_bodies import GRAVITY, JOINTS, check_balance, ground, random_body, random_state, row, three_links
 
-JOINTS = [J.revolute, J.prismatic, J.screw, J.cylindrical, J.universal, J.spherical, J.planar, J.weld, J.free]
-GRAVITY = np.array([0.3, 1.0, -9.81])
-
-
-def check(mechanism, rng, bound=1e-11, force=False):
-    model = mechanism.model()
-    q, v = random_state(rng, mechanism, model, deflection=0.3)
-    target = rng.standard_normal(len(mechanism.rows))
-    applied = rng.standard_normal(model.n_v) if force else None
-    wrench = rng.standard_normal(6 * len(mechanism.wrenches))
-    a, lambda_ = model.evaluate(q, v, target, applied, wrench)
-    residual, accelerations = mechanism.residual(model, q, v, a, lambda_, applied, wrench)
-    assert np.abs(residual).max() < bound
-    if len(target):
-        assert np.abs(accelerations - target).max() < bound * (1 + np.abs(a).max())
+check = partial(check_balance, deflection=0.3)
 
 
 @pytest.mark.parametrize("joint", JOINTS, ids=[joint.name for joint in JOINTS])

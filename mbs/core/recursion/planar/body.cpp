@@ -47,7 +47,7 @@ template <class M> bool vanishes(const M &matrix, double scale) {
 
 } // namespace
 
-Body::Body(const PlanarData &data, const std::vector<int> &used) : n(static_cast<int>(data.modes())) {
+Body::Body(const PlanarData &data, const std::vector<int> &used, int tilted) : n(static_cast<int>(data.modes())) {
   mass = data.mass, J = data.inertia, sx = data.first_moment.x(), sy = data.first_moment.y();
   blocks = 1 + static_cast<int>(used.size()) / 2;
   padded = (n + 7) / 8 * 8;
@@ -70,6 +70,9 @@ Body::Body(const PlanarData &data, const std::vector<int> &used) : n(static_cast
     }
     ports.push_back(port);
   }
+  is_tilted = n && tilted >= 0;
+  if (is_tilted)
+    W.row(TILT) = data.markers[static_cast<std::size_t>(tilted)].Phi.row(2);
   columns.assign(static_cast<std::size_t>(std::max(n, 1) * width()), 0.0);
   rows.assign(static_cast<std::size_t>(padded * width()), 0.0);
   for (int r = 0; r < width(); ++r)

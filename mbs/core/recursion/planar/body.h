@@ -4,7 +4,8 @@
 // Everything that p_ddot = Q_f - m^T A + sum of P^T f meets are products with the rows
 //     W = [S_bar_x; S_bar_y; h; Phi_x, Phi_y, Phi_rotation of port 0; of port 1; ...]
 // and G = W W^T, both constant (but for h where S_tilde is not zero). They lie in blocks of eight: the frame's three
-// and port 0, ports 1 and 2, ports 3 and 4 …
+// and port 0, ports 1 and 2, ports 3 and 4 … Where modes turn the section of a pin (pins.h), that rotation is row TILT
+// of the first block.
 #pragma once
 
 #include "core/recursion/model.h"
@@ -22,10 +23,11 @@ struct Port {
 };
 
 struct Body {
-  enum { Sx, Sy, H };
+  enum { Sx, Sy, H, TILT = 6 };
   Body() = default;
-  // `used`: markers of `data` that are ports
-  Body(const PlanarData &data, const std::vector<int> &used);
+  // `used`: markers of `data` that are ports; `tilted`: that of the section that the joint holds, -1 where the frame
+  // turns with it
+  Body(const PlanarData &data, const std::vector<int> &used, int tilted);
 
   int n = 0, blocks = 1, padded = 0;
   double mass = 0, sx = 0, sy = 0, J = 0;
@@ -39,7 +41,8 @@ struct Body {
   // Where these are not empty, an evaluation takes the long way round: modal forces one by one.
   Eigen::MatrixXd D_full, S_tilde, m_xy;
   Eigen::VectorXd j;
-  bool has_more = false; // any of these
+  bool has_more = false;  // any of these
+  bool is_tilted = false; // has row TILT
 
   int width() const { return 8 * blocks; }
   int row_count() const { return width(); }
@@ -63,6 +66,7 @@ template <class T> struct State {
   T absolute_cosine, absolute_sine; // of the frame
   T omega;                          // of the frame
   T A[3];                           // of the last evaluation
+  T on_modes = T(0.);               // moment along the coordinate of a pin, where modes turn its section
   T p_p, p_v;
   Aligned<T> u, u_dot, Q; // W p, W p_dot, W Q_f
   Aligned<T> elastic;     // (n) K p + D p_dot - applied modal forces
@@ -215,6 +219,8 @@ FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, const do
         if (port.turns)
           sum += z[r + 2] * Eight::load(W + (r + 2) * stride);
       }
+    if (b.is_tilted && !by_multipliers)
+      sum += z[Body::TILT] * Eight::load(W + Body::TILT * stride);
     if (b.has_more) {
       sum += z[2] * Eight::load(s.h.data() + i);
       if (!by_multipliers)

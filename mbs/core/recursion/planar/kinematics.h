@@ -60,6 +60,8 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
     T angle = T(0.);
     if (node.joint == JointKind::revolute || node.joint == JointKind::free)
       angle = q[node.joint == JointKind::free ? node.q + 2 : node.q];
+    if (node.body.is_tilted)
+      angle -= s.u[planar::Body::TILT];
     if (node.parent >= 0)
       angle += section_angle(m.nodes[node.parent].body, node.parent_port - m.nodes[node.parent].first_port,
                              w.bodies[node.parent]);
@@ -86,7 +88,7 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
     if (node.rotor_inertia > 0)
       hinge.spin = omega + node.gear_ratio * v[node.v];
     if (node.joint == JointKind::revolute)
-      s.omega = omega + v[node.v];
+      s.omega = omega + (node.body.is_tilted ? T(v[node.v] - s.u_dot[planar::Body::TILT]) : v[node.v]);
     else {
       PlanarPlace<T> to;
       place(node.joint, node.lead, q + node.q, v + node.v, to);
@@ -96,7 +98,7 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
         hinge.r[k] = to.r[k], hinge.r_dot[k] = to.r_dot[k];
       hinge.c[0] = -(oo * to.r[0]) - o2 * to.r_dot[1], hinge.c[1] = o2 * to.r_dot[0] - oo * to.r[1], hinge.c[2] = T(0.);
     }
-    if (!node.is_pin) {
+    if (!node.is_pin || (node.parent >= 0 && !m.nodes[node.parent].is_pin)) {
       hinge.column[0][0] = cosine, hinge.column[0][1] = sine, hinge.column[0][2] = -hinge.r[1];
       hinge.column[1][0] = -sine, hinge.column[1][1] = cosine, hinge.column[1][2] = hinge.r[0];
       hinge.column[2][2] = T(1.);

@@ -1,7 +1,11 @@
-// The recursion for what most planar mechanisms consist of: a body whose frame sits at a revolute joint, with at most
-// one port, which passes forces only. Ports have two rows then, Y is 2 x 2 in closed form without a subtraction,
+// The recursion for what most planar mechanisms consist of: a body whose frame's origin sits at a revolute joint, with
+// at most one port, which passes forces only. Ports have two rows then, Y is 2 x 2 in closed form without a
+// subtraction,
 //     Y = (Lambda + det Lambda adj G) / (1 + tr Lambda G + det Lambda det G)
 // and numbers stay in registers. The same steps as in articulated.h and release.h.
+//
+// Where modes turn the section at the joint by phi = Phi_r p (simply supported links), the recursion is that of the
+// frame, which turns by the joint's coordinate less phi; a moment along the coordinate acts on the modes by Phi_r, too.
 #pragma once
 
 #include "core/recursion/release.h"
@@ -33,7 +37,16 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   using Cols = Pack<T, W>;
   const planar::Body &body = node.body;
   planar::State<T> &s = w.bodies[&node - m.nodes.data()];
-  const planar::Inertia<T> I = inertia(body, q + node.p_q(), v + node.p_v(), s);
+  T on_modes(0.);
+  if (body.is_tilted && forces.generalized) {
+    on_modes = forces.generalized[node.v];
+    for (int r = 0; r < 8; ++r)
+      s.Q[r] -= body.gram(planar::Body::TILT, r) * on_modes;
+  }
+  planar::Inertia<T> I = inertia(body, q + node.p_q(), v + node.p_v(), s);
+  if (body.has_more && body.is_tilted)
+    I.ba += s.WH[planar::Body::TILT] * on_modes;
+  s.on_modes = on_modes;
   T M_xx = I.xx, M_xy = I.xy, M_xa = I.xa, M_yy = I.yy, M_ya = I.ya, M_aa = I.aa;
   Cols H[3];
   if (node.outboard) {
@@ -159,7 +172,7 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
   const T Aa = -(answer<Planar, T, W>(w, node.joint_slot(0), y) + hinge.pin[0] * Ax + hinge.pin[1] * Ay);
   a[node.v] = Aa - P_rotation;
   s.A[0] = Ax, s.A[1] = Ay, s.A[2] = Aa;
-  T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), T(0.), T(0.), T(0.)};
+  T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), T(0.), by_multipliers ? T(0.) : s.on_modes, T(0.)};
   if (node.outboard) {
     const planar::Port &constants = body.ports[0];
     PortWork<Planar, T> &port = w.ports[node.first_port];
@@ -185,6 +198,15 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
       }
     }
     port.A[2] = rotation;
+  }
+  if (body.is_tilted) {
+    constexpr int r = planar::Body::TILT;
+    a[node.v] += body.gram(r, 3) * z[3] + body.gram(r, 4) * z[4] - body.gram(r, 0) * Ax - body.gram(r, 1) * Ay -
+                 body.gram(r, 2) * Aa;
+    if (!by_multipliers)
+      a[node.v] += s.Q[r];
+    if (body.has_more)
+      a[node.v] -= s.WH[r] * Aa;
   }
   if (body.n)
     modal_accelerations<by_multipliers>(body, q + node.p_q(), z, s, a + node.p_v());

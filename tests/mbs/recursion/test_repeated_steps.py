@@ -1,0 +1,93 @@
+"""Runs that take the steps of another one again: as smooth in parameters as the equations are."""
+
+import numpy as np
+import pytest
+from points_in_space import J, Mechanism
+from random_bodies import ground, random_body, three_links
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.fields.expressions import parse_expression
+
+K = _core.MethodKind
+DOP853, DOPRI5, RADAU = ([(kind, 1.0, 0.0)] for kind in (K.dop853, K.dopri5, K.radau))
+TIMES = list(np.linspace(0.0, 2.0, 9))
+
+
+def controls(methods=DOP853, tolerance=1e-8, repeated=()):
+    made = _core.IntegrationControls(tolerance=tolerance, max_steps=0, methods=methods, spectral_radius=0.8)
+    made.keep_steps = True
+    made.repeated_steps = list(repeated)
+    return made
+
+
+def slide():
+    """A rigid body on a rail: (model, its coordinate in q and v, its mass as the equations have it)."""
+    body = random_body(np.random.default_rng(4), 0, J.prismatic)
+    model = Mechanism([body], ground(np.random.default_rng(5)), np.zeros(3)).model()
+    q, _, v, _ = model.first[0]
+    force = np.zeros(model.n_v)
+    force[v] = 1.0
+    a, _ = model.evaluate(np.zeros(model.n_q), np.zeros(model.n_v), np.zeros(0), force, None)
+    return model, q, v, 1.0 / a[v]
+
+
+def run(model, scene, start, control, times=TIMES):
+    return _core.tree_motion(model, scene, times, start, np.zeros(model.n_v), control, lambda t: True)
+
+
+@pytest.mark.parametrize("methods", [DOP853, DOPRI5], ids=["dop853", "dopri5"])
+def test_a_spring_by_its_stiffness(methods):
+    """x = x₀ cos ωt, ∂x/∂k = −x₀ t sin(ωt)/(2 ω m), by one central difference with k changed by 1e-5 of it."""
+    model, joint_q, joint_v, m = slide()
+    k, h = 900.0 * m, 1e-5 * 900.0 * m
+    start = np.zeros(model.n_q)
+    start[joint_q] = 0.1
+
+    def positions(stiffness, repeated):
+        scene = _core.TreeScene()
+        scene.add_joint_force(joint_q, joint_v, stiffness, 0.0, 0.0, 0.0, 1.0)
+        found = run(model, scene, start, controls(methods, repeated=repeated))
+        assert found.status == _core.IntegrationStatus.completed
+        return found.states[:, joint_q], found
+
+    _, base = positions(k, ())
+    times = np.array(TIMES)
+    exact = -0.1 * times * np.sin(30.0 * times) / (2 * 30.0 * m)
+
+    def error(repeated):
+        difference = (positions(k + h, repeated)[0] - positions(k - h, repeated)[0]) / (2 * h)
+        return np.abs(difference - exact).max() / np.abs(exact).max()
+
+    assert error(base.step_ends) < 1e-6
+
+
+def test_the_same_run_again():
+    """Links that bend: the same outputs to rounding, without the work of step control."""
+    rng = np.random.default_rng(11)
+    bodies = three_links(rng)
+    model = Mechanism(bodies, ground(rng, 2), np.array([0, 0, -9.81])).model()
+    start = np.zeros(model.n_q)
+    start[model.first[1][0]] = 1.0
+    times = list(np.linspace(0.0, 0.05, 4))
+    base = run(model, _core.TreeScene(), start, controls(tolerance=1e-6), times)
+    again = run(model, _core.TreeScene(), start, controls(tolerance=1e-6, repeated=base.step_ends), times)
+    assert again.steps == base.steps == len(base.step_ends)
+    assert again.rejected == 0
+    assert again.evaluations < base.evaluations
+    np.testing.assert_array_equal(again.step_ends, base.step_ends)
+    np.testing.assert_allclose(again.states, base.states, rtol=0, atol=1e-11 * np.abs(base.states).max())
+
+
+def test_what_cannot_be_repeated():
+    """Implicit steps, and a load that jumps within the run, have no ends to repeat."""
+    model, _, joint_v, _ = slide()
+    start, force = np.zeros(model.n_q), np.zeros(model.n_v)
+    force[joint_v] = 1.0
+    jumping, smooth = _core.TreeScene(), _core.TreeScene()
+    smooth.add_load(force, parse_expression("sin(3*t)"))
+    jumping.add_load(force, parse_expression("where(t < 0.7, 0, 1 + t)"))
+    assert len(run(model, smooth, start, controls()).step_ends)
+    assert not len(run(model, smooth, start, controls(RADAU)).step_ends)
+    assert not len(run(model, jumping, start, controls()).step_ends)
+    with pytest.raises(ValueError, match="expected an explicit method"):
+        run(model, smooth, start, controls(RADAU, repeated=[1.0, 2.0]))
