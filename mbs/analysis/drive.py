@@ -15,7 +15,7 @@ from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause
 from ..solve.initial_state import undeformed_state
-from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls, unmet
+from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls, unmet, with_steps_of
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
 from .earlier_check import check_earlier
@@ -88,7 +88,9 @@ def drive(
             continuation=replace(earlier.continuation, assembly=integrated),
         )  # fmt: skip
     began = time.perf_counter()
-    integrator = choose_integrator(assembly, analysis, start, steering, len(times))
+    integrator = with_steps_of(
+        analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
+    )
     continuation = Continuation(_core.Checkpoint(), recording)
     if earlier is not None:  # with the same candidates, and what they have become since
         known, continuation = earlier.statistics.integrator, earlier.continuation
@@ -149,7 +151,10 @@ def statistics_of(assembly: MechanismSystem, run: _core.Run, integrator: Choice,
     status, cause = STATUS[run.status], ""
     if status not in ("completed", "interrupted"):
         cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, [assembly.system.n_q])))
-    return Statistics(status, integrator, run.steps, run.rejected, run.evaluations, seconds, run.time_reached, cause)
+    return Statistics(
+        status, integrator, run.steps, run.rejected, run.evaluations, seconds, run.time_reached, cause,
+        np.array(run.step_ends),
+    )  # fmt: skip
 
 
 def _joined(earlier: EarlierRun, later: Outcome) -> Outcome:

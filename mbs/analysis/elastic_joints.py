@@ -29,6 +29,7 @@ from .outcome import GearMotion, Outcome
 
 DEGREE = 5
 UNRESOLVED = 0.001  # of a motor's largest moment: what every second output may change of it
+SLOWEST = 1e4  # s, of a gear to give way, per second of the analysis: beyond, splines do not find its twist
 
 
 def with_compliance(model: Model) -> Model:
@@ -99,7 +100,8 @@ def add_transmission(outcome: Outcome) -> Outcome:
         m = list(outcome.assembly.model.motors).index(gear.joint)
         gamma, alpha = _angles(outcome, gear)
         tau, psi_ddot = outcome.tau[:, m], gear.ratio * gamma[:, 2] + alpha[:, 2]
-        spring = GearSpring(gear.stiffness, gear.damping, gear.inertia * gear.ratio**2)
+        where = f'{outcome.assembly.model.scene.path}: joint "{gear.joint}"'
+        spring = GearSpring(gear.stiffness, gear.damping, gear.inertia * gear.ratio**2, where)
         motions[gear.joint] = gear_motion(spring, outcome.time, tau, gear.inertia * gear.ratio * psi_ddot, gamma)
     return replace(outcome, gears=motions)
 
@@ -117,18 +119,26 @@ def _angles(outcome: Outcome, gear: ElasticGear) -> tuple[Array, Array]:
 
 
 class GearSpring(NamedTuple):
-    """k (N·m/rad), c (N·m·s/rad), and J N² (kg·m²) of the rotor in front of it."""
+    """k (N·m/rad), c (N·m·s/rad), and J N² (kg·m²) of the rotor in front of it; `where` messages say it is."""
 
     stiffness: float
     damping: float
     inertia: float
+    where: str
 
 
 def gear_motion(spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array) -> GearMotion:
     """Of a gear whose motor supplies `tau` (T,) where it is rigid, `rotor` (T,) of which its rotor takes, J N ψ̈.
 
     `gamma` (T, 3): the joint's coordinate, its rate and acceleration.
+    Raises `InputError` where damping holds it so long that its moments say nothing of its twist.
     """
+    lasts, longest = spring.damping / spring.stiffness, SLOWEST * (time[-1] - time[0])
+    if len(time) > 1 and lasts > longest:
+        raise InputError(
+            f"{spring.where}: damping: expected a gear that gives way within {longest:.3g} s (damping / stiffness,"
+            f" {SLOWEST:g} times the analysis), found {lasts:.3g} s; without stiffness it does not give at all"
+        )
     transmitted = tau - rotor
     twist = _twist(spring, time, transmitted)
     moment = tau + spring.inertia * twist[:, 2]

@@ -68,7 +68,10 @@ class Forces(_Rows):
 
 @dataclass(frozen=True)
 class Statistics:
-    """How a run went. `cause` is what was found wrong at `time_reached` (s, the last step's) where it ended early."""
+    """How a run went. `cause` is what was found wrong at `time_reached` (s, the last step's) where it ended early.
+
+    `step_ends` (N,), in s, with which the run can be repeated, if it was asked for them; see `fields.steps`.
+    """
 
     status: str = "completed"
     integrator: Choice = NOT_INTEGRATED
@@ -78,6 +81,7 @@ class Statistics:
     wall_seconds: float = 0.0
     time_reached: float | None = None
     cause: str = ""
+    step_ends: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
 
     def added_to(self, earlier: Statistics) -> Statistics:
         """With the work of the run that this one went on from."""

@@ -15,7 +15,7 @@ from ..model.spatial_drives import NO_DRIVES, Command, Drives
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
-from ..solve.integrators import integration_controls
+from ..solve.integrators import integration_controls, with_steps_of
 from ..solve.spatial_integrators import choose_integrator_in_space
 from ..solve.spatial_limits import left_ranges
 from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
@@ -62,12 +62,20 @@ def spatial_drive(
     `earlier` run of the same analysis.
     """
     times = analysis.times if times is None else times
-    system, began = SpatialSystem(model, drives), time.perf_counter()
-    integrator = choose_integrator_in_space(system, analysis, start, len(times), is_sampled=control is not None)
+    commands = control.commands if control is not None else ()
+    system, began = SpatialSystem(model, drives, commands), time.perf_counter()
+    is_sampled = control is not None
+    integrator = with_steps_of(
+        analysis,
+        float(times[-1]),
+        lambda: choose_integrator_in_space(system, analysis, start, len(times), is_sampled=is_sampled),
+    )
     if earlier is not None:  # with the same candidates, and what they have become since
         integrator = replace(integrator, name=earlier.integrator.name, reason=earlier.integrator.reason)
     controls = integration_controls(analysis, integrator)
-    system.scene.watch_posture([row.is_trajectory for row in model.rows], robot_size(model))
+    system.integrated.scene.watch_posture(
+        [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
+    )
     checkpoint = _core.TreeCheckpoint() if earlier is None else earlier.checkpoint
     with nullcontext() if earlier is None else earlier.checked(model, times):
         run = _integrated(system, times, start, controls, control, progress, checkpoint)
@@ -85,6 +93,7 @@ def spatial_drive(
         status="diverged" if in_posture else STATUS[run.status], integrator=integrator.changed_in(run), steps=run.steps,
         evaluations=run.evaluations, wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
         checkpoint=checkpoint if control is None else None, again=again if control is None else None,
+        step_ends=np.array(run.step_ends),
     )  # fmt: skip
     return found if earlier is None else found.added_to(earlier)
 
@@ -92,7 +101,7 @@ def spatial_drive(
 def _rows(system: SpatialSystem, run: _core.TreeRun, earlier: EarlierSpatialRun | None) -> list[Array]:
     """What a run has of each output, `ROWS`, after what an earlier one had."""
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [system.model.tree.n_q], axis=1))
-    found = [q, v, run.accelerations, run.multipliers * system.row_signs]
+    found = [q, v, run.accelerations, system.multipliers(run.multipliers)]
     if earlier is None:
         return found
     known = [getattr(earlier, name) for name in ROWS]
@@ -115,12 +124,11 @@ def _integrated(
     progress: Progress,
     checkpoint: _core.TreeCheckpoint,
 ) -> _core.TreeRun:
+    core, scene, _ = system.integrated
     if control is None:
-        return _core.tree_motion(
-            system.core, system.scene, as_list(times), start.q, start.v, controls, progress, checkpoint
-        )
+        return _core.tree_motion(core, scene, as_list(times), start.q, start.v, controls, progress, checkpoint)
     return _core.tree_sampled(
-        model=system.core, scene=system.scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
+        model=core, scene=scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
         carry_on=progress, held=system.held_forces(control.commands), first_command=control.first,
         samples=as_list(control.times), delay=control.delay, controller=control.controller,
     )  # fmt: skip

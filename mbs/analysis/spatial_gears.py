@@ -44,6 +44,7 @@ def gears_of_motion(
         sign, N = -1.0 if node.backwards else 1.0, turning.ratio
         of_joint = ((state.q, node.q), (state.v, node.v), (state.a, node.v))
         gamma = sign * np.column_stack([values[:, part.start] for values, part in of_joint])
-        spring = GearSpring(*of_gear, turning.inertia * N**2)
+        where = f'{model.scene.path}: joint "{node.joint.name}"'
+        spring = GearSpring(*of_gear, turning.inertia * N**2, where)
         found[node.joint.name] = gear_motion(spring, time, moments[node.joint.name][:, 0], N * turning.torque, gamma)
     return found

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
@@ -40,6 +42,7 @@ class SpatialRun:
         commanded: (T, k) moments of motors by joint, N·m or N, where a controller commands them.
         details: what only its kind finds.
         checkpoint: where its integration can be gone on with; None where that cannot be done.
+        step_ends: (N,) s, with which it can be repeated, if it was asked for them; see `fields.steps`.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
     """
 
@@ -66,6 +69,7 @@ class SpatialRun:
     details: Details = field(default=Details(), repr=False)
     checkpoint: _core.TreeCheckpoint | None = field(default=None, repr=False)
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
+    step_ends: Array = field(default_factory=lambda: np.zeros(0), repr=False)
 
     @property
     def time_reached(self) -> float:

@@ -92,7 +92,7 @@ def given_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], times:
             wrench = np.stack([values.get(name, none) for name in ("x", "y", "z", "mx", "my", "mz")], axis=1)
             found += np.einsum("tij,ti->tj", L, wrench)
         elif load.joint is not None:
-            found[:, model.driven(load.joint).v] += model.sign(load.joint) * values["moment"][:, None]
+            found += np.stack([*values.values()], axis=1) @ model.along(load.joint)
     return found
 
 

@@ -17,8 +17,10 @@ from ..fields.orientations import OrientationLaw
 from ..joints.spatial.joint import SpatialJoint
 from ..scene.spatial.mechanism import SpatialMechanismScene
 from ..scene.spatial.trajectories import SpatialTrajectory
+from ..scene.topology import Edge, spanning_forest
 from .spatial_body import SpatialBody
 from .spatial_drives import Drive
+from .spatial_payloads import welded_payloads
 from .spatial_tree import Motion, Node, Section, SpatialTree
 
 RowKind = Literal["point", "slide", "dot", "rotation", "coordinate"]
@@ -87,6 +89,11 @@ class SpatialModel:
         """Indices in v of the coordinates of a joint of the tree, in the scene's order; none of a spherical one."""
         return _in_order(self.tree.nodes[self.tree.carried[joint]])
 
+    def along(self, joint: str) -> Array:
+        """Directions in v (k, n_v) of moments on the second side of a joint along its k coordinates."""
+        directions: Array = self.sign(joint) * np.eye(self.tree.n_v)[_in_order(self.driven(joint))]
+        return directions
+
     def sign(self, joint: str) -> float:
         """−1 where the tree has a joint's coordinates the other way round."""
         return -1.0 if self.driven(joint).backwards else 1.0
@@ -112,7 +119,11 @@ def _in_order(node: Node) -> Array:
 def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBody]) -> SpatialModel:
     """Check that points exist, and lay out tree and rows. Raises `InputError` for what does not exist or fit."""
     _check_points(scene, {body.name: body for body in bodies})
-    tree = SpatialTree(bodies, scene.joint, scene.topology)
+    carried = list(welded_payloads(scene))
+    joints = (*scene.joint, *(weld for _, weld in carried))
+    names = [*(body.name for body in scene.body), *(body.name for body, _ in carried)]
+    topology = spanning_forest(names, [Edge(joint.between, joint.locates) for joint in joints])
+    tree = SpatialTree([*(body for body, _ in carried), *bodies], joints, topology)
     rows = [row for joint in tree.loops for row in _loop_rows(scene, tree, joint)]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
     return SpatialModel(scene, tree, tuple(rows))

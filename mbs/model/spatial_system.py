@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Booleans, Integers
 from ...common.errors import InputError
 from ...common.rotations import exponential
 from .. import _core
 from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
-from .spatial_body import SpatialBody
 from .spatial_drives import NO_DRIVES, Command, Drive, Drives, FrameDrive, PointDrive
 from .spatial_model import SpatialModel, SpatialRow
-from .spatial_transmission import resistance, resistance_slope, rotor
-from .spatial_tree import Node, Section
+from .spatial_parts import Placed, SpatialParts, carried_body, moves, rows_of, standing_marker
+from .spatial_plane import Plane, in_plane
+from .spatial_transmission import resistance, resistance_slope
+from .spatial_tree import Section
 
 ZERO = _core.TimeFunction.constant(0.0)
 MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
-
-
-def _moves(node: Node) -> bool:
-    """Whether modes move the section of the body at its joint."""
-    Phi, _, K = _rows_of(node.body, node.outer)
-    return bool(np.any(Phi)) or any(bool(np.any(of_row)) for of_row in K)
 
 
 class Derivatives(NamedTuple):
@@ -46,6 +42,14 @@ class Derivatives(NamedTuple):
     rate_q: Array
 
 
+class Integrated(NamedTuple):
+    """A mechanism of the core, what acts on it and what its rows follow: those of the model with these numbers."""
+
+    core: _core.PlanarModel | _core.SpatialModel
+    scene: _core.TreeScene
+    rows: Integers
+
+
 class SpatialSystem:
     """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
 
@@ -54,62 +58,94 @@ class SpatialSystem:
 
     Attributes:
         model: what it was made from.
-        core: `_core.SpatialModel`.
-        scene: what its rows follow, and what acts on it.
     """
 
-    def __init__(self, model: SpatialModel, drives: Drives = NO_DRIVES) -> None:
-        """`drives` act beside the loads of the scene."""
+    def __init__(self, model: SpatialModel, drives: Drives = NO_DRIVES, commands: Sequence[Command] = ()) -> None:
+        """`drives` act beside the loads of the scene, and `commands` will, held."""
         self.model, tree = model, model.tree
         self._markers: list[list[Section]] = [[] for _ in tree.nodes]
         self._ground: list[Section] = []
         self._turning: list[tuple[int, OrientationLaw]] = []
         sides = [(self._place(node.inner), self._place(node.outer)) for node in tree.nodes]
         rows = [self._row(row) for row in model.rows]
-        driven = {name for name in model.motors} | {load.joint for load in model.scene.load}
-        driven |= {trajectory.coordinate_of for trajectory in model.scene.trajectory}
-        driven |= {node.joint.name for node in tree.nodes if node.joint.frictions}
-        driven |= {gear.joint.joint.name for gear in tree.gears}
-        self._wrenches: list[tuple[int, int]] = []
+        self._wrenches: list[Placed] = []
         loads = [PointDrive(load.point, load.components) for load in model.scene.load if load.point is not None]
         self._at_points = [self._point_drive(drive) for drive in (*loads, *drives.at_points)]
         self._check()
-        bodies = []
-        for number, (node, (inner, outer)) in enumerate(zip(tree.nodes, sides, strict=True)):
-            body = _core.SpatialBody()
-            body.name, (body.parent, body.parent_marker), body.inboard_marker = node.body.name, inner, outer[1]
-            body.joint = getattr(_core.JointKind, node.joint.type)
-            body.lead = float(getattr(node.joint, "rise", 0.0))
-            # Else the core may take the frame's coordinates where modes turn the section: same motion, other numbers.
-            body.driven = node.joint.name in driven or _moves(node)
-            body.rotor_inertia, body.gear_ratio = _rotor(node)
-            body.data = _data(node.body, self._markers[number])
-            bodies.append(body)
-        ground = [_marker(section, np.zeros((6, 0)), section.position, []) for section in self._ground]
-        for number, _ in self._turning:
-            ground[number].turns = True
-        wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
-        self._parts = bodies, ground, rows
-        self.core = _core.SpatialModel(bodies, ground, rows, wrenches, np.array(model.scene.gravity))
-        moments = [self._load(load) for load in model.scene.load if load.joint is not None]
+        moments = [drive for load in model.scene.load if load.joint is not None for drive in self._drives(load)]
         self._along = [*moments, *model.modal_loads, *drives.along]
         self._on_frames = drives.on_frames
-        self.scene = self._follow()
+        driven = self._driven(commands)
+        bodies = [
+            carried_body(node, *of_node, self._markers[number], bool(driven[node.v].any()))
+            for number, (node, of_node) in enumerate(zip(tree.nodes, sides, strict=True))
+        ]
+        turning = [number for number, _ in self._turning]
+        ground = [standing_marker(section, number in turning) for number, section in enumerate(self._ground)]
+        wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
+        self._parts = SpatialParts(bodies, ground, rows, wrenches, np.array(model.scene.gravity))
+
+    @cached_property
+    def core(self) -> _core.SpatialModel:
+        """In space."""
+        return _core.SpatialModel(*self._parts)
+
+    @cached_property
+    def scene(self) -> _core.TreeScene:
+        """What the rows of `core` follow, and what acts on it."""
+        return self._follow(None)
+
+    @cached_property
+    def plane(self) -> Plane | None:
+        """In the plane in which all moves, with the same q and v; None where there is none."""
+        return in_plane(self._parts, ~self.model.loop_rows)
+
+    @cached_property
+    def integrated(self) -> Integrated:
+        """What integrators take: in the plane where all moves in one."""
+        if self.plane is None:
+            return Integrated(self.core, self.scene, np.arange(len(self.model.rows)))
+        return Integrated(self.plane.model, self._follow(self.plane), self.plane.followed)
+
+    def multipliers(self, of_core: Array) -> Array:
+        """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""
+        found = of_core if self.plane is None else of_core @ self.plane.spread.T
+        return found * self.row_signs
 
     def held_model(self) -> _core.HeldModel:
         """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
-        return _core.HeldModel(*self._parts, np.array(self.model.scene.gravity), self.scene)
+        bodies, ground, rows, _, gravity = self._parts
+        return _core.HeldModel(bodies, ground, rows, gravity, self.scene)
+
+    def _driven(self, commands: Sequence[Command]) -> Booleans:
+        """(n_v,) along which coordinates given forces act, of which inverse analyses have none."""
+        tree = self.model.tree
+        found: Booleans = np.zeros(tree.n_v, dtype=bool)
+        for direction in (*(drive.direction for drive in self._along), *(command.direction for command in commands)):
+            found |= direction != 0
+        resisting = [node for node in tree.nodes if node.joint.frictions]
+        for node in (*resisting, *(side for gear in tree.gears for side in (gear.motor, gear.joint))):
+            found[node.v] = True
+        for body in (*(drive.body for drive in self._on_frames), *(c.frame[0] for c in commands if c.frame)):
+            found[tree.nodes[body].v] = True
+        return found
 
     def _check(self) -> None:
         """Raise `InputError` for what the core does not take."""
         path, rows = self.model.scene.path, self.model.rows
+        loaded = {load.joint for load in self.model.scene.load}
         for node in self.model.tree.nodes:
             if node.joint.type == "planar" and node.joint.frictions and node.backwards:
                 raise InputError(
                     f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a planar"
                     " joint has friction, found it second"
                 )
-            if node.joint.type == "free" and _moves(node):
+            if node.joint.type == "planar" and node.backwards and node.joint.name in loaded:
+                raise InputError(
+                    f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a load"
+                    " acts along a planar joint, found it second"
+                )
+            if node.joint.type == "free" and moves(node):
                 raise InputError(
                     f"{path}: {node.joint.label}: expected a point that modes do not move, found"
                     f' "{node.outer.point}" of "{node.body.name}": leave the joint out (a body without one is free from'
@@ -163,16 +199,18 @@ class SpatialSystem:
         by_v = found.a_v - found.a_f * slope
         return Derivatives(found.a_q, by_v, found.a_f, signs * found.value_q, signs * found.rate_q)
 
-    def _follow(self) -> _core.TreeScene:
-        """Targets of the rows, and given forces along joints."""
+    def _follow(self, plane: Plane | None) -> _core.TreeScene:
+        """Targets of the rows, and given forces along joints and at points; in the plane where it is given."""
         scene = _core.TreeScene()
-        for row in self.model.rows:
+        for row in self.model.rows if plane is None else (self.model.rows[k] for k in plane.followed):
             scene.add_target(ZERO if row.target is None else row.target, row.sign)
         for direction, magnitude in self._along:
             scene.add_load(direction, magnitude)
         for wrench, components in self._at_points:
             for name, magnitude in components.items():
-                scene.add_point_load(wrench, OF_POINT.index(name), magnitude)
+                component = OF_POINT.index(name)
+                for along, share in [(component, 1.0)] if plane is None else plane.shares(component):
+                    scene.add_point_load(wrench, along, magnitude, share)
         for drive in self._on_frames:
             self._turn_frames(scene, drive)
         for node in self.model.tree.nodes:
@@ -203,7 +241,7 @@ class SpatialSystem:
         for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
             if section.body >= 0 and (of := self.model.tree.nodes[section.body]).body.n_modes:
                 axis = sign * side * section.triad[:, 2]
-                yield of.p_q.start, of.p_v.start, _rows_of(of.body, section)[0][3:], axis
+                yield of.p_q.start, of.p_v.start, rows_of(of.body, section)[0][3:], axis
 
     def held_forces(self, commands: Sequence[Command]) -> _core.HeldForces:
         """Forces of commands that are held, in their order."""
@@ -213,12 +251,11 @@ class SpatialSystem:
                 found.add_frame_motor(number, *share)
         return found
 
-    def _load(self, load: SpatialLoad) -> Drive:
-        """Direction (n_v,) and size of the moment of a joint."""
+    def _drives(self, load: SpatialLoad) -> Iterator[Drive]:
+        """Directions (n_v,) and sizes of the moments of a joint."""
         assert load.joint is not None
-        direction = np.zeros(self.model.tree.n_v)
-        direction[self.model.driven(load.joint).v] = self.model.sign(load.joint)
-        return Drive(direction, load.components["moment"])
+        for direction, moment in zip(self.model.along(load.joint), load.moments, strict=True):
+            yield Drive(direction, moment)
 
     def _point_drive(self, drive: PointDrive) -> tuple[int, Mapping[str, TimeFunction]]:
         """Number of the wrench, and its components over time."""
@@ -234,7 +271,7 @@ class SpatialSystem:
         self._turning.append((len(self._ground) - 1, law))
         return len(self._ground) - 1
 
-    def _place(self, section: Section) -> tuple[int, int]:
+    def _place(self, section: Section) -> Placed:
         """Body (−1: the ground) and number of the marker of a section there; made where it is new."""
         known = self._ground if section.body < 0 else self._markers[section.body]
         for number, other in enumerate(known):
@@ -259,52 +296,6 @@ class SpatialSystem:
         return found
 
 
-def _rotor(node: Node) -> tuple[float, float]:
-    """Inertia of the rotor in a joint and its ratio on the inner section.
-
-    It sits on the first side and spins with N Ω_second − (N − 1) Ω_first; where that side is the outer one, with
-    N' Ω_outer − (N' − 1) Ω_inner and N' = 1 − N.
-    """
-    inertia, ratio = rotor(node)
-    return inertia, 1.0 - ratio if node.backwards else ratio
-
-
 def _turning_law(law: OrientationLaw) -> _core.TurningLaw:
     kind = getattr(_core.OrientationKind, law.kind)
     return _core.TurningLaw(kind, list(law.functions), exponential(np.array(law.reference)))
-
-
-def _data(body: SpatialBody, markers: list[Section]) -> _core.SpatialData:
-    """The constants of a body; those of modes are left empty of a rigid one."""
-    data = _core.SpatialData()
-    data.mass, data.first_moment, data.J2 = body.mass, np.array(body.first_moment), np.array(body.second_moment)
-    if body.n_modes:
-        diagonal = np.array_equal(body.damping, np.diag(np.diag(body.damping)))
-        data.stiffness = np.array(body.stiffness)
-        data.damping = np.array(np.diag(body.damping)[:, None] if diagonal else body.damping)
-        data.S_bar, data.I_bar = np.array(body.S_bar), np.array(body.I_bar.reshape(9, -1))
-        booked = body.S_bar_kl.copy()
-        booked[2, 2] += body.S_spin
-        data.S_bar_kl = [np.array(booked[k, l]) for k in range(3) for l in range(3)]  # noqa: E741
-        data.h_spin, data.S_spin = np.array(body.h_spin), np.array(body.S_spin)
-    if body.stiffening is not None:
-        data.K_s = list(body.stiffening.K_s)
-        data.K_x = list(body.stiffening.K_x.reshape(9, body.n_modes, body.n_modes))
-    data.J_spin = body.J_spin
-    data.markers = [_marker(section, *_rows_of(body, section)) for section in markers]
-    return data
-
-
-def _rows_of(body: SpatialBody, section: Section) -> tuple[Array, Array, list[Array]]:
-    """Φ over Φ_r (6, n) and the position (3,) of a section; six K (n, n) where it moves to second order."""
-    if not section.point:
-        return np.zeros((6, body.n_modes)), np.zeros(3), []
-    at = body.points[section.point]
-    K = [] if body.stiffening is None else list(body.stiffening.K_points.get(section.point, []))
-    return np.vstack([at.translation, at.rotation]), at.position, K
-
-
-def _marker(section: Section, Phi: Array, position: Array, K: list[Array]) -> _core.SpatialMarker:
-    marker = _core.SpatialMarker()
-    marker.position, marker.triad, marker.Phi, marker.K = np.array(position), np.array(section.triad), Phi, K
-    return marker

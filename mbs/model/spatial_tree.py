@@ -14,7 +14,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans
 from ...common.rotations import exponential, left_jacobian, of_quaternion, quaternions, skew
-from ..fields.field_types import GROUND, split_point
+from ..fields.field_types import GROUND
 from ..joints.spatial.free import SpatialFree
 from ..joints.spatial.joint import SpatialJoint
 from ..scene.topology import Topology
@@ -116,10 +116,10 @@ class SpatialTree:
         self.carried = {node.joint.name: number for number, node in enumerate(nodes)}
 
     def section(self, side: str, triad: Array, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
-        """The triad on "BODY.POINT" or on "ground" `at` (m)."""
+        """The triad on "BODY.POINT", on the frame of "BODY" or on "ground" `at` (m)."""
         if side == GROUND:
             return Section(-1, "", triad, np.array(at, dtype=float))
-        body, point = split_point(side)
+        body, _, point = side.partition(".")
         return Section(self.index[body], point, triad, np.zeros(3))
 
     @property

@@ -17,6 +17,7 @@ from ..fields.field_types import split_point
 from ..model.spatial_inverse import BodyForces, body_forces, required_forces
 from ..model.spatial_model import SpatialRow
 from ..model.spatial_motors import split_forces
+from ..model.spatial_payloads import turns_as_a_body
 from ..model.spatial_transmission import rotors
 from ..model.spatial_tree import Section
 from ..model.spatial_wrench import Wrench, row_wrenches
@@ -33,10 +34,21 @@ def link_loads_in_space(motion: SpatialMotion, bodies: Iterable[str]) -> dict[st
     """Of each of `bodies`. Nothing where motors turn frames: what they do to a link acts at no interface."""
     if motion.model.scene.motors == "frame":
         return {}
+    return _link_loads(motion, bodies, _forces_of_rows(motion))
+
+
+def loads_in_equations(motion: SpatialMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
+    """Of each of `bodies`, as its equations of motion have them: forces along trajectories where these act."""
+    return _link_loads(motion, bodies, zip(motion.model.rows, -motion.multipliers.T, strict=True))
+
+
+def _link_loads(
+    motion: SpatialMotion, bodies: Iterable[str], of_rows: Iterable[tuple[SpatialRow, Array]]
+) -> dict[str, LinkLoads]:
     tree, state = motion.model.tree, motion.accelerated
     of_frames, gravity = state.of_frames(), np.array(motion.model.scene.gravity)
     needed = [body_forces(n, state, of, gravity) for n, of in zip(tree.nodes, of_frames, strict=True)]
-    acting, found = _wrenches(motion, needed), {}
+    acting, found = _wrenches(motion, needed, of_rows), {}
     for name in bodies:
         number = tree.index[name]
         node, frame = tree.nodes[number], motion.frames[number]
@@ -47,7 +59,7 @@ def link_loads_in_space(motion: SpatialMotion, bodies: Iterable[str]) -> dict[st
             left -= wrench @ np.vstack([at.translation, at.rotation])
         for payload in motion.model.scene.payload:
             body, point = split_point(payload.point)
-            if body == name:
+            if body == name and not turns_as_a_body(payload):  # others are bodies of their own
                 at_points[point] = at_points.get(point, 0.0) + _of_mass(motion, payload)
         a, alpha = (
             np.einsum("tji,tj->ti", frame.F, x) for x in (of_frames[number].r - gravity, of_frames[number].Omega)
@@ -87,8 +99,10 @@ def _of_mass(motion: SpatialMotion, payload: SpatialPayload) -> Array:
     return np.hstack([np.einsum("tji,tj->ti", F, x) for x in (force, moment + np.cross(arm, force))])
 
 
-def _wrenches(motion: SpatialMotion, needed: list[BodyForces]) -> list[AtPoints]:
-    """On points of each body, in the order of the tree."""
+def _wrenches(
+    motion: SpatialMotion, needed: list[BodyForces], of_rows: Iterable[tuple[SpatialRow, Array]]
+) -> list[AtPoints]:
+    """On points of each body, in the order of the tree; `of_rows` has the forces (T,) of rows that act."""
     tree = motion.model.tree
     acting: list[AtPoints] = [{} for _ in tree.nodes]
 
@@ -97,7 +111,7 @@ def _wrenches(motion: SpatialMotion, needed: list[BodyForces]) -> list[AtPoints]
             at = acting[section.body]
             at[section.point] = at[section.point].plus(wrench) if section.point in at else wrench
 
-    for row, size in _forces_of_rows(motion):
+    for row, size in of_rows:
         on_a, on_b = row_wrenches(tree, row, size, motion.q, motion.time, motion.frames)
         put(row.a, on_a)
         put(row.b, on_b)

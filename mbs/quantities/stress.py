@@ -142,13 +142,21 @@ def mode_acceleration(
     if not known:
         return mode_displacement(p)
     names = tuple(name for name in known if np.any(loads[name]))
-    work = work_on_modes(body.S_bar, body.I_bar, body.interfaces)
+    work = work_on_modes(body.S_bar, body.I_bar, body.interfaces, _spin_in_static_stresses(body))
     sizes = np.array([loads[name] for name in names]).reshape(-1, len(p)).T
     forces = sizes @ np.array([work[name] for name in names]).reshape(-1, body.mode_count)
     if sections is not None:
         forces = forces + sections.modal_force
     static = forces @ T @ np.linalg.solve(T.T @ body.stiffness @ T, T.T)
     return Recovery("mode acceleration", p - static, names, sizes, sections)
+
+
+def _spin_in_static_stresses(body: ModalBody) -> Array | None:
+    """h_spin (n,) where static stresses count the inertia of a line of mass about it; files of 0.1 do not."""
+    static = [point.static for point in body.stress.values() if point.static is not None]
+    column = body.stress_loads.index("r_x") if "r_x" in body.stress_loads else None
+    counted = column is not None and any(np.any(stress[:, column]) for stress in static)
+    return body.h_spin if counted else None
 
 
 def has_stresses(body: ModalBody) -> bool:

@@ -9,7 +9,7 @@ than a link on simple supports.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
 
@@ -20,6 +20,8 @@ from ...fe_models.modal_body import ModalBody
 from ..analysis.outcome import Outcome
 from .observation import modes_of_file
 from .stiffening import NOTABLE
+
+IN_PLANE, IN_SPACE = (1,), (1, 2)  # axes across a link along which it bends
 
 DEFLECTION_LIMIT = {False: 0.02, True: 0.05}  # of the length, from the chord; without and with geometric stiffening
 SHORTENING_LIMIT = {False: 1e-3, True: 1e-2}  # of the length: a half wave at 2 %; where the second order ends
@@ -125,14 +127,6 @@ def enough_pieces(shortening: float, count: int) -> int:
     return max(2, ceil(count * sqrt(shortening / ENOUGH)))
 
 
-def shortening_in_space(link: ModalBody, p: Array) -> Array:
-    """½∫(v'² + w'²) dx (T,) in the frame of a link in space, of its length; p (T, n) of the modes of its file."""
-    stations, x = link.stations, link.stations.position[:, 0]
-    squares = (p @ stations.rotation[:, 1].T) ** 2 + (p @ stations.rotation[:, 2].T) ** 2
-    found: Array = 0.25 * (squares[:, 1:] + squares[:, :-1]) @ np.diff(x) / link.length
-    return found
-
-
 def bending(
     outcome: Outcome, links: Mapping[str, ModalBody], stiffness_changes: Mapping[str, float], is_stiffened: bool
 ) -> dict[str, Bending]:
@@ -141,25 +135,41 @@ def bending(
     found = {}
     for name, link in links.items():
         p = modes_of_file(outcome, outcome.assembly.model.body(name))
-        deflection, rotation, shortening = _shape(link, p)
         forces = [np.linalg.norm(w[:, :2], axis=1) for w in wrenches.get(name, {}).values()]
         force = np.max(forces, axis=0) if forces else np.zeros(len(p))
-        change = stiffness_changes.get(name, 0.0)
-        peaks = (deflection / link.length, rotation, shortening, force * shortening)
-        w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
-        found[name] = Bending(w, phi, s, moment, change, link.length, is_stiffened)
+        found[name] = bending_of_link(link, p, force, stiffness_changes.get(name, 0.0), is_stiffened, IN_PLANE)
     return found
 
 
-def _shape(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
-    """Largest deflection (m) and section rotation (rad) from the chord, and foreshortening (m), each (T,)."""
+def bending_of_link(
+    link: ModalBody, p: Array, force: Array, change: float, is_stiffened: bool, axes: Sequence[int]
+) -> Bending:
+    """Of one link of modal coordinates p (T, n) of its file, across along `axes`; see `Bending`.
+
+    `force` (T,) N: the largest at an interface.
+    """
+    deflection, rotation, shortening = shape_from_chord(link, p, axes)
+    peaks = (deflection / link.length, rotation, shortening, force * shortening)
+    w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
+    return Bending(w, phi, s, moment, change, link.length, is_stiffened)
+
+
+def shape_from_chord(link: ModalBody, p: Array, axes: Sequence[int]) -> tuple[Array, Array, Array]:
+    """Largest deflection (m) and section rotation (rad) from the chord, and foreshortening (m), each (T,).
+
+    Across along `axes`, 1 for y and 2 for z: v' = φ_z, w' = −φ_y.
+    """
     stations, x = link.stations, link.stations.position[:, 0]
-    y, slope = p @ stations.translation[:, 1].T, p @ stations.rotation[:, 2].T
-    chord = (y[:, -1:] - y[:, :1]) / (x[-1] - x[0])
-    deflection = y - y[:, :1] - chord * (x - x[0])
-    squares = slope**2
+    off, turned, squares = (np.zeros((len(p), len(x))) for _ in range(3))
+    for axis in axes:
+        w, slope = p @ stations.translation[:, axis].T, p @ stations.rotation[:, 3 - axis].T
+        slope = slope if axis == 1 else -slope
+        chord = (w[:, -1:] - w[:, :1]) / (x[-1] - x[0])
+        off += (w - w[:, :1] - chord * (x - x[0])) ** 2
+        turned += (slope - chord) ** 2
+        squares += slope**2
     shortening = 0.5 * (0.5 * (squares[:, 1:] + squares[:, :-1])) @ np.diff(x)
-    return np.abs(deflection).max(axis=1), np.abs(slope - chord).max(axis=1), shortening
+    return np.sqrt(off.max(axis=1)), np.sqrt(turned.max(axis=1)), shortening
 
 
 def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:

@@ -15,7 +15,7 @@ from ...common.arrays import Array, as_floats
 from ...common.numbers import MOST_OUTPUTS, MOST_STEPS
 from ...common.validation import Record, did_you_mean, either, quoted
 from .._core import TimeFunction
-from ..fields.field_types import Name, Positive
+from ..fields.field_types import KeptSteps, Name, Positive
 from ..fields.references import Reference
 
 TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
@@ -161,6 +161,10 @@ class IntegratedAnalysis(TimedAnalysis):
     """Of generalized-alpha at infinite frequency: what a step leaves of vibrations far above one over its size."""
     max_steps: Annotated[int, Field(gt=0, le=MOST_STEPS)] = 5_000_000
     """The run ends after so many steps."""
+    keep_steps: bool = False
+    """Write where steps end to the results, if one explicit integrator makes them all; "auto" then does not change."""
+    repeat_steps: KeptSteps | None = None
+    """Results file of this analysis, with `keep_steps`: its steps are taken again, whatever they err."""
 
     is_integrated = True
 
@@ -170,6 +174,21 @@ class IntegratedAnalysis(TimedAnalysis):
             raise ValueError(
                 'expected the key "spectral_radius" only with integrator = "generalized-alpha", found integrator ='
                 f' "{self.integrator}"'
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _steps_fit(self) -> Self:
+        if (steps := self.repeat_steps) is None:
+            return self
+        if self.integrator not in ("auto", steps.method):
+            raise ValueError(
+                f'repeat_steps: expected integrator = "{steps.method}", which made the steps in {steps.path}, found'
+                f' "{self.integrator}"'
+            )
+        if self.is_checked:
+            raise ValueError(
+                'repeat_steps: expected no "check" beside it, found one: finer links want steps of their own'
             )
         return self
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
+from ...common.errors import InputError
 from .. import _core
 from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
@@ -36,6 +38,8 @@ NEGLIGIBLE_DOP853, NEGLIGIBLE_RADAU = 0.1, 1.0
 MOST_COORDINATES = 600  # beyond them the eigenproblem takes longer than many a run
 MANY_PERIODS = 1e5
 ASKED_FOR = "asked for"
+REPEATED = "steps taken again"
+EXPLICIT = ("dopri5", "dop853")
 
 
 AFTER = " after "  # in names of integrators that were changed during a run
@@ -150,10 +154,30 @@ def integration_controls(analysis: IntegratedAnalysis, choice: Choice) -> _core.
     """What the core integrates an analysis with."""
     candidates = choice.candidates or (Candidate(choice.name),)
     methods = [(METHODS[one.name], one.cost, one.pace) for one in candidates]
-    return _core.IntegrationControls(
+    controls = _core.IntegrationControls(
         tolerance=analysis.tolerance, max_steps=analysis.max_steps, methods=methods,
         spectral_radius=analysis.spectral_radius,
     )  # fmt: skip
+    controls.keep_steps = analysis.keep_steps
+    if analysis.repeat_steps is not None:
+        controls.repeated_steps = as_list(analysis.repeat_steps.ends)
+    return controls
+
+
+def with_steps_of(analysis: IntegratedAnalysis, end: float, choose: Callable[[], Choice]) -> Choice:
+    """What `choose` chooses for a run up to `end` (s), unless it repeats steps. Where they are kept, none takes over.
+
+    Raises `InputError` where the steps to repeat end elsewhere.
+    """
+    if (steps := analysis.repeat_steps) is not None:
+        if steps.ends[-1] != end:
+            raise InputError(
+                f'{steps.path}: analysis "{analysis.name}": repeat_steps: expected steps up to {end:.9g} s, where'
+                f" the run ends, found them up to {steps.ends[-1]:.9g} s"
+            )
+        return Choice(steps.method, REPEATED)
+    choice = choose()
+    return replace(choice, candidates=()) if analysis.keep_steps and choice.name in EXPLICIT else choice
 
 
 def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:

@@ -87,5 +87,6 @@ def _excitation(system: SpatialSystem, start: State, found: SpatialVibrations) -
 def _acceleration(system: SpatialSystem, t: float, state: State) -> Array:
     """(n_v,) at time t."""
     states = np.concatenate([state.q, state.v])[None]
-    found: Array = _core.tree_outputs(system.core, system.scene, [t], states).accelerations[0]
+    core, scene, _ = system.integrated
+    found: Array = _core.tree_outputs(core, scene, [t], states).accelerations[0]
     return found

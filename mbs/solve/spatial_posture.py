@@ -83,7 +83,8 @@ def solve_postures(model: SpatialModel, times: Array, q: Array) -> tuple[Array, 
     row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
     going = np.arange(len(q))
     for _ in range(MOST_ITERATIONS):
-        C, C_v = row_values(model, q[going], times[going])
+        with np.errstate(over="ignore", invalid="ignore"):  # from anywhere: what is not finite ends there
+            C, C_v = row_values(model, q[going], times[going])
         left[going] = np.abs(C / row_scales).max(axis=1)
         on = (left[going] > TOLERANCE) & np.isfinite(left[going])
         going = going[on]

@@ -2,6 +2,7 @@
 
 from types import MappingProxyType
 
+import mpmath
 import numpy as np
 from mechanisms import make_model, revolute
 from numpy.polynomial import Legendre, Polynomial
@@ -72,6 +73,37 @@ def ritz_link(name, condition, length=1.0, mass=1.0, EI=30.0, modes=3, damping_r
         length=length,
         stiffening=axial if stiffening else None,
     )
+
+
+def eigenmode_link(name, condition, modes, length=1.0, mass=1.0, EI=30.0):
+    """The same beam in its exact modes, any number of them.
+
+    Integrals and slopes of the shapes: Blevins, Formulas for Natural Frequency and Mode Shape, table 8-1.
+    """
+    k = np.arange(1, modes + 1)
+    sign, one = (-1.0) ** (k + 1), np.ones(modes)
+    if condition == "simply-supported":
+        beta = k * np.pi
+        ends, slopes = (0 * one, 0 * one), (np.sqrt(2) * beta, -np.sqrt(2) * beta * sign)
+        mean, moment = np.sqrt(2) * (1 + sign) / beta, np.sqrt(2) * sign / beta
+    else:
+        beta = np.array(
+            [float(mpmath.findroot(lambda x: mpmath.cos(x) + mpmath.sech(x), (n - 0.5) * np.pi)) for n in k]
+        )
+        sigma = np.array([float((mpmath.cosh(x) + mpmath.cos(x)) / (mpmath.sinh(x) + mpmath.sin(x))) for x in beta])
+        ends, slopes = (0 * one, 2 * sign), (0 * one, 2 * sign * sigma * beta)
+        mean, moment = 2 * sigma / beta, 2 / beta**2
+    zero, root = np.zeros((modes, modes)), np.sqrt(mass)
+    points = {
+        label: PlanarPoint(np.array([at * length, 0.0]), np.array([0 * one, end / root]), slope / (length * root))
+        for label, at, end, slope in zip(("root", "tip"), (0.0, 1.0), ends, slopes, strict=True)
+    }
+    return PlanarBody(
+        name=name, mass=mass, inertia=mass * length**2 / 3, first_moment=np.array([mass * length / 2, 0.0]),
+        stiffness=EI / (mass * length**3) * beta**4, damping=zero, S_bar=root * np.array([0 * one, mean]),
+        h=root * length * moment, j=0 * one, S_tilde=zero, m_xy=np.eye(modes), points=MappingProxyType(points),
+        modal_transform=np.eye(modes), length=length, stiffening=None,
+    )  # fmt: skip
 
 
 ANGLES = {"link1": 0.4, "link2": 1.3}

@@ -3,6 +3,9 @@
 import numpy as np
 from points_in_space import Body, J, r
 
+JOINTS = [J.revolute, J.prismatic, J.screw, J.cylindrical, J.universal, J.spherical, J.planar, J.weld, J.free]
+GRAVITY = np.array([0.3, 1.0, -9.81])
+
 
 def rotation(rng):
     Q = np.linalg.qr(rng.standard_normal((3, 3)))[0]
@@ -72,3 +75,17 @@ def three_links(rng, modes=3, **keys):
         random_body(rng, modes, J.spherical, parent=0, parent_marker=1, **keys),
         random_body(rng, modes, J.universal, parent=1, parent_marker=1, **keys),
     ]
+
+
+def check_balance(mechanism, rng, bound=1e-11, force=False, deflection=0.1):
+    """Accelerations of the recursion against d'Alembert's principle, over all points."""
+    model = mechanism.model()
+    q, v = random_state(rng, mechanism, model, deflection=deflection)
+    target = rng.standard_normal(len(mechanism.rows))
+    applied = rng.standard_normal(model.n_v) if force else None
+    wrench = rng.standard_normal(6 * len(mechanism.wrenches))
+    a, lambda_ = model.evaluate(q, v, target, applied, wrench)
+    residual, accelerations = mechanism.residual(model, q, v, a, lambda_, applied, wrench)
+    assert np.abs(residual).max() < bound
+    if len(target):
+        assert np.abs(accelerations - target).max() < bound * (1 + np.abs(a).max())

@@ -192,6 +192,13 @@ def test_coarse_outputs_are_told_of():
     assert "refine output_step" in line
 
 
+def test_dampers_that_hold_a_gear_for_good_are_refused():
+    """Moments say nothing of a twist that takes 15 000 analyses to come; splines would have no solution to rounding."""
+    model = rigid_arm(GEARED | {"damping": 4.5e7}, RIGID)
+    with pytest.raises(InputError, match=r'joint "O": damping: expected .* within 1e\+04 s .*, found 1.5e\+04'):
+        add_transmission(run_pcid(model, pcid(tolerance=1e-6), True, always))
+
+
 def test_equilibrium_winds_the_gears():
     """About it, forces are needed along the motors alone: springs carry the links."""
     analysis = Linear(name="linear", kind="linear")

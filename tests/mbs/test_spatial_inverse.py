@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from spatial_scenes import as_scene, coordinates, tree_model
+from moving_trees import NOW, SMALL, moving
+from spatial_scenes import as_scene, tree_model
 from spatial_trees import TYPES, random_tree
 
 from ffrobot.mbs import _core
@@ -10,35 +11,13 @@ from ffrobot.mbs.model.spatial_accelerations import Accelerated, row_acceleratio
 from ffrobot.mbs.model.spatial_drives import Drive, Drives
 from ffrobot.mbs.model.spatial_gears import with_compliance_in_space
 from ffrobot.mbs.model.spatial_inverse import required_forces
-from ffrobot.mbs.model.spatial_model import row_values
 from ffrobot.mbs.model.spatial_motors import path_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.model.spatial_transmission import gear_forces
 from ffrobot.mbs.quantities.spatial_energy import energies, momentum
-from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
 from ffrobot.mbs.solve.integrators import METHODS
 
-SMALL = 0.01  # modal coordinates: sections turn by about 0.1 rad
-NOW = np.zeros(1)
 ONE = _core.TimeFunction.constant(1.0)
-
-
-def moving(rng, types, kinds, loops=0):
-    """A random tree at random velocities, and what the recursion makes of it: motion of one instant, and its core."""
-    tree = random_tree(rng, types, kinds, chain=True, size=SMALL, loops=loops)
-    plain, tables = as_scene(tree, False)
-    model, mechanism = tree_model(plain, tables), plain.mechanism()
-    system = SpatialSystem(model)
-    q = model.tree.at_rest(coordinates(model, plain, False))
-    for node in model.tree.nodes:
-        q[node.p_q] = mechanism.coordinates.parts(tree.q, node.body.name)[2]
-    v = rng.standard_normal(model.tree.n_v)
-    C_v = row_values(model, q[None], NOW)[1][0]
-    v -= np.linalg.pinv(C_v, rcond=1e-10) @ (C_v @ v)
-    if len(model.rows):
-        system.core.keep_independent_rows(q, v)
-    a, multipliers = system.core.evaluate(q, v, np.zeros(len(model.rows)), None, None)
-    return SpatialMotion(model, NOW, q[None], v[None], a[None], multipliers[None]), system
 
 
 @pytest.mark.parametrize("joint", TYPES)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from moving_trees import moving
 from rotations import logarithm
 from spatial_trees import TYPES
-from test_spatial_inverse import moving
 
 from ffrobot.common.rotations import of_quaternion
 from ffrobot.mbs import _core

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from spatial_scenes import tree_model
+from spatial_scenes import as_scene, coordinates, tree_model
 from spatial_trees import TYPES, placed, random_tree
-from test_spatial_tree import as_scene, coordinates
 
 from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
 from ffrobot.mbs.quantities.spatial_reactions import reactions

@@ -1,5 +1,7 @@
 """Where robots in space start: postures of the checkpoints, undeformed and in equilibrium, mobility, messages."""
 
+import warnings
+
 import numpy as np
 import pytest
 from rotations import quaternion
@@ -65,3 +67,13 @@ def test_loops_are_cut_at_the_spherical_joint():
     model = model_of("slider_crank_3d")
     assert [joint.name for joint in model.tree.loops] == ["rod_tip"]
     assert [row.kind for row in model.rows] == ["point"] * 4
+
+
+def test_a_search_that_leaves_all_bounds_ends_in_silence():
+    """From angles of 3e10 rad series of rotations overflow; the search says whether it converged, NumPy nothing."""
+    model = model_of("stanford")
+    q = undeformed_posture(model).q
+    q[model.tree.nodes[model.tree.carried["q2"]].q] = 3e10
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert solve_posture(model, 0.0, q) is None

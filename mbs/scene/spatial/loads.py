@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from ....common.validation import Record
 from ..._core import TimeFunction
-from ...fields.field_types import Expression, PointReference, one_of, only, present
+from ...fields.field_types import Expression, Expressions, PointReference, one_of, only, present
 from ...fields.references import Reference, marker_reference
 
 OF_POINT = ("x", "y", "z", "mx", "my", "mz")
@@ -35,8 +35,9 @@ class SpatialLoad(Record):
     """Moment about the ground's y axis on the section, N·m; expression in t."""
     mz: Expression | None = None
     """Moment about the ground's z axis on the section, N·m; expression in t."""
-    moment: Expression | None = None
-    """On the second side of the joint along its coordinate, N·m (N where it slides); expression in t."""
+    moment: Expressions | None = None
+    """On the second side of the joint along its coordinate, N·m (N where it slides); expression in t. A list of them
+    for a joint with several coordinates."""
     voltage: tuple[Expression, ...] | None = None
     """One expression in t for each patch of the layout, V."""
 
@@ -57,7 +58,15 @@ class SpatialLoad(Record):
 
     @property
     def components(self) -> dict[str, TimeFunction]:
-        """The given functions of time by component; of voltages "voltage[k]"."""
+        """The given functions of time by component; of joints "moment[k]", of voltages "voltage[k]"."""
         of_point = present(x=self.x, y=self.y, z=self.z, mx=self.mx, my=self.my, mz=self.mz)
         voltages = {f"voltage[{k}]": function for k, function in enumerate(self.voltage or ())}
-        return of_point | present(moment=self.moment) | voltages
+        moments = {f"moment[{k}]": function for k, function in enumerate(self.moments)}
+        return of_point | moments | voltages
+
+    @property
+    def moments(self) -> tuple[TimeFunction, ...]:
+        """Along each coordinate of the joint."""
+        if self.moment is None:
+            return ()
+        return self.moment if isinstance(self.moment, tuple) else (self.moment,)

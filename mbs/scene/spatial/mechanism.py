@@ -30,8 +30,9 @@ class SpatialMechanismKeys(Record):
     """Acceleration of gravity, m/s², global axes."""
     motors: Literal["section", "frame"] = "section"
     """What motors turn: the sections at the joint, or the frames of the bodies."""
-    geometric_stiffening: bool = False
-    """Loads change the stiffness of links."""
+    geometric_stiffening: bool | Literal["auto"] | None = None
+    """Loads change the stiffness of links; "auto": where they change that of a mode by more than 1 %. Left out: of
+    links in pieces alone, but those with loads between the ends of a piece."""
     redundancy: Literal["least-torque", "least-motion"] | None = None
     """What settles the freedom that trajectories leave to joints, found with undeformed links: from the state at t = 0
     on the least integral of the squares of motor moments over the whole motion, or at every time the least sum of
