@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.plane import rotated
-from ..common.validation import Record
-from ..fe_models.modal_body import ModalBody
+from ..common.validation import Record, did_you_mean, quoted
+from ..fe_models.modal_body import Interface, ModalBody
 from ..mbs import _core
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import PointActuator
 from ..mbs.fields.field_types import Name
 from ..mbs.fields.references import Reference
 from ..mbs.model.planar_body import PlanarBody, PlanarPoint
+from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
 
 DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same
 AXES = {"axial": (1.0, 0.0), "transverse": (0.0, 1.0)}
 
+
+P = TypeVar("P", PlanarPoint, SpatialPoint)
 
 Place = float | Name
 """Where on a link: the distance from its root (m), or the name of one of its points."""
@@ -187,10 +191,7 @@ def _automatic(key: str, name: str, body: ModalBody | None, planar: PlanarBody) 
     """Out of both components at every station, those that QR with column pivoting takes first: far from dependent."""
     from scipy.linalg import qr
 
-    places: list[float | str] = list(planar.points)
-    if body is not None:
-        places = list(np.unique(body.stations.position[:, 0]))
-    points = [_point(key, place, body, planar) for place in places]
+    points = [_point(key, place, body, planar) for place in candidate_places(key, body, planar.points)]
     candidates = _named(name, ("axial",) * len(points) + ("transverse",) * len(points), points * 2, planar)
     _, R, order = qr(_scaled(candidates), mode="economic", pivoting=True)
     coordinates = 3 + planar.n_modes
@@ -206,26 +207,59 @@ def _automatic(key: str, name: str, body: ModalBody | None, planar: PlanarBody) 
 
 
 def _named(name: str, axes: tuple[str, ...], points: list[PlanarPoint], planar: PlanarBody) -> PointSet:
-    names = tuple(f"actuation{k}" for k in range(1, len(points) + 1))
-    length = planar.length or max(float(np.linalg.norm(p.position)) for p in planar.points.values()) or 1.0
-    scale = np.concatenate([[1.0, 1.0, 1.0 / length], np.full(planar.n_modes, np.sqrt(planar.mass))])
-    return PointSet(name, names, axes, tuple(points), scale)
+    scale = np.concatenate([[1.0, 1.0, 1.0 / length_of(planar)], np.full(planar.n_modes, np.sqrt(planar.mass))])
+    return PointSet(name, point_names(len(points)), axes, tuple(points), scale)
 
 
-def _point(key: str, place: float | str, body: ModalBody | None, planar: PlanarBody) -> PlanarPoint:
+def _point(key: str, place: Place, body: ModalBody | None, planar: PlanarBody) -> PlanarPoint:
+    T = planar.modal_transform
+    return point_at(
+        key, place, body, planar.points,
+        lambda at: PlanarPoint(at.position[:2], at.translation[:2] @ T, at.rotation[2] @ T),
+    )  # fmt: skip
+
+
+def point_names(count: int) -> tuple[str, ...]:
+    """What the points of so many components are called in results."""
+    return tuple(f"actuation{k}" for k in range(1, count + 1))
+
+
+def length_of(body: PlanarBody | SpatialBody) -> float:
+    """By which moments on a body are measured against forces, m."""
+    return body.length or max(float(np.linalg.norm(point.position)) for point in body.points.values()) or 1.0
+
+
+def candidate_places(key: str, body: ModalBody | None, points: Mapping[str, P]) -> list[Place]:
+    """Where components may be put: the stations of a link, the points of a rigid body.
+
+    Raises `InputError` where there are none.
+    """
+    if body is not None:
+        return [float(x) for x in np.unique(body.stations.position[:, 0])]
+    if not points:
+        raise InputError(f"{key}: expected a rigid body with points, found none")
+    return list(points)
+
+
+def point_at(
+    key: str, place: Place, body: ModalBody | None, points: Mapping[str, P], made: Callable[[Interface], P]
+) -> P:
+    """One of the `points` of a body by its name, or the one `made` of the section at a distance from its link's root.
+
+    Raises `InputError` for a place that the body has not.
+    """
     if isinstance(place, str):
-        if place not in planar.points:
-            raise InputError(f'{key}: expected a point of the body ({", ".join(planar.points)}), found "{place}"')
-        return planar.points[place]
+        if place not in points:
+            raise InputError(
+                f'{key}: expected a point of the body ({quoted(points)}), found "{place}"' + did_you_mean(place, points)
+            )
+        return points[place]
     if body is None:
-        raise InputError(
-            f"{key}: expected points of the rigid body by name ({', '.join(planar.points)}), found {place:g}"
-        )
+        raise InputError(f"{key}: expected points of the rigid body by name ({quoted(points)}), found {place:g}")
     slack = 1e-9 * body.length
     if not -slack <= place <= body.length + slack:
         raise InputError(f"{key}: expected places within the link, 0 … {body.length:g} m, found {place:g} m")
-    at, T = body.interpolate(place), planar.modal_transform
-    return PlanarPoint(at.position[:2], at.translation[:2] @ T, at.rotation[2] @ T)
+    return made(body.interpolate(place))
 
 
 def _scaled(chosen: PointSet) -> Array:

@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.spatial_run import SpatialContext
+from ..mbs.model.spatial_body import SpatialBody
 from .patches.spatial_patches import LinkPatches
 
 
 @dataclass(frozen=True)
 class ActuatedSpatialContext(SpatialContext):
-    """With the `patches` of links by body, and the modal bodies of `links`."""
+    """With the `patches` of links by body, the modal bodies of `links`, and bodies `carrying` all their payloads."""
 
     patches: Mapping[str, LinkPatches] = field(default_factory=dict)
     links: Mapping[str, ModalBody] = field(default_factory=dict)
+    carrying: Mapping[str, SpatialBody] = field(default_factory=dict)

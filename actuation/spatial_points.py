@@ -25,7 +25,7 @@ from ..mbs.model.spatial_model import SpatialModel, row_values
 from ..mbs.model.spatial_motors import path_forces, spin_of_modes
 from ..mbs.model.spatial_tree import Motion, Section
 from ..mbs.model.spatial_wrench import Wrench, row_wrenches
-from .points import DEPENDENT, Place, PointForces
+from .points import DEPENDENT, Place, PointForces, candidate_places, length_of, point_at, point_names
 
 AXES = "xyz"
 
@@ -194,10 +194,7 @@ def _automatic(key: str, name: str, body: ModalBody | None, spatial: SpatialBody
     """Out of all components at every station, those that QR with column pivoting takes first: far from dependent."""
     from scipy.linalg import qr
 
-    places: list[float | str] = list(spatial.points)
-    if body is not None:
-        places = list(np.unique(body.stations.position[:, 0]))
-    points = [_point(key, place, body, spatial) for place in places]
+    points = [_point(key, place, body, spatial) for place in candidate_places(key, body, spatial.points)]
     candidates = _named(name, tuple(axis for axis in AXES for _ in points), points * 3, spatial)
     _, R, order = qr(_scaled(candidates, np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
@@ -206,26 +203,16 @@ def _automatic(key: str, name: str, body: ModalBody | None, spatial: SpatialBody
 
 
 def _named(name: str, axes: tuple[str, ...], points: list[SpatialPoint], spatial: SpatialBody) -> SpatialPointSet:
-    names = tuple(f"actuation{k}" for k in range(1, len(points) + 1))
-    length = spatial.length or max(float(np.linalg.norm(p.position)) for p in spatial.points.values()) or 1.0
-    scale = np.concatenate([np.ones(3), np.full(3, 1.0 / length), np.full(spatial.n_modes, np.sqrt(spatial.mass))])
-    return SpatialPointSet(name, names, axes, tuple(points), scale)
+    per_length, per_mass = np.full(3, 1.0 / length_of(spatial)), np.full(spatial.n_modes, np.sqrt(spatial.mass))
+    scale = np.concatenate([np.ones(3), per_length, per_mass])
+    return SpatialPointSet(name, point_names(len(points)), axes, tuple(points), scale)
 
 
-def _point(key: str, place: float | str, body: ModalBody | None, spatial: SpatialBody) -> SpatialPoint:
-    if isinstance(place, str):
-        if place not in spatial.points:
-            raise InputError(f'{key}: expected a point of the body ({", ".join(spatial.points)}), found "{place}"')
-        return spatial.points[place]
-    if body is None:
-        raise InputError(
-            f"{key}: expected points of the rigid body by name ({', '.join(spatial.points)}), found {place:g}"
-        )
-    slack = 1e-9 * body.length
-    if not -slack <= place <= body.length + slack:
-        raise InputError(f"{key}: expected places within the link, 0 … {body.length:g} m, found {place:g} m")
-    at, T = body.interpolate(place), spatial.modal_transform
-    return SpatialPoint(at.position, at.translation @ T, at.rotation @ T)
+def _point(key: str, place: Place, body: ModalBody | None, spatial: SpatialBody) -> SpatialPoint:
+    T = spatial.modal_transform
+    return point_at(
+        key, place, body, spatial.points, lambda at: SpatialPoint(at.position, at.translation @ T, at.rotation @ T)
+    )
 
 
 def _scaled(chosen: SpatialPointSet, p: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from datetime import date, time
 from typing import Any
 
 DEEPEST = 32  # tables and lists within each other
@@ -54,6 +55,8 @@ def _beyond(value: Any, loc: tuple[int | str, ...]) -> Iterator[tuple[tuple[int 
         yield loc, f"expected at most {LONGEST_TEXT} characters, found {len(value)}"
     elif isinstance(value, int) and abs(value) > LARGEST_INTEGER:
         yield loc, f"expected a whole number of at most {LARGEST_INTEGER:.3g}, found a larger one"
+    elif isinstance(value, date | time):  # TOML has them where quotes are forgotten
+        yield loc, f'expected no date or time, found {value} (text is written in quotes: "{value}")'
     elif isinstance(value, float) and LARGEST < abs(value) < float("inf"):  # records say so of infinity and NaN
         yield loc, f"expected a number between -{LARGEST:g} and {LARGEST:g}, found {value:g}"
 

@@ -25,7 +25,7 @@ class Record(BaseModel):
     Validators of a record raise `ValueError("expected …, found …")`; `validate` puts file and key in front.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
 
+
+@cache
 def program_version() -> str:
     """As files and reports state it. Read where it is asked for: the lookup takes longer than importing the package."""
     from importlib.metadata import version

@@ -31,7 +31,10 @@ from .modal_body_file import FORMAT_VERSION
 ALGORITHM_VERSION = {"beam": 5, "solid": 4}
 
 # Likewise, of what files of links with stresses hold of these: 1 without static ones of unit loads.
-STRESS_VERSION = 2
+STRESS_VERSION = 3
+
+# And of links by Timoshenko's theory: 1 without the geometric stiffness of sections that turn.
+SECTIONS_VERSION = 2
 
 _AFTER_THE_MODES = ("name", "damping", "stress", "measured")
 
@@ -55,6 +58,8 @@ def modes_hash(link: Link) -> str:
 
 def _content(link: Link) -> dict[str, Any]:
     record = link.model_dump(mode="json")
+    if isinstance(link, BeamLink) and link.model.theory == "timoshenko":
+        record["sections"] = SECTIONS_VERSION
     if isinstance(link, SolidLink):
         record["geometry"] = geometry_content(link.geometry)
     del record["measured"]  # links without it keep the hash that they had before it was a key

@@ -55,7 +55,7 @@ def _link(context: ActuatedSpatialContext, name: str) -> PatchableLink:
 
     def patches(**changes: object) -> PatchArray:
         keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None} | changes
-        found = link_patches(path, [layout.model_copy(update=elsewhere(layout, keys))], body, spatial)
+        found = link_patches(path, [layout.model_copy(update=elsewhere(layout, keys))], body, context.carrying[name])
         if not np.array_equal(found.modes[label].rows, reached.rows):
             raise InputError(f'{path}: placement.body: expected patches that reach the modes of "{label}"')
         return found.arrays[label]

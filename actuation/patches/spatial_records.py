@@ -55,6 +55,11 @@ class SpatialPztLayout(PatchKeys):
             self._check_plain()
         else:
             self._check_fibres(given)
+        if self.coupling == "surface" and (given or self.bends != "in-plane"):
+            raise ValueError(
+                'expected bends = "in-plane" and no fibres beside coupling = "surface": link files outline patches of'
+                f" plain ceramic on faces ±y alone; found {self.bends if not given else given[0]}"
+            )
         allowed = FACES.get(self.bends)
         if self.face is not None and allowed is not None and self.face not in allowed:
             raise ValueError(f'expected face {quoted(allowed)} beside bends = "{self.bends}", found "{self.face}"')

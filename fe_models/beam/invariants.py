@@ -20,6 +20,7 @@ from ...common.arrays import Array, Integers
 from ...mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
 from ..link_records import BeamLink
 from ..modal_body.invariants import Invariants
+from ..modal_body.tensors import LEVI_CIVITA
 from ..modal_body.unit_loads import unit_load_names
 from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
 
@@ -133,7 +134,8 @@ def geometric_stiffness(
 
     Loads (docs/theory.md, Geometric stiffness) on the undeformed link, held axially at its root: inertia of unit frame
     acceleration `t_x` … `t_z`, of unit angular acceleration `r_x` …, of unit products of angular velocity `omega_xx` …;
-    `force/NAME/x` … and `moment/NAME/x` …. Those that load a straight axis across, or twist it, leave N = 0: zero.
+    `force/NAME/x` … and `moment/NAME/x` …. Those that load a straight axis across, or twist it, leave N = 0: zero, but
+    for what sections with rotary inertia have of it.
 
     Args:
         link: for density and sections.
@@ -150,7 +152,32 @@ def geometric_stiffness(
     for name, position in interfaces.items():
         if position > 0:
             matrices[f"force/{name}/x"] = _stiffness_of(stations, fields, partial(_up_to, position))
+    if link.model.theory == "timoshenko":  # others are a line of mass
+        for name, matrix in _of_sections(link, stations, fields[[R_X, R_Y, R_Z]]).items():
+            matrices[name] = matrices[name] + matrix
     return matrices
+
+
+def _of_sections(link: BeamLink, stations: StationSpace, phi: Array) -> dict[str, Array]:
+    """(n, n) by load: what the inertia of sections that turn by φ (3, k, n) has of geometric stiffness.
+
+    A point d from the axis moves by ½ φ × (φ × d) = −½ (d φ² − φ φ·d) besides φ × d. Of d φ² − φ φ·d = pᵀG p are
+    K_x,kl = ∫ρ d_k G_l dV, and from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc (docs/theory.md).
+    """
+    n, rho = phi.shape[2], link.material.density
+    K_x = np.zeros((3, 3, n, n))
+    for k, moment in ((1, lambda s: s.I_yy), (2, lambda s: s.I_zz)):
+        W = _weighted(link, stations, moment, rho)
+        products = np.array([[a.T @ (W @ b) for b in phi] for a in phi])
+        products = 0.5 * (products + products.transpose(0, 1, 3, 2))
+        K_x[k] = -products[k]
+        K_x[k, k] += np.einsum("aamn->mn", products)
+    K_omega = np.einsum("ij,kkmn->ijmn", np.eye(3), K_x) - 0.5 * (K_x + K_x.transpose(1, 0, 2, 3))
+    K_r = np.einsum("abc,bcmn->amn", LEVI_CIVITA, K_x)
+    found = {f"r_{axis}": -K_r[a] for a, axis in enumerate("xyz")}  # of d'Alembert's loads
+    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
+        found[f"omega_{'xyz'[i]}{'xyz'[j]}"] = K_omega[i, j] * (1.0 if i == j else 2.0)
+    return found
 
 
 def _stiffness_of(stations: StationSpace, fields: Array, axial_force: AxialForce) -> Array:

@@ -10,7 +10,7 @@ section forces are those of statics: the link, held isostatically, has no others
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import roots_legendre
@@ -159,8 +159,6 @@ def _unit_loads(
     link: BeamLink, material: Material, attached: Sequence[Lump], interfaces: Mapping[str, Interface]
 ) -> SectionLoads:
     """All unit loads, (q, 3, l), in the order of `unit_load_names`."""
-    if link.model.theory == "euler-bernoulli":  # a line of mass, as in the invariants
-        material = replace(material, inertia=np.zeros_like(material.inertia))
     moving = material.with_lumps(attached).under_unit_motions()
     places, motions = len(interfaces), moving.force.shape[2]
     loads = np.zeros((places, 6, motions + 6 * places))

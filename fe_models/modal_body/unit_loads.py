@@ -59,14 +59,21 @@ def inertia_wrenches(x: Array, mass: Array, inertia: Array) -> dict[str, Array]:
     return found
 
 
-def work_on_modes(S_bar: Array, I_bar: Array, interfaces: Mapping[str, Interface]) -> dict[str, Array]:
-    """(n,) modal forces Φᵀb of each unit load b, from the invariants of a link and what its modes do at interfaces."""
+def work_on_modes(
+    S_bar: Array, I_bar: Array, interfaces: Mapping[str, Interface], h_spin: Array | None = None
+) -> dict[str, Array]:
+    """(n,) modal forces Φᵀb of each unit load b, from the invariants of a link and what its modes do at interfaces.
+
+    `h_spin` (n,) = ∫ρI_p φ dx of a line of mass, which Ī does not have.
+    """
     cross = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}
     found = dict[str, Array]()
     for k, axis in enumerate("xyz"):
         i, j = cross[axis]
         found[f"t_{axis}"] = -S_bar[k]
         found[f"r_{axis}"] = I_bar[j, i] - I_bar[i, j]  # −∫ρ (e × x)·Φ
+    if h_spin is not None:
+        found["r_x"] = found["r_x"] - h_spin
     trace = I_bar[0, 0] + I_bar[1, 1] + I_bar[2, 2]
     for name, (a, b) in PAIRS.items():  # −e_a × (e_b × x) = δ_ab x − x_a e_b
         found[f"omega_{name}"] = trace - I_bar[a, a] if a == b else -(I_bar[a, b] + I_bar[b, a])

@@ -70,6 +70,8 @@ class Gradients:
 def gradients(model: SolidModel, fields: Array) -> Iterator[Gradients]:
     """Gradients of `fields` (3 (owned + ghosts), k) in all cells that this rank owns, a chunk at a time."""
     mesh, k = model.mesh, fields.shape[1]
+    if not k:
+        return
     cell = lagrange_element(model.V).cell_type
     X, rule = basix.make_quadrature(cell, strain_degree(mesh, model.order))
     shapes = lagrange_element(model.V).tabulate(1, X)[1:, :, :, 0]  # (3, q, d)

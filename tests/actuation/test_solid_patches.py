@@ -7,8 +7,11 @@ import pytest
 
 from ffrobot.actuation.patches.patches import patch_array
 from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.actuation.patches.spatial_patches import link_patches
+from ffrobot.actuation.patches.spatial_records import SpatialPztLayout
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.model.planar_body import from_modal_body
+from ffrobot.mbs.model.spatial_body import from_modal_body as spatial_body
 
 LINK = """
 name = "link"
@@ -39,7 +42,7 @@ def arrays(tmp_path_factory):
     folder = tmp_path_factory.mktemp("solid")
     bodies = {}
 
-    def compute(faces=None, coupling="rotation"):
+    def compute(faces=None, coupling="rotation", in_space=False):
         if faces not in bodies:
             path = folder / f"{faces}.toml"
             path.write_text(LINK.replace("KIND", BEAM if faces is None else SOLID.replace("FACES", faces)))
@@ -56,6 +59,9 @@ def arrays(tmp_path_factory):
             "count": 10,
             "structural": False,
         }
+        if in_space:
+            layout = SpatialPztLayout(body="link", coupling=coupling, **keys)
+            return link_patches(Path("scene.toml"), [layout], body, spatial_body("link", body)).Phi_V
         layout = PztLayout(body="link", coupling=coupling, **keys)
         return patch_array(Path("scene.toml"), layout, body, from_modal_body("link", body)).Phi_V
 
@@ -84,3 +90,8 @@ def test_one_face_or_two_bend_alike(arrays):
     np.testing.assert_allclose(
         arrays("top", "surface"), arrays("both", "surface"), atol=1e-3 * np.abs(arrays("both", "surface")).max()
     )
+
+
+@pytest.mark.parametrize("coupling", ["surface", "rotation"])
+def test_in_space_they_do_the_same(arrays, coupling):
+    np.testing.assert_array_equal(arrays("both", coupling, in_space=True), arrays("both", coupling))

@@ -91,3 +91,10 @@ def test_rigid_interface_and_a_section_inside(bar):
     for name in ("tip", "middle"):
         assert flexibility(few, name)[1, 1] == pytest.approx(flexibility(many, name)[1, 1], rel=2e-6)
     assert flexibility(few, "middle", "tip")[1, 5] == pytest.approx(0.2**2 / (2 * E * I_Z), rel=1e-2)
+
+
+def test_interfaces_that_do_not_move_add_no_modes(bar):
+    """Both at the clamped end: loads there bend nothing."""
+    at_root = "position = [0.0, 0.0, 0.0]\nnormal = [-1.0, 0.0, 0.0]"
+    more = "".join(f'[[interface]]\nname = "{name}"\n{at_root}\n' for name in ("root", "tip"))
+    assert len(bar(more=more).stiffness) == 4

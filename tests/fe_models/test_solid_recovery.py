@@ -71,6 +71,12 @@ def test_masses_are_those_of_the_beam(pair):
         )
 
 
+def test_spin_about_the_axis_stiffens_as_in_the_beam(pair):
+    """What sections that tilt lose of their height: by their rotation in beams, by stresses across it in solids."""
+    found, expected = (body.geometric_stiffness["omega_xx"] for body in (pair[1], pair[0]))
+    np.testing.assert_allclose(found, expected, atol=5e-4 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("name", ["top", "edge"])
 def test_bending_stress_is_that_of_the_beam(pair, name):
     beam, solid = (body.stress[name].stress for body in pair)
