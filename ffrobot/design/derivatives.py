@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 
+from ..common.arrays import Array
 from ..sweep.sweep import Key
 from .designs import Design, Point
 from .differences import LEVELS, derivative
 from .goals import Followed, Goal, Reading
 
 SIZES = (1.0, 0.5, 0.25)  # of the first steps
+REPEATED = (-0.01, 0.01, 0.02)  # likewise, to either side, where steps of integrations are taken again
 AIM = 1e-6  # error of percent per percent that needs no smaller steps
 ROUGH = 1e-2  # of a derivative: beyond, the goal is hardly smooth
 
@@ -22,7 +24,8 @@ ROUGH = 1e-2  # of a derivative: beyond, the goal is hardly smooth
 class Base:
     """The place where derivatives are taken: k `keys` with their values `point`, and g `goals` with their `readings`.
 
-    `steps` (k) are the largest ones.
+    `steps` (k) are the largest ones. `changes`: what differs there from the scene, by key. `repeats`: the tolerance of
+    runs that take the steps of the scene's own again; 0 where they choose their own.
     """
 
     goals: tuple[Goal, ...]
@@ -30,6 +33,8 @@ class Base:
     keys: tuple[Key, ...]
     point: Point
     steps: tuple[float, ...]
+    changes: Mapping[Key, Any] = field(default_factory=dict)
+    repeats: float = 0.0
 
     def moved(self, k: int, offset: float) -> Point:
         """The point with one value changed."""
@@ -46,17 +51,21 @@ class Sample:
     failure: str = ""
 
 
+Method = Literal["differences", "repeated steps", "one-sided", "exact", "none"]
+"""How a derivative was found; "repeated steps": differences of runs with the same steps of integration."""
+
+
 @dataclass(frozen=True)
 class Entry:
     """∂goal/∂key with the estimate of its error, both in SI units, NaN where there is none.
 
-    `method`: "differences", "one-sided", "exact" or "none"; `step`: the largest that was taken; `notes`: what to mind.
+    `method`: one of `Method`; `step`: the largest that was taken; `notes`: what to mind.
     """
 
     derivative: float
     error: float
     step: float
-    method: Literal["differences", "one-sided", "exact", "none"]
+    method: Method
     notes: tuple[str, ...] = ()
 
 
@@ -84,11 +93,21 @@ def entries(base: Base, samples: Sequence[Sample], exact: Exact) -> tuple[tuple[
 
 def wants_smaller_steps(base: Base, samples: Sequence[Sample], exact: Exact) -> list[int]:
     """Keys by number with an entry whose error is above `AIM` and least with the smallest steps there are."""
+    return _rough_keys(base, samples, exact, lambda sizes: sizes[-LEVELS:][0])
+
+
+def wants_larger_steps(base: Base, samples: Sequence[Sample], exact: Exact) -> list[int]:
+    """Likewise, least with the largest ones."""
+    return _rough_keys(base, samples, exact, lambda sizes: sizes[0])
+
+
+def _rough_keys(base: Base, samples: Sequence[Sample], exact: Exact, best: Callable[[list[float]], float]) -> list[int]:
+    """Keys by number with an entry whose error is above `AIM` and least with the step that is `best` of all sizes."""
     found, rows = [], entries(base, samples, exact)
     for k in range(len(base.keys)):
         sizes = sorted({abs(one.offset) for one in samples if one.k == k and one.goals}, reverse=True)
         if sizes and any(
-            _relative(row[k].error, base, g, k) > AIM and np.isclose(row[k].step, sizes[-LEVELS:][0])
+            _relative(row[k].error, base, g, k) > AIM and np.isclose(abs(row[k].step), best(sizes))
             for g, row in enumerate(rows)
         ):
             found.append(k)
@@ -99,10 +118,19 @@ def _entry(base: Base, g: int, k: int, samples: Sequence[Sample]) -> Entry:
     whole = [one for one in samples if one.goals and np.isfinite(one.goals[g].value)]
     offsets = np.array([0.0, *(one.offset for one in whole)])
     found = derivative(offsets, np.array([base.readings[g].value, *(one.goals[g].value for one in whole)]))
-    both = offsets.min() < 0.0 < offsets.max()
-    method: Literal["differences", "one-sided", "none"] = "differences" if both else "one-sided"
+    # Steps that are the same for all runs err alike: no difference of runs tells of that.
+    size = abs(base.readings[g].value) / (abs(base.point[k]) or 1.0)
+    found = found._replace(error=found.error + base.repeats * max(abs(found.value), size))
     notes = tuple(_notes(base, g, k, samples, found.error, found.value))
-    return Entry(*found, "none" if np.isnan(found.value) else method, notes)
+    return Entry(*found, _method(base, offsets, found.value), notes)
+
+
+def _method(base: Base, offsets: Array, value: float) -> Method:
+    if np.isnan(value):
+        return "none"
+    if not offsets.min() < 0.0 < offsets.max():
+        return "one-sided"
+    return "repeated steps" if base.repeats else "differences"
 
 
 def _notes(base: Base, g: int, k: int, samples: Sequence[Sample], error: float, value: float) -> Iterator[str]:

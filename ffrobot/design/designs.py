@@ -18,6 +18,7 @@ from ..sweep import Sweep, forget_failures, run_sweep
 from ..sweep.runs import RESULTS, Row
 from ..sweep.sweep import Key, check_point, claim_folder
 from ..sweep.variation import Variation
+from ..sweep.workers import Workers
 
 Point = tuple[float, ...]
 """A value for each key."""
@@ -66,11 +67,16 @@ class Designs:
         variations = tuple(Variation(key, ()) for key in keys)
         self._sweep = Sweep(path, variations, (), folder, (), allowed, fixed, own, growing=True)
         self._processes, self._watcher, self._retry = processes, watcher, retry
+        self._workers = Workers()
 
     @property
     def table(self) -> Path:
         """The file with a row for every design."""
         return self._sweep.table
+
+    def change_beside(self, changes: Mapping[Key, Any]) -> None:
+        """Have these changes in all designs from now on but the scene's own."""
+        self._sweep = replace(self._sweep, beside=changes)
 
     def problem(self, point: Point) -> str:
         """What is wrong with the scene or a link file at a point, before any run; empty where nothing is seen."""
@@ -87,7 +93,8 @@ class Designs:
             forget_failures(replace(self._sweep, points=tuple(set(points) - set(self._sweep.points))))
         known = dict.fromkeys((*self._sweep.points, *points))
         self._sweep = replace(self._sweep, points=tuple(known))
-        rows = {row.values: row for row in run_sweep(self._sweep, self._processes, self._watcher)}
+        done = run_sweep(self._sweep, self._processes, self._watcher, self._workers)
+        rows = {row.values: row for row in done}
         folders = {run.values: run.folder for run in self._sweep.runs}
         return [Design(point, rows[point], folders[point]) for point in points]
 

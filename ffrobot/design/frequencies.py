@@ -44,7 +44,7 @@ def _of_beam(path: Path, base: Base, k: int, goal: Frequency, reading: Reading) 
     links = []
     try:
         for offset in offsets:
-            link = link_with(path, goal.body, {base.keys[k]: base.point[k] + float(offset)})
+            link = link_with(path, goal.body, {**base.changes, base.keys[k]: base.point[k] + float(offset)})
             if not isinstance(link, BeamLink) or link.measured or link.reference.condition == "craig-bampton":
                 return None
             links.append(link)

@@ -17,11 +17,12 @@ from ..common.errors import InputError
 from ..common.validation import did_you_mean, either, quoted
 from ..fe_models.modal_body import ModalBody
 from ..results.file import Results
+from ..sweep.files import value_of
 from .histories import POWER, History, read_history
 
 FORMS = (
     "peak HISTORY", "rms HISTORY", "mean HISTORY", "integral HISTORY", "at TIME HISTORY", "energy joints.NAME",
-    "frequency NUMBER BODY", "mass", "mass BODY",
+    "frequency NUMBER BODY", "mass", "mass BODY", "value KEY",
 )  # fmt: skip
 
 NOISE = 1e-6  # of a peak: a valley that is less deep lies between no two peaks
@@ -186,6 +187,23 @@ class Mass(Goal):
         return Reading(sum(_mass(results, bodies[name]) for name in wanted), "kg")
 
 
+@dataclass(frozen=True)
+class Value(Goal):
+    """A number of the scene file itself, such as the duration of a path; not of link files."""
+
+    text: str
+    key: str
+    needs_motion = False
+
+    def read(self, results: Results) -> Reading:
+        """By the scene that the results have."""
+        parts = tuple(self.key.split("."))
+        found = value_of(results.scene, parts, option=f'"{self.text}"')
+        if isinstance(found, bool) or not isinstance(found, int | float):
+            raise InputError(f'"{self.text}": expected a number of the scene at {self.key}, found {found!r}')
+        return Reading(float(found))
+
+
 def parse_goal(text: str, option: str = "--of") -> Goal:
     """What `text` asks for, one of `FORMS`. Raises `InputError` where it is none of them."""
     word, *rest = text.split() or [""]
@@ -204,6 +222,8 @@ def parse_goal(text: str, option: str = "--of") -> Goal:
             return Mass(text)
         case "mass", [body]:
             return Mass(text, body)
+        case "value", [key] if all(key.split(".")):
+            return Value(text, key)
     raise InputError(f'{option}: expected {either(FORMS)}, found "{text}"')
 
 

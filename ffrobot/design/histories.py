@@ -10,6 +10,7 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.validation import did_you_mean
+from ..mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
 from ..results.file import COLUMN, Results
 from ..results.meanings import RESULTS, meaning
 from ..sweep.runs import is_vector
@@ -66,7 +67,7 @@ def read_history(results: Results, name: str, option: str) -> History:
         values = values[:, k : k + 1]
     elif is_vector(results, found, values):
         values = np.linalg.norm(values, axis=1, keepdims=True)
-    return History(name, _unit(found), results.time(found), as_floats(values))
+    return History(name, _unit(results, found), results.time(found), as_floats(values))
 
 
 def _known(results: Results) -> dict[str, str]:
@@ -95,12 +96,20 @@ def _power(results: Results, name: str) -> Array:
     return as_floats(power.sum(axis=1, keepdims=True))
 
 
-def _unit(name: str) -> str:
-    """Where the dataset has one only: that of a joint's moment depends on the joint."""
+def _unit(results: Results, name: str) -> str:
+    """Where the dataset has one only; of a joint that of its coordinates, where these are all angles or all ways."""
     if name.endswith(f"/{POWER}"):
         return "W"
     known = meaning(name.partition("/")[2], RESULTS)
-    return known.unit if known is not None and "," not in known.unit else ""
+    if known is None or "," not in known.unit:
+        return known.unit if known is not None else ""
+    match = JOINT.match(name)
+    kinds = {str(joint["name"]): str(joint["type"]) for joint in results.scene["joint"]} if match else {}
+    if match is None or match["joint"] not in kinds:
+        return ""
+    units = set(SPATIAL_JOINT_TYPES[kinds[match["joint"]]].units)  # types that the plane has too have the same there
+    turning, sliding = known.unit.split(", ")
+    return {"rad": turning, "m": sliding}[units.pop()] if len(units) == 1 else ""
 
 
 def _example(known: list[str]) -> str:

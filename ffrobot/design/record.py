@@ -23,6 +23,14 @@ COLUMNS = (
 )  # fmt: skip
 
 
+HOW = {
+    "repeated steps": "repeated steps: differences of runs that take the same steps in time",
+    "differences": "differences: central, extrapolated",
+    "exact": "exact: by modes, without runs",
+}
+ERRORS = "errors: how far off the derivative is without the largest step, noise, and the tolerance of repeated steps"
+
+
 @dataclass(frozen=True)
 class Sensitivity:
     """Derivatives of g goals by k keys.
@@ -127,10 +135,11 @@ def remarks(found: Sensitivity) -> Iterator[str]:
         yield f"failed     {failed} of {found.runs} runs, left out: {found.failures[0]}" + (
             f", and {failed - 1} more in the table of runs" if failed > 1 else ""
         )
+    methods = {one.method for row in found.entries for one in row}
+    told = [words for method, words in HOW.items() if method in methods]
     yield (
         f"how        {found.runs} run{'s' if found.runs > 1 else ''} with a tolerance of at most {found.tolerance:g};"
-        " differences: central, extrapolated; exact: by modes, without runs; errors: how far off the derivative is"
-        " without the largest step"
+        f" {'; '.join([*told, ERRORS])}"
     )
 
 

@@ -9,16 +9,20 @@ from typing import Any
 
 from ..fe_models.link_file import LinkTable, read_link
 from ..fe_models.link_records import Link
+from ..mbs.fields.steps import DATASET
+from ..results.file import Results
 from ..scene.any_space import AnyScene, load_any_scene
 from ..sweep.files import run_files
 from ..sweep.sweep import Key
 from .goals import Goal
 
 
-def changes_for(path: Path, goals: Sequence[Goal], tolerance: float | None) -> dict[Key, Any]:
+def changes_for(
+    path: Path, goals: Sequence[Goal], tolerance: float | None, *, keep_steps: bool = False
+) -> dict[Key, Any]:
     """Changes of the scene at `path`: analyses that no goal needs are left out, the others have at most `tolerance`.
 
-    Replays of inverse analyses on finer links, which change no result, are left out too.
+    Replays of inverse analyses on finer links, which change no result, are left out too. `keep_steps`: of integrations.
     """
     scene = load_any_scene(path)
     needed = _needed(scene, goals)
@@ -28,7 +32,20 @@ def changes_for(path: Path, goals: Sequence[Goal], tolerance: float | None) -> d
         table.pop("check", None)
         if tolerance is not None:
             table["tolerance"] = min(tolerance, record.tolerance)
+        if keep_steps and record.is_integrated:
+            table["keep_steps"] = True
     return {("analysis",): tables}
+
+
+def repeated_steps(results: Results, path: Path) -> dict[Key, Any]:
+    """Changes of a scene with which its integrations take the steps of a run again, whose `results` are at `path`.
+
+    Nothing where one of them cannot be repeated.
+    """
+    stepping = [name for name in results.analyses if results.attributes(name)["steps"]]
+    if not all(results.has(f"{name}/{DATASET}") for name in stepping):
+        return {}
+    return {("analysis", name, "repeat_steps"): str(path.absolute()) for name in stepping}
 
 
 def link_with(path: Path, body: str, changes: Mapping[Key, float]) -> Link | None:

@@ -1,14 +1,20 @@
 """Derivatives of goals by numbers of a scene and its links: `ffrobot sensitivity`.
 
-Every key takes steps of three sizes to both sides, h, h/2 and h/4 with h one percent, in runs that are integrated with
-a tighter tolerance than the scene's; `differences` has the extrapolation. Where errors are above `AIM` and still fall
-with smaller steps, as where vibrations pass through many periods, steps of a quarter follow, twice at most.
+Where integrations can be repeated, runs beside the scene's own take its steps again (`mbs/fields/steps.py`). Their
+differences have no noise but rounding, and three runs, with a key changed by -h, h and 2h, h = 1e-4 of it, are enough.
+Where they err by more than `AIM`, smaller changes follow if errors fall with these, as with vibrations that pass
+through many periods, and larger ones if they grow.
+
+Otherwise every key takes steps of three sizes to both sides, h, h/2 and h/4 with h one percent, in runs that are
+integrated with a tighter tolerance than the scene's; `differences` has the extrapolation. Where errors are above `AIM`
+and still fall with smaller steps, steps of a quarter follow, twice at most.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,16 +22,20 @@ from ..common.errors import InputError, SolveError
 from ..common.parallel import processes as of_mpi
 from ..run.watcher import Watcher
 from ..sweep.files import number_at
-from .derivatives import SIZES, Base, Exact, Sample, entries, sample, wants_smaller_steps
+from ..sweep.runs import RESULTS
+from ..sweep.sweep import Key
+from .derivatives import REPEATED, SIZES, Base, Exact, Sample, entries, sample, wants_larger_steps, wants_smaller_steps
 from .designs import Designs, Point, parse_key
 from .frequencies import exact_entries
 from .goals import Goal, Reading, parse_goal
 from .record import Sensitivity
-from .scenes import changes_for
+from .scenes import changes_for, repeated_steps
 
 STEP = 0.01  # of a key's value, the largest; of keys that are 0, in their unit
 FINER = ((0.125, 0.0625), (0.03125, 0.015625))  # of those that follow where these are too large
+FINER_REPEATED = ((-0.00125, 0.00125, 0.0025), (-0.00015625, 0.00015625, 0.0003125))  # of runs with the same steps
 TOLERANCE = 1e-9  # of the runs: below, rounding in forces of stiff links is not far
+TOLERANCE_REPEATED = 1e-7  # of those that take the same steps: their noise is none of its
 
 
 def sensitivity(
@@ -36,14 +46,15 @@ def sensitivity(
     *,
     processes: int = 1,
     step: float = STEP,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     retry: bool = False,
     watcher: Watcher | None = None,
 ) -> Sensitivity:
     """Derivatives of the goals `of` the scene file at `path` by the numbers at its keys `to`; runs stay in `folder`.
 
-    `step`: the largest, of the keys' values. `tolerance`: of the runs, where the scene has a larger one. `processes`:
-    runs side by side. `retry`: whether designs that failed before are run again.
+    `step`: the largest, of the keys' values. `tolerance`: of the runs, where the scene has a larger one; None: 1e-7
+    where steps are repeated, 1e-9 elsewhere. `processes`: runs side by side. `retry`: whether designs that failed
+    before are run again.
 
     Raises:
         InputError: goals or keys that mean nothing, or keys that may take no other value.
@@ -57,9 +68,13 @@ def sensitivity(
         raise InputError("sensitivity: expected at least one goal (--of) and one key (--to)")
     point = tuple(number_at(path, key, "--to") for key in keys)
     steps = tuple(step * (abs(value) or 1.0) for value in point)
-    fixed = changes_for(path, goals, tolerance)
-    designs = Designs(path, keys, point, folder, fixed, processes=processes, watcher=watcher or Watcher(), retry=retry)
-    base = Base(goals, _nominal(path, designs, goals, point), keys, point, steps)
+
+    def designs_with(fixed: Mapping[Key, Any]) -> Designs:
+        return Designs(path, keys, point, folder, fixed, processes=processes, watcher=watcher or Watcher(), retry=retry)
+
+    designs, readings, repeats = _base(path, goals, keys, point, tolerance, designs_with)
+    tolerance = repeats or tolerance or TOLERANCE
+    base = Base(goals, readings, keys, point, steps, repeats=repeats)
     _check_steps(designs, base)
     exact = exact_entries(path, base)
     samples = _samples(designs, base, exact)
@@ -72,14 +87,37 @@ def sensitivity(
     )  # fmt: skip
 
 
-def _nominal(path: Path, designs: Designs, goals: Sequence[Goal], point: Point) -> tuple[Reading, ...]:
-    """The goals of the scene's own design."""
+def _base(
+    path: Path,
+    goals: Sequence[Goal],
+    keys: Sequence[Key],
+    point: Point,
+    tolerance: float | None,
+    designs_with: Callable[[Mapping[Key, Any]], Designs],
+) -> tuple[Designs, tuple[Reading, ...], float]:
+    """Designs, the goals of the scene's own, and the tolerance of runs that repeat its steps, 0 where they cannot."""
+    if not any(key[0] == "analysis" for key in keys):  # of which steps depend by more than their errors
+        repeats = tolerance or TOLERANCE_REPEATED
+        designs = designs_with(changes_for(path, goals, repeats, keep_steps=True))
+        readings, steps = _nominal(path, designs, goals, point)
+        if steps:
+            designs.change_beside(steps)
+            return designs, readings, repeats
+    designs = designs_with(changes_for(path, goals, tolerance or TOLERANCE))
+    readings, _ = _nominal(path, designs, goals, point)
+    return designs, readings, 0.0
+
+
+def _nominal(
+    path: Path, designs: Designs, goals: Sequence[Goal], point: Point
+) -> tuple[tuple[Reading, ...], dict[Key, Any]]:
+    """The goals of the scene's own design, and what has its steps taken again."""
     (design,) = designs.run([point])
     if not design.completed:
         error = InputError if design.row.status == "wrong input" else SolveError
         raise error(f"{path}: {design.row.status}: {design.row.message}")
     with design.results() as results:
-        return tuple(goal.read(results) for goal in goals)
+        return tuple(goal.read(results) for goal in goals), repeated_steps(results, design.folder / RESULTS)
 
 
 def _check_steps(designs: Designs, base: Base) -> None:
@@ -94,18 +132,29 @@ def _check_steps(designs: Designs, base: Base) -> None:
 
 
 def _samples(designs: Designs, base: Base, exact: Exact) -> list[Sample]:
-    """All that derivatives need which are not `exact`, with smaller steps where the first ones are too large."""
+    """All that derivatives need which are not `exact`, with other steps where the first ones are not good enough."""
     wanted = [k for k in range(len(base.keys)) if any((g, k) not in exact for g in range(len(base.goals)))]
-    samples = _beside(designs, base, wanted, SIZES)
+    samples: list[Sample] = []
+    if base.repeats:
+        for parts in (REPEATED, *FINER_REPEATED):
+            samples += _beside(designs, base, wanted, parts)
+            wanted = wants_smaller_steps(base, samples, exact)
+        if not (wanted := wants_larger_steps(base, samples, exact)):
+            return samples
+    samples += _beside(designs, base, wanted, _both_sides(SIZES))
     for sizes in FINER:
         if not (rough := wants_smaller_steps(base, samples, exact)):
             break
-        samples += _beside(designs, base, rough, sizes)
+        samples += _beside(designs, base, rough, _both_sides(sizes))
     return samples
 
 
-def _beside(designs: Designs, base: Base, which: Sequence[int], sizes: Sequence[float]) -> list[Sample]:
-    """Runs with one key changed to both sides."""
-    places = [(k, sign * size * base.steps[k]) for k in which for size in sizes for sign in (1.0, -1.0)]
+def _both_sides(sizes: Sequence[float]) -> list[float]:
+    return [sign * size for size in sizes for sign in (1.0, -1.0)]
+
+
+def _beside(designs: Designs, base: Base, which: Sequence[int], parts: Sequence[float]) -> list[Sample]:
+    """Runs with one key changed by these parts of its largest step."""
+    places = [(k, part * base.steps[k]) for k in which for part in parts]
     found = designs.run([base.moved(k, offset) for k, offset in places])
     return [sample(base, k, offset, design) for (k, offset), design in zip(places, found, strict=True)]

@@ -15,6 +15,7 @@ from .record import Sensitivity, ranked
 
 BARS = 15  # the largest
 WIDTH, BAR, REST = 5.0, 0.22, 0.8  # inches: of the figure, of a bar, of title and axis
+ROOM = 0.2  # of the axis, beside the longest bars: for their numbers
 
 
 def write_tornados(found: Sensitivity, folder: Path) -> list[Path]:
@@ -33,9 +34,15 @@ def draw_tornado(found: Sensitivity, g: int) -> Figure:
     values = found.logarithmic[g, known]
     picture = Figure(figsize=(WIDTH, REST + BAR * max(1, len(known))), layout="constrained")
     axes = picture.subplots()
-    axes.set_title(found.goals[g], loc="left")
-    axes.barh(range(len(known)), values, color=[COLORS[0] if value >= 0.0 else COLORS[1] for value in values])
+    reading = found.readings[g]
+    axes.set_title(f"{found.goals[g]}: {reading.value:.5g} {reading.unit}".rstrip(), loc="left")
+    bars = axes.barh(range(len(known)), values, color=[COLORS[0] if value >= 0.0 else COLORS[1] for value in values])
+    numbers = [f"{value:+.3g}".replace("-", "−") if value else "0" for value in values]
+    axes.bar_label(bars, numbers, padding=2, fontsize=7)
+    axes.margins(x=ROOM)
+    axes.locator_params(axis="x", nbins=7)
     axes.set_yticks(range(len(known)), [found.keys[k] for k in known])
+    axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
     axes.set_axisbelow(True)

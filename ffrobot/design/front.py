@@ -1,0 +1,197 @@
+"""Two goals against each other: the least of one for each value that the other may have (Pareto front).
+
+By the ε-constraint method (Haimes, Lasdon & Wismer 1971): the ends are the best designs for each goal alone; between
+them the second goal is limited, in equal ratios where both ends have one sign. Each search begins at its neighbour's
+design. All designs are runs of one folder, so that the same command takes up what was stopped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..common.arrays import Array, as_floats
+from ..common.errors import InputError, SolveError
+from ..run.watcher import Watcher
+from .designs import Designs, Point
+from .evaluations import Evaluated, Evaluations, SpentError
+from .goals import Goal, Reading, parse_goal
+from .local_search import AIM, search_from
+from .optimality import Optimality
+from .optimise import MOST, TOLERANCE, check_bounds, check_start
+from .problem import KEPT, Limit, Problem, read_problem
+from .scenes import changes_for
+from .slopes import Differentiation
+from .variables import Place, Space, read_space
+
+POINTS = 8
+SAME = 1e-6  # of the second goal: ends of a front that are one design
+
+
+@dataclass(frozen=True)
+class FrontPoint:
+    """The best design with one limit of the second goal.
+
+    Attributes:
+        point: values of the keys.
+        goal, against: of both goals there, in the `units` of the front.
+        price: ∂goal/∂against along the front; NaN at its ends.
+        converged: whether gradients say that nothing better is near. `feasible`: whether it keeps all limits.
+        message: why the search ended where it is not.
+    """
+
+    point: tuple[object, ...]
+    goal: float
+    against: float
+    price: float
+    converged: bool
+    feasible: bool
+    message: str
+
+
+@dataclass(frozen=True)
+class Front:
+    """What a trade-off has found: `points` from the least `goals[0]` to the least `goals[1]`; `runs` in all."""
+
+    scene: Path
+    goals: tuple[str, str]
+    units: tuple[str, str]
+    keys: tuple[str, ...]
+    points: tuple[FrontPoint, ...]
+    runs: int
+    tolerance: float
+
+    @property
+    def values(self) -> Array:
+        """(N, 2) of both goals."""
+        return np.array([(one.goal, one.against) for one in self.points])
+
+
+def trade_off(
+    path: Path,
+    vary: Sequence[str],
+    folder: Path,
+    *,
+    minimise: str,
+    against: str,
+    points: int = POINTS,
+    subject_to: Sequence[str] = (),
+    most: int = MOST,
+    processes: int = 1,
+    tolerance: float = TOLERANCE,
+    retry: bool = False,
+    watcher: Watcher | None = None,
+) -> Front:
+    """The least goal `minimise` of the scene file at `path` for each of `points` values of the goal `against`.
+
+    Other arguments are those of `optimise`; `most` counts the runs of all searches together.
+
+    Raises:
+        InputError: as of `optimise`; catalogues; fewer than three points; goals that are least in one design.
+        SolveError: a design that a search begins with does not complete.
+    """
+    if points < 3:
+        raise InputError(f"optimise: --points: expected at least 3, found {points}")
+    problem, space, watcher = read_problem(minimise, None, subject_to), read_space(path, vary), watcher or Watcher()
+    other = parse_goal(against, "--against")
+    if other.text == problem.objective.text:
+        raise InputError(f'--against: expected another goal than "{other.text}", which is to be least')
+    if catalogue := next((v for v in space.variables if v.is_catalogue), None):
+        raise InputError(f"--against: expected numbers between bounds, found the catalogue of {catalogue.name}")
+    check_start(path, space, "slsqp")
+    fixed = changes_for(path, (*problem.goals, other), tolerance)
+    designs = Designs(path, space.keys, space.own, folder, fixed, processes=processes, watcher=watcher, retry=retry)
+    check_bounds(designs, space)
+    return _Searches(path, space, designs, problem, other, most, tolerance, watcher).front(points)
+
+
+@dataclass
+class _Searches:
+    """What the searches of a front share; `ran`: the points of all their runs."""
+
+    path: Path
+    space: Space
+    designs: Designs
+    problem: Problem
+    against: Goal
+    most: int
+    tolerance: float
+    watcher: Watcher
+    ran: set[Point] = field(default_factory=set)
+
+    def front(self, count: int) -> Front:
+        """The ends, then from the first one on to the second."""
+        start = tuple(float(u or 0.0) for u in self.space.start())
+        first = self._least(self.problem, start, f"1 of {count}")
+        last = self._least(replace(self.problem, objective=self.against), first.best.place, f"{count} of {count}")
+        high, low = (self._read(self.against, one.best).value for one in (first, last))
+        if high - low <= SAME * abs(high):
+            raise InputError(
+                f'--against: expected goals that ask for different designs: where "{self.problem.objective.text}" is'
+                f' least, "{self.against.text}" is too'
+            )
+        found = [first]
+        for k, bound in enumerate(_between(high, low, count), start=2):
+            limits = (Limit(self.against, 1.0, bound), *self.problem.limits)
+            found.append(self._least(replace(self.problem, limits=limits), found[-1].best.place, f"{k} of {count}"))
+        units = [self._read(goal, first.best).unit for goal in (self.problem.objective, self.against)]
+        middle = [self._point(one, self._price(one)) for one in found[1:]]
+        return Front(
+            self.path, (self.problem.objective.text, self.against.text), (units[0], units[1]),
+            tuple(map(".".join, self.space.keys)),
+            (self._point(first, np.nan), *middle, self._point(last, np.nan)), len(self.ran), self.tolerance,
+        )  # fmt: skip
+
+    def _least(self, problem: Problem, start: Place, title: str) -> Search:
+        evaluations = Evaluations(self.designs, self.space, problem, self.most - len(self.ran))
+        differentiation = Differentiation(self.path, evaluations, self.tolerance)
+        try:
+            found = search_from(start, "slsqp", differentiation, lambda text: self.watcher.stage(f"{title}: {text}"))
+        except SpentError:
+            raise SolveError(
+                f"{self.path}: ended before {title} points after {self.most} runs, as many as allowed"
+            ) from None
+        self.ran |= evaluations.points
+        if not found.best.completed:
+            raise SolveError(f"{self.path}: no design could be run to its end: {found.message}")
+        return Search(found.best, found.optimality, found.message, evaluations.problem)
+
+    @staticmethod
+    def _price(one: Search) -> float:
+        """∂goal/∂limit of the second goal, the first of the limits; 0 where it is not reached."""
+        if one.optimality is None:
+            return np.nan
+        scale = one.problem.limits[0].scale * one.problem.factors(one.best.values)[0]
+        return float(-np.nan_to_num(one.optimality.limits[0]) / scale)
+
+    def _point(self, one: Search, price: float) -> FrontPoint:
+        goal, against = (self._read(goal, one.best).value for goal in (self.problem.objective, self.against))
+        stands = one.optimality
+        return FrontPoint(
+            self.space.point(one.best.place), goal, against, price, stands is not None and stands.reached(AIM),
+            one.problem.violation(one.best.readings) <= KEPT, one.message,
+        )  # fmt: skip
+
+    @staticmethod
+    def _read(goal: Goal, design: Evaluated) -> Reading:
+        with design.design.results() as results:
+            return goal.read(results)
+
+
+@dataclass(frozen=True)
+class Search:
+    """One search: the best of its designs, how that stands, why it ended where not there, what was asked."""
+
+    best: Evaluated
+    optimality: Optimality | None
+    message: str
+    problem: Problem
+
+
+def _between(high: float, low: float, count: int) -> Array:
+    """Limits from `high` down to `low` without these: in equal ratios, or steps where the signs differ."""
+    spaced = np.geomspace if low * high > 0.0 else np.linspace
+    return as_floats(spaced(high, low, count)[1:-1])

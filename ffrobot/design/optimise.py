@@ -1,0 +1,192 @@
+"""The best design of a scene: `ffrobot optimise`. Every design is a run that is kept, as those of sensitivities are.
+
+Numbers are sought by SLSQP or trust-constr with gradients, from the scene's own values and further starts of a Latin
+hypercube; catalogues, and goals that are rough, by differential evolution or by trying every row. What is found last
+is judged by central differences: multipliers of limits and bounds, and how far the gradient is from theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+from scipy.stats.qmc import LatinHypercube
+
+from ..common.errors import InputError, SolveError
+from ..common.parallel import processes as of_mpi
+from ..run.watcher import Watcher
+from ..sweep.files import run_files
+from .designs import Designs
+from .evaluations import Evaluations, SpentError, write_designs
+from .local_search import Local, best_of, rank, search_from
+from .optimum import Optimum
+from .problem import read_problem
+from .scenes import changes_for
+from .slopes import Differentiation
+from .variables import Place, Space, read_space
+from .whole_search import combinations, evolve, try_all
+
+Method = Literal["auto", "slsqp", "trust-constr", "differential-evolution", "all"]
+
+TOLERANCE = 1e-8  # of the runs: steps of differences follow from it
+MOST = 1000  # runs
+BEST = "best"  # folder of the best design's scene
+EVERY = 500  # combinations of rows: more are sought among
+
+
+def optimise(
+    path: Path,
+    vary: Sequence[str],
+    folder: Path,
+    *,
+    minimise: str | None = None,
+    maximise: str | None = None,
+    subject_to: Sequence[str] = (),
+    method: Method = "auto",
+    starts: int = 1,
+    seed: int = 0,
+    most: int = MOST,
+    processes: int = 1,
+    tolerance: float = TOLERANCE,
+    retry: bool = False,
+    watcher: Watcher | None = None,
+) -> Optimum:
+    """The design of the scene file at `path` with the least (or largest) goal within limits; runs stay in `folder`.
+
+    `vary`, `subject_to`: as on the command line, see `variables` and `problem`. `method`: by default
+    "slsqp", and where there are catalogues "all" of them or "differential-evolution". `starts`: how many searches
+    along gradients, from the scene itself and from a Latin hypercube with `seed`. `most`: runs. `tolerance`: of the
+    runs, where the scene has a larger one. `processes`: runs side by side. `retry`: whether designs that failed before
+    are run again.
+
+    Raises:
+        InputError: goals, limits or keys that mean nothing, bounds that no design can have.
+        SolveError: no design completed.
+    """
+    if of_mpi() > 1:
+        raise InputError("optimise: expected one process, found several under mpirun: -j runs designs side by side")
+    problem, space, watcher = read_problem(minimise, maximise, subject_to), read_space(path, vary), watcher or Watcher()
+    chosen = _method(space, method, most)
+    check_start(path, space, chosen)
+    fixed = changes_for(path, problem.goals, tolerance)
+    designs = Designs(path, space.keys, space.own, folder, fixed, processes=processes, watcher=watcher, retry=retry)
+    check_bounds(designs, space)
+    evaluations = Evaluations(designs, space, problem, most)
+    differentiation = Differentiation(path, evaluations, tolerance)
+    try:
+        searches = _search(chosen, differentiation, _starts(space, starts, seed), seed, watcher)
+    finally:
+        if evaluations.searched:
+            write_designs(evaluations, folder / "designs.csv")
+    best = min(searches, key=lambda one: rank(evaluations, one.best))
+    if not best.best.completed:
+        raise SolveError(f"{path}: no design could be run to its end; the first one: {evaluations.failures[0]}")
+    return _optimum(path, folder, chosen, evaluations, best, searches, tolerance)
+
+
+def _method(space: Space, method: Method, most: int) -> Method:
+    catalogues, combined = any(v.is_catalogue for v in space.variables), combinations(space)
+    if method == "auto":
+        return "slsqp" if not catalogues else "all" if 0 < combined <= min(EVERY, most) else "differential-evolution"
+    if method in ("slsqp", "trust-constr") and catalogues:
+        raise InputError(
+            f'optimise: method: expected "differential-evolution" where there are catalogues, found "{method}"'
+        )
+    if method == "all" and not combined:
+        raise InputError('optimise: method: expected catalogues alone for "all", found a number between bounds')
+    if method == "all" and combined > most:
+        raise InputError(f"optimise: expected at most {most} designs in the catalogues (--runs), found {combined}")
+    return method
+
+
+def check_start(path: Path, space: Space, method: Method) -> None:
+    """Raise `InputError` where a search along gradients could not begin at the scene itself."""
+    for variable, start in zip(space.variables, space.start(), strict=True):
+        if start is None and method in ("slsqp", "trust-constr"):
+            values = [value for key, value in zip(space.keys, space.own, strict=True) if key in variable.keys]
+            raise InputError(
+                f"{path}: --vary: expected bounds of {variable.name} that hold the value where the search begins,"
+                f" {' and '.join(f'{value:g}' for value in values)}, found {variable.low:g}:{variable.high:g}"
+            )
+
+
+def check_bounds(designs: Designs, space: Space) -> None:
+    """Raise `InputError` for a bound that is impossible wherever the others are, before any run."""
+    own = space.start()
+    others: list[Place] = [] if None in own else [tuple(float(u or 0.0) for u in own)]
+    others += [(0.0,) * len(own), tuple(variable.top for variable in space.variables)]
+    for j, variable in enumerate(space.variables):
+        ends = () if variable.is_catalogue else ((0.0, variable.low), (1.0, variable.high))
+        for end, bound in ends:
+            problem = ""
+            for place in others:
+                if not (problem := designs.problem(space.point((*place[:j], end, *place[j + 1 :])))):
+                    break
+            if problem:
+                raise InputError(
+                    f"--vary: expected bounds that designs can have, found {variable.name} = {bound:g}:\n{problem}"
+                )
+
+
+def _starts(space: Space, count: int, seed: int) -> list[Place]:
+    """The scene itself, where it is in all bounds and catalogues, and places of a Latin hypercube."""
+    own = space.start()
+    found: list[Place] = [] if None in own else [tuple(float(u or 0.0) for u in own)]
+    if count > 1:
+        sample = LatinHypercube(len(space.variables), seed=seed).random(count - 1)
+        found += [tuple(map(float, row)) for row in sample]
+    return found
+
+
+def _search(
+    method: Method, differentiation: Differentiation, starts: Sequence[Place], seed: int, watcher: Watcher
+) -> list[Local]:
+    """The searches that `method` means; of catalogues one, which goes on along gradients of numbers."""
+    evaluations = differentiation.evaluations
+    if method in ("slsqp", "trust-constr"):
+        return _from_starts(method, differentiation, starts, watcher)
+    message = ""
+    if method == "all":
+        try_all(evaluations)
+    else:
+        message = evolve(evaluations, seed, starts[0] if starts else None, watcher.stage)
+    first, best = evaluations.searched[0], best_of(evaluations, evaluations.searched)
+    if not best.completed or all(variable.is_catalogue for variable in evaluations.space.variables):
+        return [Local(first, best, None, message)]
+    found = search_from(best.place, "slsqp", differentiation, watcher.stage)
+    return [Local(first, found.best, found.optimality, "; ".join(text for text in (message, found.message) if text))]
+
+
+def _from_starts(
+    method: str, differentiation: Differentiation, starts: Sequence[Place], watcher: Watcher
+) -> list[Local]:
+    """A search from each, as long as runs are left."""
+    found: list[Local] = []
+    for k, place in enumerate(starts):
+        title = f"start {k + 1} of {len(starts)}: " if len(starts) > 1 else ""
+        with suppress(SpentError):
+            found.append(search_from(place, method, differentiation, partial(_tell, watcher, title)))
+    return found
+
+
+def _tell(watcher: Watcher, title: str, text: str) -> None:
+    watcher.stage(title + text)
+
+
+def _optimum(
+    path: Path, folder: Path, method: Method, evaluations: Evaluations, best: Local, searches: Sequence[Local],
+    tolerance: float,
+) -> Optimum:  # fmt: skip
+    space, problem = evaluations.space, evaluations.problem
+    with best.best.design.results() as results:
+        verdict = results.verdict
+    point = space.point(best.best.place)
+    changes = {key: value for key, value, own in zip(space.keys, point, space.own, strict=True) if value != own}
+    scene = run_files(path, changes, folder / BEST).write(folder / BEST)
+    return Optimum(
+        path, problem, space, method, best.start, best.best, best.optimality, best.message, tuple(searches),
+        evaluations.runs, tuple(evaluations.failures), tolerance, verdict, scene, designs=folder / "designs.csv",
+    )  # fmt: skip

@@ -1,0 +1,109 @@
+"""How keys are spread: `KEY=±2%`, `KEY=±0.1`, `KEY=uniform:LO:HI`, `KEY=normal:SIGMA`, `KEY=normal:2%`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from scipy.special import ndtri
+
+from ..common.arrays import Array, as_floats
+from ..common.errors import InputError
+from ..common.tables import shown
+from ..sweep.files import number_at
+from ..sweep.sweep import Key
+from .designs import parse_key
+
+WIDE = 2.0  # standard deviations of a normal key within which scenes have to make sense
+
+
+@dataclass(frozen=True)
+class Spread:
+    """One key: all values within `half` of `mean` alike, or normal with the standard deviation `deviation`.
+
+    `text` is what the user wrote, `own` the value of the scene.
+    """
+
+    key: Key
+    text: str
+    own: float
+    kind: Literal["uniform", "normal"]
+    mean: float
+    deviation: float
+
+    @property
+    def half(self) -> float:
+        """Of a uniform key: from the mean to an end, √3 standard deviations."""
+        return math.sqrt(3.0) * self.deviation
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Where a scene has to make sense."""
+        far = self.half if self.kind == "uniform" else WIDE * self.deviation
+        return self.mean - far, self.mean + far
+
+    def values(self, u: Array) -> Array:
+        """Of probabilities u (n,) in (0, 1)."""
+        if self.kind == "uniform":
+            return as_floats(self.mean + self.half * (2.0 * u - 1.0))
+        return as_floats(self.mean + self.deviation * ndtri(u))
+
+
+def parse_spread(text: str, path: Path) -> Spread:
+    """What `text` says of a key of the scene file at `path`. Raises `InputError` where that is nothing."""
+    name, equals, values = text.partition("=")
+    key = parse_key(name, "--spread")
+    own = number_at(path, key, "--spread")
+    word, *numbers = values.strip().split(":")
+    for sign in ("±", "+-", "+/-"):
+        if word.startswith(sign):
+            word, numbers = "±", [word.removeprefix(sign), *numbers]
+    match word, numbers:
+        case "±", [half] if equals:
+            return Spread(key, text, own, "uniform", own, _size(half, own, text) / math.sqrt(3.0))
+        case "normal", [sigma]:
+            return Spread(key, text, own, "normal", own, _size(sigma, own, text))
+        case "uniform", [low, high]:
+            a, b = _number(low, text), _number(high, text)
+            if a < b:
+                return Spread(key, text, own, "uniform", (a + b) / 2.0, (b - a) / math.sqrt(12.0))
+    raise _wrong(text)
+
+
+def spread_points(spreads: Sequence[Spread], u: Array) -> list[tuple[float, ...]]:
+    """Points of probabilities u (n, k)."""
+    columns = np.column_stack([spread.values(u[:, k]) for k, spread in enumerate(spreads)])
+    return [tuple(map(float, row)) for row in columns]
+
+
+def _size(text: str, own: float, whole: str) -> float:
+    """A positive number, or so many percent of the key's value."""
+    percent = text.strip().endswith("%")
+    value = _number(text.strip().removesuffix("%"), whole)
+    if percent and own == 0.0:
+        raise InputError(f'--spread: expected a spread in the unit of a key whose value is 0, found "{shown(whole)}"')
+    size = value / 100.0 * abs(own) if percent else value
+    if not size > 0.0:
+        raise _wrong(whole)
+    return size
+
+
+def _number(text: str, whole: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise _wrong(whole) from None
+    if not math.isfinite(value):
+        raise _wrong(whole)
+    return value
+
+
+def _wrong(text: str) -> InputError:
+    return InputError(
+        "--spread: expected KEY=±2%, KEY=±0.1, KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=normal:2%, with positive"
+        f' spreads, found "{shown(text)}"'
+    )

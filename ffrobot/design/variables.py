@@ -1,0 +1,172 @@
+"""What a search may change: numbers within bounds and rows of catalogues, and the unit cube that optimisers see.
+
+A place u has a coordinate for each variable: of a number its way from the lower bound (0) to the upper one (1), of a
+catalogue the number of the row, from 0.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..common.errors import InputError
+from ..common.numbers import MOST_RUNS
+from ..common.tables import shown
+from ..sweep.files import number_at, value_at
+from ..sweep.sweep import Key
+from .designs import Point, parse_key
+
+Place = tuple[float, ...]
+"""A coordinate for each variable."""
+
+CATALOGUE = re.compile(r"(?P<keys>.*\S)\s+in\s*\{(?P<rows>.*)\}\s*", re.DOTALL)
+FORMS = '"KEY=LOW:HIGH", "KEY=LOW:HIGH:log", "KEY in {A, B, C}" or "KEY,KEY in {A1:A2, B1:B2}"'
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number between `low` and `high` that all `keys` take, or one of the `rows` with a value for each key."""
+
+    keys: tuple[Key, ...]
+    low: float = np.nan
+    high: float = np.nan
+    logarithmic: bool = False
+    rows: tuple[tuple[Any, ...], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """As the user writes it."""
+        return ",".join(".".join(key) for key in self.keys)
+
+    @property
+    def is_catalogue(self) -> bool:
+        """Whether its values are listed."""
+        return bool(self.rows)
+
+    @property
+    def top(self) -> float:
+        """The largest coordinate; the smallest is 0."""
+        return len(self.rows) - 1.0 if self.rows else 1.0
+
+    def values(self, u: float) -> tuple[Any, ...]:
+        """Of the keys."""
+        if self.rows:
+            return self.rows[round(u)]
+        a, b = self.low, self.high
+        value = a * (b / a) ** u if self.logarithmic else a + u * (b - a)
+        return (float(np.clip(value, a, b)),) * len(self.keys)  # rounding goes past no bound
+
+    def coordinate(self, values: tuple[Any, ...]) -> float | None:
+        """Of the keys' values; None where they are out of bounds, not all the same, or no row of the catalogue."""
+        if self.rows:
+            return float(self.rows.index(values)) if values in self.rows else None
+        x, (a, b) = values[0], (self.low, self.high)
+        if any(value != x for value in values) or not a <= x <= b:
+            return None
+        return float(np.log(x / a) / np.log(b / a)) if self.logarithmic else (x - a) / (b - a)
+
+    def slope(self, u: float) -> float:
+        """dx/du of a number."""
+        if self.logarithmic:
+            return float(self.values(u)[0] * np.log(self.high / self.low))
+        return self.high - self.low
+
+    def step(self, u: float, relative: float) -> float:
+        """A step of u that changes the number x by `relative` of itself, or of the range where that is smaller."""
+        span = self.high - self.low
+        scale = np.clip(abs(self.values(u)[0]), SMALL * span, span)
+        return float(relative * scale / self.slope(u))
+
+
+SMALL = 1e-3  # of the range: numbers near 0 take steps of this times the relative one
+
+
+@dataclass(frozen=True)
+class Space:
+    """All `variables`; `own` is what the scene has at their keys, in order."""
+
+    variables: tuple[Variable, ...]
+    own: Point
+
+    @property
+    def keys(self) -> tuple[Key, ...]:
+        """Of all variables."""
+        return tuple(key for variable in self.variables for key in variable.keys)
+
+    def point(self, place: Place) -> Point:
+        """The values of all keys; those that the scene has are its very own, not a rounding beside them."""
+        return tuple(value for _, values in self._of(place) for value in values)
+
+    def _of(self, place: Place) -> Iterator[tuple[Variable, tuple[Any, ...]]]:
+        return ((v, v.values(u)) for v, u in zip(self.variables, place, strict=True))
+
+    def start(self) -> tuple[float | None, ...]:
+        """Coordinates of the scene itself; None where it is out of bounds or in no catalogue."""
+        first, found = 0, []
+        for variable in self.variables:
+            found.append(variable.coordinate(self.own[first : first + len(variable.keys)]))
+            first += len(variable.keys)
+        return tuple(found)
+
+
+def read_space(path: Path, vary: Sequence[str]) -> Space:
+    """What `--vary` says of the scene file at `path`. Raises `InputError`."""
+    variables = tuple(parse_variable(text) for text in vary)
+    if not variables:
+        raise InputError(f"optimise: expected at least one --vary, {FORMS}")
+    keys = [key for variable in variables for key in variable.keys]
+    if twice := next((key for key in keys if keys.count(key) > 1), None):
+        raise InputError(f"--vary: expected every key once, found {'.'.join(twice)} several times")
+    return Space(variables, tuple(_own(path, v, key) for v in variables for key in v.keys))
+
+
+def _own(path: Path, variable: Variable, key: Key) -> Any:  # noqa: ANN401 (whatever the file has)
+    return value_at(path, key, "--vary") if variable.is_catalogue else number_at(path, key, "--vary")
+
+
+def parse_variable(text: str) -> Variable:
+    """`payload.0.mass=0.1:0.5`, or `a.outer,a.inner in {0.05:0.045, 0.06:0.054}`. Raises `InputError`."""
+    if match := CATALOGUE.fullmatch(text):
+        keys = _keys(match["keys"])
+        return Variable(keys, rows=_rows(match["rows"], len(keys), text))
+    name, equals, bounds = text.partition("=")
+    pieces = bounds.split(":")
+    try:
+        low, high = map(float, pieces[:2])
+    except ValueError:
+        low = high = np.nan
+    logarithmic = len(pieces) == 3 and pieces[2].strip() == "log"
+    if not equals or not (len(pieces) == 2 or logarithmic) or not np.isfinite([low, high]).all():
+        raise InputError(f'--vary: expected {FORMS}, found "{shown(text)}"')
+    if not low < high:
+        raise InputError(f'--vary: expected a lower bound and a higher one, LOW:HIGH, found "{shown(text)}"')
+    if logarithmic and low <= 0.0:
+        raise InputError(f'--vary: expected bounds above 0 for steps in the logarithm, found "{shown(text)}"')
+    return Variable(_keys(name), low, high, logarithmic)
+
+
+def _keys(text: str) -> tuple[Key, ...]:
+    return tuple(parse_key(part, "--vary") for part in text.split(","))
+
+
+def _rows(text: str, columns: int, whole: str) -> tuple[tuple[Any, ...], ...]:
+    """The rows of a catalogue; columns are parted by colons."""
+    listed = text if columns == 1 else ", ".join(f"[{row.replace(':', ',')}]" for row in text.split(","))
+    try:
+        values = tomllib.loads(f"values = [{listed}]")["values"]
+    except (ValueError, RecursionError):
+        values = []
+    rows = [(value,) if columns == 1 else tuple(value) for value in values]
+    nested = any(isinstance(value, list | dict) for row in rows for value in row)
+    if nested or not 0 < len(rows) <= MOST_RUNS or any(len(row) != columns for row in rows):
+        raise InputError(
+            f"--vary: expected rows of {columns} value{'s' if columns > 1 else ''} (texts in quotes, columns with"
+            f' colons), {FORMS}, found "{shown(whole)}"'
+        )
+    return tuple(dict.fromkeys(rows))

@@ -1,0 +1,78 @@
+"""`ffrobot optimise … --against`: the curve of mass and deflection of a cantilever, which is a power law."""
+
+import csv
+
+import numpy as np
+import pytest
+import tomli_w
+
+import ffrobot
+
+L, E, RHO, FORCE, WIDTH = 0.5, 70e9, 2700.0, 20.0, 0.02
+BEAM = {
+    "name": "beam",
+    "material": {"youngs_modulus": E, "density": RHO, "poissons_ratio": 0.3},
+    "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.02, "width": WIDTH}},
+    "mesh": {"elements": 2},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 2, "family": "in-plane-bending"},
+    "damping": {"ratio": 0.01},
+}
+CANTILEVER = {
+    "name": "cantilever",
+    "gravity": [0.0, 0.0],
+    "body": [{"name": "beam", "link": BEAM}],
+    "joint": [{"name": "clamp", "type": "weld", "between": ["ground", "beam.root"]}],
+    "load": [{"point": "beam.tip", "y": str(FORCE)}],
+    "initial": {"state": "static"},
+    "analysis": [{"name": "still", "kind": "static"}],
+}
+HEIGHT = "links.beam.geometry.section.height=0.01:0.04:log"
+TIP = "peak points.beam.tip.deflection"
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps(CANTILEVER), encoding="utf-8")
+    return path
+
+
+def deflection(height):
+    return 4.0 * FORCE * L**3 / (E * WIDTH * height**3)
+
+
+def test_mass_against_deflection_is_a_power_law(scene):
+    """m = ρ L w (4 F L³/(E w δ))^⅓ from one bound of the height to the other, δ in equal ratios; ∂m/∂δ = −m/(3 δ)."""
+    found = ffrobot.trade_off(scene, [HEIGHT], minimise="mass", against=TIP, points=4, processes=2)
+    mass, tip = found.values.T
+    np.testing.assert_allclose(tip, np.geomspace(deflection(0.01), deflection(0.04), 4), rtol=1e-6)
+    np.testing.assert_allclose(mass, RHO * L * WIDTH * (4.0 * FORCE * L**3 / (E * WIDTH * tip)) ** (1 / 3), rtol=1e-6)
+    for one in found.points[1:-1]:
+        assert one.price == pytest.approx(-one.goal / (3.0 * one.against), rel=1e-4)
+    assert all(one.converged and one.feasible for one in found.points)
+    assert found.units == ("kg", "m")
+
+
+def test_going_on(ffrobot, scene):
+    """What was stopped is taken up: the same command makes no run twice, and writes table and picture."""
+    folder = scene.with_suffix(".optimum")
+    command = ("optimise", scene, "--minimise", "mass", "--against", TIP, "--points", 3, "--vary", HEIGHT, "-j", 2)
+    stopped = ffrobot(*command, "--runs", 6)
+    assert stopped.returncode == 1
+    assert "as many as allowed" in stopped.stderr
+    rows = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")}
+    assert 0 < len(rows) <= 6
+    done = ffrobot(*command)
+    assert done.returncode == 0, done.stderr
+    assert {path: path.stat().st_mtime_ns for path in rows} == rows
+    with (folder / "front.csv").open(encoding="utf-8") as file:
+        designs = list(csv.DictReader(file))
+    assert [row["converged"] for row in designs] == ["yes"] * 3
+    assert float(designs[1][TIP]) == pytest.approx(np.sqrt(deflection(0.01) * deflection(0.04)), rel=1e-6)
+    assert (folder / "front.png").stat().st_size > 1000
+
+
+def test_goals_that_go_together(scene):
+    with pytest.raises(ffrobot.InputError, match="expected goals that ask for different designs"):
+        ffrobot.trade_off(scene, [HEIGHT], minimise="mass", against="mass beam", points=3, processes=2)

@@ -1,0 +1,261 @@
+"""`ffrobot optimise`: optima in closed form, prices of limits, catalogues, designs that fail, going on."""
+
+import csv
+import tomllib
+from copy import deepcopy
+
+import numpy as np
+import pytest
+import tomli_w
+
+import ffrobot
+
+RIGID = {"mass": 2.0, "center": [0.3, 0.0], "inertia": 0.05, "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
+J = 0.05 + 2.0 * 0.3**2  # of the arm about its joint
+ARM = {
+    "name": "arm",
+    "gravity": [0.0, 0.0],
+    "body": [{"name": "arm", "rigid": RIGID}],
+    "joint": [
+        {
+            "name": "shoulder",
+            "type": "revolute",
+            "between": ["ground", "arm.root"],
+            "gear_ratio": 50.0,
+            "rotor_inertia": 2e-5,
+        }
+    ],
+    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.1}],
+}
+MOTOR = "peak joints.shoulder.motor_moment"
+RATIO = "joint.shoulder.gear_ratio"
+
+L, E, RHO, FORCE, DEFLECTION = 0.5, 70e9, 2700.0, 20.0, 1e-3
+BEAM = {
+    "name": "beam",
+    "material": {"youngs_modulus": E, "density": RHO, "poissons_ratio": 0.3},
+    "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.02, "width": 0.02}},
+    "mesh": {"elements": 2},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 2, "family": "in-plane-bending"},
+    "damping": {"ratio": 0.01},
+}
+CANTILEVER = {
+    "name": "cantilever",
+    "gravity": [0.0, 0.0],
+    "body": [{"name": "beam", "link": BEAM}],
+    "joint": [{"name": "clamp", "type": "weld", "between": ["ground", "beam.root"]}],
+    "load": [{"point": "beam.tip", "y": str(FORCE)}],
+    "initial": {"state": "static"},
+    "analysis": [{"name": "still", "kind": "static"}],
+}
+HEIGHT, WIDTH, OUTER, INNER = (f"links.beam.geometry.section.{key}" for key in ("height", "width", "outer", "inner"))
+STIFF = f"peak points.beam.tip.deflection <= {DEFLECTION}"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def scene(keys):
+        path = tmp_path / "scene.toml"
+        path.write_text(tomli_w.dumps(keys), encoding="utf-8")
+        return path
+
+    return scene
+
+
+@pytest.mark.parametrize("method", ["slsqp", "trust-constr"])
+def test_gear_ratio_of_matched_inertias(write, method):
+    """Of a motor with inertia J_m behind a gear, α (J/N + J_m N) is least at N = √(J/J_m): 2 α √(J J_m)."""
+    found = ffrobot.optimise(write(ARM), [f"{RATIO}=20:500:log"], minimise=MOTOR, method=method, processes=2)
+    assert found.values[0] == pytest.approx(np.sqrt(J / 2e-5), rel=1e-4)
+    assert found.value == pytest.approx(2.0 * 2.0 * np.sqrt(J * 2e-5), rel=1e-8)
+    assert found.converged
+    assert found.start.values[0] == pytest.approx(2.0 * (J / 50.0 + 2e-5 * 50.0), rel=1e-9)
+    assert not np.isfinite(found.bound_prices).any()
+
+
+def test_lightest_cantilever(write):
+    """w h³ ≥ a = 4 F L³/(E δ): h as high as it may be, and w = a/h³: m = ρ L a/h², ∂m/∂δ = −m/δ, ∂m/∂h = −2 m/h."""
+    found = ffrobot.optimise(
+        write(CANTILEVER),
+        [f"{HEIGHT}=0.01:0.04", f"{WIDTH}=0.002:0.05"],
+        minimise="mass",
+        subject_to=[STIFF, "frequency 1 beam >= 10"],
+        processes=2,
+    )
+    a, h = 4.0 * FORCE * L**3 / (E * DEFLECTION), 0.04
+    mass = RHO * L * a / h**2
+    np.testing.assert_allclose(found.values, [h, a / h**3], rtol=1e-6)
+    assert found.value == pytest.approx(mass, rel=1e-6)
+    assert found.limits[0] <= DEFLECTION * (1.0 + 1e-6)
+    assert found.feasible
+    assert found.converged
+    assert found.prices[0] == pytest.approx(-mass / DEFLECTION, rel=1e-4)
+    assert np.isnan(found.prices[1])
+    assert found.bound_prices[0] == pytest.approx(-2.0 * mass / h, rel=1e-4)
+    text = str(found)
+    assert f"peak points.beam.tip.deflection: 0.00101 m in place of 0.001 saves {0.01 * mass:.4g} kg (1 %)" in text
+    assert f"{HEIGHT}: 0.0404 in place of 0.04 saves {0.02 * mass:.4g} kg (2 %)" in text
+    assert "inverse" not in text
+    assert "still: completed" in text
+
+
+def test_designs_that_fail_are_passed_over(write):
+    """The lightest tube is as wide as it may be and thin: designs with a wider hole than themselves fail on the way."""
+    link = BEAM | {"geometry": BEAM["geometry"] | {"section": {"shape": "tube", "outer": 0.03, "inner": 0.005}}}
+    scene = CANTILEVER | {"body": [{"name": "beam", "link": link}]}
+    vary = [f"{OUTER}=0.01:0.031", f"{INNER}=0.001:0.0305"]
+    found = ffrobot.optimise(write(scene), vary, minimise="mass", subject_to=[STIFF], processes=2)
+    inertia = FORCE * L**3 / (3.0 * E * DEFLECTION)
+    expected = [0.031, (0.031**4 - 64.0 * inertia / np.pi) ** 0.25]
+    np.testing.assert_allclose(found.values, expected, rtol=1e-6)
+    assert any("expected less than outer" in text for text in found.failures)
+    assert found.converged
+
+
+def test_rows_of_a_catalogue(write):
+    """Gears with their rotors: 2 (J/N + J_m N) of each row, by hand."""
+    rows = [(30, 1e-5), (60, 5e-5), (90, 2e-5), (160, 2.5e-5)]
+    text = ", ".join(f"{ratio}:{inertia}" for ratio, inertia in rows)
+    found = ffrobot.optimise(
+        write(ARM), [f"{RATIO},joint.shoulder.rotor_inertia in {{{text}}}"], minimise=MOTOR, processes=2
+    )
+    moments = [2.0 * (J / ratio + inertia * ratio) for ratio, inertia in rows]
+    assert found.values == rows[int(np.argmin(moments))]
+    assert found.value == pytest.approx(min(moments), rel=1e-8)
+    assert (found.method, found.runs) == ("all", 4)
+
+
+def test_catalogue_beside_a_number(write):
+    """Of each rotor the best gear has 4 √(J J_m): the lightest rotor, with the gear between bounds found to 1e-4."""
+    vary = ["joint.shoulder.rotor_inertia in {5e-5, 1e-5, 3e-5}", f"{RATIO}=20:500:log"]
+    found = ffrobot.optimise(write(ARM), vary, minimise=MOTOR, processes=2, seed=3)
+    assert found.method == "differential-evolution"
+    assert found.values[0] == 1e-5
+    assert found.values[1] == pytest.approx(np.sqrt(J / 1e-5), rel=1e-4)
+
+
+def test_places_of_patches(write, tmp_path):
+    """Two patches where the largest voltage over a path is least: the same as `kind = "placement"` says of all sets."""
+    link = BEAM | {
+        "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
+        "mesh": {"elements": 10},
+        "geometry": BEAM["geometry"] | {"section": {"shape": "rectangle", "height": 0.004, "width": 0.03}},
+    }
+    pzt = {
+        "body": "beam",
+        "centers": [0.1, 0.4],
+        "length": 0.1,
+        "width": 0.025,
+        "thickness": 0.75e-3,
+        "modulus": 63e9,
+        "d31": 110e-12,
+        "structural": False,
+    }
+    scene = {
+        "name": "placed",
+        "gravity": [0.0, 0.0],
+        "body": [{"name": "beam", "link": link}],
+        "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "beam.root"]}],
+        "trajectory": [{"name": "tip", "point": "beam.tip", "y": "0.1*sin(2*pi*t)"}],
+        "pzt": [pzt],
+        "analysis": [
+            {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.01},
+            {
+                "name": "placed",
+                "kind": "placement",
+                "about": "inverse",
+                "placement": {"body": "beam", "criterion": "voltage"},
+            },
+        ],
+    }
+    path = write(scene)
+    with ffrobot.solve(path) as results:
+        best, places = results["placed/placement/best/centers"], results["placed/placement/candidates"]
+        voltage = results["placed/placement/best/value"]
+    rows = ", ".join(f"{a}:{b}" for a in places for b in places if b - a > 0.0999)
+    found = ffrobot.optimise(
+        path, [f"pzt.beam.centers.0,pzt.beam.centers.1 in {{{rows}}}"],
+        minimise="peak pzt.beam.required_voltage", processes=2,
+    )  # fmt: skip
+    assert found.values == pytest.approx(best)
+    assert found.value == pytest.approx(-float(voltage), rel=1e-6)  # the criterion is to be largest
+
+
+def test_shortest_path_time(write):
+    """A quintic from rest to rest takes 10/√3 J Δ/T² at most: the least T that a motor's moment M allows."""
+    scene = deepcopy(ARM)
+    del scene["trajectory"][0]["value"]
+    scene["trajectory"][0] |= {"via": [0.0, 1.2], "duration": 0.8, "smoothness": 2}
+    scene["joint"][0]["rotor_inertia"] = 0.0
+    scene["analysis"][0] |= {"end": 1.0, "output_step": 0.0005}
+    found = ffrobot.optimise(
+        write(scene),
+        ["trajectory.swing.duration=0.2:1.0"],
+        minimise="value trajectory.swing.duration",
+        subject_to=["peak joints.shoulder.moment <= 5"],
+        processes=2,
+    )
+    assert found.value == pytest.approx(np.sqrt(10.0 / np.sqrt(3.0) * J * 1.2 / 5.0), rel=1e-5)
+    assert found.limits[0] <= 5.0 * (1.0 + 1e-6)
+    assert found.prices[0] == pytest.approx(-found.value / 10.0, rel=1e-2)
+
+
+def test_starts(write):
+    """The moment J x s̈ + m g c cos(x s) at a time of the path to x has minima near x s = π and, lower, 3π.
+
+    From the scene the first one is found, from a Latin hypercube the second: sin(x s) = J s̈/(m g c s).
+    """
+    scene = deepcopy(ARM) | {"gravity": [0.0, -9.81]}
+    scene["joint"][0]["rotor_inertia"] = 0.0
+    del scene["trajectory"][0]["value"]
+    scene["trajectory"][0] |= {"via": [0.0, 2.5], "duration": 2.0, "smoothness": 2}
+    scene["analysis"][0] |= {"end": 2.0, "output_step": 0.2}
+    task = {"minimise": "at 1.6 joints.shoulder.moment", "processes": 2}
+    vary = ["trajectory.swing.via.1=1:12"]
+    s, acceleration, weight = 0.94208, -1.44, 2.0 * 9.81 * 0.3
+    tilt = np.arcsin(-J * acceleration / (weight * s))
+    near = ffrobot.optimise(write(scene), vary, **task)
+    assert near.values[0] == pytest.approx((np.pi + tilt) / s, rel=1e-4)
+    found = ffrobot.optimise(write(scene), vary, starts=4, seed=1, **task)
+    x = (3.0 * np.pi + tilt) / s
+    assert found.values[0] == pytest.approx(x, rel=1e-4)
+    assert found.value == pytest.approx(J * acceleration * x + weight * np.cos(x * s), rel=1e-8)
+    assert len(found.searches) == 4
+
+
+def test_going_on(ffrobot, write):
+    """What was stopped is taken up: no run is made twice. The best design is a scene of its own."""
+    scene = write(CANTILEVER)
+    vary = ("--vary", f"{HEIGHT}=0.01:0.04", "--vary", f"{WIDTH}=0.002:0.05")
+    command = ("optimise", scene, "--minimise", "mass", "--subject-to", STIFF, *vary, "-j", 2)
+    folder = scene.with_suffix(".optimum")
+    stopped = ffrobot(*command, "--runs", 8)
+    assert "ended after" in stopped.stdout
+    rows = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")}
+    assert len(rows) <= 8
+    done = ffrobot(*command)
+    assert done.returncode == 0, done.stderr
+    assert "price      peak points.beam.tip.deflection: 0.00101 m in place of 0.001 saves" in done.stdout
+    assert {path: path.stat().st_mtime_ns for path in rows} == rows
+    with (folder / "designs.csv").open(encoding="utf-8") as file:
+        designs = list(csv.DictReader(file))
+    assert {row["status"] for row in designs} == {"completed"}
+    best = min((row for row in designs if float(row["violation"]) <= 1e-6), key=lambda row: float(row["mass"]))
+    link = tomllib.loads((folder / "best" / "scene.toml").read_text(encoding="utf-8"))["body"][0]["link"]
+    assert link["geometry"]["section"]["width"] == pytest.approx(float(best[WIDTH]), rel=1e-6)
+    assert ffrobot("solve", folder / "best" / "scene.toml").returncode == 0
+
+
+def test_no_design_keeps_the_limits(ffrobot, write):
+    scene = write(CANTILEVER)
+    done = ffrobot(
+        "optimise", scene, "--minimise", "mass", "--subject-to", "peak points.beam.tip.deflection <= 1e-5",
+        "--vary", f"{WIDTH}=0.01:0.03", "-j", 2,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "no design found that keeps all limits" in done.stderr
+    height, width = 0.02, 0.03
+    deflection = 4.0 * FORCE * L**3 / (E * width * height**3)
+    assert f"exceeded by {100 * (deflection / 1e-5 - 1):.3g} %" in done.stdout

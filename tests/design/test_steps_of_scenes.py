@@ -1,0 +1,104 @@
+"""`keep_steps` and `repeat_steps` of analyses: the same run again, mistakes, and where sensitivity does without."""
+
+from copy import deepcopy
+
+import numpy as np
+import pytest
+import tomli_w
+
+import ffrobot
+
+LINK = {
+    "name": "arm",
+    "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
+    "mesh": {"elements": 6},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
+    "damping": {"ratio": 0.02},
+}
+SCENE = {
+    "name": "arm",
+    "gravity": [0.0, -9.81],
+    "body": [{"name": "arm", "link": LINK}],
+    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+    "payload": [{"point": "arm.tip", "mass": 0.5}],
+    "initial": {"state": "static"},
+    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
+    "analysis": [
+        {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01},
+        {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints"},
+    ],
+}
+IN_SPACE = {
+    "space": "spatial",
+    "gravity": [0.0, 0.0, -9.81],
+    "joint": [SCENE["joint"][0] | {"axis": [0.3, 0.8, 0.5]}],
+    "body": [{"name": "arm", "link": LINK | {"modes": LINK["modes"] | {"family": "in-plane-bending"}}}],
+}
+
+
+def with_steps(keys, **of_analyses):
+    new = deepcopy(keys)
+    for analysis in new["analysis"]:
+        analysis |= of_analyses
+    return new
+
+
+@pytest.fixture
+def kept(tmp_path):
+    """The file of a planar run with its steps."""
+    path = tmp_path / "kept.h5"
+    with ffrobot.solve(ffrobot.make_scene(**with_steps(SCENE, keep_steps=True))) as results:
+        return results.save(path)
+
+
+def histories(results):
+    names = [f"{analysis}/points/arm.tip/position" for analysis in results.analyses] + [
+        "inverse/joints/shoulder/moment"
+    ]
+    return np.hstack([results[name].reshape(len(results[name]), -1) for name in names])
+
+
+@pytest.mark.parametrize("more", [{}, IN_SPACE], ids=["plane", "space"])
+def test_the_same_run_again(tmp_path, more):
+    """An inverse analysis and its replay with their own steps: equal to rounding; and they keep the same steps."""
+    scene = SCENE | more
+    with ffrobot.solve(ffrobot.make_scene(**with_steps(scene, keep_steps=True))) as results:
+        path = results.save(tmp_path / "kept.h5")
+        expected, steps = histories(results), {name: results[f"{name}/step_ends"] for name in results.analyses}
+    again = with_steps(scene, keep_steps=True, repeat_steps=str(path))
+    with ffrobot.solve(ffrobot.make_scene(**again)) as results:
+        for name, ends in steps.items():
+            np.testing.assert_array_equal(results[f"{name}/step_ends"], ends)
+            assert results.attributes(name)["integrator_reason"] == "steps taken again"
+        np.testing.assert_allclose(histories(results), expected, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"end": 0.2}, "expected steps up to 0.2 s, where the run ends, found them up to 0.1 s"),
+        ({"name": "other"}, 'expected the steps of an analysis "other", found none'),
+        ({"integrator": "radau"}, 'expected integrator = "dop853", which made the steps'),
+        ({"check": "finer"}, 'expected no "check" beside it'),
+        ({"repeat_steps": "kept.hdf"}, 'did you mean "kept.h5"?'),
+    ],
+)
+def test_mistakes(tmp_path, kept, changes, message):
+    keys = SCENE | {"analysis": [SCENE["analysis"][0] | {"repeat_steps": "kept.h5"} | changes]}
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps(keys), encoding="utf-8")
+    with pytest.raises(ffrobot.InputError) as told:
+        ffrobot.solve(path)
+    assert message in str(told.value)
+
+
+def test_runs_that_cannot_be_repeated_choose_their_own_steps(tmp_path):
+    """With the implicit integrator: differences as they are of any runs, at the tolerance of those."""
+    keys = SCENE | {"analysis": [SCENE["analysis"][0] | {"integrator": "radau", "end": 0.02}]}
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps(keys), encoding="utf-8")
+    found = ffrobot.sensitivity(path, ["rms joints.shoulder.moment"], ["payload.0.mass"], processes=2)
+    assert {entry.method for row in found.entries for entry in row} == {"differences"}
+    assert found.tolerance == 1e-9

@@ -1,0 +1,253 @@
+"""`ffrobot uncertainty`: closed forms, functions with known Sobol indices, bands two ways, failed samples."""
+
+import csv
+from math import sqrt
+
+import h5py
+import numpy as np
+import pytest
+import tomli_w
+from scipy.stats import norm, qmc
+
+import ffrobot
+from ffrobot.design.linear_spread import LinearModel
+from ffrobot.design.spreads import Spread, parse_spread, spread_points
+from ffrobot.design.statistics import LEVELS, regression_shares, sobol_indices, statistics
+
+ARM = {
+    "name": "arm",
+    "gravity": [0.0, -9.81],
+    "payload": [{"point": "arm.tip", "mass": 0.5}],
+    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.05}],
+    "body": [
+        {
+            "name": "arm",
+            "rigid": {
+                "mass": 2.0,
+                "center": [0.3, 0.0],
+                "inertia": 0.05,
+                "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]},
+            },
+        }
+    ],
+}
+MASS, PAYLOAD, MOMENT = "body.arm.rigid.mass", "payload.0.mass", "joints.shoulder.moment"
+SLOPES = np.array([9.81 * 0.3 + 2.0 * 0.3**2, 9.81 * 0.6 + 2.0 * 0.6**2])
+"""Of the moment at the start, level and with 2 rad/s², by both masses."""
+
+BEAM = {
+    "name": "arm",
+    "material": {"youngs_modulus": 70e9, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
+    "mesh": {"elements": 4},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 1, "family": "in-plane-bending", "attachment_modes": False},
+    "damping": {"ratio": 0.02},
+}
+
+
+@pytest.fixture
+def write(tmp_path):
+    def scene(keys):
+        path = tmp_path / "scene.toml"
+        path.write_text(tomli_w.dumps(keys), encoding="utf-8")
+        return path
+
+    return scene
+
+
+def spread(kind, deviation, mean=0.0):
+    return Spread(("key",), "", mean, kind, mean, deviation)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "mean", "deviation"),
+    [
+        ("payload.0.mass=±2%", "uniform", 0.5, 0.01 / sqrt(3.0)),
+        ("payload.0.mass=+-0.1", "uniform", 0.5, 0.1 / sqrt(3.0)),
+        ("payload.0.mass=uniform:0.2:0.6", "uniform", 0.4, 0.4 / sqrt(12.0)),
+        ("payload.0.mass=normal:0.03", "normal", 0.5, 0.03),
+        ("gravity.1=normal:1%", "normal", -9.81, 0.0981),
+    ],
+)
+def test_what_spreads_say(write, text, kind, mean, deviation):
+    found = parse_spread(text, write(ARM))
+    assert found.kind == kind
+    assert found.mean == pytest.approx(mean, rel=1e-14)
+    assert found.deviation == pytest.approx(deviation, rel=1e-14)
+    values = found.values((np.arange(100_000) + 0.5) / 100_000)
+    assert values.mean() == pytest.approx(mean, rel=1e-9)
+    assert values.std() == pytest.approx(deviation, rel=1e-3)  # the tails of a normal one are cut a little
+
+
+def test_sampling_errors_are_what_repetitions_show():
+    """Of 2000 experiments with 300 samples each: a skewed quantity, x + x²/10 with x normal."""
+    x = np.random.default_rng(7).normal(size=(300, 2000))
+    found = statistics(x + x**2 / 10.0)
+    for values, errors in (
+        (found.mean, found.mean_error),
+        (found.deviation, found.deviation_error),
+        *zip(found.quantiles, found.quantile_errors, strict=True),
+    ):
+        assert np.sqrt(np.mean(errors**2)) == pytest.approx(values.std(), rel=0.15)
+    assert found.mean.mean() == pytest.approx(0.1, abs=4.0 * found.mean.std() / sqrt(2000))
+    z = norm.ppf(LEVELS)
+    off = found.quantiles.mean(axis=1) - (z + z**2 / 10.0)
+    assert np.all(np.abs(off) < 0.2 * found.quantiles.std(axis=1))  # of order 1/n
+
+
+def test_sobol_indices_of_a_known_function():
+    """Ishigami & Homma (1990): sin x₁ + a sin² x₂ + b x₃⁴ sin x₁ on [−π, π]³, whose third input acts with the first."""
+    a, b, n = 7.0, 0.1, 8192
+    u = qmc.LatinHypercube(6, seed=3).random(n)
+    blocks = [u[:, :3], u[:, 3:]]
+    blocks += [np.where(np.arange(3) == i, blocks[1], blocks[0]) for i in range(3)]
+
+    def ishigami(u):
+        x = np.pi * (2.0 * u - 1.0)
+        return (np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0]))[:, None]
+
+    f = np.array([ishigami(block) for block in blocks])
+    found = sobol_indices(f[0], f[1], f[2:])
+    v1, v2, v13 = 0.5 * (1.0 + b * np.pi**4 / 5.0) ** 2, a**2 / 8.0, b**2 * np.pi**8 * (1.0 / 18.0 - 1.0 / 50.0)
+    first, total = np.array([v1, v2, 0.0]), np.array([v1 + v13, v2, v13])
+    np.testing.assert_array_less(np.abs(found.first[0] - first / (v1 + v2 + v13)), 4.0 * found.first_error[0])
+    np.testing.assert_array_less(np.abs(found.total[0] - total / (v1 + v2 + v13)), 4.0 * found.total_error[0])
+    assert found.first_error.max() < 0.03
+    assert found.total_error.max() < 0.03
+    f[3, 5] = np.nan  # a run that failed
+    np.testing.assert_allclose(sobol_indices(f[0], f[1], f[2:]).total, found.total, atol=0.01)
+
+
+def test_shares_of_a_linear_function():
+    u = qmc.LatinHypercube(2, optimization="random-cd", seed=1).random(200)
+    x = np.array(spread_points((spread("uniform", 1.0), spread("normal", 2.0)), u))
+    shares, explained = regression_shares(x, x @ np.array([[3.0], [-2.0]]))
+    np.testing.assert_allclose(shares[0], [9.0 / 25.0, 16.0 / 25.0], atol=0.02)
+    assert explained[0] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_gradients_of_a_quadratic_tell_how_far_they_are_off():
+    """f = x + x²/10, x normal: the mean is 1/10, the variance 1 + 2/100."""
+    one = spread("normal", 1.0)
+    middle, sides = np.array(0.0), np.array([[1.1, -0.9]])
+    found = LinearModel.through((one,), middle, sides).statistics()
+    assert found.mean == 0.0
+    assert found.mean_error == pytest.approx(0.1, rel=1e-2)
+    assert found.deviation == pytest.approx(1.0, rel=1e-14)
+    assert found.deviation_error == pytest.approx(sqrt(1.02) - 1.0, rel=0.05)
+    np.testing.assert_allclose(found.quantiles, norm.ppf(LEVELS), atol=3e-3)  # there one of 4096 is 2.4e-3
+
+
+def test_linear_goals(write, tmp_path):
+    """Mass and moment of a rigid arm, by samples and by gradients; the samples are the runs'."""
+    path = write(ARM)
+    spreads = [f"{MASS}=±10%", f"{PAYLOAD}=normal:5%"]
+    of = ["mass", f"peak {MOMENT}", MOMENT]
+    deviations = np.array([0.2 / sqrt(3.0), 0.025])
+    expected = [deviations[0], sqrt(np.sum((SLOPES * deviations) ** 2))]
+    exact = ffrobot.uncertainty(path, of, spreads, tmp_path / "runs", by="gradients")
+    assert exact.runs == 5
+    np.testing.assert_allclose(exact.statistics.deviation, expected, rtol=1e-9)
+    np.testing.assert_allclose(exact.statistics.mean, [2.0, SLOPES @ [2.0, 0.5] + 2.0 * 0.05], rtol=1e-9)
+    np.testing.assert_allclose(exact.shares[1], (SLOPES * deviations / expected[1]) ** 2, rtol=1e-9)
+    assert exact.statistics.deviation_error.max() < 1e-9
+    sampled = ffrobot.uncertainty(path, of, spreads, tmp_path / "runs", samples=40)
+    assert sampled.runs == 41
+    assert not sampled.failures
+    np.testing.assert_allclose(sampled.statistics.deviation, expected, rtol=0.03)  # 0.3 % with 200 samples
+    np.testing.assert_allclose(sampled.statistics.mean, exact.statistics.mean, rtol=1e-3)
+    (band,) = sampled.bands
+    np.testing.assert_allclose(band.statistics.deviation, exact.bands[0].statistics.deviation, rtol=0.03)
+    assert band.statistics.deviation[0] == pytest.approx(sampled.statistics.deviation[1], rel=1e-12)
+    with (tmp_path / "runs" / "table.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))[-40:]
+    masses = np.array([[float(row[MASS]), float(row[PAYLOAD])] for row in rows])
+    np.testing.assert_allclose(sampled.samples[:, 0], masses[:, 0], rtol=1e-14)
+    np.testing.assert_allclose(sampled.samples[:, 1], masses @ SLOPES + 2.0 * 0.05, rtol=1e-9)
+
+
+def test_sobol_indices_of_a_scene(write):
+    """The moment is a sum: what a key does alone is all it does."""
+    spreads = [f"{MASS}=±10%", f"{PAYLOAD}=normal:5%"]
+    found = ffrobot.uncertainty(write(ARM), [f"peak {MOMENT}"], spreads, samples=48, indices=True, processes=2)
+    assert found.runs == 1 + 24 * 4
+    parts = (SLOPES * [0.2 / sqrt(3.0), 0.025]) ** 2
+    expected = parts / parts.sum()
+    i = found.indices
+    assert np.all(np.abs(i.first[0] - expected) < 4.0 * i.first_error[0])
+    assert np.all(np.abs(i.total[0] - expected) < 4.0 * i.total_error[0])
+
+
+def test_failed_samples_are_told_and_left_out(write, ffrobot, tmp_path):
+    """Of 60 masses 2 ± 0.95 the lowest is below 0 in a Latin hypercube: a sixtieth is below 2.13 deviations."""
+    command = ["uncertainty", write(ARM), "--of", "mass", "--spread", f"{MASS}=normal:0.95", "--samples", 60, "-j", 2]
+    done = ffrobot(*command)
+    assert done.returncode == 0, done.stderr
+    assert "failed     1 of 61 runs, left out: body.arm.rigid.mass = -" in done.stdout
+    assert "expected a number greater than 0" in done.stdout
+    runs = tmp_path / "scene.uncertainty" / "runs"
+    rows = sorted(runs.glob("*/row.json"))
+    before = [row.stat().st_mtime_ns for row in rows]
+    rows[7].unlink()
+    again = ffrobot(*command)
+    assert again.stdout == done.stdout
+    after = [row.stat().st_mtime_ns for row in rows]
+    assert [k for k, (old, new) in enumerate(zip(before, after, strict=True)) if old != new] == [7]
+    with (tmp_path / "scene.uncertainty" / "uncertainty.csv").open(encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    with (tmp_path / "scene.uncertainty" / "table.csv").open(encoding="utf-8") as file:
+        masses = np.array([float(one[MASS]) for one in list(csv.DictReader(file))[1:]])
+    assert float(row["mean"]) == pytest.approx(masses[masses > 0.0].mean(), rel=1e-12)
+    assert float(row["deviation"]) == pytest.approx(masses[masses > 0.0].std(ddof=1), rel=1e-12)
+
+
+@pytest.mark.slow
+def test_frequency_of_a_beam(write, tmp_path):
+    """f ∝ h/L²: with both uniform, E[h] E[L⁻²] and E[h²] E[L⁻⁴] are closed forms."""
+    body = [{"name": "arm", "link": BEAM}]
+    path = write(ARM | {"body": body, "analysis": [ARM["analysis"][0] | {"end": 0.001, "output_step": 0.001}]})
+    spreads = ["links.arm.geometry.section.height=±5%", "links.arm.geometry.length=uniform:0.55:0.65"]
+    found = ffrobot.uncertainty(path, ["frequency 1 arm"], spreads, tmp_path / "runs", samples=60)
+    a, b, h = 0.55, 0.65, 0.01
+    squared, fourth = 1.0 / (a * b), (a**-3 - b**-3) / (3.0 * (b - a))
+    factor = found.readings[0].value / (h / 0.6**2)
+    mean, square = h * squared, h**2 * (1.0 + 0.05**2 / 3.0) * fourth
+    assert found.statistics.mean[0] == pytest.approx(factor * mean, rel=2e-3)
+    assert found.statistics.deviation[0] == pytest.approx(factor * sqrt(square - mean**2), rel=0.04)
+    near = ffrobot.uncertainty(path, ["frequency 1 arm"], spreads, tmp_path / "runs", by="gradients")
+    off = abs(near.statistics.mean[0] - factor * mean)
+    assert off == pytest.approx(near.statistics.mean_error[0], rel=0.1)  # curvature is nearly all of it
+
+
+@pytest.mark.slow
+def test_bands_of_two_link_by_gradients_and_by_samples(case_copy, tmp_path):
+    """Within 5 %, peaks, means and the band of a moment, from rest with everything ±2 %: nothing rings much.
+
+    40 samples are enough for a hundredth: pairs of low discrepancy, and nearly sums of functions of one key.
+    """
+    path = case_copy("two_link")
+    text = path.read_text(encoding="utf-8").partition("# The same moments")[0]
+    for old, new in {"end = 1.0": "end = 0.02", "limit = 200.0": "limit = 1e6", '"undeformed"': '"static"'}.items():
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    names = ("links.link2.material.density", "links.link2.material.youngs_modulus", "gravity.1", "pzt.0.thickness")
+    spreads = [f"{name}=±2%" for name in names]
+    of = ["peak joints.O.moment", "rms pzt.link1.required_voltage[0]", "joints.O.moment"]
+    sampled = ffrobot.uncertainty(path, of, spreads, tmp_path / "runs", samples=40, processes=2)
+    near = ffrobot.uncertainty(path, of, spreads, tmp_path / "runs", by="gradients", processes=2)
+    assert near.runs == 9
+    np.testing.assert_allclose(near.statistics.deviation, sampled.statistics.deviation, rtol=0.05)
+    np.testing.assert_allclose(near.shares, sampled.shares, atol=0.05)
+    np.testing.assert_allclose(near.bands[0].statistics.deviation, sampled.bands[0].statistics.deviation, rtol=0.05)
+    _one_of_them_is_that_of_a_single_run(tmp_path)
+
+
+def _one_of_them_is_that_of_a_single_run(folder):
+    run = sorted((folder / "runs" / "runs").glob("*/results.h5"))[11]
+    with h5py.File(run) as file:
+        expected = file["inverse/joints/A/moment"][()]
+    np.testing.assert_array_equal(ffrobot.solve(run.with_name("scene.toml"))["inverse/joints/A/moment"], expected)
