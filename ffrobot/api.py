@@ -11,7 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
+    from .design.front import Front
+    from .design.optimise import Method
+    from .design.optimum import Optimum
     from .design.record import Sensitivity
+    from .design.uncertainty import Uncertainty
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
     from .fit import Fit
@@ -114,7 +118,7 @@ def _solve_spatial(
     else:
         solution = solve_spatial(scene, watcher, keep)
     for name, result in solution.analyses.items():
-        for text in result.run.warnings:
+        for text in result.warnings:
             warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=3)
     for run in solution.outcomes.values():
         run.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if path is not None else "")
@@ -167,25 +171,126 @@ def sensitivity(
     *,
     processes: int = 1,
     step: float = 0.01,
-    tolerance: float = 1e-9,
+    tolerance: float | None = None,
     allow_python: Sequence[AnyPath] = (),
 ) -> Sensitivity:
     """Derivatives of scalar results `of` a scene file by the numbers at keys `to`: `ffrobot sensitivity`.
 
     Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.sensitivity`.
     """
+    from .design.sensitivity import sensitivity
+
+    with _designs(Path(scene), output, allow_python) as folder:
+        found = sensitivity(Path(scene), of, to, folder, processes=processes, step=step, tolerance=tolerance)
+    return found if output is not None else replace(found, table=None)
+
+
+def optimise(
+    scene: AnyPath,
+    vary: Sequence[str],
+    output: AnyPath | None = None,
+    *,
+    minimise: str | None = None,
+    maximise: str | None = None,
+    subject_to: Sequence[str] = (),
+    method: Method = "auto",
+    starts: int = 1,
+    seed: int = 0,
+    runs: int = 1000,
+    processes: int = 1,
+    tolerance: float = 1e-8,
+    allow_python: Sequence[AnyPath] = (),
+) -> Optimum:
+    """The design with the least, or largest, goal within limits: `ffrobot optimise`, whose options these are.
+
+    Where no design keeps the limits the nearest one is returned, not `feasible`. Runs stay in the folder `output`, and
+    are not run again; without one they are forgotten. See `design.optimise`.
+    """
+    from .design.optimise import optimise
+
+    with _designs(Path(scene), output, allow_python) as folder:
+        found = optimise(
+            Path(scene), vary, folder, minimise=minimise, maximise=maximise, subject_to=subject_to, method=method,
+            starts=starts, seed=seed, most=runs, processes=processes, tolerance=tolerance,
+        )  # fmt: skip
+    return found if output is not None else replace(found, best_scene=None, designs=None)
+
+
+def trade_off(
+    scene: AnyPath,
+    vary: Sequence[str],
+    output: AnyPath | None = None,
+    *,
+    minimise: str,
+    against: str,
+    points: int = 8,
+    subject_to: Sequence[str] = (),
+    runs: int = 1000,
+    processes: int = 1,
+    tolerance: float = 1e-8,
+    allow_python: Sequence[AnyPath] = (),
+) -> Front:
+    """The least of one goal for each of `points` values of another: `ffrobot optimise … --against`.
+
+    Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.front`.
+    """
+    from .design.front import trade_off
+
+    with _designs(Path(scene), output, allow_python) as folder:
+        return trade_off(
+            Path(scene), vary, folder, minimise=minimise, against=against, points=points, subject_to=subject_to,
+            most=runs, processes=processes, tolerance=tolerance,
+        )  # fmt: skip
+
+
+@contextmanager
+def _designs(scene: Path, output: AnyPath | None, allow_python: Sequence[AnyPath]) -> Iterator[Path]:
+    """The folder of designs of a scene file, a temporary one without `output`."""
+    from tempfile import TemporaryDirectory
+
+    from .common.outputs import protected
+    from .common.python_files import python_allowed
+    from .run.inputs import files_of
+
+    with ExitStack() as stack:
+        folder = output if output is not None else stack.enter_context(TemporaryDirectory())
+        stack.enter_context(protected(files_of(scene)))
+        stack.enter_context(python_allowed(Path(place) for place in allow_python))
+        yield Path(folder)
+
+
+def uncertainty(
+    scene: AnyPath,
+    of: Sequence[str],
+    spread: Sequence[str],
+    output: AnyPath | None = None,
+    *,
+    samples: int = 200,
+    seed: int = 0,
+    by: Literal["samples", "gradients"] = "samples",
+    indices: bool = False,
+    processes: int = 1,
+    allow_python: Sequence[AnyPath] = (),
+) -> Uncertainty:
+    """Statistics of goals and histories `of` a scene file whose keys are `spread`: `ffrobot uncertainty`.
+
+    Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.uncertainty`.
+    """
     from contextlib import nullcontext
     from tempfile import TemporaryDirectory
 
     from .common.outputs import protected
     from .common.python_files import python_allowed
-    from .design.sensitivity import sensitivity
+    from .design.uncertainty import uncertainty
     from .run.inputs import files_of
 
     path = Path(scene)
     where = TemporaryDirectory() if output is None else nullcontext(str(output))
     with where as folder, protected(files_of(path)), python_allowed(Path(place) for place in allow_python):
-        found = sensitivity(path, of, to, Path(folder), processes=processes, step=step, tolerance=tolerance)
+        found = uncertainty(
+            path, of, spread, Path(folder),
+            samples=samples, seed=seed, by=by, indices=indices, processes=processes,
+        )  # fmt: skip
     return found if output is not None else replace(found, table=None)
 
 

@@ -20,7 +20,20 @@ FLOORS = {
     "fe_models": ("link_records", "modal_body", "beam", "solid", "."),
     "mbs": ("fields", "joints", "scene", "model", "solve", "analysis", "quantities", "."),
     "actuation": ("patches", ".", "control"),
-    "ffrobot": ("scene", "run", "results", "present", "exchange", "pictures", "sweep", "fit", "design", "bench", "."),
+    "ffrobot": (
+        "scene",
+        "run",
+        "results",
+        "present",
+        "exchange",
+        "pictures",
+        "sweep",
+        "fit",
+        "design",
+        "bench",
+        "commands",
+        ".",
+    ),
 }
 
 

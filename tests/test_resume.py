@@ -1,28 +1,13 @@
 """Runs that were stopped go on from their results file as if they had never been."""
 
 import h5py
-import numpy as np
 import pytest
+from stopped_runs import Stops, differences, edit, go_on, stop
 
 import ffrobot
-from ffrobot.run.watcher import Watcher
 
 END = 0.12
 SHORT = {"end = 1.0": f"end = {END}"}
-
-
-class Stops(Watcher):
-    """Stops the run of one analysis at its time t."""
-
-    def __init__(self, analysis, t):
-        self.analysis, self.t, self.stages, self.asked = analysis, t, [], []
-
-    def stage(self, title):
-        self.stages.append(title)
-
-    def advance(self, t, end):
-        self.asked.append((self.stages[-1], t))
-        return self.analysis not in self.stages[-1] or t < self.t
 
 
 @pytest.fixture
@@ -36,36 +21,6 @@ def arm(case_copy, ffrobot, monkeypatch):
         return scene
 
     return copy
-
-
-def edit(scene, replacements):
-    text = scene.read_text(encoding="utf-8")
-    for old, new in replacements.items():
-        assert old in text, old
-        text = text.replace(old, new)
-    scene.write_text(text, encoding="utf-8")
-
-
-def stop(scene, analysis, t):
-    watcher = Stops(analysis, t)
-    with pytest.raises(ffrobot.SolveError, match="interrupted") as error:
-        ffrobot.solve(scene, scene.with_suffix(".h5"), watcher)
-    return str(error.value)
-
-
-def go_on(scene, watcher=None):
-    return ffrobot.solve(scene, scene.with_suffix(".h5"), watcher, resume=True)
-
-
-def differences(results, expected):
-    """Of all histories of both, largest difference over largest value."""
-    assert results.analyses == expected.analyses
-    for analysis in expected.analyses:
-        found, wanted = results.columns(analysis), expected.columns(analysis)
-        assert found.keys() == wanted.keys()
-        for name, values in wanted.items():
-            assert found[name].shape == values.shape
-            yield name, np.abs(found[name] - values).max() / (np.abs(values).max() or 1.0)
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..mbs.quantities.attachment_error import JOLT
-from ..mbs.quantities.validity import largest
 from ..run.solution import AnalysisResult, Solution
+from .lines import deflection_in_words
 
 NOT_ESTIMATED = "not estimated"
 RESOLVED = 0.3  # an estimated error of modes beyond is none: they do not resolve the motion
@@ -18,7 +18,7 @@ def error_budget(solution: Solution) -> Iterator[str]:
         asked = " … ".join(f"{aim:.0e}" for aim in sorted({min(aims), max(aims)}))
         yield f"time integration: {asked} of peaks, asked for"
     yield f"modes: {_modes(solution)}"
-    yield f"deflection: {_deflection(solution)}"
+    yield f"deflection: {deflection_in_words(result.bending for result in solution.analyses.values())}"
     for name, result in solution.analyses.items():
         if result.check is not None:
             yield f"{name}, {result.check.in_words}"
@@ -43,12 +43,3 @@ def _modes(solution: Solution) -> str:
     if max(known) > RESOLVED:
         return "too few: vibrations faster than the highest take part"
     return f"{max(known):.0e} of peaks, estimated"
-
-
-def _deflection(solution: Solution) -> str:
-    """Of the analysis in which it is worst."""
-    found = [worst for result in solution.analyses.values() if (worst := largest(result.bending)) is not None]
-    if not found:
-        return "links are rigid"
-    name, link = max(found, key=lambda item: (item[1].is_beyond, item[1].position_error))
-    return "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"

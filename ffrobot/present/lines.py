@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from ..mbs.quantities.validity import Bending, deflection_warning, largest
 from ..mbs.solve.integrators import Choice
 
 
@@ -14,6 +15,26 @@ def alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
         names.setdefault(text, []).append(name)
     for text, of in names.items():
         yield f"{', '.join(of)}: {text}"
+
+
+def warning_lines(bending: Mapping[str, Mapping[str, Bending]], warnings: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Of all analyses by name; of those whose links bend too much the worst in full, the others by name."""
+    bent = {name: text for name, links in bending.items() if (text := deflection_warning(links))}
+    if bent:
+        worst = max(bent, key=lambda name: max(link.position_error for link in bending[name].values()))
+        others = [name for name in bent if name != worst]
+        yield f"{worst}: {bent[worst]}" + (f" (likewise, but less: {', '.join(others)})" if others else "")
+    told = ((name, text) for name, of in warnings.items() for text in of)
+    yield from alike((name, text) for name, text in told if text != bent.get(name))
+
+
+def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
+    """How far links bend, and what it does to results, in the analysis in which it is worst."""
+    found = [worst for links in bending if (worst := largest(links)) is not None]
+    if not found:
+        return "links are rigid"
+    name, link = max(found, key=lambda item: (item[1].is_beyond, item[1].position_error))
+    return "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"
 
 
 def integrator_lines(choices: Mapping[str, Choice]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from rich.table import Table
 from ..results.verdict import Verdict
 from ..run.spatial_solution import SpatialSolution
 from .control import control_lines, control_tables
-from .lines import integrator_lines
+from .lines import deflection_in_words, integrator_lines, warning_lines
 from .modes import chosen_modes, pieces_in_words
 from .stresses import stress_table
 from .tables import plain_table
@@ -55,9 +55,9 @@ def print_spatial_summary(
         if table.row_count:
             console.print()
             console.print(table)
-    for name, result in solution.analyses.items():
-        for text in result.warnings:
-            console.print(f"warning    {name}: {text}")
+    bending = {name: result.bending for name, result in solution.analyses.items()}
+    for line in warning_lines(bending, {name: result.warnings for name, result in solution.analyses.items()}):
+        console.print(f"warning    {line}")
     notes = Table.grid(padding=(0, 2))
     for one in verdict.analyses:
         if one.answer:
@@ -67,6 +67,7 @@ def print_spatial_summary(
     chosen = {name: one.run.integrator for name, one in solution.analyses.items() if one.run.analysis.is_integrated}
     for line in integrator_lines(chosen):
         notes.add_row("integrator", line)
+    notes.add_row("accuracy", f"deflection: {deflection_in_words(bending.values())}")
     for name, result in solution.analyses.items():
         if result.check is not None:
             notes.add_row("accuracy", f"{name}, {result.check.in_words}")

@@ -13,12 +13,11 @@ from rich.table import Table
 from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
 from ..mbs.analysis.outcome import Details, Outcome
 from ..mbs.model.raised_mass import raised_in_words
-from ..mbs.quantities.validity import deflection_warning
 from ..results.verdict import Verdict
 from ..run.solution import Solution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
-from .lines import alike, integrator_lines
+from .lines import integrator_lines, warning_lines
 from .modes import chosen_modes, pieces_in_words
 from .stresses import stress_table
 from .tables import plain_table
@@ -38,7 +37,9 @@ def print_summary(
 ) -> None:
     """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
     console.print(_analyses(solution))
-    for line in _warnings(solution):
+    bending = {name: result.bending for name, result in solution.analyses.items()}
+    told = {name: result.warnings for name, result in solution.analyses.items()}
+    for line in warning_lines(bending, told):
         console.print(f"warning    {line}")
     for table in _tables(solution):
         console.print()
@@ -90,17 +91,6 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
     yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
     if solution.omissions:
         yield "skipped", "; ".join(solution.omissions)
-
-
-def _warnings(solution: Solution) -> Iterator[str]:
-    """Of all analyses; of those whose links bend too much the worst in full, the others by name."""
-    bent = {name: text for name, result in solution.analyses.items() if (text := deflection_warning(result.bending))}
-    if bent:
-        worst = max(bent, key=lambda name: solution.analyses[name].position_error)
-        others = [name for name in bent if name != worst]
-        yield f"{worst}: {bent[worst]}" + (f" (likewise, but less: {', '.join(others)})" if others else "")
-    told = ((name, text) for name, result in solution.analyses.items() for text in result.warnings)
-    yield from alike((name, text) for name, text in told if text != bent.get(name))
 
 
 def _inversion(outcome: Outcome, found: InvertedPath) -> str:

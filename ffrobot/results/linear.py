@@ -36,10 +36,11 @@ def write_linear(group: h5py.Group, outcome: Outcome, linear: LinearModels) -> N
 def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: LinearModels) -> None:
     """Of an analysis in space: linear/; `motion` is what it is about."""
     along_v, shapes = _motion(linear), {}
-    for node, frame in zip(motion.model.tree.nodes, motion.frames, strict=True):
+    for name in motion.points:
+        node, frame = motion.node(name), motion.frames[motion.model.tree.index[name]]
         of_frame = np.einsum("tij,tfj->tfi", frame.L, along_v)
         modal = along_v[:, :, node.p_v] @ node.body.modal_transform.T
-        shapes[node.body.name] = {"position": of_frame[:, :, :3], "rotation": of_frame[:, :, 3:], "modal": modal}
+        shapes[name] = {"position": of_frame[:, :, :3], "rotation": of_frame[:, :, 3:], "modal": modal}
     write_models(group, linear, shapes)
 
 

@@ -26,6 +26,7 @@ def _table(text: str) -> Mapping[str, Meaning]:
 
 RESULTS = _table("""
 time | s | of outputs
+step_ends | s | where steps end, with keep_steps
 bodies/*/position | m | of the body's frame
 bodies/*/angle | rad | of the body's frame
 bodies/*/quaternion | | of the body's frame, w first

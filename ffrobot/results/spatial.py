@@ -17,13 +17,13 @@ from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial_solution import SpatialResult, SpatialSolution
 from .actuators import write_placement, write_point_forces
-from .bodies import write_stress
+from .bodies import write_bending, write_stress
 from .control import write_loop
 from .forces import write_path
 from .linear import write_spatial_linear
 from .spatial_actuation import write_actuation
 from .spatial_resume import write_state_in_space
-from .write import write_check, write_head, write_mode_errors
+from .write import write_check, write_head, write_mode_errors, write_steps
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -36,7 +36,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         write_head(file, solution.scene.name, solution.scene.text, solution.bodies)
         file.attrs["space"] = "spatial"
-        file.attrs["geometric_stiffening"] = solution.scene.geometric_stiffening
+        file.attrs["geometric_stiffening"] = solution.is_stiffened
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
             _write_analysis(file.create_group(name), solution, result)
@@ -61,12 +61,15 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
     group.attrs.update({"integrator": run.integrator.name, "integrator_reason": run.integrator.reason})
     for key in ("steps", "evaluations", "wall_seconds", "status"):
         group.attrs[key] = getattr(run, key)
+    group.attrs["stiffening_effect"] = result.stiffening_effect
     group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
     if joints := resolving_joints(motion.model):
         group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     group["time"] = run.time
     write_check(group, result.check)
+    write_steps(group, run.step_ends, run.integrator.name)
     _write_bodies(group, solution, result)
+    write_bending(group, result.bending)
     _write_joints(group, solution, result)
     for body, forces in result.point_forces.items():
         write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)

@@ -17,6 +17,7 @@ from ..mbs.analysis.spatial_earlier import MEMORY, ROWS, VECTORS, EarlierSpatial
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.solve.integrators import Choice
 from ..run.spatial import Keep, prepare_spatial, run_spatial
+from ..run.spatial_prepare import stiffened_in_space
 from ..run.spatial_solution import SpatialSolution
 from ..run.watcher import Watcher
 from ..scene.spatial import SpatialScene
@@ -43,6 +44,8 @@ def resume_spatial(
         names = analyses(solution)
         if all(file.has(name) and file.attributes(name)["status"] == "completed" for name in names):
             return None
+        if solution.scene.geometric_stiffening == "auto" and file.attributes("/")["geometric_stiffening"]:
+            solution = stiffened_in_space(solution)
         kept = [name for name in file.analyses if file.has(f"{name}/{GROUP}")]
         solution = replace(solution, earlier={name: _earlier_run(file, name) for name in kept})
     return run_spatial(solution, watcher, keep)

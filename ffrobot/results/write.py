@@ -12,11 +12,14 @@ import h5py
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placing import Placed
-from ..common.checksum import MARK, METHOD, sealed
+from ..common.arrays import Array
+from ..common.checksum import MARK, sealed
+from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.version import program_version
 from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Details, Outcome
+from ..mbs.fields.steps import DATASET, METHOD
 from ..run.loaded_body import Loaded
 from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, FinerCheck, Solution
@@ -62,7 +65,7 @@ def write_head(file: h5py.File, name: str, text: str, bodies: Mapping[str, Loade
     """What every results file says of itself, of the scene `name` with its `text`, and of the modal bodies' files."""
     file.attrs["format"] = FORMAT
     file.attrs["format_version"] = FORMAT_VERSION
-    file.attrs[MARK] = METHOD
+    file.attrs[MARK] = CHECKSUM
     file.attrs["ffrobot_version"] = program_version()
     file.attrs["name"] = name
     file.attrs["scene"] = text
@@ -90,6 +93,7 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     write_bending(group, result.bending)
     for body, divided in solution.divided.items():
         group[f"bodies/{body}"].attrs["pieces"] = len(divided.names)
+    write_steps(group, outcome.statistics.step_ends, outcome.statistics.integrator.name)
     write_forces(group, outcome)
     write_actuators(group, solution, result)
     for body, stress in result.stresses.items():
@@ -97,6 +101,13 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     for found, write in DETAILS.items():
         if isinstance(outcome.details, found):
             write(group, outcome, outcome.details)
+
+
+def write_steps(group: h5py.Group, ends: Array, method: str) -> None:
+    """Where steps of an integration ended, if it can be repeated by them."""
+    if len(ends):
+        group[DATASET] = ends
+        group[DATASET].attrs[METHOD] = method
 
 
 def write_check(group: h5py.Group, found: FinerCheck | None) -> None:

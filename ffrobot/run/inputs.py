@@ -14,7 +14,7 @@ from ..common.errors import InputError
 from ..common.toml_files import parse_toml, read_text
 from ..common.version import program_version
 
-FILE_KEYS = {"link", "modal", "waypoints", "file", "python", "table"}
+FILE_KEYS = {"link", "modal", "waypoints", "file", "python", "table", "repeat_steps"}
 """Keys of scene and link files whose text names a file, "FILE.py:FUNCTION" of Python."""
 
 PROGRAM = "ffrobot"

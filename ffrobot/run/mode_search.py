@@ -133,17 +133,22 @@ class ModeSearch(Generic[B]):
         self._level, self._is_over, self._completed = 0, False, False
         self._began = self._last = time.perf_counter()
 
-    def next_bodies(self) -> Mapping[str, B] | None:
-        """The bodies to solve with; None where the last solve is the one to keep."""
-        self._last = self._last if self._is_over else time.perf_counter()
-        return None if self._is_over else self._levels[self._level]
+    @property
+    def bodies(self) -> Mapping[str, B]:
+        """The bodies to solve with next; those of the solve to keep once it is over."""
+        return self._levels[self._level]
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last solve is the one to keep."""
+        return self._is_over
 
     def add(self, reported: Mapping[str, Reported] | None, *, last: bool) -> None:
-        """Take in, by analysis, what a solve with the bodies asked for found; None where not all of them completed.
+        """Take in, by analysis, what a solve with `bodies` found; None where not all of them completed.
 
         It is the `last` one in any case where that is said.
         """
-        self._tried.append(sum(body.n_modes for body in self._levels[self._level].values()))
+        self._tried.append(sum(body.n_modes for body in self.bodies.values()))
         self._completed = reported is not None
         if reported is not None:
             self._estimate.add(reported)
@@ -152,6 +157,7 @@ class ModeSearch(Generic[B]):
         if not self._is_over:
             hopeless = not self._completed or self._estimate.is_hopeless(self._tolerances, self._more - 1)
             self._level = len(self._levels) - 1 if hopeless else self._level + 1
+            self._last = time.perf_counter()
 
     @property
     def _more(self) -> int:

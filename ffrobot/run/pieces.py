@@ -14,7 +14,6 @@ import numpy as np
 
 from ..actuation.control.linear import LinearModels
 from ..common.arrays import Array, as_floats
-from ..common.errors import InputError
 from ..common.plane import perpendicular, rotated
 from ..fe_models.link_records import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
@@ -23,9 +22,8 @@ from ..mbs.model.model import Constraint, Model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.system import MechanismSystem
 from ..mbs.quantities.stiffening import shortenings
-from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces
-from ..scene.pieces import BodyInPieces, bodies_in_pieces, places_on_pieces
-from ..scene.scene import Scene
+from ..mbs.quantities.validity import ENOUGH, enough_pieces
+from ..scene.pieces import BodyInPieces, places_on_pieces
 from .bodies import LoadedBody
 from .divided import as_divided
 from .solution import Solution
@@ -54,32 +52,6 @@ def wanted_pieces(solution: Solution) -> dict[str, int]:
             wanted[body.name] = max(min(MOST, count), len(names))
     now = {name: len(solution.divided[name].names) if name in solution.divided else 1 for name in wanted}
     return {} if wanted == now else wanted
-
-
-def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyInPieces]) -> dict[str, Bending]:
-    """How far links bend, each divided one as its piece whose results are worst."""
-    link_of = {piece: name for name, body in divided.items() for piece in body.names}
-    worst: dict[str, Bending] = {}
-    for piece, found in bending.items():
-        name = link_of.get(piece, piece)
-        if name not in worst or found.position_error > worst[name].position_error:
-            worst[name] = replace(found, pieces=len(divided[name].names)) if name in divided else found
-    return worst
-
-
-def with_advice(bending: Mapping[str, Bending], scene: Scene) -> dict[str, Bending]:
-    """How far links bend, those beyond small deformations with whether the scene lets them be divided."""
-    return {
-        name: replace(found, is_divisible=_is_divisible(scene, name)) if found.is_beyond else found
-        for name, found in bending.items()
-    }
-
-
-def _is_divisible(scene: Scene, name: str) -> bool:
-    try:
-        return bool(bodies_in_pieces(scene, {name: 2}))
-    except InputError:
-        return False
 
 
 def as_one_link(

@@ -79,6 +79,11 @@ class AnalysisResult:
     warnings: tuple[str, ...] = ()
 
     @property
+    def status(self) -> str:
+        """How the run ended."""
+        return self.outcome.status
+
+    @property
     def stiffening_effect(self) -> float:
         """Largest relative change of a mode's stiffness by the loads of the run."""
         return max((link.stiffness_change for link in self.bending.values()), default=0.0)

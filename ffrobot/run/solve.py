@@ -23,15 +23,17 @@ from ..mbs.model.raised_mass import by_body
 from ..mbs.quantities.stiffening import NOTABLE, stiffness_changes
 from ..mbs.quantities.validity import bending
 from ..scene.kinds import AnyKind
-from ..scene.pieces import places_on_pieces
+from ..scene.pieces import bodies_in_pieces, places_on_pieces
 from ..scene.scene import Scene
+from .bent_links import with_advice, worst_of_pieces
 from .divided import as_divided
+from .enough import with_enough_modes, with_enough_pieces
 from .evaluation import evaluated
 from .finer import check_on, finer_scene
 from .mode_choice import mode_levels, reported
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths
-from .pieces import as_one_link, wanted_pieces, with_advice, worst_of_pieces
+from .pieces import as_one_link, wanted_pieces
 from .prepare import prepare, stiffened, with_bodies, with_pieces
 from .solution import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
@@ -91,10 +93,11 @@ def _evaluated(solution: Solution) -> Solution:
 
 def told_of_links(solution: Solution, result: AnalysisResult) -> AnalysisResult:
     """The result of links in pieces as that of the one link each, and whether links that bend far can be divided."""
+    divide = partial(bodies_in_pieces, solution.scene)
     if solution.whole is None:
-        return replace(result, bending=with_advice(result.bending, solution.scene))
+        return replace(result, bending=with_advice(result.bending, divide))
     outcome = _told(solution, result.outcome)
-    bent = with_advice(worst_of_pieces(result.bending, solution.divided), solution.scene)
+    bent = with_advice(worst_of_pieces(result.bending, solution.divided), divide)
     voltages = {name: _unmet_of_link(solution, name, of_pieces) for name, of_pieces in result.voltages.items()}
     return replace(result, outcome=outcome, bending=bent, voltages=voltages)
 
@@ -130,27 +133,24 @@ def _checked(solution: Solution, watcher: Watcher) -> Solution:
 
 def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
     """The scene solved with as many modes as its tolerances need: see `mode_search`."""
-    search = ModeSearch(error_tolerances(solution.scene), mode_levels(solution.scene, solution.bodies))
-    while (bodies := search.next_bodies()) is not None:
-        solution = _completed(with_bodies(solution, bodies), watcher, interruption)
-        if solution.failure is not None:
-            return solution
-        results = solution.analyses
-        completed = len(results) == len(solution.scene.analysis) and all(
-            result.outcome.status == "completed" for result in results.values()
-        )
-        found = {name: reported(solution.scene, result) for name, result in results.items()} if completed else None
-        search.add(found, last=interruption.requested)
-    return replace(solution, mode_choice=search.choice())
+    return with_enough_modes(
+        solution,
+        ModeSearch(error_tolerances(solution.scene), mode_levels(solution.scene, solution.bodies)),
+        lambda last, bodies: _completed(with_bodies(last, bodies), watcher, interruption),
+        partial(reported, solution.scene),
+        interruption,
+    )
 
 
 def _with_enough_pieces(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
     """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
-    solution = _completed(solution, watcher, interruption)
-    given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
-    while solution.failure is None and not interruption.requested and (wanted := wanted_pieces(solution)):
-        solution = _completed(with_pieces(solution, given | wanted, watcher), watcher, interruption)
-    return solution
+    return with_enough_pieces(
+        solution,
+        lambda trial: _completed(trial, watcher, interruption),
+        lambda last, counts: with_pieces(last, counts, watcher),
+        wanted_pieces,
+        interruption,
+    )
 
 
 def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:

@@ -18,16 +18,24 @@ from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.quantities.spatial_energy import energies, momentum
 from ..mbs.quantities.spatial_reactions import reactions
+from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
+from .enough import with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
 from .spatial_actuation import actuated_in_space, patches_in_space, supplied_by_patches
 from .spatial_bodies import load_spatial_bodies
 from .spatial_finer import checked_in_space
 from .spatial_mode_choice import mode_levels_in_space, reported_in_space
-from .spatial_pieces import MotionOfLinks, divided_links, wanted_pieces_in_space
-from .spatial_prepare import made_solution, with_bodies_in_space, with_pieces_in_space, with_scene_in_space
+from .spatial_pieces import MotionOfLinks, bending_of_links, divided_links, wanted_pieces_in_space
+from .spatial_prepare import (
+    made_solution,
+    stiffened_in_space,
+    with_bodies_in_space,
+    with_pieces_in_space,
+    with_scene_in_space,
+)
 from .spatial_solution import SpatialResult, SpatialSolution
 from .spatial_stresses import stresses_in_space
 from .watcher import Interruption, Watcher
@@ -83,7 +91,7 @@ def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None =
         elif any(body.pieces == "auto" for body in scene.body):
             solution = _with_enough_pieces(solution, watcher, interruption)
         else:
-            solution = _run_all(solution, watcher, interruption)
+            solution = _completed(solution, watcher, interruption)
         solution = checked_in_space(solution, prepare_spatial, watcher)
         if keep is not None and solution.analyses:
             keep(solution)
@@ -94,27 +102,24 @@ def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None =
 
 def _with_enough_modes(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
     """The scene solved with as many modes as its tolerances need: see `mode_search`."""
-    search = ModeSearch(error_tolerances(solution.scene), mode_levels_in_space(solution.scene, solution.bodies))
-    while (bodies := search.next_bodies()) is not None:
-        solution = _run_all(with_bodies_in_space(solution, bodies), watcher, interruption)
-        if solution.failure is not None:
-            return solution
-        results = solution.analyses
-        completed = len(results) == len(solution.scene.analysis) and all(
-            result.run.status == "completed" for result in results.values()
-        )
-        found = {name: reported_in_space(result) for name, result in results.items()} if completed else None
-        search.add(found, last=interruption.requested)
-    return replace(solution, mode_choice=search.choice())
+    return with_enough_modes(
+        solution,
+        ModeSearch(error_tolerances(solution.scene), mode_levels_in_space(solution.scene, solution.bodies)),
+        lambda last, bodies: _completed(with_bodies_in_space(last, bodies), watcher, interruption),
+        reported_in_space,
+        interruption,
+    )
 
 
 def _with_enough_pieces(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
     """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
-    solution = _run_all(solution, watcher, interruption)
-    given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
-    while solution.failure is None and not interruption.requested and (wanted := wanted_pieces_in_space(solution)):
-        solution = _run_all(with_pieces_in_space(solution, given | wanted, watcher), watcher, interruption)
-    return solution
+    return with_enough_pieces(
+        solution,
+        lambda trial: _completed(trial, watcher, interruption),
+        lambda last, counts: with_pieces_in_space(last, counts, watcher),
+        wanted_pieces_in_space,
+        interruption,
+    )
 
 
 def _judged(
@@ -122,14 +127,23 @@ def _judged(
 ) -> Feasibility | None:
     """What the one analysis of a scene asks of motors and patches; None where it fails."""
     try:
-        (result,) = _run_all(with_scene_in_space(solution, trial), watcher, interruption).analyses.values()
+        (result,) = _completed(with_scene_in_space(solution, trial), watcher, interruption).analyses.values()
     except SolveError:
         return None
     return None if result.run.failed or result.actuation is None else result.actuation.feasibility
 
 
-def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
-    """The analyses up to the first that fails."""
+def _completed(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
+    """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
+    found = _run_all(solution, watcher, interruption)
+    if found is None:
+        found = _run_all(stiffened_in_space(solution), watcher, interruption)
+    assert found is not None
+    return found
+
+
+def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution | None:
+    """The analyses up to the first that fails; None where `geometric_stiffening = "auto"` asks for them all again."""
     results: dict[str, SpatialResult] = {}
     seconds = dict(solution.seconds)
     for analysis in solution.scene.analysis:
@@ -140,11 +154,15 @@ def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interrup
         try:
             with of_file(solution.scene.path):
                 run = IN_SPACE[analysis.kind](_context(solution, analysis, results, watcher, interruption), analysis)
-                results[analysis.name] = _evaluated(solution, run)
+                result = _evaluated(solution, run)
         except Exception as error:  # raised once the analyses before it are kept
             if not results:
                 raise
             return replace(solution, analyses=results, seconds=seconds, failure=error)
+        automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
+        if automatic and result.stiffening_effect > NOTABLE and run.status != "interrupted":
+            return None
+        results[analysis.name] = result
         seconds[analysis.name] = time.perf_counter() - began
         _log(run)
         if run.failed:
@@ -169,6 +187,7 @@ def _context(
     return ActuatedSpatialContext(
         solution.model, runs, progress, supply, partial(forces_at_points, solution.points),
         solution.earlier.get(analysis.name), solution.patches, solution.links,
+        {name: body.carrying for name, body in solution.bodies.items()},
     )  # fmt: skip
 
 
@@ -190,8 +209,9 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
         at_points = {name: solve_spatial_points(points, run) for name, points in solution.points.items()}
     return SpatialResult(
-        run, motion, reactions(motion), energies(motion), momentum(motion), actuation, stresses, at_points
-    )
+        run, motion, reactions(motion), energies(motion), momentum(motion), actuation, stresses, at_points,
+        bending=bending_of_links(solution, motion),
+    )  # fmt: skip
 
 
 def _log(run: SpatialRun) -> None:

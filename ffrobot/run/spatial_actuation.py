@@ -50,7 +50,7 @@ def patches_in_space(scene: SpatialScene, bodies: Bodies) -> dict[str, LinkPatch
     for name, layouts in by_body(scene.pzt):
         body = bodies[name]
         assert body.modal is not None
-        found[name] = link_patches(scene.path, layouts, body.modal, body.spatial)
+        found[name] = link_patches(scene.path, layouts, body.modal, body.carrying)
     return found
 
 
@@ -78,7 +78,7 @@ def actuated_in_space(
     scene: SpatialScene, motion: SpatialMotion, bodies: Bodies, patches: Mapping[str, LinkPatches]
 ) -> SpatialActuation:
     """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it."""
-    flexible = {name: (body.modal, body.spatial) for name, body in bodies.items() if body.modal is not None}
+    flexible = {name: (body.modal, body.carrying) for name, body in bodies.items() if body.modal is not None}
     links = links_in_motion(motion, flexible)
     voltages: dict[str, Voltages] = {}
     unmet = {}

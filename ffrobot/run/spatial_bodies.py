@@ -16,6 +16,7 @@ from ..fe_models.link_records import FAMILIES
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.model.spatial_body import SpatialBody, from_modal_body, rigid_body
 from ..mbs.model.spatial_masses import with_payload
+from ..mbs.model.spatial_payloads import turns_as_a_body
 from ..mbs.scene.spatial.bodies import BodyInSpace, tensor
 from ..scene.spatial import SpatialScene
 from .loaded_body import Loaded, payloads_on
@@ -23,9 +24,14 @@ from .loaded_body import Loaded, payloads_on
 
 @dataclass(frozen=True, kw_only=True)
 class LoadedSpatialBody(Loaded):
-    """A body of the scene with its equations in space, and what patches that are part of it change."""
+    """A body of the scene with its equations in space, and what patches that are part of it change.
+
+    `spatial` is that of the equations, in which payloads with inertia on links are bodies of their own; `carrying` has
+    these as well, as small rotations turn them: its modes are those of the loaded link.
+    """
 
     spatial: SpatialBody
+    carrying: SpatialBody
     structure: StructureEffect | None = None
 
     @property
@@ -39,11 +45,14 @@ class LoadedSpatialBody(Loaded):
 def load_spatial_bodies(scene: SpatialScene, stage: Callable[[str], None]) -> list[LoadedSpatialBody]:
     """In the order of the scene, with payloads and patches; stage 1 runs where links are out of date: `stage` is told.
 
+    They have geometric stiffening where the scene, or the key `pieces` of the body, may put it into the equations.
+
     Raises `InputError` for files that are none, and payloads and patches that do not fit.
     """
     patches = dict(by_body(scene.pzt))
     with of_file(scene.path):
-        loaded = [_loaded(body, scene.geometric_stiffening, stage) for body in scene.body]
+        wanted = bool(scene.geometric_stiffening)
+        loaded = [_loaded(body, wanted or body.pieces is not None, stage) for body in scene.body]
     bodies = [(body.spatial.name, _with_payloads(scene, body)) for body in loaded]
     return [_patched(scene, loaded, patches[name]) if name in patches else loaded for name, loaded in bodies]
 
@@ -53,33 +62,38 @@ def _loaded(body: BodyInSpace, stiffened: bool, stage: Callable[[str], None]) ->
         rigid = body.rigid
         points = {name: np.array(position) for name, position in rigid.points.items()}
         made = rigid_body(body.name, rigid.mass, np.array(rigid.center), tensor(rigid.inertia), points)
-        return LoadedSpatialBody(spatial=made)
+        return LoadedSpatialBody(spatial=made, carrying=made)
     if body.modal is not None:
         modal = read_modal_body(body.modal)
         made = from_modal_body(body.name, modal, stiffened)
-        return LoadedSpatialBody(spatial=made, modal=modal, path=body.modal)
+        return LoadedSpatialBody(spatial=made, carrying=made, modal=modal, path=body.modal)
     from ..fe_models.link import cached_modal_body
 
     assert body.link is not None
     outcome = cached_modal_body(body.link, stage)
+    made = from_modal_body(body.name, outcome.body, stiffened)
     return LoadedSpatialBody(
-        spatial=from_modal_body(body.name, outcome.body, stiffened),
-        modal=outcome.body, path=outcome.path, computed=outcome.computed, reused=outcome.reused,
+        spatial=made, carrying=made, modal=outcome.body,
+        path=outcome.path, computed=outcome.computed, reused=outcome.reused,
     )  # fmt: skip
 
 
 def _with_payloads(scene: SpatialScene, body: LoadedSpatialBody) -> LoadedSpatialBody:
-    spatial = body.spatial
+    spatial = carrying = body.spatial
     for point, payload in payloads_on(scene.payload, spatial.name, spatial.points, scene.path):
-        spatial = with_payload(spatial, point, payload.mass, np.array(payload.center), tensor(payload.inertia))
-    return replace(body, spatial=spatial)
+        about = point, payload.mass, np.array(payload.center), tensor(payload.inertia)
+        carrying = with_payload(carrying, *about)
+        if body.modal is None or not turns_as_a_body(payload):
+            spatial = with_payload(spatial, *about)
+    return replace(body, spatial=spatial, carrying=carrying)
 
 
 def _patched(scene: SpatialScene, body: LoadedSpatialBody, layouts: Sequence[SpatialPztLayout]) -> LoadedSpatialBody:
     """With the mass and stiffness of its patches, as far as the scene asks for it."""
     assert body.modal is not None
-    link_patches(scene.path, layouts, body.modal, body.spatial)  # refuses patches that do not fit
+    link_patches(scene.path, layouts, body.modal, body.carrying)  # refuses patches that do not fit
     if not any(layout.adds_mass or layout.adds_stiffness for layout in layouts):
         return body
-    patched = with_patches_in_space(body.spatial, body.modal, layouts)
-    return replace(body, spatial=patched, structure=structure_effect_in_space(body.spatial, patched))
+    spatial, carrying = (with_patches_in_space(of, body.modal, layouts) for of in (body.spatial, body.carrying))
+    effect = structure_effect_in_space(body.carrying, carrying)
+    return replace(body, spatial=spatial, carrying=carrying, structure=effect)

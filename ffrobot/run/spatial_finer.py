@@ -57,7 +57,9 @@ def _finer_scene(solution: SpatialSolution) -> SpatialScene:
     forward = Forward(name="replay", kind="forward", end=1.0, output_step=1.0)  # asks nothing of patches
     served = {"allocation": "least-squares", "mode_weights": None, "point_weights": None}
     pzt = tuple(layout.model_copy(update=served) for layout in scene.pzt)
-    return scene.model_copy(update={"body": bodies, "pzt": pzt, "analysis": (forward,)})
+    stiffening = solution.stiffened if scene.geometric_stiffening == "auto" else scene.geometric_stiffening
+    changed = {"body": bodies, "pzt": pzt, "analysis": (forward,), "geometric_stiffening": stiffening}
+    return scene.model_copy(update=changed)
 
 
 def _check(solution: SpatialSolution, source: SpatialRun, finer: SpatialSolution, watcher: Watcher) -> FinerCheck:

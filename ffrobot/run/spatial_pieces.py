@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -20,8 +20,11 @@ from ..fe_models.modal_body import ModalBody
 from ..mbs.model.divided_link import spread_in_space
 from ..mbs.model.spatial_motors import MotorForces
 from ..mbs.quantities.spatial_motion import BodyMotion, PointMotion, SpatialMotion, continuous
-from ..mbs.quantities.validity import ENOUGH, enough_pieces, shortening_in_space
+from ..mbs.quantities.spatial_validity import bending_in_space
+from ..mbs.quantities.validity import ENOUGH, IN_SPACE, Bending, enough_pieces, shape_from_chord
 from ..scene.pieces import BodyInPieces
+from ..scene.spatial_pieces import bodies_in_pieces_in_space
+from .bent_links import with_advice, worst_of_pieces
 from .spatial_solution import SpatialSolution
 
 MOST = 64
@@ -123,15 +126,23 @@ def wanted_pieces_in_space(solution: SpatialSolution) -> dict[str, int]:
     return {} if wanted == now else wanted
 
 
+def bending_of_links(solution: SpatialSolution, motion: SpatialMotion) -> dict[str, Bending]:
+    """How far flexible bodies bend, links in pieces as their worst piece, and whether they can be divided further."""
+    bodies = solution.parts or solution.bodies
+    links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
+    worst = worst_of_pieces(bending_in_space(motion, links), solution.divided)
+    return with_advice(worst, partial(bodies_in_pieces_in_space, solution.scene))
+
+
 def _shortening(solution: SpatialSolution, name: str) -> float:
     """The largest of a body of the equations over all analyses, of its length."""
     modal = (solution.parts or solution.bodies)[name].modal
     assert modal is not None
     found = [
-        shortening_in_space(modal, SpatialMotion.body(result.motion, name).modal).max(initial=0.0)
+        shape_from_chord(modal, SpatialMotion.body(result.motion, name).modal, IN_SPACE)[2].max(initial=0.0)
         for result in solution.analyses.values()
     ]
-    return float(max(found, default=0.0))
+    return float(max(found, default=0.0)) / modal.length
 
 
 def _motion_of_link(motion: SpatialMotion, link: Divided) -> BodyMotion:

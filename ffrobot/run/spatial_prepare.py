@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from ..actuation.patches.spatial_patches import LinkPatches
@@ -28,7 +28,9 @@ def made_solution(
     points: Mapping[str, SpatialPointSet],
 ) -> SpatialSolution:
     """A solution without analyses."""
-    return SpatialSolution(scene, _model(scene, bodies, patches, {}, {}), bodies, patches, {}, seconds, points=points)
+    stiffened = _all_stiffened(scene, False)
+    model = _model(scene, bodies, patches, {}, {}, stiffened)
+    return SpatialSolution(scene, model, bodies, patches, {}, seconds, points=points, stiffened=stiffened)
 
 
 def with_bodies_in_space(solution: SpatialSolution, spatial: Mapping[str, SpatialBody]) -> SpatialSolution:
@@ -54,17 +56,32 @@ def with_pieces_in_space(solution: SpatialSolution, counts: Mapping[str, int], w
     if divided:
         scene = scene_of_pieces_in_space(solution.scene, divided)
         own = {name: body for name, body in solution.bodies.items() if name not in divided}
-        new = scene.model_copy(update={"body": tuple(body for body in scene.body if body.name not in own)})
-        loaded = load_spatial_bodies(new.model_copy(update={"pzt": ()}), watcher.stage)
+        alone = {"body": tuple(body for body in scene.body if body.name not in own), "pzt": ()}
+        may_be = {"geometric_stiffening": scene.geometric_stiffening is not False}
+        new = scene.model_copy(update=alone | may_be)
+        loaded = load_spatial_bodies(new, watcher.stage)
         parts = own | {body.name: part for body, part in zip(new.body, loaded, strict=True)}
         parts = {body.name: parts[body.name] for body in scene.body}
     return _unsolved(replace(solution, divided=divided, parts=parts))
 
 
+def stiffened_in_space(solution: SpatialSolution) -> SpatialSolution:
+    """The scene with geometric stiffening of all links, nothing solved yet."""
+    return _unsolved(replace(solution, stiffened=True))
+
+
 def _unsolved(solution: SpatialSolution) -> SpatialSolution:
-    model = _model(solution.scene, solution.bodies, solution.patches, solution.divided, solution.parts)
+    stiffened = _all_stiffened(solution.scene, solution.stiffened)
+    model = _model(solution.scene, solution.bodies, solution.patches, solution.divided, solution.parts, stiffened)
     seconds = {"bodies": solution.seconds["bodies"]}
-    return replace(solution, model=model, analyses={}, seconds=seconds)
+    return replace(solution, model=model, analyses={}, seconds=seconds, stiffened=stiffened)
+
+
+def _all_stiffened(scene: SpatialScene, is_needed: bool) -> bool:
+    """Whether all links are stiffened; with "auto", where that `is_needed`, and beside links in pieces."""
+    if scene.geometric_stiffening == "auto":
+        return is_needed or any(body.pieces is not None for body in scene.body)
+    return scene.geometric_stiffening is True
 
 
 def _model(
@@ -73,9 +90,29 @@ def _model(
     patches: Mapping[str, LinkPatches],
     divided: Mapping[str, BodyInPieces],
     parts: Bodies,
+    stiffened: bool,
 ) -> SpatialModel:
     """The equations, of pieces in place of their links, with the voltages that the scene gives to patches."""
+    links = [divided[body.name].names if body.name in divided else (body.name,) for body in scene.body if body.pieces]
     if divided:
         scene, bodies = scene_of_pieces_in_space(scene, divided), parts
-    model = build_spatial_model(scene, [body.spatial for body in bodies.values()])
+    spatial = {name: body.spatial for name, body in bodies.items()}
+    if not stiffened:
+        known = set() if scene.geometric_stiffening is False else _known_between(scene, spatial, links)
+        spatial |= {name: replace(body, stiffening=None) for name, body in spatial.items() if name not in known}
+    model = build_spatial_model(scene, list(spatial.values()))
     return replace(model, modal_loads=tuple(given_voltages(model, patches)))
+
+
+def _known_between(
+    scene: SpatialScene, bodies: Mapping[str, SpatialBody], links: Iterable[tuple[str, ...]]
+) -> set[str]:
+    """Bodies of those `links` in pieces on which nothing acts between the ends of a piece.
+
+    Modal body files have the geometric stiffness of loads at interfaces alone.
+    """
+    at = [point for reference in scene.references() if (point := reference.body_and_point) is not None]
+    between = {
+        body for body, point in at if (found := bodies[body].stiffening) is not None and point not in found.K_points
+    }
+    return {name for names in links if between.isdisjoint(names) for name in names}

@@ -19,6 +19,7 @@ from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_energy import Energies, Momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.stress import BodyStress
+from ..mbs.quantities.validity import Bending, deflection_warning
 from ..scene.pieces import BodyInPieces
 from ..scene.spatial import SpatialScene
 from .mode_search import ModeChoice
@@ -40,6 +41,7 @@ class SpatialResult:
         stresses: by body, where modal body files hold modal stresses.
         point_forces: at actuation points, by body.
         check: what a replay on finer links found, where that is asked for.
+        bending: how far flexible bodies leave small deformations, and what loads do to their stiffness.
     """
 
     run: SpatialRun
@@ -51,15 +53,27 @@ class SpatialResult:
     stresses: Mapping[str, BodyStress] = field(default_factory=dict)
     point_forces: Mapping[str, PointForces] = field(default_factory=dict)
     check: FinerCheck | None = None
+    bending: Mapping[str, Bending] = field(default_factory=dict)
+
+    @property
+    def status(self) -> str:
+        """How the run ended."""
+        return self.run.status
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Why results may be wrong, or not mean what they seem to, a text each."""
+        """Why results may be wrong, or not mean what they seem to, a text each, the most serious first."""
         missed = None if self.actuation is None else self.actuation.unsupplied
-        told = (*self.run.warnings, *unresolved_gears(self.motion.gears))
+        bent = deflection_warning(self.bending)
+        told = (*([bent] if bent else []), *self.run.warnings, *unresolved_gears(self.motion.gears))
         if isinstance(self.run.details, LoopRecord):
             told = (*told, *self.run.details.warnings)
         return told if missed is None else (*told, missed.in_words)
+
+    @property
+    def stiffening_effect(self) -> float:
+        """Largest relative change of a mode's stiffness by the loads of the run."""
+        return max((link.stiffness_change for link in self.bending.values()), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -78,6 +92,7 @@ class SpatialSolution:
         earlier: runs of analyses to go on with, from a results file: see `results.spatial_resume`.
         mode_choice: where `modes = "auto"`.
         divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`.
+        stiffened: whether all links have geometric stiffening.
     """
 
     scene: SpatialScene
@@ -93,6 +108,7 @@ class SpatialSolution:
     mode_choice: ModeChoice | None = None
     divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
     parts: Mapping[str, LoadedSpatialBody] = field(default_factory=dict)
+    stiffened: bool = False
 
     @property
     def outcomes(self) -> dict[str, SpatialRun]:
@@ -103,6 +119,11 @@ class SpatialSolution:
     def links(self) -> dict[str, ModalBody]:
         """The modal bodies of the flexible bodies, as their files have them."""
         return {name: body.modal for name, body in self.bodies.items() if body.modal is not None}
+
+    @property
+    def is_stiffened(self) -> bool:
+        """Whether geometric stiffening is in the equations, of all links or of those in pieces."""
+        return self.stiffened or any(node.body.stiffening is not None for node in self.model.tree.nodes)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -72,7 +72,7 @@ def _scene(data: dict[str, Any], path: Path, text: str, objects: Mapping[str, ob
         if isinstance(link, LinkTable):
             read_link(link)
     check_functions(keys, path)
-    return Scene(**dict(keys), path=path.absolute(), text=text)
+    return Scene.model_construct(**dict(keys), path=path.absolute(), text=text)  # the keys are validated
 
 
 def _refuse_unavailable(data: dict[str, Any], path: Path) -> None:

@@ -26,10 +26,9 @@ from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from .actuation_times import with_times_of_actuation
 from .kinds import KINDS, AnalysisInSpace
 
-# Keys of planar scenes that scenes in space do not have yet, by the table in which they stand ("" is the file).
-UNAVAILABLE = {
-    "load": ("force",),
-}
+# Keys of planar scenes that scenes in space do not have, by the table in which they stand, and what there is instead.
+UNAVAILABLE = {"load": {"force": "forces that depend on the motion (functions of Python) are those of planar scenes;"
+                                " what depends on time alone is x, y, z, mx, my, mz"}}  # fmt: skip
 
 
 class SpatialSceneKeys(SpatialMechanismKeys):
@@ -104,18 +103,17 @@ def spatial_scene(
         if isinstance(link, LinkTable):
             read_link(link)
     _check_functions(keys, path)
-    return SpatialScene(**dict(keys), path=path.absolute(), text=text)
+    return SpatialScene.model_construct(**dict(keys), path=path.absolute(), text=text)  # the keys are validated
 
 
 def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
     """Keys that only planar scenes have so far, before they are called unknown."""
     for table, keys in UNAVAILABLE.items():
-        entries = [data] if not table else data.get(table, [])
+        entries = data.get(table, [])
         for entry in entries if isinstance(entries, list) else []:
-            for key in keys:
+            for key, instead in keys.items():
                 if isinstance(entry, dict) and key in entry:
-                    of = f'{table} "{entry.get("name", "?")}": ' if table else ""
-                    yield f'{of}{key}: expected no such key in space = "spatial", found it: not available there yet'
+                    yield f'{table}: {key}: expected no such key in space = "spatial", found it: {instead}'
 
 
 def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
@@ -137,6 +135,15 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
         if count and found != count:
             of = f'one for each patch of "{load.pzt}"'
             yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {found}"
+        loaded = next((joint for joint in scene.joint if joint.name == load.joint), None)
+        if loaded is not None and not loaded.units:
+            yield (
+                f'load no. {k}: joint: expected one with coordinates, found "{loaded.name}", a {loaded.type} joint:'
+                " forces and moments on what it joins are loads on points (x, y, z, mx, my, mz)"
+            )
+        elif loaded is not None and len(load.moments) != len(loaded.units):
+            of = f'one for each coordinate of "{loaded.name}" ({", ".join(loaded.units)})'
+            yield f"load no. {k}: moment: expected {len(loaded.units)} expressions, {of}, found {len(load.moments)}"
     for k, analysis in enumerate(scene.analysis):
         for problem in analysis.problems(Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS)):
             yield f'analysis "{analysis.name}": {problem}'
@@ -187,19 +194,16 @@ def _not_available(scene: SpatialSceneKeys) -> Iterator[str]:
     """The list of what the records can say and the program cannot do yet."""
     for joint in scene.joint:
         if not joint.units and getattr(joint, "motor", False):
-            yield f"{joint.label}: motor: expected false of a {joint.type} joint, found true: not available yet"
+            yield (
+                f"{joint.label}: motor: expected false of a {joint.type} joint, which has no coordinates for motors,"
+                " found true: revolute and prismatic joints in series have them"
+            )
     for layout in scene.pzt:
         if layout.adds_mass and scene.geometric_stiffening:
             yield (
                 'geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link'
                 f' between its interfaces, found those of "{layout.label}"'
             )
-        if layout.coupling != "rotation":
-            yield f'pzt "{layout.label}": coupling: expected "rotation", found "surface": not available in space yet'
-    for k, load in enumerate(scene.load, 1):
-        loaded = next((joint for joint in scene.joint if joint.name == load.joint), None)
-        if loaded is not None and len(loaded.units) != 1:
-            yield f'load no. {k}: joint: expected one with a single coordinate, found "{loaded.name}", a {loaded.type}'
 
 
 def _check_functions(scene: SpatialSceneKeys, path: Path) -> None:

@@ -69,15 +69,17 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
     return RunFiles(scene, copies, inputs)
 
 
-def number_at(scene_path: Path, key: tuple[str, ...], option: str) -> float:
-    """The number that the scene, or for `links.BODY.…` the link file, has at `key`.
+def value_at(scene_path: Path, key: tuple[str, ...], option: str) -> Value:
+    """What the scene, or for `links.BODY.…` the link file, has at `key`; None where it has nothing there.
 
-    Raises `InputError`, with the `option` of the command that names the key, where there is none.
+    Raises `InputError`, with the `option` of the command that names the key, where that leads nowhere.
     """
-    scene = load_toml(scene_path, "scene file")
-    _resolve(scene, scene_path.absolute().parent)
-    inner = key[2:] if key[0] == LINKS else key
-    tables = _link_of(scene_path, scene, key, {}, option) if key[0] == LINKS else scene
+    return value_of(*_place(scene_path, key, option), key, option)
+
+
+def number_at(scene_path: Path, key: tuple[str, ...], option: str) -> float:
+    """The same of a number. Raises `InputError` where there is none."""
+    tables, inner = _place(scene_path, key, option)
     value = value_of(tables, inner, key, option)
     if isinstance(value, bool) or not isinstance(value, int | float):
         found = "none" if value is None else repr(value)
@@ -86,6 +88,13 @@ def number_at(scene_path: Path, key: tuple[str, ...], option: str) -> float:
             + (", and no default counts: write its value into the file" if value is None else "")
         )
     return float(value)
+
+
+def _place(scene_path: Path, key: tuple[str, ...], option: str) -> tuple[Table, tuple[str, ...]]:
+    """The tables that `key` is in, those of the scene or of a link file, and the key there."""
+    scene = load_toml(scene_path, "scene file")
+    _resolve(scene, scene_path.absolute().parent)
+    return (_link_of(scene_path, scene, key, {}, option), key[2:]) if key[0] == LINKS else (scene, key)
 
 
 def _near(data: Node, key: tuple[str, ...]) -> str:

@@ -1,16 +1,14 @@
-"""One run of a sweep: a process of its own, and the row of the table that it leaves."""
+"""One run of a sweep, by a worker, and the row of the table that it leaves."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from subprocess import DEVNULL, PIPE, Popen
 from typing import Any
 
 import numpy as np
@@ -18,9 +16,9 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.files import write_atomically
-from ..common.parallel import environment_without_mpi
 from ..results.file import Results
 from .files import SCENE
+from .workers import Workers
 
 ROW, RESULTS = "row.json", "results.h5"
 
@@ -69,33 +67,27 @@ class Row:
     inputs: dict[str, str] = field(default_factory=dict)
 
 
-_children: set[Popen[str]] = set()
-
-
-def stop_runs() -> None:
-    """Ask the processes of runs that go on to end."""
-    for child in list(_children):
-        child.terminate()
-
-
-def perform(run: Run) -> Row | None:
+def perform(run: Run, workers: Workers) -> Row | None:
     """Solve the scene in the run's folder; None where a signal has asked it to stop."""
     results = run.folder / RESULTS
-    command = [sys.executable, "-m", "ffrobot", "solve", str(run.folder / SCENE), "-o", str(results)]
-    command += [f"--allow-python={path}" for path in run.allow_python]
-    threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    arguments = ["solve", str(run.folder / SCENE), "-o", str(results)]
+    arguments += [f"--allow-python={path}" for path in run.allow_python]
     results.unlink(missing_ok=True)  # of other input, maybe
-    environment = environment_without_mpi() | threads
-    with Popen(command, env=environment, stdout=DEVNULL, stderr=PIPE, text=True) as child:
-        _children.add(child)
-        _, told = child.communicate()
-        _children.discard(child)
-    if child.returncode in STOPPED:
+    code, told = workers.perform(arguments)
+    if code in STOPPED:
         return None
-    status = {0: "completed", 1: "failed", 2: "wrong input"}.get(child.returncode, "crashed")
-    message = "" if child.returncode == 0 else _last_message(told, run.folder)
+    status = {0: "completed", 1: "failed", 2: "wrong input"}.get(code, "crashed")
+    message = "" if code == 0 else _last_message(told, run.folder) or _ended(code)
     quantities = _quantities(results, run.collect) if results.exists() else {}
     return Row(run.number, run.values, status, message, quantities, run.inputs)
+
+
+_of_process = Workers()
+
+
+def perform_under_mpi(run: Run) -> Row | None:
+    """As `perform`, by whichever process of `mpirun`."""
+    return perform(run, _of_process)
 
 
 def keep_row(folder: Path, row: Row) -> None:
@@ -113,7 +105,14 @@ def finished_row(folder: Path) -> Row | None:
 
 def _last_message(text: str, folder: Path) -> str:
     lines = [line for line in text.splitlines() if line.strip()]
-    return lines[-1].removeprefix("ffrobot: ").replace(f"{folder}{os.sep}", "") if lines else "no message"
+    return lines[-1].removeprefix("ffrobot: ").replace(f"{folder}{os.sep}", "") if lines else ""
+
+
+def _ended(code: int) -> str:
+    """What there is to say of a process without a message."""
+    with suppress(ValueError):
+        return f"ended by {signal.Signals(-code).name}"
+    return "no message"
 
 
 def _quantities(path: Path, collect: Sequence[str]) -> dict[str, float]:

@@ -20,9 +20,10 @@ from ..common.python_files import allowed_python, python_allowed
 from ..run.inputs import PROGRAM, changed
 from ..run.watcher import Watcher
 from .files import SCENE, RunFiles, run_files
-from .runs import RESULTS, ROW, Row, Run, collected, finished_row, keep_row, perform, stop_runs
+from .runs import RESULTS, ROW, Row, Run, collected, finished_row, keep_row, perform, perform_under_mpi
 from .table import write_table
 from .variation import Value, Variation, grid, latin_hypercube, parse_variation
+from .workers import Workers
 
 PLAN = "plan.json"
 
@@ -35,9 +36,9 @@ class Sweep:
     """The runs of a scene: `points` are the combinations of the `variations`' values, one run each.
 
     `collect` names histories whose reductions become columns beside the standard ones; see `runs.REDUCTIONS`. `fixed`
-    are changes that all points share, `own` the values that the scene has itself, which change nothing. `growing`:
-    points may be added later, by a search; folders of runs are then named by what their scenes have changed, and their
-    results stay, to be read.
+    are changes that all points share, `own` the values that the scene has itself, which change nothing, `beside`
+    changes of all points but that one. `growing`: points may be added later, by a search; folders of runs are then
+    named by what their scenes have changed, and their results stay, to be read.
     """
 
     scene: Path
@@ -48,6 +49,7 @@ class Sweep:
     allow_python: tuple[Path, ...] = ()
     fixed: Mapping[Key, Value] = field(default_factory=dict)
     own: tuple[Value, ...] = ()
+    beside: Mapping[Key, Value] = field(default_factory=dict)
     growing: bool = False
 
     @property
@@ -76,7 +78,8 @@ class Sweep:
     def changes(self, values: Sequence[Value]) -> dict[Key, Value]:
         """What is changed in the scene of one run, by key."""
         points = zip(self.variations, values, self.own or (None,) * len(values), strict=True)
-        return {**self.fixed, **{v.key: value for v, value, own in points if value != own}}
+        shared = {**self.fixed, **({} if values == self.own else self.beside)}
+        return {**shared, **{v.key: value for v, value, own in points if value != own}}
 
     def _name(self, number: int, values: Sequence[Value]) -> str:
         """Of the run's folder."""
@@ -111,20 +114,21 @@ def plan_sweep(
     return sweep
 
 
-def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher) -> list[Row]:
+def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Workers | None = None) -> list[Row]:
     """The rows of all runs; failures are rows, too. The table in the sweep's folder grows with every run.
 
-    `side_by_side` runs go at once, each in a process of its own. Under mpirun all processes call this: the first hands
-    out the runs and has the rows, the others, on whatever machine they are, perform them (mpi4py.futures).
+    `side_by_side` runs go at once, each in a process of its own; `workers` stay for later runs. Under mpirun all
+    processes call this: the first hands out the runs and has the rows, the others, on whatever machine they are,
+    perform them (mpi4py.futures).
     """
     if not is_first():
-        with _performed([], side_by_side):
+        with _performed([], side_by_side, Workers()):
             return []
     rows, waiting = _rows_and_runs(sweep)
     if rows or sweep.table.exists():
         write_table(sweep.table, sweep.keys, [rows[k] for k in sorted(rows)])
     watcher.stage(f"{len(waiting)} runs" + (f", {len(rows)} done before" if rows else ""))
-    with _performed(list(waiting.values()), side_by_side) as finished:
+    with _performed(list(waiting.values()), side_by_side, workers or Workers()) as finished:
         for row in finished:
             if row is None:
                 raise StoppedError(f"{sweep.folder}: stopped; the same command takes it up again", signal.SIGINT)
@@ -175,22 +179,22 @@ def _is_whole(sweep: Sweep, run: Run, row: Row) -> bool:
 
 
 @contextmanager
-def _performed(runs: Sequence[Run], side_by_side: int) -> Iterator[Iterable[Row | None]]:
+def _performed(runs: Sequence[Run], side_by_side: int, workers: Workers) -> Iterator[Iterable[Row | None]]:
     """Rows of the runs as they finish; the body of the `with` ends when the last one is there."""
     if processes() > 1:
         from mpi4py.futures import MPICommExecutor
 
         with MPICommExecutor() as entered:  # None but on the first process: the others serve it until it is done
             executor: Any = entered  # by the types of mpi4py 4 it is no executor
-            yield () if executor is None else executor.map(perform, runs, unordered=True)
+            yield () if executor is None else executor.map(perform_under_mpi, runs, unordered=True)
         return
-    with ThreadPoolExecutor(side_by_side) as threads:  # each waits for a process
-        futures = [threads.submit(perform, run) for run in runs]
+    with ThreadPoolExecutor(side_by_side) as threads:  # each waits for a worker
+        futures = [threads.submit(perform, run, workers) for run in runs]
         try:
             yield (future.result() for future in as_completed(futures))
         finally:
             threads.shutdown(wait=False, cancel_futures=True)
-            stop_runs()
+            workers.stop()
 
 
 def _files(sweep: Sweep, run: Run) -> RunFiles:

@@ -211,6 +211,11 @@ MISTAKES = {
         ['analysis "for\\nward": name: expected a name without line breaks', 'found "for\\nward"'],
     ),
     "name with a slash": ("scene.toml", {'name = "forward"': 'name = "a/b"'}, ['name: expected a name without "/"']),
+    "name without quotes that is a date": (
+        "scene.toml",
+        {'name = "forward"': "name = 2020-01-01"},
+        ['analysis no. 2: name: expected no date or time, found 2020-01-01 (text is written in quotes: "2020-01-01")'],
+    ),
     "number beyond all sense": (
         "scene.toml",
         {"end = 1.0": "end = 1e300"},

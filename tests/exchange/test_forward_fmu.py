@@ -18,14 +18,14 @@ STEP, END = 0.01, 0.3
 CHANGES = (0.1, 0.2)  # s, at which inputs change
 
 
-def link(name, modes, *, width=0.003):
+def link(name, modes, *, width=0.003, height=0.02, **keys):
     return {
         "name": name, "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
         "geometry": {"kind": "beam", "length": 0.4,
-                     "section": {"shape": "rectangle", "height": 0.02, "width": width}},
+                     "section": {"shape": "rectangle", "height": height, "width": width}},
         "mesh": {"elements": 12}, "reference": {"condition": "cantilever"}, "modes": {"count": modes},
-        "damping": {"ratio": 0.02},
-    }  # fmt: skip
+        "damping": {"ratio": 0.02}, "stress": {"points": {"gauge": [0.05, 0.2 * height, 0.001]}},
+    } | keys  # fmt: skip
 
 
 def box(**points):
@@ -36,8 +36,75 @@ def pin(name, first, second, axis=(0.0, 1.0, 0.0), **keys):
     return {"name": name, "type": "revolute", "between": [first, second], "axis": list(axis), **keys}
 
 
+def flat_link(name, modes, **keys):
+    return link(name, modes, width=0.02, height=0.003, **keys)
+
+
+def flat_box(**points):
+    return {"mass": 0.4, "center": [0.1, 0.02], "inertia": 2e-3, "points": points}
+
+
+def flat_pin(name, first, second, **keys):
+    return {"name": name, "type": "revolute", "between": [first, second], **keys}
+
+
 ROOT, TIP = [0.0, 0.0, 0.02], [0.3, 0.01, 0.0]
-SCENES = {
+PLANE = {"space": "planar", "gravity": [0.0, -9.81]}
+PLANAR = {
+    # fewer modes than the link has, an outer first side, a rotor behind a stiff gear, friction, patches with mass and
+    # stiffness, a payload with inertia, a weld and a way that are turned, a trajectory that nothing follows, rates
+    "flat arm": PLANE | {
+        "body": [{"name": "upper", "link": flat_link("upper", 4), "modes": 2},
+                 {"name": "fore", "rigid": flat_box(root=[0.0, 0.0], tip=[0.3, 0.01])},
+                 {"name": "hand", "link": flat_link("hand", 1)}, {"name": "tool", "rigid": flat_box(a=[0.0, 0.1])}],
+        "joint": [
+            flat_pin("shoulder", "ground", "upper.root", at=[0.1, 0.2], viscous_friction=0.05),
+            flat_pin("elbow", "fore.root", "upper.tip", rotor_inertia=2e-5, gear_ratio=50.0),
+            {"name": "wrist", "type": "weld", "between": ["fore.tip", "hand.root"], "motor": False},
+            {"name": "way", "type": "prismatic", "between": ["tool.a", "hand.tip"], "axis": [1.0, 2.0]},
+        ],
+        "pzt": [
+            {"body": "upper", "centers": [0.06, 0.2, 0.34], "length": 0.06, "width": 0.01, "thickness": 0.5e-3,
+             "modulus": 63e9, "d31": -1.9e-10, "density": 7600.0, "limit": 200.0, "structural": True,
+             "allocation": "least-squares"}
+        ],
+        "payload": [{"point": "upper.tip", "mass": 0.1, "inertia": 1e-4}, {"point": "fore.tip", "mass": 0.2}],
+        "trajectory": [{"name": "path", "angle": "hand.tip", "value": "0.2 + t"}],
+        "initial": {"angles": {"upper": -0.4, "fore": 0.3, "hand": 0.9, "tool": 0.2}, "rates": {"upper": 0.5},
+                    "joints": {"way": 0.05}, "joint_rates": {"way": 0.2}},
+    },
+    # gears that give; attachment modes, whose masses are raised
+    "flat gears": PLANE | {
+        "gravity": [0.0, 0.0],
+        "body": [{"name": "upper", "link": flat_link("upper", 2, reference={"condition": "craig-bampton"})},
+                 {"name": "fore", "rigid": flat_box(root=[0.0, 0.0])}],
+        "joint": [
+            flat_pin("shoulder", "ground", "upper.root", stiffness=50.0, damping=0.05, rotor_inertia=1e-5,
+                     gear_ratio=60.0),
+            flat_pin("elbow", "upper.tip", "fore.root", stiffness=30.0, rotor_inertia=1e-5, gear_ratio=40.0),
+        ],
+    },
+    # two links welded at an angle hang from a pin, from static equilibrium; implicit steps
+    "flat rest": PLANE | {
+        "body": [{"name": "upper", "link": flat_link("upper", 1)}, {"name": "fore", "link": flat_link("fore", 1)}],
+        "joint": [flat_pin("pin", "ground", "upper.root", coulomb_friction=0.02),
+                  {"name": "bend", "type": "weld", "between": ["upper.tip", "fore.root"]}],
+        "initial": {"state": "static", "joints": {"pin": -1.9}, "angles": {"fore": -0.8}},
+    },
+    # a crank that drives a slider, from a guess of angles that does not close the loop
+    "flat loop": PLANE | {
+        "body": [{"name": "slider", "rigid": flat_box(pin=[0.0, 0.0])},
+                 {"name": "crank", "rigid": flat_box(a=[0.0, 0.0], b=[0.1, 0.0])},
+                 {"name": "rod", "link": flat_link("rod", 1)}, {"name": "flyer", "rigid": flat_box()}],
+        "joint": [
+            {"name": "guide", "type": "prismatic", "between": ["ground", "slider.pin"], "axis": [1.0, 0.2]},
+            flat_pin("drive", "ground", "crank.a", motor=True), flat_pin("knee", "crank.b", "rod.root"),
+            flat_pin("out", "slider.pin", "rod.tip"),
+        ],
+        "initial": {"angles": {"crank": 1.2, "rod": -0.3}},
+    },
+}  # fmt: skip
+SCENES = PLANAR | {
     # flexible links, an outer first side, a rotor behind a stiff gear, friction, patches, three analyses to choose from
     "arm": {
         "body": [{"name": "upper", "link": link("upper", 2)}, {"name": "fore", "rigid": box(root=ROOT, tip=TIP)}],
@@ -89,12 +156,17 @@ INPUTS = {
     "gears": {"joint/shoulder/moment": (4.0, -5.0, 1.0), "joint/elbow/moment": (-1.0, 2.0, 0.0)},
     "loop": {"joint/drive/moment": (0.3, -1.0, 1.5)},
     "radau": {"joint/shoulder/moment": (-1.2, -0.2, 0.6)},
+    "flat arm": {"joint/shoulder/moment": (1.0, -3.0, 2.0), "joint/elbow/moment": (0.5, -1.5, 1.0),
+                 "joint/way/moment": (4.0, 6.0, 3.0), "pzt/upper/2": (150.0, -200.0, 0.0)},
+    "flat gears": {"joint/shoulder/moment": (4.0, -5.0, 1.0), "joint/elbow/moment": (-1.0, 2.0, 0.0)},
+    "flat rest": {"joint/pin/moment": (0.0, 0.5, -0.3)},
+    "flat loop": {"joint/drive/moment": (0.3, -1.0, 1.5)},
 }  # fmt: skip
 
 
 def scene_text(name, loads=()):
     analysis = {"name": "swing", "kind": "forward", "end": END, "output_step": STEP, "tolerance": 1e-8}
-    if name == "radau":
+    if name in ("radau", "flat rest"):
         analysis |= {"tolerance": 1e-7, "integrator": "radau"}
     keys = {"name": f"{name} as an FMU", "space": "spatial", "gravity": [0.0, 0.0, -9.81], **SCENES[name]}
     return tomli_w.dumps(keys | {"load": list(loads), "analysis": [analysis]})
@@ -135,13 +207,25 @@ def robot(request, tmp_path_factory, ffrobot):
     return request.param, folder / "scene.fmu", Results(folder / "loaded.results.h5")
 
 
+def modal(results, body):
+    """In the modes of the file."""
+    found = results[f"swing/bodies/{body}/modal"]
+    if "modal_transform" not in results.names(f"swing/bodies/{body}"):
+        return found
+    return found @ results[f"swing/bodies/{body}/modal_transform"].T
+
+
 def expected(results, variable):
     """Of `solve`, by the name that the FMU has."""
     kind, name, *last = variable.split("/")
     if kind == "point":
         return results[f"swing/points/{name}/position"][:, "xyz".index(last[0])]
     if kind == "modal":
-        return results[f"swing/bodies/{name}/modal"][:, int(last[0]) - 1]
+        return modal(results, name)[:, int(last[0]) - 1]
+    if kind == "strain":
+        body, _, point = name.partition(".")
+        strain = results.modal_body(body).stress[point].strain[("xx", "yy", "zz", "yz", "xz", "xy").index(last[0])]
+        return modal(results, body) @ strain
     joint, _, number = name.partition(" ")
     found = results[f"swing/joints/{joint}/{'rate' if last else 'coordinate'}"]
     return found[:, int(number) - 1] if number else found
@@ -161,11 +245,19 @@ def test_motion(robot):
         sizes[variable] = kind, values
     largest = {kind: max(size for of, size in sizes.values() if of == kind) for kind, _ in sizes.values()}
     assert largest["joint"] > 0.3  # it moves
+    assert largest["strain"] > 1e-4 or "loop" in name  # whose rod is stiff
     for variable in outputs:
         np.testing.assert_allclose(
             found[variable], expected(results, variable), rtol=0, atol=1e-6 * largest[sizes[variable][0]],
             err_msg=variable,
         )  # fmt: skip
+
+
+def test_planar_scenes_have_no_outputs_across_the_plane(robot):
+    name, fmu, _ = robot
+    outputs = [each.name for each in read_model_description(str(fmu)).modelVariables if each.causality == "output"]
+    axes = {output.rpartition("/")[2] for output in outputs if output.startswith("point/")}
+    assert axes == (set("xy") if name in PLANAR else set("xyz"))
 
 
 @pytest.fixture
@@ -211,6 +303,35 @@ def test_reset_and_length_of_steps(slave):
     instance.reset()
     np.testing.assert_array_equal(again, first)
     np.testing.assert_allclose(run(15), first, rtol=1e-7)
+    instance.terminate()
+    instance.freeInstance()
+
+
+def test_steps_that_are_repeated(slave):
+    """Kept states bring back motion, inputs and step sizes: the same again to the last bit, also after a reset."""
+    _, told, make = slave
+    instance, reference = make()
+    outputs, motor = (
+        [reference[name] for name in ("joint/shoulder/rate", "point/fore.tip/z")],
+        reference["joint/elbow/moment"],
+    )
+    instance.setReal([motor], [-0.5])
+    instance.doStep(0.0, 0.1)
+    kept, then = instance.getFMUstate(), instance.getReal(outputs)
+    found = []
+    for _ in range(2):
+        instance.doStep(0.1, 0.05)
+        instance.setReal([motor], [1.0])
+        instance.doStep(0.15, 0.05)
+        found.append(instance.getReal(outputs))
+        instance.reset()
+        instance.setFMUstate(kept)
+        assert instance.getReal([*outputs, motor]) == [*then, -0.5]
+    assert found[0] == found[1] != then
+    instance.freeFMUstate(kept)
+    with pytest.raises(Exception, match="fmi2SetFMUstate failed"):
+        instance.setFMUstate(None)
+    assert "expected a state of fmi2GetFMUstate, found none" in told[-1]
     instance.terminate()
     instance.freeInstance()
 
@@ -293,3 +414,21 @@ def test_what_cannot_be_exported(tmp_path, keys, analysis, message):
     scene.write_text(tomli_w.dumps(tomllib.loads(scene_text("radau")) | keys))
     with pytest.raises(InputError, match=message):
         export_file(scene, "fmu", analysis, None)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"geometric_stiffening": True}, "geometric_stiffening: expected false of a scene exported as an FMU"),
+        ({"motors": "frame"}, 'motors: expected "section"'),
+        (
+            {"joint": []},
+            'initial: expected bodies without joints to start at angle and rate 0 in space, not so of "upper"',
+        ),
+    ],
+)
+def test_what_cannot_be_exported_of_planar_scenes(tmp_path, keys, message):
+    scene, turned = tmp_path / "scene.toml", {"initial": {"angles": {"upper": 0.1}}}
+    scene.write_text(tomli_w.dumps(tomllib.loads(scene_text("flat gears")) | turned | keys))
+    with pytest.raises(InputError, match=message):
+        export_file(scene, "fmu", "swing", None)

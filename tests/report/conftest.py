@@ -65,6 +65,14 @@ class Browser:
             assert time.monotonic() < end, f"not within {seconds} s: {condition}"
             time.sleep(0.05)
 
+    def pictures(self, count):
+        """Wait until the page has drawn so many pictures."""
+        self.driver.execute_async_script(
+            "const done = arguments[1]; let left = arguments[0];"
+            "const next = () => left-- > 0 ? requestAnimationFrame(next) : done(); next()",
+            count,
+        )  # fmt: skip
+
     def slide(self, name, value):
         """Move a slider as a user does."""
         self.run(

@@ -110,13 +110,23 @@ def test_pixels_move(paused):
     assert (end & ~start).sum() > 200
 
 
-def test_drag_turns_the_scene_and_wheel_zooms(paused):
+def drag(browser, selector, pixels, moves=9):
+    """Drag to the right as a hand does: the page sees every move (what falls between two pictures is lost)."""
+    middle = browser.driver.find_element("css selector", selector)
+    ActionChains(browser.driver).move_to_element(middle).click_and_hold().perform()
+    for _ in range(moves):
+        browser.pictures(2)
+        ActionChains(browser.driver).move_by_offset(pixels // moves, 0).perform()
+    browser.pictures(2)
+    ActionChains(browser.driver).release().perform()
+
+
+def test_drag_turns_the_scene(paused):
     """Pictures of later times keep the camera that the user has chosen; the z axis stays upright."""
     eye = "Object.values((({eye}) => ({x: eye.x, y: eye.y, z: eye.z}))(stage._fullLayout.scene._scene.getCamera()))"
     show(paused, 0.2)
     before, picture = np.array(paused.value(eye)), pixels(paused)
-    stage = paused.driver.find_element("css selector", "#mechanism")
-    ActionChains(paused.driver).move_to_element(stage).click_and_hold().move_by_offset(90, 0).release().perform()
+    drag(paused, "#mechanism", 90)
     paused.wait(f"Math.abs(stage._fullLayout.scene._scene.getCamera().eye.x - {before[0]}) > 0.2", WAIT)
     turned = np.array(paused.value(eye))
     assert np.linalg.norm(turned) == pytest.approx(np.linalg.norm(before), rel=1e-3)

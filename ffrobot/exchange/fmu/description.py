@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 from xml.etree import ElementTree
 
 import numpy as np
@@ -71,10 +72,13 @@ def forward_description(unit: HeldUnit, identifier: str, name: str, analysis: Fo
     """That of a forward motion under held inputs, in UTF-8; outputs follow the state alone, no input."""
     about = "motion from the initial state under held inputs; gravity and friction act as in the scene"
     root = _root(name, unit.data.guid, about, generator)
-    stepping = {"canHandleVariableCommunicationStepSize": "true", "canNotUseMemoryManagementFunctions": "true"}
+    stepping = {
+        "canHandleVariableCommunicationStepSize": "true", "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true",
+    }  # fmt: skip
     ElementTree.SubElement(root, "CoSimulation", {"modelIdentifier": identifier, **stepping})
     experiment = {"startTime": "0", "stopTime": f"{analysis.last_time:g}", "stepSize": f"{analysis.output_step:g}"}
-    _add_variables(root, {"inputs": unit.inputs, "outputs": unit.outputs}, experiment)
+    _add_variables(root, {"inputs": unit.inputs, "outputs": unit.outputs}, experiment, unit.references)
     structure, first = ElementTree.SubElement(root, "ModelStructure"), len(unit.inputs) + 1
     for group in ("Outputs", "InitialUnknowns"):
         element = ElementTree.SubElement(structure, group)
@@ -97,13 +101,17 @@ def _text(root: ElementTree.Element) -> bytes:
 
 
 def _add_variables(
-    root: ElementTree.Element, groups: Mapping[str, tuple[Variable, ...]], experiment: dict[str, str]
+    root: ElementTree.Element,
+    groups: Mapping[str, tuple[Variable, ...]],
+    experiment: dict[str, str],
+    references: Iterable[int] | None = None,
 ) -> None:
-    """Units, log, experiment and variables, in the order that FMI wants."""
+    """Units, log, experiment and variables, in the order that FMI wants; `references`: of variables, or 0, 1, 2, …."""
     _units(ElementTree.SubElement(root, "UnitDefinitions"), {each.unit for of in groups.values() for each in of})
     ElementTree.SubElement(ElementTree.SubElement(root, "LogCategories"), "Category", name="logStatusError")
     ElementTree.SubElement(root, "DefaultExperiment", experiment)
-    _variables(ElementTree.SubElement(root, "ModelVariables"), groups)
+    numbers = count() if references is None else iter(references)
+    _variables(ElementTree.SubElement(root, "ModelVariables"), groups, numbers)
 
 
 def _units(parent: ElementTree.Element, used: set[str]) -> None:
@@ -123,26 +131,27 @@ def _experiment(A: Array) -> dict[str, str]:
     return {"startTime": "0", "stopTime": f"{stop:g}", "stepSize": f"{stop / 1000:g}"}
 
 
-def _variables(parent: ElementTree.Element, groups: Mapping[str, tuple[Variable, ...]]) -> None:
+def _variables(
+    parent: ElementTree.Element, groups: Mapping[str, tuple[Variable, ...]], references: Iterator[int]
+) -> None:
     attributes: Mapping[str, Mapping[str, str]] = {
         "states": {"causality": "local", "initial": "exact"},
         "derivatives": {"causality": "local", "initial": "calculated"},
         "inputs": {"causality": "input"},
         "outputs": {"causality": "output", "initial": "calculated"},
     }
-    reference = 0
     for group, variables in groups.items():
         fixed = attributes[group]
         for k, each in enumerate(variables, 1):
             words = {"description": each.description} if each.description else {}
-            named = {"name": each.name, "valueReference": str(reference), **words, "variability": "continuous", **fixed}
+            number = {"valueReference": str(next(references))}
+            named = {"name": each.name, **number, **words, "variability": "continuous", **fixed}
             variable = ElementTree.SubElement(parent, "ScalarVariable", named)
             real = ElementTree.SubElement(variable, "Real", unit=each.unit)
             if group in ("states", "inputs"):
                 real.set("start", "0")
             if group == "derivatives":
                 real.set("derivative", str(k))  # states are the first variables
-            reference += 1
 
 
 def _structure(parent: ElementTree.Element, unit: Unit) -> None:

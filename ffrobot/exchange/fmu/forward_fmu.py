@@ -1,4 +1,4 @@
-"""`ffrobot export SCENE.toml --format fmu`: a forward motion in space as an FMU for co-simulation."""
+"""`ffrobot export SCENE.toml --format fmu`: a forward motion as an FMU for co-simulation."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ from ...mbs import _core
 from ...mbs.analysis.forward import Forward
 from ...mbs.analysis.spatial_run import without_paths
 from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import build_spatial_model
+from ...mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ...run.spatial_actuation import patches_in_space
 from ...run.spatial_bodies import load_spatial_bodies
 from ...run.spatial_mode_choice import mode_levels_in_space
-from ...scene.any_space import load_any_scene
+from ...run.watcher import Watcher
+from ...scene.any_space import AnyScene, load_any_scene
 from ...scene.spatial import SpatialScene
 from .archive import PLATFORMS, identifier_of, zipped
 from .description import forward_description
-from .forward_model import HeldUnit, has_own_coordinates, held_unit
+from .forward_model import HeldUnit, has_own_coordinates, held_unit, voltages_in_space
+from .planar_forward import unit_in_plane
 
 logger = logging.getLogger(__name__)
 
@@ -35,26 +37,17 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str
     """The FMU of an analysis of kind "forward", the first if not named; a few words on it, remarks.
 
     Raises:
-        InputError: there is no such analysis, the scene is planar, or something acts that the FMU does not have.
+        InputError: there is no such analysis, or something acts that the FMU does not have.
         SolveError: the scene has no state to start from.
     """
     scene = load_any_scene(path)
-    if not isinstance(scene, SpatialScene):
-        raise InputError(
-            f'{path}: --format fmu: expected a scene with space = "spatial", found a planar one: forward motions in the'
-            " plane are not available as FMUs yet"
-        )
     chosen = _chosen(path, scene, analysis)
     _check(path, scene)
     place = PLATFORMS.get((sys.platform, platform.machine()))
     if place is None:
         raise InputError(f"{path}: --format fmu: FMI 2.0 has no name for {sys.platform} on {platform.machine()}")
-    bodies = load_spatial_bodies(scene, lambda stage: logger.info("%s", stage))
-    loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
-    fewer = mode_levels_in_space(scene, loaded)[-1]  # "auto": all of them
-    spatial = [fewer.get(name, part.spatial) for name, part in loaded.items()]
-    model = with_compliance_in_space(without_paths(build_spatial_model(scene, spatial)))
-    unit = held_unit(model, patches_in_space(scene, loaded), chosen)
+    held = _unit_in_space(scene, chosen) if isinstance(scene, SpatialScene) else unit_in_plane(scene, chosen, _Logged())
+    model, unit = held
     names = "\n".join(each.name for each in (*unit.inputs, *unit.outputs))
     unit.data.guid = f"{{{uuid5(NAMESPACE_URL, unit.data.to_bytes().hex() + names)}}}"
     identifier, (folder, suffix) = identifier_of(scene.name, chosen.name), place
@@ -67,11 +60,36 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str
         f"binaries/{folder}/{identifier}{suffix}": library.read_bytes(),
     }
     what = f"{chosen.name}, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
-    silent = [node.joint.name for node in model.tree.nodes if node.joint.units and not has_own_coordinates(node)]
-    return zipped(content), what, tuple(_remarks(unit, silent, folder))
+    return zipped(content), what, tuple(_remarks(unit, _silent(model), folder))
 
 
-def _chosen(path: Path, scene: SpatialScene, name: str | None) -> Forward:
+class _Logged(Watcher):
+    """Stages in the log."""
+
+    def stage(self, title: str) -> None:
+        """Of a link that is computed."""
+        logger.info("%s", title)
+
+
+def _unit_in_space(scene: SpatialScene, analysis: Forward) -> tuple[SpatialModel, HeldUnit]:
+    bodies = load_spatial_bodies(scene, _Logged().stage)
+    loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
+    fewer = mode_levels_in_space(scene, loaded)[-1]  # "auto": all of them
+    spatial = [fewer.get(name, part.spatial) for name, part in loaded.items()]
+    model = with_compliance_in_space(without_paths(build_spatial_model(scene, spatial)))
+    links = {name: part.modal for name, part in loaded.items() if part.modal is not None}
+    voltages = voltages_in_space(model, patches_in_space(scene, loaded))
+    return model, held_unit(model, voltages, links, analysis)
+
+
+def _silent(model: SpatialModel) -> list[str]:
+    """Joints whose coordinates are no outputs: those at which loops are cut, and those that are turned freely."""
+    own = {node.joint.name for node in model.tree.nodes if has_own_coordinates(node)}
+    nodes = [node.joint for node in model.tree.nodes]
+    return [joint.name for joint in (*nodes, *model.tree.loops) if joint.units and joint.name not in own]
+
+
+def _chosen(path: Path, scene: AnyScene, name: str | None) -> Forward:
     """The analysis of this name, or the first that fits."""
     found = {each.name: each for each in scene.analysis}
     if name is not None and name not in found:
@@ -90,7 +108,7 @@ def _chosen(path: Path, scene: SpatialScene, name: str | None) -> Forward:
     raise InputError(f'{path}: --analysis: expected {wanted}, found "{name}" of {what}')
 
 
-def _check(path: Path, scene: SpatialScene) -> None:
+def _check(path: Path, scene: AnyScene) -> None:
     if scene.load:
         raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs, found some")
     for body in scene.body:

@@ -1,8 +1,8 @@
-"""A forward motion in space as co-simulation FMUs have it: inputs, outputs and what the core's library reads."""
+"""A forward motion as co-simulation FMUs have it: inputs, outputs and what the core's library reads."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from ...actuation.patches.spatial_patches import LinkPatches
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.validation import quoted
+from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
 from ...mbs.model.spatial_model import SpatialModel, modal_direction
@@ -22,19 +23,37 @@ from ...mbs.solve.spatial_statics import initial_state
 from .variables import Variable
 
 UNIT_OF_FORCE = {"rad": "N.m", "m": "N"}
+COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")  # the last three are 2 ε, as in modal body files
+AXES = "xyz"
+
+Input = tuple[Variable, Array]
+"""A variable, and what a unit of it does along v (n_v,)."""
 
 
 @dataclass(frozen=True)
 class HeldUnit:
-    """Variables in the order of their value references, inputs first, and the `data` of the model."""
+    """Inputs and outputs, and the `data` of the model.
+
+    The library numbers inputs, then outputs; `references` are the numbers of those that the FMU has.
+    """
 
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
+    references: tuple[int, ...]
     data: _core.HeldModel
 
 
-def held_unit(model: SpatialModel, patches: Mapping[str, LinkPatches], analysis: Forward) -> HeldUnit:
-    """The motion of `analysis` from its initial state under moments of motors and voltages of `patches` (by body).
+def held_unit(
+    model: SpatialModel,
+    voltages: Iterable[Input],
+    links: Mapping[str, ModalBody],
+    analysis: Forward,
+    axes: str = AXES,
+) -> HeldUnit:
+    """The motion of `analysis` from its initial state under moments of motors and `voltages` of patches.
+
+    `links` are the modal bodies of flexible bodies, whose strains are outputs where their files have some; places of
+    points are outputs along `axes`.
 
     Raises `InputError` and `SolveError` as the analysis itself does.
     """
@@ -48,25 +67,28 @@ def held_unit(model: SpatialModel, patches: Mapping[str, LinkPatches], analysis:
     data.method = METHODS[integrator_of(model, analysis.integrator)]
     data.spectral_radius, data.tolerance = analysis.spectral_radius, analysis.tolerance
     data.duration = analysis.last_time
-    inputs = [*_motors(model), *_voltages(model, patches)]
-    linear = [*_joints(model), *_modes(model)]
+    inputs = [*_motors(model), *voltages]
+    linear = [*_joints(model), *_modes(model), *_strains(model, links)]
     places = list(_places(model))
     data.inputs = [direction for _, direction in inputs]
     data.linear, data.places = [output for _, output in linear], [output for _, output in places]
-    of_places = [
-        Variable(f"point/{point}/{axis}", "m", f"place of {point} along {axis}")
+    outputs = [(variable, True) for variable, _ in linear]
+    outputs += [
+        (Variable(f"point/{point}/{axis}", "m", f"place of {point} along {axis}"), axis in axes)
         for point, _ in places
-        for axis in "xyz"
+        for axis in AXES
     ]
-    return HeldUnit(tuple(each for each, _ in inputs), (*(each for each, _ in linear), *of_places), data)
+    references = [*range(len(inputs)), *(k for k, (_, is_one) in enumerate(outputs, len(inputs)) if is_one)]
+    chosen = tuple(variable for variable, is_one in outputs if is_one)
+    return HeldUnit(tuple(each for each, _ in inputs), chosen, tuple(references), data)
 
 
 def _numbered(joint: str, number: int, count: int) -> str:
     return f"{joint} {number}" if count > 1 else joint
 
 
-def _motors(model: SpatialModel) -> Iterator[tuple[Variable, Array]]:
-    """What a unit of each does along v (n_v,): behind a gear that gives on its motor."""
+def _motors(model: SpatialModel) -> Iterator[Input]:
+    """Behind a gear that gives they act on its motor."""
     units = {joint.name: joint.units for joint in model.scene.joint}
     for joint, columns in model.motors.items():
         for k, (column, unit) in enumerate(zip(columns, units[joint], strict=True), 1):
@@ -75,13 +97,18 @@ def _motors(model: SpatialModel) -> Iterator[tuple[Variable, Array]]:
             yield variable, model.sign(joint) * np.eye(model.tree.n_v)[column]
 
 
-def _voltages(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> Iterator[tuple[Variable, Array]]:
+def voltages_in_space(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> Iterator[Input]:
+    """Of all layouts, by the body that carries them."""
     for body, of_link in patches.items():
         columns = iter(of_link.Phi_V.T)
         for layout, array in of_link.arrays.items():
             for k in range(1, len(array.edges) + 1):
-                variable = Variable(f"pzt/{layout}/{k}", "V", f"voltage of patch {k} of {layout}")
-                yield variable, modal_direction(model, body, next(columns))
+                yield voltage(layout, k), modal_direction(model, body, next(columns))
+
+
+def voltage(layout: str, number: int) -> Variable:
+    """Of a patch, the `number`-th of its layout."""
+    return Variable(f"pzt/{layout}/{number}", "V", f"voltage of patch {number} of {layout}")
 
 
 def _joints(model: SpatialModel) -> Iterator[tuple[Variable, _core.LinearOutput]]:
@@ -107,13 +134,29 @@ def has_own_coordinates(node: Node) -> bool:
 
 
 def _modes(model: SpatialModel) -> Iterator[tuple[Variable, _core.LinearOutput]]:
-    """Modal coordinates of the file of each body."""
+    """Modal coordinates of the file of each body: of a planar scene those that move in its plane."""
     for node in model.tree.nodes:
         entries = list(range(node.p_q.start, node.p_q.stop))
         for k, row in enumerate(node.body.modal_transform, 1):
-            name = node.body.name
-            variable = Variable(f"modal/{name}/{k}", "kg0.5.m", f"modal coordinate {k} of {name}")
-            yield variable, _core.LinearOutput(entries, row.tolist())
+            if np.any(row):
+                name = node.body.name
+                variable = Variable(f"modal/{name}/{k}", "kg0.5.m", f"modal coordinate {k} of {name}")
+                yield variable, _core.LinearOutput(entries, row.tolist())
+
+
+def _strains(model: SpatialModel, links: Mapping[str, ModalBody]) -> Iterator[tuple[Variable, _core.LinearOutput]]:
+    """At the points of links where their files have strains, in axes of the link: what the modes make of them."""
+    for node in model.tree.nodes:
+        name, entries = node.body.name, list(range(node.p_q.start, node.p_q.stop))
+        if name not in links:
+            continue
+        for label, point in links[name].stress.items():
+            for component, row in zip(COMPONENTS, point.strain @ node.body.modal_transform, strict=True):
+                if np.any(row):
+                    variable = Variable(
+                        f"strain/{name}.{label}/{component}", "1", f"strain {component} at {label} of {name}"
+                    )
+                    yield variable, _core.LinearOutput(entries, row.tolist())
 
 
 def _places(model: SpatialModel) -> Iterator[tuple[str, _core.PlaceOutput]]:

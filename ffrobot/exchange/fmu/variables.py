@@ -11,6 +11,7 @@ from ...mbs.joints.spatial.free import SpatialFree
 from ...mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
 
 UNITS: Mapping[str, Mapping[str, int]] = {
+    "1": {},
     "rad": {"rad": 1},
     "m": {"m": 1},
     "rad/s": {"rad": 1, "s": -1},

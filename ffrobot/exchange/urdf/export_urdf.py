@@ -63,7 +63,8 @@ class UrdfOfScene:
 
     def __init__(self, scene: SpatialScene, loaded: Mapping[str, LoadedSpatialBody]) -> None:
         self._scene, self._loaded = scene, loaded
-        model = build_spatial_model(scene, [loaded[body.name].spatial for body in scene.body])
+        without = scene.model_copy(update={"payload": ()})  # they are part of their links
+        model = build_spatial_model(without, [loaded[body.name].carrying for body in scene.body])
         self.tree, self.size = model.tree, robot_size(model)
         self._link_names = Names((GROUND, *(body.name for body in scene.body)))
         self._joint_names = Names(joint.name for joint in scene.joint)

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 
 from ..common.errors import InputError
-from ..common.outputs import protected
 from ..present.logs import FILE, logging_options
+from .protect import protect
 
 
 @click.command(name="import")
@@ -35,19 +35,19 @@ def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool)
     BODY.SID_FEM (standard input data, Wallrapp) and BODY.fem (MBDyn) become modal body files, which scenes take as
     `modal = "BODY.h5"`.
     """
+    from ..exchange.export import READERS, import_body
+    from ..exchange.present import print_export, print_import
+    from ..exchange.urdf.import_urdf import import_urdf
     from ..present.summary import summary_console
-    from .export import READERS, import_body
-    from .present import print_export, print_import
-    from .urdf.import_urdf import import_urdf
 
     links = _links(flexible)
     if file.suffix.lower() in READERS:
         if links or force:
             raise InputError(f"{file}: expected --flexible and --force with a URDF only, found a body")
-        with protected([file]):
-            print_export(import_body(file, output), summary_console())
+        protect([file])
+        print_export(import_body(file, output), summary_console())
         return
-    click.get_current_context().with_resource(protected([file, *links.values()]))
+    protect([file, *links.values()])
     print_import(import_urdf(file, output, links, force=force), summary_console())
 
 
@@ -95,12 +95,12 @@ def export(file: Path, file_format: str, analysis: str | None, output: Path | No
     craig-bampton     .npz with M, K, C in interface coordinates and fixed-interface modes
     exudyn            .npz of EXUDYN's ObjectFFRFreducedOrderInterface
     urdf              of a scene in space, for viewers: links rigid, shapes simple
-    fmu               of a scene in space: FMI 2.0, co-simulation, of a forward motion under moments and voltages
+    fmu               of a scene: FMI 2.0, co-simulation, of a forward motion under moments and voltages
     """  # noqa: D301 (click wants the backspace itself)
     from ..common.hdf5 import reading
+    from ..exchange.export import export_file
+    from ..exchange.present import print_export
     from ..present.summary import summary_console
-    from .export import export_file
-    from .present import print_export
 
     with reading(file):
         print_export(export_file(file, file_format, analysis, output), summary_console())

@@ -1,4 +1,4 @@
-"""The command line of `ffrobot bench`. Heavy imports happen inside, as in `cli`."""
+"""The command `bench`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from pathlib import Path
 
 import click
 
+from ..bench import OF_A_SCENE, PARTS, PEER
 from ..present.logs import FILE, logging_options, python_option
-from . import OF_A_SCENE, PARTS, PEER
+from .protect import protect
 
 
 def _texts(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:
@@ -71,20 +72,18 @@ def bench(
     source tree: the same for the two cases of the paper, how time grows with modes, links and outputs, and ratios to
     the two-link case written by hand. Tables as CSV and JSON, figures as PNG and PDF.
     """
-    from ..common.outputs import protected
+    from ..bench.campaign import Campaign, Settings
+    from ..bench.precision import INTEGRATORS, TOLERANCES
     from ..present.progress import Display
     from ..present.summary import summary_console
     from ..run.inputs import files_of
-    from .campaign import Campaign, Settings
-    from .precision import INTEGRATORS, TOLERANCES
 
     if scene_file is not None and (peer or set(parts) - set(OF_A_SCENE)):
         raise click.UsageError(f"of a scene, only the parts {' and '.join(OF_A_SCENE)} can be measured")
     if scene_file is None and analysis is not None:
         raise click.UsageError("--analysis goes with a scene")
     if scene_file is not None:
-        context = click.get_current_context()
-        context.with_resource(protected(files_of(scene_file)))
+        protect(files_of(scene_file))
     settings = Settings(integrators or INTEGRATORS, tolerances or TOLERANCES, repeat, budget)
     folder = output or (scene_file.with_suffix(".bench") if scene_file else Path("bench"))
     with Display() as display:

@@ -1,0 +1,48 @@
+"""The command `fit`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from ..present.logs import FILE, logging_options, python_option
+from .protect import protect
+
+
+@click.command()
+@click.argument("file", metavar="LINK.toml|SCENE.toml", type=FILE)
+@click.option("--measured", metavar="MODES.csv", type=FILE, required=True, help="Table: mode, frequency (Hz), …")
+@click.option("--vary", metavar="KEY,KEY …", multiple=True, required=True, help="Keys to fit; repeatable.")
+@click.option("--motors", type=click.Choice(["free", "held"]), help="Of a robot, as it was measured [free].")
+@click.option("-o", "--output", metavar="FILE.toml", type=FILE, help="Where to write [FILE.fitted.toml].")
+@click.option("--force", is_flag=True, help="Replace files of an earlier fit.")
+@python_option
+@logging_options
+def fit(
+    file: Path,
+    measured: Path,
+    vary: tuple[str, ...],
+    motors: Literal["free", "held"] | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Fit keys of a link or a scene to measured natural frequencies; new files have what was found.
+
+    \b
+    ffrobot fit arm.toml --measured modes.csv --vary material.youngs_modulus
+    ffrobot fit scene.toml --measured robot.csv --vary joint.elbow.stiffness,links.arm.material.youngs_modulus
+
+    A link vibrates under its reference condition, a robot at the start of its scene. KEY=KEY: changed by one factor.
+    Says how sure the values are; keys that the frequencies cannot tell apart are refused.
+    """  # noqa: D301 (click wants the backspace itself)
+    from ..fit.fitting import fit_measured
+    from ..fit.table import print_fit
+    from ..present.summary import summary_console
+    from ..run.inputs import files_of
+
+    protect([*files_of(file), measured])
+    keys = [key for text in vary for key in text.split(",")]
+    found = fit_measured(file, measured, keys, output, motors=motors, force=force)
+    print_fit(found, summary_console())

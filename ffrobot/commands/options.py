@@ -1,0 +1,34 @@
+"""Options that commands which make many runs share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import click
+
+from ..present.logs import FILE
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
+    """Give a command `-j`, `--retry` and `-o`, by default `folder`; `of`: what is in it."""
+
+    def add(command: F) -> F:
+        for option in (
+            click.option("-o", "--output", metavar="DIR", type=FILE, help=f"{of} [{folder} beside the input]."),
+            click.option("--retry", is_flag=True, help="Run again what failed before."),
+            click.option(
+                "-j",
+                "--processes",
+                type=click.IntRange(1, 1000),
+                default=1,
+                show_default=True,
+                help="Runs side by side.",
+            ),
+        ):
+            command = option(command)
+        return command
+
+    return add

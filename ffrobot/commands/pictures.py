@@ -1,0 +1,115 @@
+"""The commands `plot`, `view` and `report`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..present.logs import FILE
+
+MOST = 100_000  # frames of a view
+
+
+def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Which movie, of what, and how."""
+    seconds = click.FloatRange(0.1, 600.0)
+    for option in (
+        click.option("--movie", metavar="FILE.gif|.mp4", type=FILE, help="Write a movie of the motion, no other file."),
+        click.option("--seconds", metavar="S", type=seconds, default=8.0, help="That the movie plays [8]."),
+        click.option("--analysis", metavar="NAME", help="Movie, or grid, of this analysis only."),
+        click.option("--scale", metavar="S", type=float, help="Of deflections as drawn [as large as can be seen]."),
+    ):
+        command = option(command)
+    return command
+
+
+@click.command()
+@click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
+@click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several [png,pdf].")
+@click.option("--only", metavar="NAME", multiple=True, help='Figures of this name, or like "moment_*"; repeatable.')
+@movie_options
+def plot(
+    file: Path,
+    output: Path | None,
+    formats: str,
+    only: tuple[str, ...],
+    movie: Path | None,
+    **options: Any,  # noqa: ANN401 (the fields of MovieOptions)
+) -> None:
+    """Draw the figures of a results file, or mesh and modes of a modal body file.
+
+    Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn. With
+    --movie, a movie of the motion instead.
+    """
+    from ..common.hdf5 import reading
+    from ..pictures.figures.movie import write_motion
+    from ..pictures.figures.plot import plot_file
+    from ..pictures.movie_file import MovieOptions
+
+    with reading(file):
+        if movie is not None:
+            _tell([movie], write_motion(file, movie, MovieOptions(**options)))
+            return
+        paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","), only)
+    _tell(paths)
+
+
+@click.command()
+@click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the files; FILE.view if absent.")
+@click.option("--frames", metavar="N", type=click.IntRange(1, MOST), default=201, help="Time steps at most [201].")
+@click.option("--time", metavar="SECONDS", type=float, help="Of the picture [where deflections are largest].")
+@click.option("--pictures/--no-pictures", default=None, help="PNG pictures too [where PyVista can draw].")
+@movie_options
+def view(
+    file: Path,
+    output: Path | None,
+    movie: Path | None,
+    seconds: float,
+    **options: Any,  # noqa: ANN401 (the fields of Options)
+) -> None:
+    """Write links and motions as solids: VTKHDF and XDMF files for ParaView, pictures by PyVista.
+
+    Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies. With
+    --movie, a movie by PyVista instead.
+    """
+    from ..common.hdf5 import reading
+    from ..pictures.movie_file import MovieOptions
+    from ..pictures.view import Options, view_file, view_movie
+
+    with reading(file):
+        if movie is not None:
+            wanted = MovieOptions(options["analysis"], seconds, options["scale"])
+            _tell([movie], view_movie(file, movie, wanted))
+            return
+        viewed = view_file(file, output or file.with_suffix(".view"), Options(**options))
+    _tell(viewed.paths, viewed.notes)
+
+
+def _tell(paths: Iterable[Path], notes: Iterable[str] = ()) -> None:
+    """What was written, and what was not as it should be."""
+    for path in paths:
+        click.echo(path)
+    for note in notes:
+        click.echo(f"ffrobot: {note}", err=True)
+
+
+@click.command()
+@click.argument("results_files", metavar="RESULTS.h5 …", nargs=-1, required=True, type=FILE)
+@click.option("-o", "--output", metavar="FILE.html", type=FILE, help="Where to write [RESULTS.html, of the first].")
+def report(results_files: tuple[Path, ...], output: Path | None) -> None:
+    """Write one self-contained HTML page: motion, histories, modes, tables.
+
+    Several results files come side by side, for comparison. The page needs no network and no other file.
+    """
+    from ..common.hdf5 import reading
+    from ..pictures.report import write_report
+
+    path = output or results_files[0].with_suffix(".html")
+    with reading(*results_files):
+        write_report(results_files, path)
+    click.echo(path)

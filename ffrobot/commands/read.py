@@ -1,0 +1,48 @@
+"""The commands that say what files hold: `info`, `feasibility` and `linear`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..present.logs import FILE
+
+
+@click.command()
+@click.argument("file", metavar="FILE.h5", type=FILE)
+def info(file: Path) -> None:
+    """Say what a modal body file or a results file holds."""
+    from ..common.hdf5 import reading
+    from ..present.info import describe
+
+    with reading(file):
+        click.echo(describe(file))
+
+
+@click.command()
+@click.argument("results_file", metavar="RESULTS.h5", type=FILE)
+@click.option("--analysis", metavar="NAME", help="Of this analysis only.")
+def feasibility(results_file: Path, analysis: str | None) -> None:
+    """Say whether motors and patches can do what the analyses of a results file ask of them, and what would do."""
+    from ..common.hdf5 import reading
+    from ..present.feasibility import print_feasibility
+    from ..present.summary import summary_console
+
+    with reading(results_file):
+        print_feasibility(results_file, analysis, summary_console())
+
+
+@click.command()
+@click.argument("results_file", metavar="RESULTS.h5", type=FILE)
+@click.option("--analysis", metavar="NAME", help="Of this analysis; the first linear one if absent.")
+@click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Where to write [RESULTS.npz].")
+def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
+    """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
+    from ..common.hdf5 import reading
+    from ..results.file import Results
+
+    path = output or results_file.with_suffix(".npz")
+    with reading(results_file), Results(results_file) as results:
+        name = results.export_linear(analysis, path)
+    click.echo(f"{path}: linear model of {name}")

@@ -1,0 +1,137 @@
+"""The command `solve`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..present.logs import FILE, logging_options, python_option
+from .protect import protect
+
+if TYPE_CHECKING:
+    from ..present.progress import Display
+    from ..run.solution import Solution
+    from ..run.spatial_solution import SpatialSolution
+
+
+@click.command()
+@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@click.option(
+    "-o",
+    "--output",
+    metavar="RESULTS.h5",
+    type=FILE,
+    help="Where to write [SCENE.results.h5 beside the input].",
+)
+@click.option("--resume", is_flag=True, help="Go on with a run that was stopped, from its results file.")
+@click.option("--strict", is_flag=True, help="Exit with 1 where there is a warning; results are written all the same.")
+@python_option
+@logging_options
+def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) -> None:
+    """Run the analyses of a scene (stage 2).
+
+    Links given as .toml are taken through stage 1 first where they are not up to date. Prints a summary: time per
+    stage, steps, constraint violation, and the largest voltage against its limit.
+
+    Ctrl-C keeps what was computed; --resume goes on from there, and from the start where there are no results yet.
+    """
+    from ..common.files import check_output
+    from ..results.file import FORMAT
+    from ..run.inputs import files_of
+    from ..scene.spatial import is_spatial
+
+    path = output or scene_file.with_suffix(".results.h5")
+    protect(files_of(scene_file))
+    check_output(path, FORMAT)
+    again = f"ffrobot solve {scene_file}{f' -o {output}' if output else ''} --resume"
+    _solve(
+        _in_space() if is_spatial(scene_file) else _in_plane(), scene_file, path, again, resume=resume, strict=strict
+    )
+
+
+@dataclass(frozen=True)
+class _Stage2:
+    """What solves scenes of one dimension: functions that get the same, and return the solutions of that dimension."""
+
+    solve: Callable[..., Any]
+    resume: Callable[..., Any]
+    write: Callable[[Any, Path], None]
+    print_summary: Callable[..., None]
+
+
+def _in_plane() -> _Stage2:
+    from ..present.summary import print_summary
+    from ..results.resume import resume
+    from ..results.write import write_results
+    from ..run.solve import solve
+
+    return _Stage2(solve, resume, write_results, print_summary)
+
+
+def _in_space() -> _Stage2:
+    from ..present.spatial import print_spatial_summary
+    from ..results.spatial import write_spatial_results
+    from ..results.spatial_resume import resume_spatial
+    from ..run.spatial import solve_spatial
+
+    return _Stage2(solve_spatial, resume_spatial, write_spatial_results, print_spatial_summary)
+
+
+def _solve(program: _Stage2, scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
+    """Solve, write and tell; `again` is the command that goes on with it."""
+    from ..present.progress import Display
+    from ..present.summary import summary_console
+    from ..results.file import Results
+
+    writing = 0.0
+
+    def keep(solution: Solution | SpatialSolution) -> None:
+        nonlocal writing
+        began = time.perf_counter()
+        program.write(solution, path)
+        writing = time.perf_counter() - began
+
+    with Display() as display:
+        if resume:
+            solution = program.resume(scene_file, path, display, keep)
+        else:
+            solution = program.solve(scene_file, display, keep)
+    if solution is None:
+        click.echo(f"{path}: complete, nothing to go on with")
+        return
+    with Results(path) as results:
+        verdict = results.verdict
+    program.print_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
+    _check_ended(solution, display, scene_file, again)
+    if strict:
+        _check_without_warnings(solution, scene_file)
+
+
+def _check_ended(solution: Solution | SpatialSolution, display: Display, scene_file: Path, again: str) -> None:
+    """Raise `SolveError` where an analysis ended early, `StoppedError` where a signal has asked for an end."""
+    from ..common.errors import SolveError, StoppedError
+    from ..results.stopped import how_to_go_on, left_out
+
+    go_on = how_to_go_on(solution, again)
+    try:
+        for outcome in solution.outcomes.values():
+            outcome.check_completed(go_on)
+    except SolveError as error:
+        raise StoppedError(str(error), display.signal) if display.signal else error from None
+    if display.signal:
+        done = "before all analyses" if left_out(solution) else "when all was computed and written"
+        raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
+
+
+def _check_without_warnings(solution: Solution | SpatialSolution, scene_file: Path) -> None:
+    """Raise `SolveError` for the first warning."""
+    from ..common.errors import SolveError
+
+    for name, result in solution.analyses.items():
+        for text in result.warnings:
+            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')

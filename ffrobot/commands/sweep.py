@@ -1,0 +1,69 @@
+"""The command `sweep`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..common.parallel import is_first, on_first
+from ..present.logs import FILE, logging_options, python_option
+from .options import runs_options
+from .protect import protect
+
+MOST = 100_000  # runs
+
+
+@click.command()
+@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@click.option("--vary", metavar="KEY=VALUES", multiple=True, required=True, help="What takes which values; repeatable.")
+@click.option(
+    "--sample", metavar="N", type=click.IntRange(1, MOST), help="N points of a Latin hypercube, not the full grid."
+)
+@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Of the sample.")
+@click.option("--collect", metavar="DATASET[:max|rms|first|last]", multiple=True, help="Further columns; repeatable.")
+@click.option("--keep/--no-keep", default=True, show_default=True, help="Whether results files of the runs stay.")
+@runs_options("SCENE.sweep", "Folder of the sweep")
+@python_option
+@logging_options
+def sweep(
+    scene_file: Path,
+    vary: tuple[str, ...],
+    sample: int | None,
+    seed: int,
+    collect: tuple[str, ...],
+    processes: int,
+    retry: bool,
+    keep: bool,
+    output: Path | None,
+) -> None:
+    """Solve a scene many times with some of its keys varied; one table of all runs, failed ones too.
+
+    \b
+    --vary links.link1.geometry.section.height=0.01:0.03:9   a key of a body's link file, 9 values
+    --vary pzt.link1.thickness=1e-4:1e-3:5:log               evenly spaced in the logarithm
+    --vary 'initial.state="static","undeformed"'             a list
+    --vary gravity.1=-9.81,0                                 an entry of a list by its number, from 0
+
+    Entries of lists of tables go by their name or body. The same command takes up a sweep that was stopped. Runs go
+    side by side with -j on one machine, and on several under mpirun, where the first process hands them out.
+    """  # noqa: D301 (click wants the backspace itself)
+    from ..present.progress import Display
+    from ..present.summary import summary_console
+    from ..run.inputs import files_of
+    from ..sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
+
+    folder = output or scene_file.with_suffix(".sweep")
+    protect(files_of(scene_file))
+    plan = on_first(lambda: plan_sweep(scene_file, vary, folder, sample, seed, collect))
+    if retry and is_first():
+        forget_failures(plan)
+    if is_first() and (changes := stale_rows(plan)):
+        click.echo(f"ffrobot: {changes}", err=True)
+    with Display() as display:
+        rows = run_sweep(plan, processes, display)
+    if not is_first():
+        return
+    if not keep:
+        drop_results(plan)
+    print_table(plan.table, plan.keys, rows, plan.collected, summary_console())

@@ -1,0 +1,75 @@
+"""The command `uncertainty`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from ..present.logs import FILE, logging_options, python_option
+from .options import runs_options
+from .protect import protect
+
+
+@click.command()
+@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@click.option("--of", metavar="GOAL|HISTORY", multiple=True, required=True, help="What is wanted; repeatable.")
+@click.option("--spread", metavar="KEY=SPREAD", multiple=True, required=True, help="What is not sure; repeatable.")
+@click.option("--samples", metavar="N", type=int, default=200, show_default=True, help="Of a Latin hypercube.")
+@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Of the samples.")
+@click.option(
+    "--by", type=click.Choice(["samples", "gradients"]), default="samples", show_default=True,
+    help="Samples, or two runs for each key.",
+)  # fmt: skip
+@click.option("--indices", is_flag=True, help="Sobol indices, by N/2 more runs for each key.")
+@click.option("--figures/--no-figures", default=True, show_default=True, help="Whether bands are drawn.")
+@runs_options("SCENE.uncertainty")
+@python_option
+@logging_options
+def uncertainty(
+    scene_file: Path,
+    of: tuple[str, ...],
+    spread: tuple[str, ...],
+    samples: int,
+    seed: int,
+    by: Literal["samples", "gradients"],
+    indices: bool,
+    processes: int,
+    retry: bool,
+    figures: bool,
+    output: Path | None,
+) -> None:
+    """Say how sure results are where numbers of a scene and its links are not.
+
+    \b
+    --of "peak joints.elbow.moment"            goals as of `sensitivity`: mean, deviation, quantiles
+    --of joints.elbow.moment                   a history: a band
+    --spread payload.0.mass=±5%                anything within 5 %, alike ("+-5%" does, too)
+    --spread joint.elbow.stiffness=±20         … within 20 of the scene's value
+    --spread links.arm.material.youngs_modulus=normal:3%     a normal distribution, its deviation
+    --spread gravity.1=uniform:-9.83:-9.78     between two values
+
+    Every number has its own error. The same command takes up what was stopped; failed runs are told and left out.
+    """  # noqa: D301 (click wants the backspace itself)
+    from ..design.uncertainty import uncertainty as find
+    from ..design.uncertainty_record import print_uncertainty, write_uncertainty
+    from ..present.progress import Display
+    from ..present.summary import summary_console
+    from ..run.inputs import files_of
+
+    folder = output or scene_file.with_suffix(".uncertainty")
+    protect(files_of(scene_file))
+    with Display() as display:
+        found = find(
+            scene_file, of, spread, folder, samples=samples, seed=seed, by=by, indices=indices, processes=processes,
+            retry=retry, watcher=display,
+        )  # fmt: skip
+    print_uncertainty(found, summary_console())
+    for path in write_uncertainty(found, folder):
+        click.echo(f"written    {path}")
+    if figures and found.bands:
+        from ..design.band_figures import write_bands
+
+        for path in write_bands(found, folder):
+            click.echo(f"written    {path}")

@@ -1,0 +1,58 @@
+"""Scenes solved again and again, with more modes or in more pieces, until there are enough; plane and space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from ..mbs.model.planar_body import PlanarBody
+from ..mbs.model.spatial_body import SpatialBody
+from .mode_search import ModeSearch, Reported
+from .solution import AnalysisResult, Solution
+from .spatial_solution import SpatialResult, SpatialSolution
+from .watcher import Interruption
+
+B = TypeVar("B", PlanarBody, SpatialBody)
+R = TypeVar("R", AnalysisResult, SpatialResult)
+S = TypeVar("S", Solution, SpatialSolution)
+
+
+def with_enough_modes(
+    solution: S,
+    search: ModeSearch[B],
+    solved: Callable[[S, Mapping[str, B]], S],
+    reported: Callable[[R], Reported],
+    interruption: Interruption,
+) -> S:
+    """The scene `solved` with the bodies that `search` asks for, until that has enough."""
+    while True:
+        solution = solved(solution, search.bodies)
+        if solution.failure is not None:
+            return solution
+        search.add(_reported(solution, reported), last=interruption.requested)
+        if search.is_over:
+            return replace(solution, mode_choice=search.choice())
+
+
+def _reported(solution: Solution | SpatialSolution, reported: Callable[[Any], Reported]) -> dict[str, Reported] | None:
+    """What counts, by analysis; None where not all of them completed."""
+    results = solution.analyses
+    if len(results) < len(solution.scene.analysis) or any(of.status != "completed" for of in results.values()):
+        return None
+    return {name: reported(result) for name, result in results.items()}
+
+
+def with_enough_pieces(
+    solution: S,
+    solved: Callable[[S], S],
+    divided: Callable[[S, Mapping[str, int]], S],
+    wanted: Callable[[S], Mapping[str, int]],
+    interruption: Interruption,
+) -> S:
+    """The scene `solved` with links `divided` in as many pieces as they bend far, which is what solutions want more."""
+    solution = solved(solution)
+    given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
+    while solution.failure is None and not interruption.requested and (more := wanted(solution)):
+        solution = solved(divided(solution, {**given, **more}))
+    return solution

@@ -1,0 +1,81 @@
+"""What scenes in space do not have of what their keys, or planar scenes, can say: THE list, which pages print.
+
+Each of these is refused by name where it is found, with what to write in its place; `where` is the module that does so.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Lack(NamedTuple):
+    """What there is not, what there is in its place, and the module that refuses it."""
+
+    what: str
+    instead: str
+    where: str
+
+
+LACKS = (
+    Lack(
+        "`[[load]] force`, a function of Python of the motion of its point",
+        "forces and moments over time: `x`, `y`, `z`, `mx`, `my`, `mz`",
+        "ffrobot.scene.spatial",
+    ),
+    Lack(
+        "`motor = true` of spherical and free joints, which have no coordinates",
+        "revolute and prismatic joints in series; loads on points",
+        "ffrobot.scene.spatial",
+    ),
+    Lack(
+        '`coupling = "surface"` of patches on ±z, of fibres and of twist: link files outline patches on ±y',
+        '`coupling = "rotation"`',
+        "ffrobot.actuation.patches.spatial_records",
+    ),
+    Lack(
+        "bodies in pieces in analyses other than `pcid`, `forward` and `static` (in the plane also `linear` and"
+        " `closed-loop`)",
+        "the link in one, or several links welded to each other",
+        "ffrobot.scene.spatial_pieces",
+    ),
+    Lack(
+        "patches on bodies in pieces",
+        "several links welded to each other, each with its patches",
+        "ffrobot.scene.spatial_pieces",
+    ),
+    Lack(
+        'linear models with `motors = "frame"`',
+        '`motors = "section"`',
+        "ffrobot.mbs.solve.spatial_linearisation",
+    ),
+    Lack(
+        "linear models of gears that give (`stiffness` of joints)",
+        "gears without `stiffness`",
+        "ffrobot.mbs.solve.spatial_linearisation",
+    ),
+    Lack(
+        "`placement` of patches on a link with several layouts",
+        "one layout on that link",
+        "ffrobot.actuation.control.spatial_placement",
+    ),
+    Lack(
+        '`output = "redefined"` of `motors-only` in closed loops',
+        '`output = "tip"`',
+        "ffrobot.mbs.solve.spatial_servo",
+    ),
+    Lack(
+        "free joints at points of links that modes move",
+        "no joint at all: a body without one is free",
+        "ffrobot.mbs.model.spatial_system",
+    ),
+    Lack(
+        "more rows of paths and cut loops than the core takes (`MOST_ROWS`)",
+        "fewer loops",
+        "ffrobot.mbs.model.spatial_system",
+    ),
+    Lack(
+        "forward motions with geometric stiffening as FMUs",
+        "`geometric_stiffening = false`",
+        "ffrobot.exchange.fmu.forward_model",
+    ),
+)

@@ -1,0 +1,113 @@
+"""Processes that perform runs, kept from one run to the next: `ffrobot.worker`."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import weakref
+from contextlib import suppress
+from pathlib import Path
+from subprocess import PIPE, Popen
+from tempfile import TemporaryFile
+from threading import Lock
+
+from ..common.parallel import environment_without_mpi
+
+ALONE = {
+    "OMP_NUM_THREADS": "1",  # several runs go side by side
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMPI_MCA_pml": "ob1",  # Open MPI opens no network, and nothing that several processes share: runs are one process
+    "OMPI_MCA_btl": "self",
+    "OMPI_MCA_ess_singleton_isolated": "1",  # nor a daemon
+}
+
+
+class Worker:
+    """One such process, with the environment and in the folder of its making."""
+
+    def __init__(self) -> None:
+        self.place = _place()
+        self._told = TemporaryFile("a+b")  # noqa: SIM115 (as long as the worker)
+        command = [sys.executable, "-m", "ffrobot.worker"]
+        environment = environment_without_mpi() | ALONE
+        self._process = Popen(command, env=environment, stdin=PIPE, stdout=PIPE, stderr=self._told)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._requests, self._answers = self._process.stdin, self._process.stdout
+
+    def perform(self, arguments: list[str]) -> tuple[int, str]:
+        """Exit code and error messages of `ffrobot ARGUMENTS`; those of the worker where it ends with the run."""
+        self._told.truncate(0)
+        answer = b""
+        with suppress(BrokenPipeError):
+            self._requests.write(json.dumps({"arguments": arguments}).encode() + b"\n")
+            self._requests.flush()
+            answer = self._answers.readline()
+        code = json.loads(answer)["code"] if answer.endswith(b"\n") else self._process.wait()
+        self._told.seek(0)
+        return code, self._told.read().decode(errors="replace")
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it takes another run."""
+        return self._process.poll() is None
+
+    def stop(self) -> None:
+        """Ask the run under way to end, or the worker itself."""
+        self._process.terminate()
+
+    def close(self) -> None:
+        """End it, with nothing under way."""
+        with suppress(BrokenPipeError):
+            self._requests.close()
+        self._answers.close()
+        self._process.wait()
+        self._told.close()
+
+
+class Workers:
+    """Workers as they are needed, ended with this object."""
+
+    def __init__(self) -> None:
+        self._idle: list[Worker] = []
+        self._busy: set[Worker] = set()
+        self._lock = Lock()
+        weakref.finalize(self, _close, self._idle)
+
+    def perform(self, arguments: list[str]) -> tuple[int, str]:
+        """As `Worker.perform`, by any of them; from several threads at once."""
+        worker = self._take()
+        try:
+            return worker.perform(arguments)
+        finally:
+            with self._lock:
+                self._busy.discard(worker)
+                if worker.is_alive:
+                    self._idle.append(worker)
+
+    def stop(self) -> None:
+        """Ask all runs under way to end."""
+        with self._lock:
+            for worker in self._busy:
+                worker.stop()
+
+    def _take(self) -> Worker:
+        """One that is idle and would be made the same now, or a new one."""
+        with self._lock:
+            fit = [worker for worker in self._idle if worker.place == _place() and worker.is_alive]
+            _close([worker for worker in self._idle if worker not in fit])
+            self._idle[:] = fit
+            worker = self._idle.pop() if self._idle else Worker()
+            self._busy.add(worker)
+        return worker
+
+
+def _close(idle: list[Worker]) -> None:
+    while idle:
+        idle.pop().close()
+
+
+def _place() -> tuple[Path, dict[str, str]]:
+    """What a process inherits."""
+    return Path.cwd(), dict(os.environ)

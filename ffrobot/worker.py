@@ -1,0 +1,145 @@
+"""A process that solves scenes one after the other: `python -m ffrobot.worker`, for runs of sweeps and designs.
+
+It loads the program once, and forks for every scene: what a run does to its process (a crash, memory, the folder it is
+in, modules and caches that a scene's Python functions leave) ends with that run, and a run finds what one of
+`ffrobot solve` finds. Requests and answers are lines of JSON on the standard streams, `{"arguments": ["solve", …]}` and
+`{"code": 0}`, the exit code as `subprocess` has it. What runs print on the error stream goes where this process's does.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import json
+import os
+import random
+import signal
+import sys
+import warnings
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
+from types import FrameType
+from typing import BinaryIO, NoReturn
+
+from .common.interrupts import SIGNALS, EndOfCommand
+
+LOADED = (  # by every run; what else a run has loaded, the next one finds
+    "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write", "ffrobot.results.resume",
+    "ffrobot.results.stopped", "ffrobot.present.progress", "ffrobot.present.summary", "ffrobot.fe_models.link",
+    "ffrobot.scene.spatial",
+)  # fmt: skip
+PIPE = 1 << 15  # bytes that a pipe takes without a reader
+
+
+def main() -> None:
+    """Answer requests until there are no more, or SIGTERM, which the run under way has first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: runs have it, whoever asks for them decides
+    requests, answers = _private_streams()
+    _load(LOADED)
+    for line in requests:
+        names, report = os.pipe()
+        child = _fork()
+        if child == 0:
+            for stream in (requests, answers):  # of a worker that dies nothing may stay open
+                stream.close()
+            os.close(names)
+            _run(json.loads(line)["arguments"], report)
+        os.close(report)
+        code = _wait(child)
+        answers.write(json.dumps({"code": code}).encode() + b"\n")
+        answers.flush()
+        with open(names, "rb") as stream:
+            _load(stream.read().decode().split())
+
+
+def _wait(child: int) -> int:
+    """Exit code of a process, which is handed SIGTERM meanwhile; signals are blocked before."""
+
+    def hand_on(number: int, frame: FrameType | None) -> None:
+        with suppress(ProcessLookupError):
+            os.kill(child, number)
+
+    signal.signal(signal.SIGTERM, hand_on)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    signal.signal(signal.SIGTERM, EndOfCommand())
+    return code
+
+
+def _run(arguments: Sequence[str], report: int) -> NoReturn:
+    """`ffrobot ARGUMENTS` in the process of one run, which ends with it; what it has loaded is told on `report`."""
+    _end_with_parent()
+    for number in SIGNALS:
+        signal.signal(number, EndOfCommand())
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    from .cli import main as command_line
+
+    _seed()
+    before = set(sys.modules)
+    sys.argv = ["ffrobot", *arguments]
+    code = 0
+    try:
+        command_line()
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else 1
+    loaded = set(sys.modules) - before
+    names = sorted(name for name in loaded if name.startswith("ffrobot."))
+    os.write(report, " ".join(names).encode()[:PIPE])
+    if "mpi4py.MPI" in loaded:  # it has to be finished where it was begun
+        sys.exit(code)
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
+
+
+def _private_streams() -> tuple[BinaryIO, BinaryIO]:
+    """Standard input and output, which others in this process get nothing of."""
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for standard in (0, 1):
+        os.dup2(nowhere, standard)
+    os.close(nowhere)
+    return requests, answers
+
+
+def _fork() -> int:
+    """As `os.fork`, with `SIGNALS` blocked in both processes.
+
+    Python's warning of threads is left out: MPI has one, which waits for other processes.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        return os.fork()
+
+
+def _load(names: Sequence[str]) -> None:
+    """Modules of the program; what one fails of, the run that needs it says."""
+    for name in names:
+        with suppress(Exception):
+            import_module(name)
+
+
+def _seed() -> None:
+    """Give a run random numbers of its own where its scene's functions draw some: modules are seeded as they load."""
+    import numpy as np
+
+    random.seed()
+    np.random.seed()  # noqa: NPY002 (the one generator that there is without asking)
+
+
+def _end_with_parent() -> None:
+    """Have Linux end a run whose worker was killed: nobody waits for it any more, and another may write its file."""
+    with suppress(Exception):
+        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, EndOfCommand())
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit(128 + signal.SIGTERM)

@@ -1,0 +1,240 @@
+"""Processes that perform the runs of sweeps one after the other: what a run does to its process is gone with it."""
+
+import csv
+import os
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pytest
+import tomli_w
+
+from ffrobot.sweep.workers import Workers
+
+CONTROLLER = '''
+"""A motor's constant command, by functions that do much else to their process."""
+
+import os
+import random
+import signal
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+NOTES = Path(__file__).with_name("notes.txt")
+traces = [name for name in ("mark", "numpy.marked") if name in sys.modules]
+traces += ["folder"] * (Path.cwd().name == "elsewhere") + ["environment"] * ("FFROBOT_MARK" in os.environ)
+traces += ["warnings"] * (warnings.filters[0][0] == "error") + ["NumPy"] * (np.geterr()["over"] == "raise")
+DRAWN = f"{np.random.random()} {random.random()}"
+
+
+def note(text):
+    with NOTES.open("a") as file:
+        print(os.getppid(), os.getpid(), text, file=file)
+
+
+def constant(setup):
+    note(" ".join(traces) or "clean")
+    return lambda k, y: np.full(len(setup.inputs), 0.1)
+
+
+def careless(setup):
+    elsewhere = Path(__file__).with_name("elsewhere")
+    elsewhere.mkdir(exist_ok=True)
+    os.chdir(elsewhere)
+    os.environ["FFROBOT_MARK"] = "1"
+    sys.modules["mark"] = sys.modules["numpy.marked"] = sys
+    warnings.simplefilter("error")
+    np.seterr(over="raise")
+    np.random.seed(0)
+    random.seed(0)
+    return constant(setup)
+
+
+def drawing(setup):
+    note(DRAWN)
+    return lambda k, y: np.full(len(setup.inputs), 0.1)
+
+
+def killed(setup):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def aborting(setup):
+    os.abort()
+
+
+def worker_killed(setup):
+    note("kills")
+    os.kill(os.getppid(), signal.SIGKILL)
+    time.sleep(1.0)
+    note("lives on")
+
+
+def waiting(setup):
+    def act(k, y):
+        if k == 0:
+            note("waits")
+        time.sleep(0.05)
+        return np.full(len(setup.inputs), 0.1)
+
+    return act
+'''
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A wheel with a controller of the user's."""
+    (tmp_path / "mine.py").write_text(CONTROLLER, encoding="utf-8")
+    body = {"mass": 1.0, "inertia": 0.5, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
+    loop = {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.01}
+    tables = {
+        "name": "wheel",
+        "gravity": [0.0, 0.0],
+        "body": [{"name": "w", "rigid": body}],
+        "joint": [{"name": "O", "type": "revolute", "between": ["ground", "w.root"]}],
+        "trajectory": [{"name": "turn", "joint": "O", "value": "t**2"}],
+        "analysis": [
+            {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01},
+            loop | {"controller": [{"kind": "python", "python": "mine.py:constant"}]},
+        ],
+    }
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps(tables), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def sweep(ffrobot, scene):
+    """The table of a sweep over functions of that file."""
+
+    def run(*functions, options=()):
+        listed = ",".join(f'"{scene.parent}/mine.py:{name}"' for name in functions)
+        vary = f"analysis.loop.controller.0.python={listed}"
+        done = ffrobot("sweep", scene, "--vary", vary, "--collect", "loop/joints/O/coordinate:last", *options)
+        assert done.returncode == 0, done.stderr
+        with (scene.with_suffix(".sweep") / "table.csv").open(encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+
+    return run
+
+
+def notes(scene):
+    """(worker, process, text) of every run that told."""
+    lines = scene.with_name("notes.txt").read_text(encoding="utf-8").splitlines()
+    return [(int(worker), int(process), text) for worker, process, text in (line.split(" ", 2) for line in lines)]
+
+
+def datasets(path):
+    with h5py.File(path) as file:
+        found = {}
+        file.visititems(lambda name, item: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
+        return found
+
+
+def test_runs_find_nothing_of_earlier_ones(sweep, scene):
+    rows = sweep("careless", "constant", "careless", "constant")
+    assert [row["status"] for row in rows] == ["completed"] * 4
+    workers, processes, texts = zip(*notes(scene), strict=True)
+    assert texts == ("clean",) * 4
+    assert len(set(workers)) == 1
+    assert len(set(processes)) == 4
+    assert len({row["loop/joints/O/coordinate last"] for row in rows}) == 1
+
+
+def test_random_numbers_are_others_in_every_run(sweep, scene):
+    """As of single runs: where nobody seeds them, the system does."""
+    sweep("careless", "drawing", "drawing")
+    drawn = [number for _, _, text in notes(scene)[1:] for number in text.split()]
+    assert len(set(drawn)) == 4
+
+
+def test_results_are_those_of_single_runs(sweep, scene, ffrobot, tmp_path):
+    """To the last bit, and of a run after another one."""
+    sweep("careless", "constant")
+    run = scene.with_suffix(".sweep") / "runs" / "0001"
+    single = tmp_path / "single.h5"
+    done = ffrobot("solve", run / "scene.toml", "-o", single, "--allow-python", scene.parent)
+    assert done.returncode == 0, done.stderr
+    expected, found = datasets(single), datasets(run / "results.h5")
+    assert set(found) == set(expected)
+    assert len(expected) > 10
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
+def test_crashes_cost_their_own_run(sweep, scene):
+    rows = sweep("constant", "killed", "aborting", "constant")
+    assert [row["status"] for row in rows] == ["completed", "crashed", "crashed", "completed"]
+    assert [row["message"] for row in rows[1:3]] == ["ended by SIGKILL", "ended by SIGABRT"]
+    assert len({worker for worker, _, _ in notes(scene)}) == 1
+
+
+def test_a_worker_that_is_killed_costs_its_run(sweep, scene):
+    """The run ends with it, and does not write into what another may write later."""
+    rows = sweep("constant", "worker_killed", "constant")
+    assert [row["status"] for row in rows] == ["completed", "crashed", "completed"]
+    time.sleep(1.2)
+    found = notes(scene)
+    assert [text for _, _, text in found] == ["clean", "kills", "clean"]
+    assert found[1][0] == found[0][0] != found[2][0]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interruptions_leave_no_process(ffrobot, scene, number):
+    """As a terminal sends them, to all, and as `kill` does, to the sweep alone."""
+    text = scene.read_text(encoding="utf-8").replace("mine.py:constant", "mine.py:waiting").replace("0.1", "100.0")
+    scene.write_text(text, encoding="utf-8")
+    process = subprocess.Popen(
+        [ffrobot.path, "sweep", scene, "--vary", "gravity.1=0,1", "-j", "2"], env=ffrobot.environment,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    while not scene.with_name("notes.txt").exists() or len(notes(scene)) < 2:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+    if number == signal.SIGINT:
+        os.killpg(process.pid, number)
+    else:
+        process.send_signal(number)
+    began = time.monotonic()
+    _, message = process.communicate(timeout=30)
+    assert time.monotonic() - began < 10.0  # a second on a machine with nothing else to do
+    assert process.returncode == 128 + number, message
+    assert "Traceback" not in message
+    assert not list(scene.with_suffix(".sweep").glob("runs/*/row.json"))
+    for worker, run, _ in notes(scene):
+        assert not _is_running(worker)
+        assert not _is_running(run)
+
+
+def test_workers_are_made_anew_where_the_process_has_changed(scene, monkeypatch, tmp_path):
+    """Environment and folder are those of the moment, as of a process that is started then."""
+    workers = Workers()
+    solve = ["solve", str(scene), "-o", str(tmp_path / "results.h5"), f"--allow-python={tmp_path}"]
+    assert workers.perform(solve) == (0, "")
+    assert workers.perform(solve) == (0, "")
+    monkeypatch.setenv("FFROBOT_MARK", "1")
+    assert workers.perform(solve) == (0, "")
+    first, second, third = notes(scene)
+    assert first[0] == second[0] != third[0]
+    assert [text for *_, text in notes(scene)] == ["clean", "clean", "environment"]
+    assert not _is_running(first[0])
+    code, told = workers.perform(["solve", str(tmp_path / "none.toml")])
+    assert code == 2
+    assert told.startswith("ffrobot: ")
+    del workers
+    assert not _is_running(third[0])
+
+
+def _is_running(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    with open(f"/proc/{pid}/stat") as file:
+        return file.read().rpartition(")")[2].split()[0] != "Z"
