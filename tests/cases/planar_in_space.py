@@ -2,42 +2,37 @@
 
 import tomllib
 
+import numpy as np
 import tomli_w
+
+from ffrobot.mbs.scene.in_space import keys
+
+# Where the joints of these cases start: [initial] of scenes in space
+TWO_LINK = {"O": 0.0, "A": 1.0471975511965976}
+CRANK = {
+    "O": 1.3548358281099402,
+    "A": -0.43192099736991246 - 1.3548358281099402,
+    "B": 0.43192099736991246,
+    "guide": 0.233,
+}
+# What is compared
+TIGHT = {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.01, "tolerance": 1e-10}
+STRAIGHT = {"name": "straight", "kind": "fcid", "shape": "zero", "end": 0.2, "output_step": 0.01}
+REST = {"name": "rest", "kind": "static"}
 
 
 def in_space(tables):
     """The tables of a planar scene, without patches and analyses, as those of one in space."""
     found = {key: tables[key] for key in ("name", "motors") if key in tables}
-    found |= {"space": "spatial", "gravity": [*tables["gravity"], 0.0]}
+    found |= {"space": "spatial", "gravity": keys.place(tables["gravity"])}
     found["body"] = [_body(body) for body in tables["body"]]
-    found["joint"] = [_joint(joint) for joint in tables["joint"]]
+    found["joint"] = [keys.joint_keys(joint) for joint in tables["joint"]]
     found["trajectory"] = [dict(trajectory) for trajectory in tables["trajectory"]]
     return found
 
 
 def _body(body):
-    if "rigid" not in body:
-        return dict(body)
-    rigid = body["rigid"]
-    points = {name: [*place, 0.0] for name, place in rigid["points"].items()}
-    J = rigid["inertia"]  # about z; the others are of no account in the plane
-    return {
-        "name": body["name"],
-        "rigid": {
-            "mass": rigid["mass"],
-            "center": [*rigid["center"], 0.0],
-            "inertia": [0.6 * J, 0.6 * J, J],
-            "points": points,
-        },
-    }
-
-
-def _joint(joint):
-    found = dict(joint)
-    if "at" in joint:
-        found["at"] = [*joint["at"], 0.0]
-    found["axis"] = [*joint["axis"], 0.0] if joint["type"] == "prismatic" else [0.0, 0.0, 1.0]
-    return found
+    return body | {"rigid": keys.rigid_keys(body["rigid"])} if "rigid" in body else dict(body)
 
 
 def read(path):
@@ -53,3 +48,28 @@ def write(tables, path):
     """A scene file."""
     path.write_text(tomli_w.dumps(tables), encoding="utf-8")
     return path
+
+
+def close(found, expected, share, least=1e-9):
+    """To a share of the peak, which is `least` at the least."""
+    np.testing.assert_allclose(found, expected, rtol=0, atol=share * max(np.abs(expected).max(), least))
+
+
+def compare_two_links(planar, spatial, analysis, share):
+    """What joints, the path and links of cases/two_link do, in the plane and in space."""
+    for joint in TWO_LINK:
+        for key in ("moment", "coordinate", "rate"):
+            name = f"{analysis}/joints/{joint}/{key}"
+            close(spatial[name], planar[name], share, 1e-6)
+        name = f"{analysis}/joints/{joint}/reaction"
+        close(spatial[name][:, :2], planar[name], share)
+        assert np.abs(spatial[name][:, 2]).max() < 1e-9 * np.abs(planar[name]).max()
+    name = f"{analysis}/trajectories/tip/force"
+    close(spatial[name], planar[name], share)
+    for link in ("link1", "link2"):
+        close(spatial[f"{analysis}/bodies/{link}/modal"], planar[f"{analysis}/bodies/{link}/modal"], share, 1e-6)
+        name = f"bodies/{link}/modal_force"  # of sagging links the small difference of large forces
+        peak = np.abs(planar[f"straight/{name}"]).max()
+        close(spatial[f"{analysis}/{name}"], planar[f"{analysis}/{name}"], share, peak)
+        name = f"{analysis}/points/{link}.tip/deflection"
+        close(spatial[name][:, :2], planar[name], share, 1e-6)

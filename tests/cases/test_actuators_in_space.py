@@ -3,40 +3,9 @@
 import h5py
 import numpy as np
 import pytest
+from patched_arms import ARM, LINK, PZT, SEVEN
 from space import close
-from test_patches_in_space import LINK, PZT, SEVEN
 
-ARM = """
-name = "arm"
-space = "spatial"
-gravity = [0.0, 0.0, -9.81]
-motors = "{motors}"
-[[body]]
-name = "column"
-[body.rigid]
-mass = 1.0
-center = [0.0, 0.0, 0.1]
-inertia = [0.01, 0.01, 0.01]
-points = {{ root = [0.0, 0.0, 0.0], top = [0.0, 0.0, 0.2] }}
-[[body]]
-name = "link"
-link = "link.toml"
-[[joint]]
-name = "waist"
-type = "revolute"
-between = ["ground", "column.root"]
-axis = [0.0, 0.0, 1.0]
-[[joint]]
-name = "shoulder"
-type = "revolute"
-between = ["column.top", "link.root"]
-axis = [0.0, -1.0, 0.0]
-[[payload]]
-point = "link.tip"
-mass = 0.1
-[initial]
-joints = {{ waist = 0.0, shoulder = 0.0 }}
-"""
 PATH = """
 [[trajectory]]
 name = "tip"

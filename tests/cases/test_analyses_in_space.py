@@ -160,7 +160,8 @@ def test_forces_on_paths_bring_the_motion_again(name, tmp_path, ffrobot):
                 close(file[f"again/joints/{joint}/coordinate"], group["coordinate"][()], 0.1)
             largest = np.abs(group["reaction"]).max()
             np.testing.assert_allclose(file[f"again/joints/{joint}/reaction"], group["reaction"], atol=2e-5 * largest)
-        assert not len(file["again"].attrs["warnings"])
+        told = list(file["again"].attrs["warnings"])  # the reference has no stiffening
+        assert all("geometric stiffening is off" in text for text in told)
 
 
 def test_motors_keep_within_their_limits(tmp_path, ffrobot):

@@ -4,8 +4,8 @@ import numpy as np
 import planar_in_space
 import pytest
 from checkpoints import CASES
+from planar_in_space import CRANK
 from scipy.linalg import expm
-from test_planar_scenes_in_space import CRANK
 
 import ffrobot
 from ffrobot.common.errors import InputError

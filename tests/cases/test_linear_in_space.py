@@ -4,7 +4,7 @@ import numpy as np
 import planar_in_space
 import pytest
 from checkpoints import CASES
-from test_planar_scenes_in_space import CRANK, TWO_LINK
+from planar_in_space import CRANK, TWO_LINK
 
 import ffrobot
 

@@ -4,7 +4,11 @@ import re
 
 import h5py
 import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
 from space import solved, write_scene
+
+import ffrobot
 
 SCENE = """
 name = "loads"
@@ -109,3 +113,60 @@ def test_links_whose_joints_stick(tmp_path, ffrobot):
     assert implicit == "radau"
     assert 10 * few < many
     np.testing.assert_allclose(radau, dop853, atol=1e-6 * np.abs(dop853).max())
+
+
+TWO_OR_MORE = {
+    "universal": {"axis": [1.0, 0.0, 0.0], "second_axis": [0.0, 1.0, 0.0]},
+    "cylindrical": {"axis": [0.3, 0.2, 1.0]},
+    "planar": {"axis": [0.0, 0.2, 1.0]},
+}
+
+
+@pytest.mark.parametrize("joint", TWO_OR_MORE)
+def test_moments_along_several_coordinates_do_their_work(joint):
+    """One expression for each coordinate: the kinetic energy of a body from rest is the work Σ ∫ moment · rate dt."""
+    inertia = {"mass": 2.0, "center": [0.1, 0.02, -0.05], "inertia": [0.02, 0.03, 0.04]}
+    moments = ["0.3 + t", "-0.2*cos(3*t)", "0.1"][: 3 if joint == "planar" else 2]
+    scene = ffrobot.make_scene(
+        name="driven", space="spatial", gravity=[0.0, 0.0, 0.0],
+        body=[{"name": "body", "rigid": inertia | {"points": {"at": [0.0, 0.0, 0.0]}}}],
+        joint=[{"name": "J", "type": joint, "between": ["ground", "body.at"], "motor": False} | TWO_OR_MORE[joint]],
+        load=[{"joint": "J", "moment": moments}],
+        analysis=[{"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.001, "tolerance": 1e-10}],
+    )  # fmt: skip
+    with ffrobot.solve(scene) as results:
+        t, rates, energy = (results[f"fall/{key}"] for key in ("time", "joints/J/rate", "energy/kinetic"))
+    power = np.sum(np.stack([0.3 + t, -0.2 * np.cos(3 * t), 0.1 + 0 * t], axis=1)[:, : len(moments)] * rates, axis=1)
+    work = CubicSpline(t, power).antiderivative()(t)
+    np.testing.assert_allclose(energy - energy[0], work, rtol=0, atol=1e-8 * work[-1])
+
+
+@pytest.mark.parametrize(
+    ("joint", "load", "says"),
+    [
+        (
+            {"type": "universal"},
+            {"moment": "1.0"},
+            r"moment: expected 2 expressions, one for each coordinate of .* found 1",
+        ),
+        ({"type": "universal"}, {"moment": ["1", "2", "3"]}, "moment: expected 2 expressions, .* found 3"),
+        (
+            {"type": "spherical"},
+            {"moment": ["1", "2", "3"]},
+            "joint: expected one with coordinates, found .* a spherical",
+        ),
+    ],
+)
+def test_moments_that_do_not_fit_their_joint(joint, load, says):
+    axes = TWO_OR_MORE["universal"] if joint["type"] == "universal" else {}
+    with pytest.raises(ffrobot.InputError, match=says):
+        ffrobot.solve(
+            ffrobot.make_scene(
+                name="driven", space="spatial", gravity=[0.0, 0.0, 0.0],
+                body=[{"name": "body", "rigid": {"mass": 1.0, "center": [0.0] * 3, "inertia": [1.0] * 3,
+                                                 "points": {"at": [0.0] * 3}}}],
+                joint=[{"name": "J", "between": ["ground", "body.at"]} | joint | axes],
+                load=[{"joint": "J"} | load],
+                analysis=[{"name": "fall", "kind": "forward", "end": 0.1, "output_step": 0.1}],
+            )
+        )  # fmt: skip

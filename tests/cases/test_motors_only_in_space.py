@@ -8,7 +8,7 @@ import planar_in_space
 import pytest
 import tomli_w
 from checkpoints import CASES
-from test_actuators_in_space import ARM, LINK
+from patched_arms import ARM, LINK
 
 import ffrobot
 

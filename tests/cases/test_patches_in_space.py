@@ -5,42 +5,9 @@ from dataclasses import dataclass
 import h5py
 import numpy as np
 import pytest
+from patched_arms import LINK, PZT, SEVEN
 
 from ffrobot import Results
-
-LINK = """
-name = "{name}"
-[material]
-youngs_modulus = 70e9
-poissons_ratio = 0.33
-density = 2700.0
-[geometry]
-kind = "beam"
-length = {length}
-section = {{ shape = "rectangle", height = {height}, width = {width} }}
-[mesh]
-elements = 4
-[reference]
-condition = "cantilever"
-[modes]
-{modes}
-attachment_modes = false
-[damping]
-ratio = 0.01
-"""
-PZT = """
-[[pzt]]
-body = "{body}"
-{keys}
-count = 4
-length = 0.06
-width = 0.01
-thickness = 0.5e-3
-modulus = 63e9
-d31 = 110e-12
-density = 7600.0
-limit = {limit}
-"""
 
 
 @dataclass
@@ -139,8 +106,6 @@ def test_planar_scene_put_into_space_has_the_planar_voltages(arm, tmp_path, ffro
         assert found.verdict["inverse"].feasible == plane.verdict["inverse"].feasible
         assert found.verdict["inverse"].answer == plane.verdict["inverse"].answer
 
-
-SEVEN = 'indices = [1, 2, 3, 4, 5, 6, 7]\nfamily = "all"'
 
 ONE_LINK = """
 name = "turned"
@@ -293,7 +258,11 @@ def test_what_no_patch_reaches_is_told_mode_by_mode(tmp_path, ffrobot):
         ('body = "link"', 'body = "lnk"', 'expected one of the bodies "link", found "lnk"'),
         ('bends = "out-of-plane"', 'bends = "twist"', "plain piezoceramic strains alike in all directions"),
         ("count = 4", "count = 1", "expected as many patches as modes"),
-        ("limit = 200.0", 'coupling = "surface"', 'coupling: expected "rotation", found "surface"'),
+        (
+            "limit = 200.0",
+            'coupling = "surface"',
+            'expected bends = "in-plane" and no fibres beside coupling = "surface"',
+        ),
     ],
 )
 def test_mistakes(old, new, message, tmp_path, ffrobot):

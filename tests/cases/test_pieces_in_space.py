@@ -60,11 +60,11 @@ def elastica(k):
 
 
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
-@pytest.mark.parametrize(("stiffened", "order", "least"), [(False, 2, 1e-2), (True, 4, 5e-4)])
+@pytest.mark.parametrize(("stiffened", "order", "least"), [(False, 2, 1e-2), (None, 4, 5e-4)])
 def test_elastica_in_an_oblique_plane(condition, stiffened, order, least):
     """A tip force across that bends the link by two thirds of its length, at any angle.
 
-    To second order of the pieces; where bending shortens them, with geometric stiffening, to fourth.
+    To fourth order of the pieces, whose bending shortens them; to second where the scene says that it does not.
     """
     A, angle, k = of_rpy(*RPY), 0.8, 2.0
     (x, w), theta = elastica(k)
@@ -80,10 +80,22 @@ def test_elastica_in_an_oblique_plane(condition, stiffened, order, least):
             section = of_quaternion(results["rest/points/beam.tip/quaternion"][0])
             turned.append(np.linalg.norm(section[:, 0] - tangent))
             assert results.attributes("rest/bodies/beam")["pieces"] == pieces
+            assert results.attributes("/")["geometric_stiffening"] == (stiffened is None)
     assert off[0] < least  # one frame is off by a quarter of the length
     for errors in (off, turned):
         orders = np.log2(np.array(errors[:-1]) / errors[1:])
         assert np.all(np.abs(orders - order) < 0.4), orders
+
+
+@pytest.mark.parametrize(("pieces", "known"), [(2, True), (3, False)])
+def test_loads_between_the_ends_of_a_piece_leave_its_link_as_it_is(pieces, known):
+    """The middle is an end of pieces, or the middle of one, of whose loads files have no geometric stiffness."""
+    load = [{"point": "beam.mid", "x": "1e-3"}]
+    with solved(link(), pieces, load=load) as results:
+        assert results.attributes("/")["geometric_stiffening"] == known
+    if not known:
+        with pytest.raises(InputError, match="expected, with geometric_stiffening, a point whose loads' geometric"):
+            solved(link(), pieces, load=load, geometric_stiffening=True)
 
 
 def test_a_moment_about_an_oblique_axis_bends_to_a_circle_and_twists():
@@ -184,7 +196,7 @@ def test_rates_of_the_one_link_are_derivatives(condition):
 
 
 def test_pieces_are_those_of_the_plane():
-    """A double pendulum in pieces in space, and in the plane of links cut by hand and welded, without stiffening.
+    """A double pendulum in pieces in space, and in the plane of links cut by hand and welded, with stiffening.
 
     At rest the same but for rounding. Where it falls the plane raises the mass of attachment modes, space does not: the
     links' fast vibrations differ.
@@ -213,7 +225,7 @@ def test_pieces_are_those_of_the_plane():
     angles = {body["name"]: -1.2 for body in by_hand}
     wind = {"x": "0.4", "y": "-0.1"}
     planar = ffrobot.make_scene(
-        name="by_hand", gravity=[0.0, -9.81], body=by_hand, joint=planar_joints + welds,
+        name="by_hand", gravity=[0.0, -9.81], geometric_stiffening=True, body=by_hand, joint=planar_joints + welds,
         load=[{"point": "second1.tip", **wind}], initial={"angles": angles}, analysis=runs,
     )  # fmt: skip
     load = [{"point": "second.tip", **wind}]

@@ -1,6 +1,7 @@
 """Scenes in space against numbers of other codes and closed forms, and what cannot change over a long time."""
 
 import numpy as np
+import pytest
 from space import solved
 
 from ffrobot.mbs.model.spatial_accelerations import Accelerated
@@ -198,12 +199,13 @@ def whirling(model, Omega):
     return np.sort(s.imag[s.imag > 0])
 
 
-def test_spinning_shaft_whirls_forward_and_backward(tmp_path):
+@pytest.mark.parametrize("stiffening", [True, False])
+def test_spinning_shaft_whirls_forward_and_backward(stiffening, tmp_path):
     """Pins, gyroscopic moments: ω² ∓ 2λω₀ω − ω₀² = 0, λ = ½ΩI_x/√(EIρS) (Code_Aster V2.02.141), seen from the shaft.
 
     With the rotary inertia of tilting sections, κ = r²k²/(1 + r²k²) of the mass (r radius of inertia, k = π/L), λω₀ is
-    κΩ. Sections that tilt by ψ keep their height in u = x + Φp: what they lose in ψ², geometric stiffening would give
-    back; without it κΩ² is missing in ω₀². The split is what gyroscopic moments make.
+    κΩ. Sections that tilt by ψ keep their height in u = x + Φp: what they lose in ψ², geometric stiffening gives back;
+    without it κΩ² is missing in ω₀². The split is what gyroscopic moments make.
     """
     diameter, length, Omega = 0.02, 1.0, 3000.0
     text = LINK.format(
@@ -212,13 +214,13 @@ def test_spinning_shaft_whirls_forward_and_backward(tmp_path):
     )  # fmt: skip
     text = text.replace("[mesh]", '[model]\ntheory = "timoshenko"\n[mesh]').replace("elements = 20", "elements = 40")
     (tmp_path / "shaft.toml").write_text(text)
-    (tmp_path / "scene.toml").write_text(SHAFT)
+    (tmp_path / "scene.toml").write_text(f"geometric_stiffening = {str(stiffening).lower()}\n{SHAFT}")
     scene = load_spatial_scene(tmp_path / "scene.toml")
     model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
     omega_0 = whirling(model, 0.0).mean()
     r_k = diameter / 4 * np.pi / length
     kappa = r_k**2 / (1 + r_k**2)
-    mean = np.sqrt(omega_0**2 - kappa * Omega**2 + (kappa * Omega) ** 2)
+    mean = np.sqrt(omega_0**2 + (kappa * Omega) ** 2 - (0.0 if stiffening else kappa * Omega**2))
     forward, backward = mean + kappa * Omega, mean - kappa * Omega
     found = whirling(model, Omega)
     np.testing.assert_allclose(found, [Omega - forward, Omega + backward], rtol=2e-6)

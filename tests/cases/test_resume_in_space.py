@@ -5,9 +5,9 @@ import re
 import h5py
 import numpy as np
 import pytest
+from stopped_runs import Stops, differences, go_on, stop
 
 import ffrobot
-from ffrobot.run.watcher import Watcher
 
 END = 0.3
 PATCHES = """
@@ -30,27 +30,6 @@ tolerance = 1e-6
 """
 
 
-class Stops(Watcher):
-    """Stops the run of one analysis at its time t, the last time that it is there.
-
-    Before a forward run the earlier analysis is made again: time passes several times.
-    """
-
-    def __init__(self, analysis="none", t=1.0, passes=1):
-        self.analysis, self.t, self.passes, self.stages, self.asked = analysis, t, passes, [], []
-
-    def stage(self, title):
-        self.stages.append(title)
-
-    def advance(self, t, end):
-        self.asked.append((self.stages[-1], t))
-        return self.analysis not in self.stages[-1] or t < self.t or self.passed(self.analysis) < self.passes
-
-    def passed(self, analysis):
-        """How many times it has begun."""
-        return sum(analysis in stage and t == 0.0 for stage, t in self.asked)
-
-
 @pytest.fixture
 def arm(case_copy, ffrobot, monkeypatch):
     """The arm of three joints, a part of its motion, with patches on its forearm; and texts replaced."""
@@ -68,27 +47,6 @@ def arm(case_copy, ffrobot, monkeypatch):
         return scene
 
     return copy
-
-
-def stop(scene, analysis, t, passes=1):
-    with pytest.raises(ffrobot.SolveError, match="interrupted") as error:
-        ffrobot.solve(scene, scene.with_suffix(".h5"), Stops(analysis, t, passes))
-    return str(error.value)
-
-
-def go_on(scene, watcher=None):
-    return ffrobot.solve(scene, scene.with_suffix(".h5"), watcher, resume=True)
-
-
-def differences(results, expected):
-    """Of all histories of both, largest difference over largest value."""
-    assert results.analyses == expected.analyses
-    for analysis in expected.analyses:
-        found, wanted = results.columns(analysis), expected.columns(analysis)
-        assert found.keys() == wanted.keys()
-        for name, values in wanted.items():
-            assert found[name].shape == values.shape
-            yield name, np.abs(found[name] - values).max() / (np.abs(values).max() or 1.0)
 
 
 @pytest.mark.parametrize("stopped", ["inverse", "forward"])

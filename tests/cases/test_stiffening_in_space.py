@@ -7,8 +7,8 @@ import numpy as np
 import planar_in_space
 import pytest
 from checkpoints import CASES
+from planar_in_space import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
 from rod_chain import falling_tip
-from test_planar_scenes_in_space import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
 
 import ffrobot
 from ffrobot.fe_models.link import computed_modal_body
@@ -105,12 +105,12 @@ def test_links_that_bend_far_across_the_plane(tmp_path):
     assert np.abs(energy - energy[0]).max() < 1e-6 * exchanged
 
 
-def both(case, analyses, guess, folder, payload=None):
+def both(case, analyses, guess, folder, payload=None, geometric_stiffening=True):
     """Results of a planar scene with geometric stiffening, and of the same in space."""
-    planar = planar_in_space.read(CASES / case / "scene.toml") | {"geometric_stiffening": True, "analysis": analyses}
+    keys = {"geometric_stiffening": geometric_stiffening, "analysis": analyses}
+    planar = planar_in_space.read(CASES / case / "scene.toml") | keys
     planar.pop("pzt", None)
-    spatial = planar_in_space.in_space(planar) | {"initial": {"joints": guess}, "analysis": analyses}
-    spatial["geometric_stiffening"] = True
+    spatial = planar_in_space.in_space(planar) | {"initial": {"joints": guess}} | keys
     if payload is not None:
         planar["payload"] = spatial["payload"] = [payload]
     return [
@@ -119,18 +119,98 @@ def both(case, analyses, guess, folder, payload=None):
     ]
 
 
-GRIPPER = {"point": "link2.tip", "mass": 0.3}
+POINT_MASS = {"point": "link2.tip", "mass": 0.3}
 
 
-@pytest.mark.parametrize("payload", [None, GRIPPER], ids=["bare", "loaded"])
+@pytest.mark.parametrize("payload", [None, POINT_MASS], ids=["bare", "loaded"])
 def test_two_links_of_the_plane(payload, tmp_path):
-    """A point mass at the tip loads the link as well. (What turns with a section turns exactly in the plane alone.)"""
+    """A point mass at the tip loads the link as well. (With inertia it is part of the link in the plane alone.)"""
     planar, spatial = both("two_link", [TIGHT, STRAIGHT, REST], TWO_LINK, tmp_path, payload)
     with planar, spatial:
         for analysis, share in (("inverse", 1e-8), ("straight", 1e-11), ("rest", 1e-9)):
             compare_two_links(planar, spatial, analysis, share)
         for key in ("kinetic", "strain", "gravitational"):
             close(spatial[f"inverse/energy/{key}"], planar[f"inverse/energy/{key}"], 1e-8)
+
+
+def test_a_payload_in_space_is_a_body_welded_in_the_plane(tmp_path):
+    """With inertia; a payload of the plane is part of its link, whose fields keep 3e-4 of the moments less of it."""
+    J, keys = 2e-3, {"geometric_stiffening": True, "analysis": [TIGHT | {"end": 0.15, "output_step": 0.01}]}
+    planar = planar_in_space.read(CASES / "two_link" / "scene.toml") | keys
+    planar.pop("pzt", None)
+    spatial = planar_in_space.in_space(planar) | {"initial": {"joints": TWO_LINK}} | keys
+    spatial["payload"] = [POINT_MASS | {"inertia": [0.7 * J, 0.6 * J, J]}]
+    rigid = {"mass": POINT_MASS["mass"], "inertia": J, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
+    planar["body"] = [*planar["body"], {"name": "load", "rigid": rigid}]
+    planar["joint"] = [
+        *planar["joint"],
+        {"name": "grip", "type": "weld", "between": [POINT_MASS["point"], "load.root"]},
+    ]
+    found, expected = (
+        ffrobot.solve(planar_in_space.write(tables, tmp_path / f"{name}.toml"))
+        for name, tables in (("spatial", spatial), ("planar", planar))
+    )
+    with found, expected:
+        for joint in TWO_LINK:
+            close(found[f"inverse/joints/{joint}/moment"], expected[f"inverse/joints/{joint}/moment"], 1e-8)
+
+
+@pytest.mark.parametrize("stiffened", [False, True])
+def test_two_links_bend_as_those_of_the_plane(stiffened, tmp_path):
+    """How far, how much loads change their stiffness, what that may do to results, and what is said of it."""
+    planar, spatial = both("two_link", [TIGHT, STRAIGHT, REST], TWO_LINK, tmp_path, geometric_stiffening=stiffened)
+    with planar, spatial:
+        for analysis in ("inverse", "straight", "rest"):
+            effects = [of.attributes(analysis)["stiffening_effect"] for of in (spatial, planar)]
+            assert effects[0] == pytest.approx(effects[1], rel=1e-7)
+            for link in ("link1", "link2"):
+                found, expected = (of.attributes(f"{analysis}/bodies/{link}") for of in (spatial, planar))
+                for key in WRITTEN:
+                    assert found[key] == pytest.approx(expected[key], rel=1e-7, abs=1e-15), (analysis, link, key)
+        told = [
+            {name: [text for text in texts if "bends by" in text] for name, texts in of.warnings.items()}
+            for of in (spatial, planar)
+        ]
+    assert told[0] == told[1]
+    assert bool(told[0]["inverse"]) == (not stiffened)  # loads change a mode's stiffness by 1.4 %
+
+
+WRITTEN = (
+    "largest_deflection", "largest_rotation", "foreshortening", "foreshortening_moment", "stiffness_change",
+    "position_error", "relative_error",
+)  # fmt: skip
+
+
+def test_how_far_a_cantilever_bends_in_an_oblique_plane(tmp_path):
+    """Under P at its tip: 0.06415 PL³/EI from its chord, shorter by P²L⁵/15(EI)² (w = P(3Lx² − x³)/6EI)."""
+    EI, P = 7e10 * 0.01**4 / 12, 2.0
+    wall = [{"name": "wall", "type": "weld", "between": ["ground", "blade.root"]}]
+    force = {"y": repr(float(P * np.cos(0.8))), "z": repr(float(P * np.sin(0.8)))}
+    rest = {"load": [{"point": "blade.tip", **force}], "joint": wall, "trajectory": [], "analysis": [REST]}
+    with ffrobot.solve(planar_in_space.write(blade(tmp_path, **rest), tmp_path / "scene.toml")) as results:
+        found = results.attributes("rest/bodies/blade")
+    at = 1 - 1 / np.sqrt(3)
+    from_chord = P / EI * (2 * at + at**3 - 3 * at**2) / 6
+    assert found["largest_deflection"] == pytest.approx(from_chord, rel=2e-3)  # at stations, between which it may be
+    assert found["largest_rotation"] == pytest.approx(P / EI / 3, rel=1e-6)  # of the root from the chord
+    assert found["foreshortening"] == pytest.approx(P**2 / EI**2 / 15, rel=2e-3)
+    assert found["foreshortening_moment"] == pytest.approx(P**3 / EI**2 / 15, rel=2e-3)
+
+
+@pytest.mark.parametrize(("spin", "stiffened"), [(0.05, False), (3.0, True)])
+def test_auto_where_loads_change_the_stiffness(spin, stiffened, tmp_path):
+    """A spin Ω adds 1.193 Ω² to the square of the first frequency (Southwell), 12.36 EI/ρAL⁴: much or little."""
+    unit = np.sqrt(7e10 * 0.01**4 / 12 / (2700 * 0.01**2))
+    path = [{"name": "spin", "joint": "hub", "value": f"{float(spin * unit)!r}*t"}]
+    frequencies = []
+    for key in ("auto", stiffened):
+        tables = blade(tmp_path, trajectory=path, geometric_stiffening=key)
+        with ffrobot.solve(planar_in_space.write(tables, tmp_path / "scene.toml")) as results:
+            assert results.attributes("/")["geometric_stiffening"] == stiffened
+            effect = results.attributes("turning")["stiffening_effect"]
+            frequencies.append(results["about/linear/frequency"][0])
+    assert effect == pytest.approx(1.1933 * spin**2 / 3.5160**2, rel=1e-3)
+    np.testing.assert_array_equal(*frequencies)
 
 
 def test_linear_model_of_two_links_of_the_plane(tmp_path):
@@ -169,9 +249,9 @@ REFUSED = {
         {"load": [{"point": "blade.mid", "y": 1.0}]},
         r'load no. 1: point: expected, with geometric_stiffening, a point .* \("root", "tip"\), found "blade.mid"',
     ),
-    "neither true nor false": (
-        {"geometric_stiffening": "auto"},
-        "geometric_stiffening: expected true or false",
+    "neither true, false nor auto": (
+        {"geometric_stiffening": "yes"},
+        'geometric_stiffening: expected true or false or "auto", found "yes"',
     ),
 }
 

@@ -128,12 +128,13 @@ def test_a_cantilever_under_force_and_moment_at_its_tip(family):
             np.testing.assert_allclose(found, [stress[0], 0, 0, 0, *stress[1:]], rtol=0, atol=share * peak)
 
 
-def test_a_shaft_that_spins_up_a_disc():
+@pytest.mark.parametrize("J", [0.01, 0.0])
+def test_a_shaft_that_spins_up(J):
     """About its own axis, so slowly that its torsion does not ring: M_x(x) = [J + ρ I_p (L − x)] α of all beyond x.
 
-    Of ρ I_p, 2 % here, the modes have to tell: static stresses of beams are without inertia about the axis.
+    Of ρ I_p, all there is without a disc, static stresses of the file tell, and not the one mode of torsion: 20 % less.
     """
-    angle, end, J = 0.5, 1.0, 0.01
+    angle, end = 0.5, 4.0
     law = f"{angle}*(10*(t/{end})**3 - 15*(t/{end})**4 + 6*(t/{end})**5)"
     keys = cantilever(
         "all",
@@ -148,7 +149,7 @@ def test_a_shaft_that_spins_up_a_disc():
     alpha = angle / end**2 * (60 * u - 180 * u**2 + 120 * u**3)
     expected = -(J / (2 * INERTIA) + RHO * (LENGTH - STATION)) * alpha * AT
     later = u > 0.1  # the start, where α gets a kink, has died away
-    np.testing.assert_allclose(found[later], expected[later], rtol=0, atol=1e-2 * np.abs(expected).max())
+    np.testing.assert_allclose(found[later], expected[later], rtol=0, atol=1e-3 * np.abs(expected).max())
 
 
 def test_a_force_between_the_ends_leaves_mode_displacement():
