@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from ffrobot.scene.spatial_lacks import LACKS
 from ffrobot.schema import schema
 
 INTRODUCTION = {
@@ -17,8 +18,8 @@ INTRODUCTION = {
     "scene": "What stage 2 reads. SI units, angles in rad; files are named relative to the scene's folder. Values that"
     " the program cannot do yet are refused, with a message that says so."
     " Axes and signs: [conventions](conventions.md).",
-    "spatial": 'What stage 2 reads where `space = "spatial"`. SI units, angles in rad. `ffrobot solve` runs static,'
-    " pcid, fcid and forward analyses, with the keys of planar scenes; what it cannot do yet is refused, with a message"
+    "spatial": 'What stage 2 reads where `space = "spatial"`. SI units, angles in rad. Analyses are those of'
+    " planar scenes, with their keys; [what space does not have](#what-space-does-not-have) is refused, with a message"
     " that says so.",
     "figures": "What `ffrobot plot` draws: a file `figures.toml` beside the results. Without it, the standard figures.",
 }
@@ -45,11 +46,18 @@ def key_pages() -> dict[str, str]:
         elsewhere += SCENE_TABLES if kind == "spatial" else ()  # a body's link has the keys of a link file
         records = [(name, record) for name, record in _records(schema(kind)) if name not in elsewhere]
         lines += [line for name, record in records for line in _section(name, record)]
+        lines += _lacks() if kind == "spatial" else ()
         text = "\n".join(lines).rstrip("\n") + "\n"
         for name in SCENE_TABLES if kind == "spatial" else ():  # analyses are those of planar scenes
             text = text.replace(f"](#{name.lower()})", f"](scene_keys.md#{name.lower()})")
         pages[f"{kind}_keys.md"] = text
     return pages
+
+
+def _lacks() -> Iterator[str]:
+    """What scenes in space do not have, and what they have instead."""
+    yield from ("## What space does not have", "", "| what | instead |", "|---|---|")
+    yield from (f"| {lack.what} | {lack.instead} |" for lack in LACKS)
 
 
 def _records(described: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
