@@ -14,7 +14,6 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.hdf5 import numbers, open_checked
 
 DATASET = "step_ends"
 """Of an analysis in a results file; its attribute `METHOD` is the integrator's name."""
@@ -32,6 +31,8 @@ class Steps:
 
 def load_steps(path: Path, analysis: str) -> Steps:
     """The steps of the analysis of that name in a results file. Raises `InputError` where it has none."""
+    from ...common.hdf5 import numbers, open_checked  # few scenes have steps, and h5py takes longer than reading one
+
     try:
         with open_checked(path) as file:
             dataset = file.get(f"{analysis}/{DATASET}")
