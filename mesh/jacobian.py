@@ -13,7 +13,9 @@ from .cells import CELLS, CellName
 # Quality below which a cell is flat.
 SLIVER = 1e-3
 # Quadrature on the reference tetrahedron that is exact for cubics.
-_CUBIC_POINTS = np.array([[1 / 4] * 3, [1 / 6] * 3, [1 / 2, 1 / 6, 1 / 6], [1 / 6, 1 / 2, 1 / 6], [1 / 6, 1 / 6, 1 / 2]])
+_CUBIC_POINTS = np.array(
+    [[1 / 4] * 3, [1 / 6] * 3, [1 / 2, 1 / 6, 1 / 6], [1 / 6, 1 / 2, 1 / 6], [1 / 6, 1 / 6, 1 / 2]]
+)
 _CUBIC_WEIGHTS = np.array([-4 / 5, *[9 / 20] * 4]) / 6
 
 

@@ -70,7 +70,9 @@ def test_cells_too_long_for_a_thin_curved_wall_are_refused(solid, mesh_part):
     ],
 )
 def test_meshes_that_would_never_be_made_are_refused_at_once(solid, mesh_part, section, mesh):
-    with pytest.raises(InputError, match=r"link\.toml: geometry: expected a mesh\.size that fits the part, found .* cells"):
+    with pytest.raises(
+        InputError, match=r"link\.toml: geometry: expected a mesh\.size that fits the part, found .* cells"
+    ):
         mesh_part(solid(section=section), **mesh)
 
 
