@@ -13,9 +13,7 @@ from .cells import CELLS, CellName
 # Quality below which a cell is flat.
 SLIVER = 1e-3
 # Quadrature on the reference tetrahedron that is exact for cubics.
-_CUBIC_POINTS = np.array(
-    [[1 / 4] * 3, [1 / 6] * 3, [1 / 2, 1 / 6, 1 / 6], [1 / 6, 1 / 2, 1 / 6], [1 / 6, 1 / 6, 1 / 2]]
-)
+_CUBIC_POINTS = np.array([[3, 3, 3], [2, 2, 2], [6, 2, 2], [2, 6, 2], [2, 2, 6]]) / 12
 _CUBIC_WEIGHTS = np.array([-4 / 5, *[9 / 20] * 4]) / 6
 
 
