@@ -158,8 +158,8 @@ def check_volume(part: PartMesh, curved: PartMesh, where: str) -> None:
     change = volume_of_tetrahedra(part.points[part.cells], part.degree) / volume - 1
     if abs(change) > _VOLUME:
         raise InputError(
-            f"{where}: expected a mesh.size at which cells follow curved faces, found a volume {100 * change:+.1f} % off"
-            " where cells that fold are straightened: cells are too long for a thin curved wall"
+            f"{where}: expected a mesh.size at which cells follow curved faces, found a volume {100 * change:+.1f} %"
+            " off where cells that fold are straightened: cells are too long for a thin curved wall"
         )
 
 
