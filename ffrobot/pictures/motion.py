@@ -74,7 +74,8 @@ def ordered_bodies(scene: Mapping[str, Any]) -> list[str]:
 
 def topology(scene: Mapping[str, Any]) -> Topology:
     """Which joint carries which body, of a scene as a results file has it."""
-    edges = [Edge(tuple(joint["between"]), joint_type(scene, joint).locates) for joint in scene.get("joint", [])]
+    joints = scene.get("joint", [])
+    edges = [Edge(tuple(joint["between"]), int(not joint_type(scene, joint).locates)) for joint in joints]
     return spanning_forest([body["name"] for body in scene["body"]], edges)
 
 

@@ -69,6 +69,11 @@ LACKS = (
         "ffrobot.mbs.model.spatial_system",
     ),
     Lack(
+        "closed loops in each of whose joints something acts: friction, a motor, a rotor, a load, limits of the position",
+        "one joint of the loop without: the loop is cut there",
+        "ffrobot.mbs.model.spatial_model",
+    ),
+    Lack(
         "more rows of paths and cut loops than the core takes (`MOST_ROWS`)",
         "fewer loops",
         "ffrobot.mbs.model.spatial_system",

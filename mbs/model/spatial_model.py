@@ -122,7 +122,7 @@ def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBo
     carried = list(welded_payloads(scene))
     joints = (*scene.joint, *(weld for _, weld in carried))
     names = [*(body.name for body in scene.body), *(body.name for body, _ in carried)]
-    topology = spanning_forest(names, [Edge(joint.between, joint.locates) for joint in joints])
+    topology = spanning_forest(names, [*scene.edges, *(Edge(weld.between) for _, weld in carried)])
     tree = SpatialTree([*(body for body, _ in carried), *bodies], joints, topology)
     rows = [row for joint in tree.loops for row in _loop_rows(scene, tree, joint)]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
@@ -130,6 +130,12 @@ def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBo
 
 
 def _loop_rows(scene: SpatialMechanismScene, tree: SpatialTree, joint: SpatialJoint) -> Iterator[SpatialRow]:
+    loaded = [f"load no. {k}" for k, load in enumerate(scene.load, 1) if load.joint == joint.name]
+    if found := [*joint.acts_along, *loaded]:
+        raise InputError(
+            f"{scene.path}: {joint.label}: expected a loop with a joint along which nothing acts, where it is cut, found"
+            f" {quoted(found)} here and something in each of the others: not available in space yet"
+        )
     if joint.held is None:
         raise InputError(
             f"{scene.path}: {joint.label}: expected another type of joint where a loop closes, found a {joint.type}"

@@ -65,10 +65,10 @@ def _rotor(node: Node) -> tuple[float, float]:
     """Inertia of the rotor in a joint and its ratio on the inner section.
 
     It sits on the first side and spins with N Ω_second − (N − 1) Ω_first; where that side is the outer one, with
-    N' Ω_outer − (N' − 1) Ω_inner and N' = 1 − N.
+    N' Ω_outer − (N' − 1) Ω_inner and N' = 1 − N. In prismatic joints it spins with the coordinate alone.
     """
     inertia, ratio = rotor(node)
-    return inertia, 1.0 - ratio if node.backwards else ratio
+    return inertia, 1.0 - ratio if node.backwards and node.joint.type == "revolute" else ratio
 
 
 def _data(body: SpatialBody, markers: list[Section]) -> _core.SpatialData:

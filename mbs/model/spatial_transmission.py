@@ -47,12 +47,18 @@ def compliance(node: Node) -> tuple[float, float] | None:
     return (joint.stiffness, joint.damping) if isinstance(joint, SpatialRevolute) and joint.stiffness else None
 
 
+def rotor_mass(node: Node) -> float:
+    """J N² in kg of the rotor in a prismatic joint, along its coordinate; 0 without one. That its side turns is left out."""
+    inertia, ratio = rotor(node)
+    return inertia * ratio**2 if node.joint.type == "prismatic" else 0.0
+
+
 def rotors(state: Accelerated) -> Iterator[RotorMotion]:
-    """Of all rotors of a tree."""
+    """Of all rotors of a tree in revolute joints."""
     of_frames = None
     for node in state.tree.nodes:
         inertia, ratio = rotor(node)
-        if not inertia:
+        if not inertia or node.joint.type == "prismatic":
             continue
         of_frames = state.of_frames() if of_frames is None else of_frames
         first, second = (node.outer, node.inner) if node.backwards else (node.inner, node.outer)
@@ -70,6 +76,9 @@ def rotors(state: Accelerated) -> Iterator[RotorMotion]:
 def rotor_forces(state: Accelerated) -> Array:
     """Generalized forces (T, n_v) that the motion of all rotors takes."""
     found = np.zeros_like(state.v)
+    for node in state.tree.nodes:
+        if node.joint.type == "prismatic":
+            found[:, node.v] += rotor_mass(node) * state.a[:, node.v]
     for one in rotors(state):
         on_second = one.ratio * one.torque[:, None] * one.axis
         on_first = one.gyroscopic - (one.ratio - 1) * one.torque[:, None] * one.axis

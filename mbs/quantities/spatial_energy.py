@@ -9,7 +9,7 @@ import numpy as np
 from ...common.arrays import Array
 from ..model.spatial_bending import affine_motions, first_moment
 from ..model.spatial_inverse import bent_inertia
-from ..model.spatial_transmission import gear_energy, resistance, rotors
+from ..model.spatial_transmission import gear_energy, resistance, rotor_mass, rotors
 from .spatial_motion import SpatialMotion
 
 
@@ -56,6 +56,8 @@ def energies(motion: SpatialMotion) -> Energies:
     of_gears = gear_energy(motion.model.tree, motion.q, motion.v)
     strain, dissipated = strain + of_gears[0], dissipated + of_gears[1]
     dissipated += np.sum(motion.v * resistance(motion.model.tree, motion.v), axis=1)
+    for node in motion.model.tree.nodes:
+        kinetic += 0.5 * rotor_mass(node) * np.sum(motion.v[:, node.v] ** 2, axis=1)
     for rotor in rotors(motion.accelerated):
         kinetic += 0.5 * rotor.inertia * rotor.spin**2
     return Energies(kinetic, strain, gravitational, dissipated)

@@ -52,7 +52,7 @@ class MechanismKeys(Record):
     @property
     def topology(self) -> Topology:
         """Which joint carries which body, by numbers of `joint`."""
-        edges = [Edge(joint.between, joint.locates) for joint in self.joint]
+        edges = [Edge(joint.between, int(not joint.locates)) for joint in self.joint]
         return spanning_forest([body.name for body in self.body], edges)
 
     @property

@@ -12,10 +12,10 @@ from ..fields.references import body_of
 
 
 class Edge(NamedTuple):
-    """A joint `between` two sides ("BODY.POINT" or "ground"), and whether it `locates` one body on the other."""
+    """A joint `between` two sides ("BODY.POINT" or "ground"); loops are cut at joints of the highest `rank`."""
 
     between: tuple[str, str]
-    locates: bool = True
+    rank: int = 0
 
 
 class Carrier(NamedTuple):
@@ -62,8 +62,8 @@ class Topology:
 def spanning_forest(bodies: Sequence[str], joints: Sequence[Edge]) -> Topology:
     """The topology of `joints` between `bodies`: trees grow from the ground, then from each body left, in their order.
 
-    A tree takes the joint that locates, and stands first among such, of all between it and the rest (Prim, Bell Syst.
-    Tech. J. 36, 1957).
+    A tree takes the joint of the lowest rank, and the first among such, of all between it and the rest (Prim, Bell
+    Syst. Tech. J. 36, 1957).
     """
     touching: dict[str, list[int]] = {name: [] for name in (GROUND, *bodies)}
     for number, joint in enumerate(joints):
@@ -74,7 +74,7 @@ def spanning_forest(bodies: Sequence[str], joints: Sequence[Edge]) -> Topology:
         if root in carriers:
             continue
         carriers[root] = None
-        candidates: list[tuple[bool, int]] = []
+        candidates: list[tuple[int, int]] = []
         _add(candidates, touching[root], joints)
         while candidates:
             _, number = heappop(candidates)
@@ -87,6 +87,6 @@ def spanning_forest(bodies: Sequence[str], joints: Sequence[Edge]) -> Topology:
     return Topology(carriers, tuple(number for number in range(len(joints)) if number not in carrying))
 
 
-def _add(candidates: list[tuple[bool, int]], numbers: Sequence[int], joints: Sequence[Edge]) -> None:
+def _add(candidates: list[tuple[int, int]], numbers: Sequence[int], joints: Sequence[Edge]) -> None:
     for number in numbers:
-        heappush(candidates, (not joints[number].locates, number))
+        heappush(candidates, (joints[number].rank, number))

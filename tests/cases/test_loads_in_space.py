@@ -39,6 +39,8 @@ axis = [0.0, 0.0, 1.0]
 viscous_friction = 3.0
 coulomb_friction = 0.5
 friction_speed = 0.05
+rotor_inertia = 2e-4
+gear_ratio = 50.0
 
 [[joint]]
 name = "turn"
@@ -86,15 +88,78 @@ def test_motors_carry_loads_friction_and_rotors(tmp_path, ffrobot):
         dissipated, kinetic = (file[f"inverse/energy/{key}"][()] for key in ("dissipated_power", "kinetic"))
     rate, acceleration = 0.3 * np.cos(3 * t), -0.9 * np.sin(3 * t)
     friction = 3.0 * rate + 0.5 * np.tanh(rate / 0.05)
-    np.testing.assert_allclose(lift, 3.0 * (acceleration + 9.81) + friction + 7 * t, rtol=1e-8)
+    of_rotor = 2e-4 * 50**2
+    np.testing.assert_allclose(
+        lift, 3.0 * (acceleration + 9.81) + of_rotor * acceleration + friction + 7 * t, rtol=1e-8
+    )
     arm = -0.25 * np.cos(0.5 * t**2)  # of the force along x, about z
     np.testing.assert_allclose(turn, 0.05 + 1e-3 * 20**2 + 0.2 * t - 0.3 - arm * 4 * np.cos(t), atol=1e-7)
     np.testing.assert_allclose(
         moment[:, 2], 0.05 + 1e-3 * 20 - 0.3 - arm * 4 * np.cos(t), atol=1e-7
     )  # the rotor's, too
     np.testing.assert_allclose(dissipated, friction * rate + 0.2 * t**2, atol=1e-7)
-    np.testing.assert_allclose(kinetic, 1.5 * rate**2 + 0.5 * (0.05 + 1e-3 * 20**2) * t**2, atol=1e-7)
+    np.testing.assert_allclose(
+        kinetic, 0.5 * (3.0 + of_rotor) * rate**2 + 0.5 * (0.05 + 1e-3 * 20**2) * t**2, atol=1e-7
+    )
     np.testing.assert_allclose(reaction[:, 0], -4 * np.cos(t), atol=1e-7)
+
+
+FOUR_BAR = {
+    "name": "four_bar", "space": "spatial", "gravity": [0.0, -9.81, 0.0],
+    "body": [
+        {
+            "name": name,
+            "rigid": {
+                "mass": 1.0, "center": [length / 2, 0.0, 0.0], "inertia": [1e-4, 1e-3, 1e-3],
+                "points": {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0]},
+            },
+        }
+        for name, length in (("crank", 0.2), ("coupler", 0.5), ("rocker", 0.4))
+    ],
+    "initial": {"joints": {"A": 1.0, "B": -0.5, "D": 1.6}},
+    "trajectory": [{"name": "turn", "joint": "A", "value": "1 + 0.3*(1 - cos(3*t))"}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.01, "tolerance": 1e-9}],
+}  # fmt: skip
+SIDES = {
+    "A": ["ground", "crank.root"], "B": ["crank.tip", "coupler.root"], "C": ["coupler.tip", "rocker.tip"],
+    "D": ["ground", "rocker.root"],
+}  # fmt: skip
+
+
+def four_bar(**of_joints):
+    keys = {"type": "revolute", "axis": [0.0, 0.0, 1.0]}
+    places = {"A": {"motor": True}, "D": {"at": [0.5, 0.0, 0.0]}}
+    joints = [
+        {"name": name, "between": sides} | keys | places.get(name, {}) | of_joints.get(name, {})
+        for name, sides in SIDES.items()
+    ]
+    return ffrobot.make_scene(**FOUR_BAR, joint=joints)
+
+
+@pytest.mark.parametrize("name", SIDES)
+def test_friction_and_rotors_in_every_joint_of_a_loop(name):
+    """The loop is cut elsewhere, and the motor gives what friction takes and the rotor gains."""
+    plain, built = (
+        ffrobot.solve(four_bar(**{name: keys})) for keys in ({}, {"viscous_friction": 2.0, "rotor_inertia": 0.7})
+    )
+    rate, body = built[f"inverse/joints/{name}/rate"], SIDES[name][0].partition(".")[0]
+    spin = rate if body == "ground" else rate + built[f"inverse/bodies/{body}/angular_velocity"][:, 2]
+    power, energy = 2.0 * rate**2, 0.35 * spin**2
+    moment, kinetic = (
+        built[f"inverse/{key}"] - plain[f"inverse/{key}"] for key in ("joints/A/moment", "energy/kinetic")
+    )
+    assert np.ptp(rate) > 0.1
+    np.testing.assert_allclose(built["inverse/energy/dissipated_power"], power, atol=1e-9)
+    np.testing.assert_allclose(kinetic, energy, atol=1e-9)
+    t, work = built["inverse/time"], moment * built["inverse/joints/A/rate"]
+    gained = CubicSpline(t, energy)(t, 1)
+    inside = slice(5, -5)  # where the spline has neighbours on both sides
+    np.testing.assert_allclose(work[inside], (power + gained)[inside], atol=1e-5 * np.abs(work).max())
+
+
+def test_a_loop_in_whose_joints_something_acts_everywhere_is_refused():
+    with pytest.raises(ffrobot.InputError, match=r"a joint along which nothing acts, where it is cut, found .viscous_"):
+        ffrobot.solve(four_bar(**dict.fromkeys(SIDES, {"viscous_friction": 2.0})))
 
 
 def test_links_whose_joints_stick(tmp_path, ffrobot):

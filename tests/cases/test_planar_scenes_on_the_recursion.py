@@ -38,6 +38,7 @@ CASES_OF = {
     ),
     "solids": ("two_link_solid", {}),
     "a loop": ("slider_crank", {}),
+    "a loop, joints as built": ("slider_crank", {"of joint": {"guide": AS_BUILT, "A": AS_BUILT}}),
 }  # fmt: skip
 
 
@@ -47,7 +48,10 @@ def solved(request, tmp_path_factory):
     case, changes = CASES_OF[request.param]
     tables = planar_in_space.read(CASES / case / "scene.toml") | {"analysis": ANALYSES}
     tables |= {key: value for key, value in changes.items() if not key.startswith("of ")}
-    tables["joint"] = [joint | changes.get("of joints", {}) for joint in tables["joint"]]
+    of_joint = changes.get("of joint", {})
+    tables["joint"] = [
+        joint | changes.get("of joints", {}) | of_joint.get(joint["name"], {}) for joint in tables["joint"]
+    ]
     tables["body"] = [body | changes.get("of bodies", {}) for body in tables["body"]]
     tables["initial"] |= changes.get("of initial", {})
     scene = load_scene(planar_in_space.write(tables, tmp_path_factory.mktemp(case) / "scene.toml"))

@@ -78,10 +78,6 @@ def test_inertia_of_a_body_is_that_of_the_plane():
     [
         ({"trajectory": [{"name": "turn", "angle": "tool.a", "value": "t"}]}, 'trajectory "turn": angle: expected'),
         ({"load": [{"point": "tool.a", "force": lambda t, r, v: (0.0, 0.0)}]}, "load no. 1: force: expected functions"),
-        (
-            {"joint": [*ARM["joint"][1:], ARM["joint"][0] | {"rotor_inertia": 1e-4}]},
-            'joint "way": rotor_inertia: expected none in prismatic joints',
-        ),
         ({"joint": ARM["joint"][2:], "trajectory": []}, 'joints that lead to the ground in space, found "lower"'),
         (
             {"joint": ARM["joint"][:2], "trajectory": [], "load": []},

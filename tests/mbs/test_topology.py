@@ -7,7 +7,7 @@ from ffrobot.mbs.scene.topology import Edge, spanning_forest
 
 
 def forest(bodies, *sides, slides=()):
-    return spanning_forest(bodies, [Edge(between, k not in slides) for k, between in enumerate(sides)])
+    return spanning_forest(bodies, [Edge(between, int(k in slides)) for k, between in enumerate(sides)])
 
 
 def carried(topology):

@@ -8,7 +8,6 @@ import numpy as np
 
 from ...common.validation import quoted
 from ...mbs.joints.spatial.moving_joint import MovingSpatialJoint
-from ...mbs.joints.spatial.revolute import SpatialRevolute
 from ...mbs.model.spatial_tree import SpatialTree
 from ...run.spatial_bodies import LoadedSpatialBody
 from ...scene.spatial import SpatialScene
@@ -53,7 +52,7 @@ def _of_keys(tree: SpatialTree, size: float) -> Iterator[str]:
     sliding = [joint for joint in joints if joint.type in ("prismatic", "cylindrical")]
     if endless := [joint.name for joint in sliding if np.isinf(joint.position_limits[-1]).any()]:
         yield f"{quoted(endless)}: a range of ±{size:.4g} m, the size of the robot: URDF wants one, the scene has none"
-    if rotors := [joint.name for joint in joints if isinstance(joint, SpatialRevolute) and joint.rotor_inertia]:
+    if rotors := [joint.name for joint in joints if getattr(joint, "rotor_inertia", 0.0)]:
         yield f"{quoted(rotors)}: rotor_inertia and what gears give left out"
     if powers := [joint.name for joint in joints if any(np.isfinite(each.power) for each in joint.motor_limits)]:
         yield f"{quoted(powers)}: power_limit left out"

@@ -54,7 +54,7 @@ FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, cons
   const Cols su = H[f] - applied;
   Pack<T, d> &U = hinge.U[freedom];
   U = M[f];
-  const double J = node.rotor_inertia, N = node.gear_ratio;
+  const double J = node.rotor_inertia, N = node.gear_ratio, c = node.rotor_turns;
   const T M_ff = M[f][f], D = J > 0 ? M_ff + N * N * J : M_ff;
   hinge.D_inverse[freedom] = T(1.) / D;
   const Cols sd = hinge.D_inverse[freedom] * su;
@@ -65,14 +65,14 @@ FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, cons
     const T U_j = U[j];
     if (j != f) {
       M[j] -= (U_j * hinge.D_inverse[freedom]) * U;
-      M[j].set(f, J > 0 ? T(U_j * (N * (N - 1) * J) * hinge.D_inverse[freedom]) : T(0.));
+      M[j].set(f, J > 0 ? T(U_j * (N * (N - c) * J) * hinge.D_inverse[freedom]) : T(0.));
       H[j] -= U_j * sd;
     }
   }
   if (J > 0) {
-    M[f] = (N * (N - 1) * J * hinge.D_inverse[freedom]) * U;
-    M[f].set(f, M_ff * ((N - 1) * (N - 1) * J) * hinge.D_inverse[freedom]);
-    U.set(f, M_ff + N * J);
+    M[f] = (N * (N - c) * J * hinge.D_inverse[freedom]) * U;
+    M[f].set(f, M_ff * ((N - c) * (N - c) * J) * hinge.D_inverse[freedom]);
+    U.set(f, M_ff + c * N * J);
     H[f] -= U[f] * sd;
   } else {
     M[f] = Pack<T, d>::zero();

@@ -105,8 +105,8 @@ void check(const BodyModel<Data> &body, std::size_t index, std::size_t ground_ma
       refuse(name + ": Phi of a marker: expected (" + std::to_string(dim) + ", " + std::to_string(body.data.modes()) +
              ")");
   check_stiffening(name, body.data);
-  if (body.rotor_inertia > 0 && body.joint != JointKind::revolute)
-    refuse(name + ": rotor_inertia: expected a revolute joint under a rotor");
+  if (body.rotor_inertia > 0 && body.joint != JointKind::revolute && body.joint != JointKind::prismatic)
+    refuse(name + ": rotor_inertia: expected a revolute or prismatic joint under a rotor");
 }
 
 bool is_weightless(const PlanarData &data) { return data.mass == 0 && data.inertia == 0 && data.modes() == 0; }
@@ -199,6 +199,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     Node<Space> &node = nodes[i];
     node.name = model.name, node.joint = model.joint, node.shape = Space::shape(model.joint);
     node.lead = model.lead, node.rotor_inertia = model.rotor_inertia, node.gear_ratio = model.gear_ratio;
+    node.rotor_turns = model.joint == JointKind::revolute ? 1 : 0;
     node.q = n_q, node.v = n_v;
     for (Row &row : rows)
       if (row.model.kind == RowKind::coordinate && row.model.coordinate >= n_v &&

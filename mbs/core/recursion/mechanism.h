@@ -16,6 +16,7 @@ template <class Space> struct Node {
   JointKind joint = JointKind::revolute;
   JointShape shape{0, 0, -1, {}};
   double lead = 0, rotor_inertia = 0, gear_ratio = 1;
+  double rotor_turns = 1; // of a rotor per turn of the inner section: 0 in prismatic joints
 
   int parent = -1;     // node, or -1
   int parent_port = 0; // of all ports; on the ground: of ground markers

@@ -68,7 +68,7 @@ template <class Data> struct BodyModel {
   JointKind joint = JointKind::revolute;
   double lead = 0;          // m/rad, of a screw
   double rotor_inertia = 0; // kg m^2, of a rotor on the inner section about z that turns `gear_ratio` times
-  double gear_ratio = 1;    // as fast as the joint
+  double gear_ratio = 1;    // as fast as the joint; rad/m in prismatic ones, where that the section turns is left out
   bool driven = false;      // forces or rows act along the joint's coordinates
   bool of_section = false;  // these are the section's even where modes turn it and nothing acts along them
   Data data;

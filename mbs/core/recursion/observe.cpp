@@ -125,7 +125,7 @@ Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Works
     if (node.rotor_inertia > 0) {
       const double spin = w.hinges[i].spin;
       sum.kinetic += 0.5 * node.rotor_inertia * spin * spin;
-      sum.angular_momentum += node.rotor_inertia * spin * joint_axis(m, i, w);
+      sum.angular_momentum += node.rotor_turns * node.rotor_inertia * spin * joint_axis(m, i, w);
     }
   }
   return sum;

@@ -124,6 +124,12 @@ class SpatialJoint(JointKeys):
         """Friction along each coordinate; empty where there is none."""
         return ()
 
+    @property
+    def acts_along(self) -> tuple[str, ...]:
+        """Keys of what acts along its coordinates, which the joint at which a loop is cut does not have."""
+        keys = ("motor", "viscous_friction", "coulomb_friction", "rotor_inertia", "position_limit")
+        return tuple(key for key in keys if getattr(self, key, None))
+
 
 def with_axis(axis: Vector3, orientation: Array) -> tuple[Array, Array]:
     """Triads whose z is along `axis`, by the smallest turn on the first side; equal at zero coordinates."""

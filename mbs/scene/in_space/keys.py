@@ -17,7 +17,6 @@ NORMAL = (0.0, 0.0, 1.0)
 """Axis about which all joints turn; angles are counter-clockwise in the plane."""
 
 ACROSS = 0.6  # moments of inertia about x and y over that about z: a body of no other shape than one in space may have
-OF_MOTOR_ALONE = ("gear_ratio", "rotor_inertia")  # of prismatic joints: without a rotor the ratio moves nothing
 
 
 def given_keys(record: Record) -> Keys:
@@ -55,8 +54,7 @@ def joint_keys(given: Given, turn: float = 0.0) -> Keys:
 
     A revolute joint has its angle as coordinate: 0 where both sides have the same axes, in the plane and in space.
     """
-    left_out = {"weld": ("motor",), "prismatic": OF_MOTOR_ALONE}.get(given["type"], ())
-    found = {key: value for key, value in given.items() if key not in left_out}
+    found = {key: value for key, value in given.items() if (given["type"], key) != ("weld", "motor")}
     if "at" in given:
         found["at"] = place(given["at"])
     if given["type"] == "revolute":

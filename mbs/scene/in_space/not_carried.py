@@ -16,12 +16,6 @@ def not_carried(scene: MechanismKeys) -> Iterator[str]:
     for k, load in enumerate(scene.load, 1):
         if load.force is not None:
             yield f"load no. {k}: force: expected functions of time in space, found one of the motion of its point"
-    for joint in scene.joint:
-        if joint.type == "prismatic" and joint.rotor_inertia:
-            yield (
-                f"{joint.label}: rotor_inertia: expected none in prismatic joints in space, found"
-                f" {joint.rotor_inertia:g}"
-            )
     if scene.motors == "frame":
         yield from _coordinates_of_frames(scene)
     yield from _floating(scene)

@@ -51,10 +51,18 @@ class SpatialMechanismKeys(Record):
     """Where the robot starts."""
 
     @property
+    def edges(self) -> list[Edge]:
+        """The joints for a spanning forest: loops are cut at spherical ones, then at one along which nothing acts."""
+        named = {trajectory.coordinate_of for trajectory in self.trajectory} | {load.joint for load in self.load}
+        return [
+            Edge(joint.between, 2 if not joint.locates else 0 if joint.name in named or joint.acts_along else 1)
+            for joint in self.joint
+        ]
+
+    @property
     def topology(self) -> Topology:
-        """Which joint carries which body, by numbers of `joint`; spherical joints are cut first where loops close."""
-        edges = [Edge(joint.between, joint.locates) for joint in self.joint]
-        return spanning_forest([body.name for body in self.body], edges)
+        """Which joint carries which body, by numbers of `joint`."""
+        return spanning_forest([body.name for body in self.body], self.edges)
 
     @property
     def motor_joints(self) -> tuple[AnySpatialJoint, ...]:

@@ -86,7 +86,7 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
     } else
       s.absolute_cosine = cosine, s.absolute_sine = sine;
     if (node.rotor_inertia > 0)
-      hinge.spin = omega + node.gear_ratio * v[node.v];
+      hinge.spin = node.rotor_turns * omega + node.gear_ratio * v[node.v];
     if (node.joint == JointKind::revolute)
       s.omega = omega + (node.body.is_tilted ? T(v[node.v] - s.u_dot[planar::Body::TILT]) : v[node.v]);
     else {

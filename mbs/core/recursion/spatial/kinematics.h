@@ -60,12 +60,13 @@ FFROBOT_INLINE void turn_revolute(const InnerSection<T> &inner, const T &q, cons
   omega[2] += v;
 }
 
-// A rotor on the inner section: its angular momentum J spin z turns with that section.
+// A rotor on the inner section: its angular momentum J spin z turns with that section, in revolute joints.
 template <class T>
 FFROBOT_INLINE void spin_rotor(const Node<Spatial> &node, const T &v, const T *omega, Hinge<Spatial, T> &hinge) {
-  hinge.spin = omega[2] + (node.gear_ratio - 1) * v;
-  hinge.gyro[0] = node.rotor_inertia * hinge.spin * omega[1];
-  hinge.gyro[1] = -(node.rotor_inertia * hinge.spin * omega[0]);
+  const double c = node.rotor_turns, J = c * node.rotor_inertia;
+  hinge.spin = c * omega[2] + (node.gear_ratio - c) * v;
+  hinge.gyro[0] = J * hinge.spin * omega[1];
+  hinge.gyro[1] = -(J * hinge.spin * omega[0]);
 }
 
 template <class T>
