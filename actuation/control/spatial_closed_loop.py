@@ -11,16 +11,14 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
-from ...mbs.analysis.outcome import GearMotion
 from ...mbs.analysis.spatial_drive import SpatialControl, spatial_drive
 from ...mbs.analysis.spatial_forward import largest_moments
-from ...mbs.analysis.spatial_gears import gears_of_motion
+from ...mbs.analysis.spatial_gears import WoundUp, wound_up
 from ...mbs.analysis.spatial_replay import in_parts, motor_forces_of, replay_times
-from ...mbs.analysis.spatial_run import SpatialRun, without_paths
-from ...mbs.model.spatial_accelerations import Accelerated
+from ...mbs.analysis.spatial_run import SpatialRun
 from ...mbs.model.spatial_drives import Command, Drives, PointDrive
 from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import SpatialModel, modal_direction
+from ...mbs.model.spatial_model import SpatialModel, modal_direction, without_paths
 from ...mbs.scene.spatial.loads import SpatialLoad
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_statics import initial_state
@@ -55,13 +53,11 @@ class _Plant(NamedTuple):
 
     Attributes:
         model: its equations of motion.
-        gears: what the inverse analysis found of gears that give, by joint.
-        source: the motion of the inverse analysis in the coordinates of `model`: q, v, a (T, …).
+        source: the motion of the inverse analysis in its coordinates, and what that found of gears that give.
     """
 
     model: SpatialModel
-    gears: dict[str, GearMotion]
-    source: tuple[Array, Array, Array]
+    source: WoundUp
 
 
 def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialClosedLoop) -> SpatialRun:
@@ -80,7 +76,7 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
     read = merged(given, more)
     sensing = SpatialSensing(plant.model.tree, read)
     outputs = replay_times(source, analysis)
-    setup = _setup(context, analysis, robot, plant, read, outputs, sensing.read(*plant.source))
+    setup = _setup(context, analysis, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     limit = np.full(len(setup.inputs), np.inf) if analysis.unlimited else _limits(context)
     loop = Loop(setup, read, acting, limit, analysis.seed)
@@ -96,35 +92,23 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
         control=control,
     )  # fmt: skip
     held = held_commands(run.time, setup, loop)
-    record = loop_record(analysis, setup, loop, acting, _followed(run, source, held), bool(plant.gears))
-    record = judged(record, analysis, loop_models_in_space(robot))
+    record = loop_record(analysis, setup, loop, acting, _followed(run, source, held), bool(plant.model.tree.gears))
+    record = judged(record, analysis, loop_models_in_space(plant.model, source.time, plant.source))
     return replace(run, commanded=_by_joint(context.model, held), details=record)
 
 
-def loop_models_in_space(robot: SpatialRobot) -> tuple[LinearModel, ...]:
+def loop_models_in_space(model: SpatialModel, time: Array, reference: WoundUp) -> tuple[LinearModel, ...]:
     """The robot at rest on its reference at start, middle and end; none where it is singular, or has none yet."""
-    source = robot.source
-    rest, rows = np.zeros(robot.model.tree.n_v), sorted({0, len(source.time) // 2, len(source.time) - 1})
+    rest, rows = np.zeros(model.tree.n_v), sorted({0, len(time) // 2, len(time) - 1})
     with suppress(SolveError, InputError):
-        linearisation = SpatialLinearisation(robot.model, source.q[0])
-        return tuple(state_space(linearisation.at(float(source.time[k]), source.q[k], rest, rest), {}) for k in rows)
+        linearisation = SpatialLinearisation(model, reference.q[0])
+        return tuple(state_space(linearisation.at(float(time[k]), reference.q[k], rest, rest), {}) for k in rows)
     return ()
 
 
 def _plant(context: ActuatedSpatialContext, source: SpatialRun) -> _Plant:
     model = with_compliance_in_space(without_paths(context.model))
-    if not model.tree.gears:
-        return _Plant(model, {}, (source.q, source.v, source.a))
-    if model.scene.motors == "frame":
-        raise InputError(
-            f'{model.scene.path}: motors: expected "section" where joints with stiffness are controlled, found "frame"'
-        )
-    state = Accelerated(source.model.tree, source.q, source.v, source.a, source.model.tree.frames(source.q))
-    gears = gears_of_motion(source.model, state, source.time, motor_forces_of(source).moments)
-    known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
-    more = (np.column_stack([getattr(of, order) for of in known]) for order in ("angle", "rate", "acceleration"))
-    q, v, a = (np.hstack(pair) for pair in zip((source.q, source.v, source.a), more, strict=True))
-    return _Plant(model, gears, (q, v, a))
+    return _Plant(model, wound_up(source, model))
 
 
 def _setup(
@@ -173,8 +157,9 @@ def _feed_forward(
         values = in_parts(made_again, found)[which[1:]]
     column = 0
     for joint, columns in context.model.motors.items():  # behind gears that give: known at outputs
-        if joint in plant.gears and analysis.feed_forward != "none":
-            values[:, column : column + 1] = between(middle, source.time, plant.gears[joint].moment[:, None])
+        if joint in plant.source.gears and analysis.feed_forward != "none":
+            moment = plant.source.gears[joint].moment[:, None]
+            values[:, column : column + 1] = between(middle, source.time, moment)
         column += len(columns)
     return values
 
@@ -201,7 +186,7 @@ def _commands(context: ActuatedSpatialContext, model: SpatialModel) -> tuple[Com
 
 def _start(context: ActuatedSpatialContext, analysis: SpatialClosedLoop, plant: _Plant) -> State:
     """As the inverse analysis starts, or as the scene says, gears that give wound as in that."""
-    q, v = plant.source[0][0].copy(), plant.source[1][0].copy()
+    q, v = plant.source.q[0].copy(), plant.source.v[0].copy()
     if analysis.start == "actuation":
         return State(q, v)
     first = initial_state(context.model)

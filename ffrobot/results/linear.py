@@ -35,7 +35,7 @@ def write_linear(group: h5py.Group, outcome: Outcome, linear: LinearModels) -> N
 
 def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: LinearModels) -> None:
     """Of an analysis in space: linear/; `motion` is what it is about."""
-    along_v, shapes = _motion(linear), {}
+    along_v, shapes = _motion(linear)[:, :, : motion.model.tree.n_v], {}  # motors behind gears come last
     for name in motion.points:
         node, frame = motion.node(name), motion.frames[motion.model.tree.index[name]]
         of_frame = np.einsum("tij,tfj->tfi", frame.L, along_v)

@@ -44,14 +44,9 @@ LACKS = (
         "ffrobot.scene.spatial_pieces",
     ),
     Lack(
-        'linear models with `motors = "frame"`',
+        'gears that give (`stiffness` of joints) with `motors = "frame"`, where they are driven, controlled or linear',
         '`motors = "section"`',
-        "ffrobot.mbs.solve.spatial_linearisation",
-    ),
-    Lack(
-        "linear models of gears that give (`stiffness` of joints)",
-        "gears without `stiffness`",
-        "ffrobot.mbs.solve.spatial_linearisation",
+        "ffrobot.mbs.analysis.spatial_gears",
     ),
     Lack(
         "`placement` of patches on a link with several layouts",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -102,6 +102,11 @@ class SpatialModel:
         """What moments on a joint of the tree turn: the body that it carries, or its motor behind a gear that gives."""
         behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
+
+
+def without_paths(model: SpatialModel) -> SpatialModel:
+    """The robot alone: joints hold, nothing is followed."""
+    return replace(model, rows=tuple(row for row in model.rows if not row.is_trajectory))
 
 
 def modal_direction(model: SpatialModel, body: str, on_modes: Array) -> Array:

@@ -99,6 +99,17 @@ def resistance_slope(tree: SpatialTree, v: Array) -> Array:
     return found
 
 
+def gear_matrices(tree: SpatialTree) -> tuple[Array, Array]:
+    """K and D (n_v, n_v) of gears that give, along v."""
+    K, D = np.zeros((2, tree.n_v, tree.n_v))
+    for gear in tree.gears:
+        twist = np.zeros(tree.n_v)
+        twist[gear.motor.v.start], twist[gear.joint.v.start] = 1.0, -gear.sign
+        K += gear.stiffness * np.outer(twist, twist)
+        D += gear.damping * np.outer(twist, twist)
+    return K, D
+
+
 def gear_forces(tree: SpatialTree, q: Array, v: Array) -> Array:
     """Of gears that give (T, n_v): k δ + c δ̇ on the second side of the joint, the opposite on the motor."""
     found = np.zeros_like(v)
