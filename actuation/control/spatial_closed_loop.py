@@ -23,6 +23,7 @@ from ...mbs.scene.spatial.loads import SpatialLoad
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_statics import initial_state
 from ...mbs.solve.state import State
+from ..context import place_of
 from ..spatial_context import ActuatedSpatialContext
 from .choice import make_controller, needed_sensors
 from .controllers import Setup
@@ -68,15 +69,15 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
     """
     assert analysis.actuation is not None
     source = context.runs[analysis.actuation]
-    plant, robot = _plant(context, source), SpatialRobot(without_paths(context.model), context.patches, source)
+    plant, robot, whole = _plant(context, source), _robot(context, source), context.whole
     given, more = (
-        [s for sensor in sensors for s in spatial_signals(plant.model, context.patches, sensor)]
+        [s for sensor in sensors for s in spatial_signals(plant.model, context.patches, sensor, whole)]
         for sensors in (analysis.sensor, needed_sensors(robot, analysis.controller))
     )
     read = merged(given, more)
     sensing = SpatialSensing(plant.model.tree, read)
     outputs = replay_times(source, analysis)
-    setup = _setup(context, analysis, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
+    setup = _setup(context, analysis, source, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     limit = np.full(len(setup.inputs), np.inf) if analysis.unlimited else _limits(context)
     loop = Loop(setup, read, acting, limit, analysis.seed)
@@ -86,15 +87,24 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
         return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
 
     control = SpatialControl(_commands(context, plant.model), loop.first, setup.times, analysis.delay, at_sample)
-    drives = Drives(at_points=tuple(PointDrive(str(load.point), load.components) for load in analysis.disturbance))
+    disturbing = ((place_of(whole, str(load.point)), load.components) for load in analysis.disturbance)
+    drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
     run = spatial_drive(
         plant.model, analysis, _start(context, analysis, plant), context.progress, drives=drives, times=outputs,
         control=control,
     )  # fmt: skip
     held = held_commands(run.time, setup, loop)
-    record = loop_record(analysis, setup, loop, acting, _followed(run, source, held), bool(plant.model.tree.gears))
+    followed = _followed(run, source, held, place_of(whole, analysis.tip))
+    record = loop_record(analysis, setup, loop, acting, followed, bool(plant.model.tree.gears))
     record = judged(record, analysis, loop_models_in_space(plant.model, source.time, plant.source))
     return replace(run, commanded=_by_joint(context.model, held), details=record)
+
+
+def _robot(context: ActuatedSpatialContext, source: SpatialRun) -> SpatialRobot:
+    """What controllers know of: whole links also where the plant has their pieces."""
+    if context.whole is None:
+        return SpatialRobot(without_paths(context.model), context.patches, source)
+    return SpatialRobot(without_paths(context.whole.model), context.patches, context.whole.told(source))
 
 
 def loop_models_in_space(model: SpatialModel, time: Array, reference: WoundUp) -> tuple[LinearModel, ...]:
@@ -114,6 +124,7 @@ def _plant(context: ActuatedSpatialContext, source: SpatialRun) -> _Plant:
 def _setup(
     context: ActuatedSpatialContext,
     analysis: SpatialClosedLoop,
+    source: SpatialRun,
     robot: SpatialRobot,
     plant: _Plant,
     read: Sequence[SpatialSignal],
@@ -121,11 +132,11 @@ def _setup(
     readings: Array,
 ) -> Setup:
     """What controllers may know; `readings` (T, sensors) are those of the inverse analysis at its outputs."""
-    times, source = sample_times(outputs, analysis.sample_time), robot.source
+    times = sample_times(outputs, analysis.sample_time)
     return Setup(
         robot, robot.model, context.patches, input_names(robot), tuple(s.name for s in read), times,
         analysis.sample_time, analysis.delay, between(times, source.time, readings),
-        _feed_forward(context, analysis, source, plant, times), source,
+        _feed_forward(context, analysis, source, plant, times), robot.source,
     )  # fmt: skip
 
 
@@ -198,11 +209,11 @@ def _start(context: ActuatedSpatialContext, analysis: SpatialClosedLoop, plant: 
     return State(q, v)
 
 
-def _followed(run: SpatialRun, source: SpatialRun, held: Array) -> Followed:
-    """Where the tip went against where it should be."""
+def _followed(run: SpatialRun, source: SpatialRun, held: Array, tip: str | None) -> Followed:
+    """Where the tip went against where it should be; `tip` is the point that the scene names, if any."""
     analysis, model = run.analysis, run.model
     assert isinstance(analysis, SpatialClosedLoop)
-    tip = analysis.tip or _default_tip(model)
+    tip = tip or _default_tip(model)
     paths = [path.components for path in model.scene.trajectory if path.point == tip]
     known = source.time, _position(source, tip)
     error = _position(run, tip) - place_of_tip(run.time, analysis.last_time, known, paths)

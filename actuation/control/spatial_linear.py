@@ -20,6 +20,7 @@ from ...mbs.scene.analysis import Analysis
 from ...mbs.solve.linearisation import LinearMechanism
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_posture import undeformed_posture
+from ..context import place_of
 from ..patches.spatial_patches import LinkPatches
 from ..spatial_context import ActuatedSpatialContext
 from .linear import Linear, LinearModels, analyse
@@ -62,9 +63,11 @@ def operating_points_in_space(
 
 
 def linear_models_in_space(context: ActuatedSpatialContext, analysis: Linear, about: OperatingPoints) -> LinearModels:
-    """About these states."""
-    free = about.model
-    linearisation = SpatialLinearisation(free, about.q[0], analysis.points or _default_points(free))
+    """About these states. Points have the names of the scene, modes those of the model, also of links in pieces."""
+    free, whole = about.model, context.whole
+    points = analysis.points or _default_points(free if whole is None else whole.model)
+    places = {point: place_of(whole, point) for point in points}
+    linearisation = SpatialLinearisation(free, about.q[0], places)
     models: list[LinearModel] = []
     for t, q, v, a in zip(about.time, about.q, about.v, about.a, strict=True):
         mechanism = linearisation.at(float(t), q, v, a)

@@ -74,9 +74,11 @@ def stiffened_in_space(solution: SpatialSolution) -> SpatialSolution:
 
 def _unsolved(solution: SpatialSolution) -> SpatialSolution:
     stiffened = _all_stiffened(solution.scene, solution.stiffened)
-    model = _model(solution.scene, solution.bodies, solution.patches, solution.divided, solution.parts, stiffened)
+    scene, bodies, patches = solution.scene, solution.bodies, solution.patches
+    model, divided = _model(scene, bodies, patches, solution.divided, solution.parts, stiffened), solution.divided
+    whole = _model(scene, bodies, patches, {}, {}, stiffened) if divided else None
     seconds = {"bodies": solution.seconds["bodies"]}
-    return replace(solution, model=model, analyses={}, seconds=seconds, stiffened=stiffened)
+    return replace(solution, model=model, whole=whole, analyses={}, seconds=seconds, stiffened=stiffened)
 
 
 def _all_stiffened(scene: SpatialScene, is_needed: bool) -> bool:

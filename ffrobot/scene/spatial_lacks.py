@@ -33,8 +33,7 @@ LACKS = (
         "ffrobot.actuation.patches.spatial_records",
     ),
     Lack(
-        "bodies in pieces in analyses other than `pcid`, `forward` and `static` (in the plane also `linear` and"
-        " `closed-loop`)",
+        "bodies in pieces in `fcid`, `motors-only` and `placement`, as in the plane",
         "the link in one, or several links welded to each other",
         "ffrobot.scene.spatial_pieces",
     ),

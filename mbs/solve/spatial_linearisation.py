@@ -35,12 +35,14 @@ class SpatialLinearisation:
 
     `model` has no rows of trajectories; its gears give where its tree has them. Independent are the motors' coordinates
     where loops leave them so, then other joint coordinates, and modes, those first that the loops determine worst at
-    `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs.
+    `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs; a mapping says where each is in the model,
+    where that is another body's point (of a link in pieces).
     """
 
-    def __init__(self, model: SpatialModel, q: Array, points: Sequence[str] = ()) -> None:
+    def __init__(self, model: SpatialModel, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:
         _check(model)
-        self.model, self.points, self.system = model, tuple(points), SpatialSystem(model)
+        self.points = dict(points) if isinstance(points, Mapping) else {point: point for point in points}
+        self.model, self.system = model, SpatialSystem(model)
         self._on_frames = turning_motors(model) if model.scene.motors == "frame" else []
         self.independent = _independent(model, q)
         names, signs = _coordinates(model)
@@ -121,8 +123,8 @@ class SpatialLinearisation:
 
     def _places(self, state: Accelerated, H: Array) -> dict[str, Array]:
         found: dict[str, Array] = {}
-        for point in self.points:
-            L = self.model.tree.motion(self.model.tree.section(point, np.eye(3)), state.q, state.frames).L[0]
+        for point, place in self.points.items():
+            L = self.model.tree.motion(self.model.tree.section(place, np.eye(3)), state.q, state.frames).L[0]
             found |= {f"{point}/{axis}": L[k] @ H for k, axis in enumerate("xyz")}
         return found
 
