@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.context import Context
@@ -35,7 +35,13 @@ class WholeLinks:
 Point = TypeVar("Point", str, str | None)
 
 
-def place_of(whole: WholeLinks | None, point: Point) -> Point:
+class _Places(Protocol):
+    @property
+    def places(self) -> Mapping[str, str]:
+        """Of points of links in pieces."""
+
+
+def place_of(whole: _Places | None, point: Point) -> Point:
     """Where a point of the scene is in the model, of whose links some are in pieces where there are `whole` ones."""
     return point if whole is None or point is None else whole.places.get(point, point)
 

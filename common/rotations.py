@@ -34,6 +34,18 @@ def left_jacobian(vectors: Array) -> Array:
     return np.eye(3) + _of_skew(vectors, 2, 3)
 
 
+def left_jacobian_slope(vector: Array, of: Array) -> Array:
+    """∂(J_l(φ) x)/∂φ (3, 3) of φ `vector` (3,) and x `of` (3,): −a x~ + (a' φ×x + b' φ×(φ×x)) 2φᵀ − b (φ×x)~ − b φ~x~.
+
+    J_l = I + a φ~ + b φ~², a' and b' by φ².
+    """
+    across = np.cross(vector, of)
+    (a, a_slope), (b, b_slope) = series(2, vector @ vector), series(3, vector @ vector)
+    by_size = a_slope * across + b_slope * np.cross(vector, across)
+    turning = a * skew(of) + b * (skew(across) + skew(vector) @ skew(of))
+    return np.outer(by_size, 2 * vector) - turning
+
+
 def left_jacobian_rate(vectors: Array, rates: Array) -> Array:
     """(dJ_l/dt) φ̇ (…, 3) = ȧ φ×φ̇ + ḃ φ×(φ×φ̇) + b φ̇×(φ×φ̇), with J_l = I + a φ~ + b φ~²."""
     x, x_dot = np.sum(np.square(vectors), axis=-1)[..., None], 2 * np.sum(vectors * rates, axis=-1)[..., None]

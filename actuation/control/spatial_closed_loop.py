@@ -11,20 +11,19 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
-from ...mbs.analysis.outcome import GearMotion
 from ...mbs.analysis.spatial_drive import SpatialControl, spatial_drive
 from ...mbs.analysis.spatial_forward import largest_moments
-from ...mbs.analysis.spatial_gears import gears_of_motion
+from ...mbs.analysis.spatial_gears import WoundUp, wound_up
 from ...mbs.analysis.spatial_replay import in_parts, motor_forces_of, replay_times
-from ...mbs.analysis.spatial_run import SpatialRun, without_paths
-from ...mbs.model.spatial_accelerations import Accelerated
+from ...mbs.analysis.spatial_run import SpatialRun
 from ...mbs.model.spatial_drives import Command, Drives, PointDrive
 from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import SpatialModel, modal_direction
+from ...mbs.model.spatial_model import SpatialModel, modal_direction, without_paths
 from ...mbs.scene.spatial.loads import SpatialLoad
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_statics import initial_state
 from ...mbs.solve.state import State
+from ..context import place_of
 from ..spatial_context import ActuatedSpatialContext
 from .choice import make_controller, needed_sensors
 from .controllers import Setup
@@ -55,13 +54,11 @@ class _Plant(NamedTuple):
 
     Attributes:
         model: its equations of motion.
-        gears: what the inverse analysis found of gears that give, by joint.
-        source: the motion of the inverse analysis in the coordinates of `model`: q, v, a (T, …).
+        source: the motion of the inverse analysis in its coordinates, and what that found of gears that give.
     """
 
     model: SpatialModel
-    gears: dict[str, GearMotion]
-    source: tuple[Array, Array, Array]
+    source: WoundUp
 
 
 def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialClosedLoop) -> SpatialRun:
@@ -72,15 +69,15 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
     """
     assert analysis.actuation is not None
     source = context.runs[analysis.actuation]
-    plant, robot = _plant(context, source), SpatialRobot(without_paths(context.model), context.patches, source)
+    plant, robot, whole = _plant(context, source), _robot(context, source), context.whole
     given, more = (
-        [s for sensor in sensors for s in spatial_signals(plant.model, context.patches, sensor)]
+        [s for sensor in sensors for s in spatial_signals(plant.model, context.patches, sensor, whole)]
         for sensors in (analysis.sensor, needed_sensors(robot, analysis.controller))
     )
     read = merged(given, more)
     sensing = SpatialSensing(plant.model.tree, read)
     outputs = replay_times(source, analysis)
-    setup = _setup(context, analysis, robot, plant, read, outputs, sensing.read(*plant.source))
+    setup = _setup(context, analysis, source, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     limit = np.full(len(setup.inputs), np.inf) if analysis.unlimited else _limits(context)
     loop = Loop(setup, read, acting, limit, analysis.seed)
@@ -90,46 +87,44 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
         return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
 
     control = SpatialControl(_commands(context, plant.model), loop.first, setup.times, analysis.delay, at_sample)
-    drives = Drives(at_points=tuple(PointDrive(str(load.point), load.components) for load in analysis.disturbance))
+    disturbing = ((place_of(whole, str(load.point)), load.components) for load in analysis.disturbance)
+    drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
     run = spatial_drive(
         plant.model, analysis, _start(context, analysis, plant), context.progress, drives=drives, times=outputs,
         control=control,
     )  # fmt: skip
     held = held_commands(run.time, setup, loop)
-    record = loop_record(analysis, setup, loop, acting, _followed(run, source, held), bool(plant.gears))
-    record = judged(record, analysis, loop_models_in_space(robot))
+    followed = _followed(run, source, held, place_of(whole, analysis.tip))
+    record = loop_record(analysis, setup, loop, acting, followed, bool(plant.model.tree.gears))
+    record = judged(record, analysis, loop_models_in_space(plant.model, source.time, plant.source))
     return replace(run, commanded=_by_joint(context.model, held), details=record)
 
 
-def loop_models_in_space(robot: SpatialRobot) -> tuple[LinearModel, ...]:
+def _robot(context: ActuatedSpatialContext, source: SpatialRun) -> SpatialRobot:
+    """What controllers know of: whole links also where the plant has their pieces."""
+    if context.whole is None:
+        return SpatialRobot(without_paths(context.model), context.patches, source)
+    return SpatialRobot(without_paths(context.whole.model), context.patches, context.whole.told(source))
+
+
+def loop_models_in_space(model: SpatialModel, time: Array, reference: WoundUp) -> tuple[LinearModel, ...]:
     """The robot at rest on its reference at start, middle and end; none where it is singular, or has none yet."""
-    source = robot.source
-    rest, rows = np.zeros(robot.model.tree.n_v), sorted({0, len(source.time) // 2, len(source.time) - 1})
+    rest, rows = np.zeros(model.tree.n_v), sorted({0, len(time) // 2, len(time) - 1})
     with suppress(SolveError, InputError):
-        linearisation = SpatialLinearisation(robot.model, source.q[0])
-        return tuple(state_space(linearisation.at(float(source.time[k]), source.q[k], rest, rest), {}) for k in rows)
+        linearisation = SpatialLinearisation(model, reference.q[0])
+        return tuple(state_space(linearisation.at(float(time[k]), reference.q[k], rest, rest), {}) for k in rows)
     return ()
 
 
 def _plant(context: ActuatedSpatialContext, source: SpatialRun) -> _Plant:
     model = with_compliance_in_space(without_paths(context.model))
-    if not model.tree.gears:
-        return _Plant(model, {}, (source.q, source.v, source.a))
-    if model.scene.motors == "frame":
-        raise InputError(
-            f'{model.scene.path}: motors: expected "section" where joints with stiffness are controlled, found "frame"'
-        )
-    state = Accelerated(source.model.tree, source.q, source.v, source.a, source.model.tree.frames(source.q))
-    gears = gears_of_motion(source.model, state, source.time, motor_forces_of(source).moments)
-    known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
-    more = (np.column_stack([getattr(of, order) for of in known]) for order in ("angle", "rate", "acceleration"))
-    q, v, a = (np.hstack(pair) for pair in zip((source.q, source.v, source.a), more, strict=True))
-    return _Plant(model, gears, (q, v, a))
+    return _Plant(model, wound_up(source, model))
 
 
 def _setup(
     context: ActuatedSpatialContext,
     analysis: SpatialClosedLoop,
+    source: SpatialRun,
     robot: SpatialRobot,
     plant: _Plant,
     read: Sequence[SpatialSignal],
@@ -137,11 +132,11 @@ def _setup(
     readings: Array,
 ) -> Setup:
     """What controllers may know; `readings` (T, sensors) are those of the inverse analysis at its outputs."""
-    times, source = sample_times(outputs, analysis.sample_time), robot.source
+    times = sample_times(outputs, analysis.sample_time)
     return Setup(
         robot, robot.model, context.patches, input_names(robot), tuple(s.name for s in read), times,
         analysis.sample_time, analysis.delay, between(times, source.time, readings),
-        _feed_forward(context, analysis, source, plant, times), source,
+        _feed_forward(context, analysis, source, plant, times), robot.source,
     )  # fmt: skip
 
 
@@ -173,8 +168,9 @@ def _feed_forward(
         values = in_parts(made_again, found)[which[1:]]
     column = 0
     for joint, columns in context.model.motors.items():  # behind gears that give: known at outputs
-        if joint in plant.gears and analysis.feed_forward != "none":
-            values[:, column : column + 1] = between(middle, source.time, plant.gears[joint].moment[:, None])
+        if joint in plant.source.gears and analysis.feed_forward != "none":
+            moment = plant.source.gears[joint].moment[:, None]
+            values[:, column : column + 1] = between(middle, source.time, moment)
         column += len(columns)
     return values
 
@@ -201,7 +197,7 @@ def _commands(context: ActuatedSpatialContext, model: SpatialModel) -> tuple[Com
 
 def _start(context: ActuatedSpatialContext, analysis: SpatialClosedLoop, plant: _Plant) -> State:
     """As the inverse analysis starts, or as the scene says, gears that give wound as in that."""
-    q, v = plant.source[0][0].copy(), plant.source[1][0].copy()
+    q, v = plant.source.q[0].copy(), plant.source.v[0].copy()
     if analysis.start == "actuation":
         return State(q, v)
     first = initial_state(context.model)
@@ -213,11 +209,11 @@ def _start(context: ActuatedSpatialContext, analysis: SpatialClosedLoop, plant: 
     return State(q, v)
 
 
-def _followed(run: SpatialRun, source: SpatialRun, held: Array) -> Followed:
-    """Where the tip went against where it should be."""
+def _followed(run: SpatialRun, source: SpatialRun, held: Array, tip: str | None) -> Followed:
+    """Where the tip went against where it should be; `tip` is the point that the scene names, if any."""
     analysis, model = run.analysis, run.model
     assert isinstance(analysis, SpatialClosedLoop)
-    tip = analysis.tip or _default_tip(model)
+    tip = tip or _default_tip(model)
     paths = [path.components for path in model.scene.trajectory if path.point == tip]
     known = source.time, _position(source, tip)
     error = _position(run, tip) - place_of_tip(run.time, analysis.last_time, known, paths)

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...mbs._core import TimeFunction
 from ...mbs.analysis.operating_points import InstantAnalysis, row_at
-from ...mbs.analysis.spatial_run import SpatialRun, without_paths
+from ...mbs.analysis.spatial_gears import wound_up
+from ...mbs.analysis.spatial_run import SpatialRun
 from ...mbs.analysis.spatial_static import run_spatial_static
-from ...mbs.model.spatial_model import SpatialModel, SpatialRow
+from ...mbs.model.spatial_gears import with_compliance_in_space
+from ...mbs.model.spatial_model import SpatialModel, SpatialRow, without_paths
 from ...mbs.scene.analysis import Analysis
 from ...mbs.solve.linearisation import LinearMechanism
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_posture import undeformed_posture
+from ..context import place_of
 from ..patches.spatial_patches import LinkPatches
 from ..spatial_context import ActuatedSpatialContext
 from .linear import Linear, LinearModels, analyse
@@ -25,22 +29,47 @@ from .linear_model import LinearModel, state_space
 
 def run_spatial_linear(context: ActuatedSpatialContext, analysis: Linear) -> SpatialRun:
     """The posture or instants that it is about, with `LinearModels`. Raises `SolveError` in singular postures."""
-    run = operating_points_in_space(context, analysis)
-    return replace(run, details=linear_models_in_space(context, analysis, run))
+    run, about = operating_points_in_space(context, analysis)
+    return replace(run, details=linear_models_in_space(context, analysis, about))
 
 
-def operating_points_in_space(context: ActuatedSpatialContext, analysis: InstantAnalysis) -> SpatialRun:
-    """The equilibrium, or the instants of a motion, that an analysis is about."""
-    source = None if analysis.source is None else context.runs[analysis.source]
-    return _equilibrium(context, analysis) if source is None else _instants(context.model, analysis, source)
+class OperatingPoints(NamedTuple):
+    """States about which a robot is linear: `model` follows nothing, its gears give where the scene says so.
+
+    time (T,) s; q (T, n_q), v and a (T, n_v).
+    """
+
+    model: SpatialModel
+    time: Array
+    q: Array
+    v: Array
+    a: Array
 
 
-def linear_models_in_space(context: ActuatedSpatialContext, analysis: Linear, run: SpatialRun) -> LinearModels:
-    """About the outputs of `run`."""
-    free = without_paths(context.model)
-    linearisation = SpatialLinearisation(free, run.q[0], analysis.points or _default_points(free))
+def operating_points_in_space(
+    context: ActuatedSpatialContext, analysis: InstantAnalysis
+) -> tuple[SpatialRun, OperatingPoints]:
+    """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states."""
+    model = with_compliance_in_space(without_paths(context.model))
+    if analysis.source is None:
+        run = _equilibrium(context, analysis)
+        source, rows = run, [0]
+    else:
+        source = context.runs[analysis.source]
+        rows = [row_at(model.scene.path, analysis, source, float(t)) for t in analysis.times]
+        run = replace(source.rows(rows), analysis=analysis, steps=0, evaluations=0, warnings=(), again=None)
+    q, v, a, _ = wound_up(source, model)
+    return run, OperatingPoints(model, run.time, q[rows], v[rows], a[rows])
+
+
+def linear_models_in_space(context: ActuatedSpatialContext, analysis: Linear, about: OperatingPoints) -> LinearModels:
+    """About these states. Points have the names of the scene, modes those of the model, also of links in pieces."""
+    free, whole = about.model, context.whole
+    points = analysis.points or _default_points(free if whole is None else whole.model)
+    places = {point: place_of(whole, point) for point in points}
+    linearisation = SpatialLinearisation(free, about.q[0], places)
     models: list[LinearModel] = []
-    for t, q, v, a in zip(run.time, run.q, run.v, run.a, strict=True):
+    for t, q, v, a in zip(about.time, about.q, about.v, about.a, strict=True):
         mechanism = linearisation.at(float(t), q, v, a)
         models.append(state_space(mechanism, patch_voltages_in_space(free, mechanism, context.patches)))
     return analyse(tuple(models))
@@ -54,11 +83,6 @@ def _equilibrium(context: ActuatedSpatialContext, analysis: Analysis) -> Spatial
             context, model=replace(model, rows=(*model.rows, *held_by_motors(model, undeformed_posture(model).q)))
         )
     return run_spatial_static(context, analysis)
-
-
-def _instants(model: SpatialModel, analysis: InstantAnalysis, source: SpatialRun) -> SpatialRun:
-    rows = [row_at(model.scene.path, analysis, source, float(t)) for t in analysis.times]
-    return replace(source.rows(rows), analysis=analysis, steps=0, evaluations=0, warnings=(), again=None)
 
 
 def held_by_motors(model: SpatialModel, q: Array) -> list[SpatialRow]:

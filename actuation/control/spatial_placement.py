@@ -9,7 +9,7 @@ import numpy as np
 from ...common.arrays import as_floats
 from ...common.errors import InputError
 from ...mbs.analysis.spatial_replay import motor_forces_of
-from ...mbs.analysis.spatial_run import SpatialRun, without_paths
+from ...mbs.analysis.spatial_run import SpatialRun
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ..patches.patches import PatchArray
 from ..patches.spatial_patches import link_patches
@@ -35,8 +35,8 @@ def run_spatial_placement(context: ActuatedSpatialContext, analysis: PatchPlacem
         reached = context.patches[wanted.body].modes[link.layout.label]
         F_p = reached.forces(motor_forces_of(source).modal[wanted.body])
         return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
-    run, free = operating_points_in_space(context, analysis), without_paths(model)
-    at = SpatialLinearisation(free, run.q[0]).at(float(run.time[0]), run.q[0], run.v[0], run.a[0])
+    run, about = operating_points_in_space(context, analysis)
+    at = SpatialLinearisation(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
     return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None))
 
 

@@ -13,7 +13,9 @@ from ...mbs.model.spatial_accelerations import Accelerated
 from ...mbs.model.spatial_model import SpatialModel
 from ...mbs.model.spatial_tree import Section, SpatialTree
 from ...mbs.solve.spatial_linearisation import labelled
+from ..context import place_of
 from ..patches.spatial_patches import LinkPatches
+from ..spatial_context import WholeLinksInSpace
 from .records import Sensor
 from .signals import ORDERS, Reading, volts_per_modal_coordinate
 
@@ -72,8 +74,13 @@ def _places_in_q(tree: SpatialTree) -> Indices:
     return places
 
 
-def spatial_signals(model: SpatialModel, patches: Mapping[str, LinkPatches], sensor: Sensor) -> Iterator[SpatialSignal]:
-    """The readings of one sensor of the scene. Raises `InputError` for a joint without coordinates in the tree."""
+def spatial_signals(
+    model: SpatialModel, patches: Mapping[str, LinkPatches], sensor: Sensor, whole: WholeLinksInSpace | None = None
+) -> Iterator[SpatialSignal]:
+    """The readings of one sensor of the scene, of whose links some are in pieces where there are `whole` ones.
+
+    Raises `InputError` for a joint without coordinates in the tree.
+    """
     order, ending = ORDERS[sensor.measure], "" if sensor.measure == "value" else f"/{sensor.measure}"
     quality = order, sensor.resolution, sensor.noise
     if sensor.joint is not None:
@@ -85,17 +92,28 @@ def spatial_signals(model: SpatialModel, patches: Mapping[str, LinkPatches], sen
         k = model.driven(sensor.motor).v.start
         yield SpatialSignal(f"motor/{sensor.motor}{ending}", *quality, along=np.eye(model.tree.n_v)[k])
     elif sensor.point is not None:
+        place = place_of(whole, sensor.point)
         for axis, name in enumerate("xyz"):
-            yield SpatialSignal(f"point/{sensor.point}/{name}{ending}", *quality, point=sensor.point, axis=axis)
+            yield SpatialSignal(f"point/{sensor.point}/{name}{ending}", *quality, point=place, axis=axis)
     elif sensor.pzt is not None:
         body = next(body for body, of_link in patches.items() if sensor.pzt in of_link.arrays)
         for k, volts in enumerate(volts_of_layout(model, patches, body, sensor.pzt, sensor.capacitance), 1):
             yield SpatialSignal(f"pzt/{sensor.pzt}/{k}", *quality, along=_on_modes(model, body, volts))
     elif sensor.modal is not None:
-        for k, unit in enumerate(np.eye(model.tree.nodes[model.tree.index[sensor.modal]].body.n_modes), 1):
-            yield SpatialSignal(
-                f"modal/{sensor.modal}/{k}{ending}", *quality, along=_on_modes(model, sensor.modal, unit)
-            )
+        for k, along in enumerate(_modal_coordinates(model, sensor.modal, whole), 1):
+            yield SpatialSignal(f"modal/{sensor.modal}/{k}{ending}", *quality, along=along)
+
+
+def _modal_coordinates(model: SpatialModel, link: str, whole: WholeLinksInSpace | None) -> Array:
+    """(n, n_v) p of a link by v: its own coordinates, or of its pieces."""
+    if whole is None or link not in whole.divided:
+        return np.eye(model.tree.n_v)[model.tree.nodes[model.tree.index[link]].p_v]
+    bodies, rows = whole.divided[link].bodies, whole.divided[link].gathered
+    places = [model.tree.nodes[model.tree.index[body]].p_v for body in bodies]
+    columns = np.concatenate([np.arange(of_piece.start, of_piece.stop) for of_piece in places])
+    found = np.zeros((len(rows), model.tree.n_v))
+    found[:, columns] = rows
+    return found
 
 
 def volts_of_layout(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -35,12 +36,13 @@ def write_linear(group: h5py.Group, outcome: Outcome, linear: LinearModels) -> N
 
 def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: LinearModels) -> None:
     """Of an analysis in space: linear/; `motion` is what it is about."""
-    along_v, shapes = _motion(linear), {}
-    for name in motion.points:
-        node, frame = motion.node(name), motion.frames[motion.model.tree.index[name]]
-        of_frame = np.einsum("tij,tfj->tfi", frame.L, along_v)
-        modal = along_v[:, :, node.p_v] @ node.body.modal_transform.T
-        shapes[name] = {"position": of_frame[:, :, :3], "rotation": of_frame[:, :, 3:], "modal": modal}
+    along_v, shapes = _motion(linear)[:, :, : motion.model.tree.n_v], {}  # motors behind gears come last
+    T, f, n_v = along_v.shape
+    moving = replace(motion, time=np.repeat(motion.time, f), q=np.repeat(motion.q, f, 0), v=along_v.reshape(-1, n_v))
+    for name in motion.points:  # what bodies do in a mode is what they do at these rates
+        body = moving.body(name)
+        rates = {"position": body.velocity, "rotation": body.angular_velocity, "modal": body.modal_velocity}
+        shapes[name] = {key: values.reshape(T, f, -1) for key, values in rates.items()}
     write_models(group, linear, shapes)
 
 

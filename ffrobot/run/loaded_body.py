@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -27,6 +27,15 @@ class Loaded:
     def file_hash(self) -> str:
         """SHA-256 of the modal body file; empty where rigid."""
         return hashlib.sha256(self.path.read_bytes()).hexdigest() if self.path else ""
+
+
+def robot_damping_ratios(bodies: Mapping[str, Loaded]) -> dict[str, float]:
+    """By body: ζ of the links that want it of the robot's vibrations."""
+    return {
+        name: float(modal.damping_ratio[0])
+        for name, body in bodies.items()
+        if (modal := body.modal) is not None and modal.damping_of == "robot"
+    }
 
 
 class _OnPoint(Protocol):

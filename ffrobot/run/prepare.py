@@ -11,7 +11,7 @@ from ..actuation.patches.patches import check_reach, patch_array
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.points import point_set, with_points
 from ..common.errors import InputError, of_file
-from ..mbs.model.model import Model, build_model
+from ..mbs.model.model import build_model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.solve.robot_damping import with_robot_damping
 from ..scene.load import load_scene
@@ -19,6 +19,7 @@ from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody, add_patches, load_bodies
 from .divided import patched_pieces, patches_on_pieces, voltage_loads
+from .loaded_body import robot_damping_ratios
 from .mode_choice import mode_levels
 from .omissions import omissions
 from .solution import Solution
@@ -74,7 +75,8 @@ def _in_pieces(whole: Solution, divided: Mapping[str, BodyInPieces], parts: Mapp
     planar = [_equations_of(part, whole.stiffened) for part in parts.values()]
     arrays = patches_on_pieces(whole.scene.path, whole.patches, whole.bodies, divided, parts)
     loads = list(voltage_loads(whole.scene, {**whole.patches, **arrays}, {body.name: body for body in planar}))
-    model = _damped(build_model(scene_of_pieces(whole.scene, divided), planar, loads), parts)
+    model = build_model(scene_of_pieces(whole.scene, divided), planar, loads)
+    model = with_robot_damping(model, robot_damping_ratios(parts))
     return replace(whole, model=model, whole=whole.model, divided=divided, parts=parts, on_pieces=arrays)
 
 
@@ -129,7 +131,7 @@ def _assembled(
     loads = list(voltage_loads(scene, patches, {body.name: body for body in planar}))
     return Solution(
         scene=scene,
-        model=_damped(build_model(scene, planar, loads), bodies),
+        model=with_robot_damping(build_model(scene, planar, loads), robot_damping_ratios(bodies)),
         bodies=bodies,
         patches=patches,
         points=points,
@@ -138,16 +140,6 @@ def _assembled(
         omissions=tuple(omissions(scene, bodies)),
         stiffened=stiffened,
     )
-
-
-def _damped(model: Model, bodies: Mapping[str, LoadedBody]) -> Model:
-    """The model with the damping that links want of the robot's vibrations."""
-    ratios = {
-        name: float(modal.damping_ratio[0])
-        for name, body in bodies.items()
-        if (modal := body.modal) is not None and modal.damping_of == "robot"
-    }
-    return with_robot_damping(model, ratios)
 
 
 def _check_stiffening(scene: Scene, bodies: Mapping[str, LoadedBody], stiffened: bool) -> None:

@@ -38,6 +38,7 @@ from .spatial_prepare import (
 )
 from .spatial_solution import SpatialResult, SpatialSolution
 from .spatial_stresses import stresses_in_space
+from .spatial_whole_links import whole_links_in_space
 from .watcher import Interruption, Watcher
 
 logger = logging.getLogger(__name__)
@@ -187,7 +188,7 @@ def _context(
     return ActuatedSpatialContext(
         solution.model, runs, progress, supply, partial(forces_at_points, solution.points),
         solution.earlier.get(analysis.name), solution.patches, solution.links,
-        {name: body.carrying for name, body in solution.bodies.items()},
+        {name: body.carrying for name, body in solution.bodies.items()}, whole_links_in_space(solution),
     )  # fmt: skip
 
 

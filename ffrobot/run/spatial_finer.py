@@ -14,10 +14,10 @@ from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.spatial_drive import spatial_drive
 from ..mbs.analysis.spatial_forward import motor_drives
 from ..mbs.analysis.spatial_replay import in_parts, motor_forces_of, replay_times
-from ..mbs.analysis.spatial_run import SpatialRun, without_paths
+from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.fields.waypoints import spline
 from ..mbs.model.spatial_drives import Drive, Drives, FrameDrive
-from ..mbs.model.spatial_model import SpatialModel, modal_direction
+from ..mbs.model.spatial_model import SpatialModel, modal_direction, without_paths
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.analysis import TimedAnalysis
 from ..mbs.solve.spatial_posture import undeformed_posture

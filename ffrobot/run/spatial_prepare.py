@@ -9,9 +9,11 @@ from ..actuation.patches.spatial_patches import LinkPatches
 from ..actuation.spatial_points import SpatialPointSet
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
+from ..mbs.solve.robot_damping import with_robot_damping_in_space
 from ..scene.pieces import BodyInPieces
 from ..scene.spatial import SpatialScene
 from ..scene.spatial_pieces import bodies_in_pieces_in_space, scene_of_pieces_in_space
+from .loaded_body import robot_damping_ratios
 from .spatial_actuation import given_voltages
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
 from .spatial_solution import SpatialSolution
@@ -72,9 +74,11 @@ def stiffened_in_space(solution: SpatialSolution) -> SpatialSolution:
 
 def _unsolved(solution: SpatialSolution) -> SpatialSolution:
     stiffened = _all_stiffened(solution.scene, solution.stiffened)
-    model = _model(solution.scene, solution.bodies, solution.patches, solution.divided, solution.parts, stiffened)
+    scene, bodies, patches = solution.scene, solution.bodies, solution.patches
+    model, divided = _model(scene, bodies, patches, solution.divided, solution.parts, stiffened), solution.divided
+    whole = _model(scene, bodies, patches, {}, {}, stiffened) if divided else None
     seconds = {"bodies": solution.seconds["bodies"]}
-    return replace(solution, model=model, analyses={}, seconds=seconds, stiffened=stiffened)
+    return replace(solution, model=model, whole=whole, analyses={}, seconds=seconds, stiffened=stiffened)
 
 
 def _all_stiffened(scene: SpatialScene, is_needed: bool) -> bool:
@@ -101,6 +105,7 @@ def _model(
         known = set() if scene.geometric_stiffening is False else _known_between(scene, spatial, links)
         spatial |= {name: replace(body, stiffening=None) for name, body in spatial.items() if name not in known}
     model = build_spatial_model(scene, list(spatial.values()))
+    model = with_robot_damping_in_space(model, robot_damping_ratios(bodies))
     return replace(model, modal_loads=tuple(given_voltages(model, patches)))
 
 

@@ -91,7 +91,8 @@ class SpatialSolution:
         points: actuation points, by body.
         earlier: runs of analyses to go on with, from a results file: see `results.spatial_resume`.
         mode_choice: where `modes = "auto"`.
-        divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`.
+        divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`, and `whole`
+            that of the links.
         stiffened: whether all links have geometric stiffening.
     """
 
@@ -108,6 +109,7 @@ class SpatialSolution:
     mode_choice: ModeChoice | None = None
     divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
     parts: Mapping[str, LoadedSpatialBody] = field(default_factory=dict)
+    whole: SpatialModel | None = None
     stiffened: bool = False
 
     @property

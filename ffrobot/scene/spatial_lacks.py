@@ -33,8 +33,7 @@ LACKS = (
         "ffrobot.actuation.patches.spatial_records",
     ),
     Lack(
-        "bodies in pieces in analyses other than `pcid`, `forward` and `static` (in the plane also `linear` and"
-        " `closed-loop`)",
+        "bodies in pieces in `fcid`, `motors-only` and `placement`, as in the plane",
         "the link in one, or several links welded to each other",
         "ffrobot.scene.spatial_pieces",
     ),
@@ -44,14 +43,9 @@ LACKS = (
         "ffrobot.scene.spatial_pieces",
     ),
     Lack(
-        'linear models with `motors = "frame"`',
+        'gears that give (`stiffness` of joints) with `motors = "frame"`, where they are driven, controlled or linear',
         '`motors = "section"`',
-        "ffrobot.mbs.solve.spatial_linearisation",
-    ),
-    Lack(
-        "linear models of gears that give (`stiffness` of joints)",
-        "gears without `stiffness`",
-        "ffrobot.mbs.solve.spatial_linearisation",
+        "ffrobot.mbs.analysis.spatial_gears",
     ),
     Lack(
         "`placement` of patches on a link with several layouts",
@@ -69,7 +63,8 @@ LACKS = (
         "ffrobot.mbs.model.spatial_system",
     ),
     Lack(
-        "closed loops in each of whose joints something acts: friction, a motor, a rotor, a load, limits of the position",
+        "closed loops in each of whose joints something acts: friction, a motor, a rotor, a load, limits of its"
+        " position",
         "one joint of the loop without: the loop is cut there",
         "ffrobot.mbs.model.spatial_model",
     ),

@@ -14,10 +14,11 @@ from ..fe_models.link_records import FAMILIES
 from ..fe_models.pieces import cut
 from ..mbs.joints.spatial.weld import SpatialWeld
 from ..mbs.scene.spatial.bodies import BodyInSpace
+from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys
 from .pieces import BodyInPieces, places_on_pieces, renamed, unfit_actuators, unfit_references, welds_between
 from .spatial import SpatialScene
 
-KINDS = ("pcid", "forward", "static")
+KINDS = ("pcid", "forward", "static", "linear", "closed-loop")
 """Kinds of analysis that links in pieces can take part in."""
 
 
@@ -38,9 +39,11 @@ def bodies_in_pieces_in_space(scene: SpatialScene, counts: Mapping[str, int]) ->
 
 
 def scene_of_pieces_in_space(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> SpatialScene:
-    """The scene in which each piece is a body; points that the scene names are those of the pieces."""
+    """The scene in which each piece is a body; points that scene and analyses name are those of the pieces."""
     places = places_on_pieces(divided)
-    keys = {name: renamed(getattr(scene, name), places) for name in ("joint", "trajectory", "load", "payload")}
+    keys = {
+        name: renamed(getattr(scene, name), places) for name in ("joint", "trajectory", "load", "payload", "analysis")
+    }
     bodies = tuple(piece for body in scene.body for piece in _pieces(body, divided))
     welds = (
         SpatialWeld(name=weld, type="weld", between=between)
@@ -83,4 +86,4 @@ def _problems(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> Itera
     for joint in scene.joint:
         if getattr(joint, "stiffness", None) is not None:
             yield f'joint "{joint.name}": stiffness: expected none {beside}, found one'
-    yield from unfit_references(scene.references(), divided)
+    yield from unfit_references(SpatialMechanismKeys.references(scene), divided)

@@ -11,10 +11,9 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from .._core import TimeFunction
 from ..fields.waypoints import spline
-from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_drives import Drive, Drives, FrameDrive, PointDrive
 from ..model.spatial_gears import with_compliance_in_space
-from ..model.spatial_model import SpatialModel, modal_direction
+from ..model.spatial_model import SpatialModel, modal_direction, without_paths
 from ..model.spatial_motors import MotorForces
 from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_statics import initial_state
@@ -22,9 +21,9 @@ from ..solve.state import State
 from .elastic_joints import DEGREE
 from .forward import Forward
 from .spatial_drive import spatial_drive
-from .spatial_gears import gears_of_motion
+from .spatial_gears import wound_up
 from .spatial_replay import motor_forces_of, path_wrenches, replay_times, replayed
-from .spatial_run import SpatialContext, SpatialRun, without_paths
+from .spatial_run import SpatialContext, SpatialRun
 
 
 class Applied(NamedTuple):
@@ -72,34 +71,24 @@ def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, co
             f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" beside joints with stiffness,'
             f' found "{analysis.apply}"'
         )
-    if model.scene.motors == "frame":
-        raise InputError(
-            f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven forward, found'
-            ' "frame"'
-        )
     if source.model.tree.gears:
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": actuation: expected an inverse analysis beside joints'
             f' with stiffness, found "{source.analysis.name}"'
         )
-    state = Accelerated(source.model.tree, source.q, source.v, source.a, source.model.tree.frames(source.q))
-    moments = motor_forces_of(source).moments
-    gears = gears_of_motion(source.model, state, source.time, moments)
-    supplied = {**moments, **{joint: gear.moment[:, None] for joint, gear in gears.items()}}
+    wound = wound_up(source, model)
+    behind = {joint: gear.moment[:, None] for joint, gear in wound.gears.items()}
+    supplied = {**motor_forces_of(source).moments, **behind}
     most = largest_moments(source.model, limits=analysis.limits)
     wanted = np.hstack([supplied[joint] for joint in model.motors])
     given = np.clip(wanted, -most, most)
     sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
-    outputs = [gear.motor for gear in model.tree.gears]
-    known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
-    first = State(np.append(source.q[0], [0.0] * len(outputs)), np.append(source.v[0], [0.0] * len(outputs)))
-    for node, found in zip(outputs, known, strict=True):
-        first.q[node.q.start], first.v[node.v.start] = found.angle[0], found.rate[0]
     along = [Drive(direction, size) for direction, size in zip(_directions(model), sizes, strict=True)]
     times = replay_times(source, analysis)
     return spatial_drive(
-        model, analysis, first, context.progress, drives=Drives(tuple(along)), times=times, earlier=context.earlier
-    )
+        model, analysis, State(wound.q[0], wound.v[0]), context.progress,
+        drives=Drives(tuple(along)), times=times, earlier=context.earlier,
+    )  # fmt: skip
 
 
 def _stop(t: float) -> bool:

@@ -6,6 +6,7 @@ The equations are those of the plane (`elastic_joints`), with the rotor's accele
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from ..model.spatial_model import SpatialModel
 from ..model.spatial_transmission import compliance, rotor, rotors
 from .elastic_joints import GearSpring, gear_motion
 from .outcome import GearMotion
+from .spatial_replay import motor_forces_of
+from .spatial_run import SpatialRun
 
 
 def gears_of_motion(
@@ -48,3 +51,38 @@ def gears_of_motion(
         spring = GearSpring(*of_gear, turning.inertia * N**2, where)
         found[node.joint.name] = gear_motion(spring, time, moments[node.joint.name][:, 0], N * turning.torque, gamma)
     return found
+
+
+class WoundUp(NamedTuple):
+    """A motion in the coordinates of a robot whose gears give.
+
+    Attributes:
+        q, v, a: (T, n_q), (T, n_v), (T, n_v).
+        gears: by joint, those that are firm in the motion; none where they give in it, too.
+    """
+
+    q: Array
+    v: Array
+    a: Array
+    gears: Mapping[str, GearMotion]
+
+
+def wound_up(run: SpatialRun, model: SpatialModel) -> WoundUp:
+    """The motion of `run` in the coordinates of `model`: where its gears give, motors as far ahead as they have to be.
+
+    Raises `InputError` where motors turn frames: what a gear carries then is not along its joint alone.
+    """
+    tree = run.model.tree
+    if not model.tree.gears or tree.gears:
+        return WoundUp(run.q, run.v, run.a, {})
+    if model.scene.motors == "frame":
+        raise InputError(
+            f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven, controlled or'
+            ' linear, found "frame"'
+        )
+    state = Accelerated(tree, run.q, run.v, run.a, tree.frames(run.q))
+    gears = gears_of_motion(run.model, state, run.time, motor_forces_of(run).moments)
+    known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
+    more = (np.column_stack([getattr(of, order) for of in known]) for order in ("angle", "rate", "acceleration"))
+    q, v, a = (np.hstack(pair) for pair in zip((run.q, run.v, run.a), more, strict=True))
+    return WoundUp(q, v, a, gears)

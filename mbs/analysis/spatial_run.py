@@ -143,8 +143,3 @@ class SpatialContext:
     supply: Supply = no_patches
     at_points: ForcesAtPoints = no_points
     earlier: EarlierSpatialRun | None = None
-
-
-def without_paths(model: SpatialModel) -> SpatialModel:
-    """The robot alone: joints hold, nothing is followed."""
-    return replace(model, rows=tuple(row for row in model.rows if not row.is_trajectory))

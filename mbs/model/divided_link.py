@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
 from .planar_body import PlanarBody
+from .spatial_body import SpatialBody
 
 INTERVALS = 32  # of a piece, over which strains are taken as constant
 
@@ -70,6 +72,24 @@ def _strains(modal: ModalBody, planar: PlanarBody, x: Array) -> Array:
     places = [modal.interpolate(at) for at in x]
     rows = np.array([[at.rotation[2] for at in places], [at.translation[0] for at in places]])
     return np.asarray(np.diff(rows, axis=1).reshape(2 * INTERVALS, -1) @ planar.modal_transform)
+
+
+class SpatialPiece(NamedTuple):
+    """A piece of a link in space: where it begins, m from the root of the link, its modal body, and its equations."""
+
+    start: float
+    modal: ModalBody
+    spatial: SpatialBody
+
+
+def divided_link_in_space(link: ModalBody, spatial: SpatialBody, pieces: Sequence[SpatialPiece]) -> DividedLink:
+    """Of a link and its pieces, each with its equations, in the coordinates of these."""
+    of_file = [_shape_in_piece_in_space(link, piece.start, piece.modal) for piece in pieces]
+    own = [np.linalg.solve(piece.spatial.modal_transform, p) for piece, p in zip(pieces, of_file, strict=True)]
+    spread = np.vstack(own) @ spatial.modal_transform
+    root = np.sqrt(np.concatenate([piece.spatial.stiffness for piece in pieces]))
+    names = tuple(piece.spatial.name for piece in pieces)
+    return DividedLink(names, spread, np.linalg.pinv(root[:, None] * spread) * root)
 
 
 def spread_in_space(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -104,6 +104,11 @@ class SpatialModel:
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
 
 
+def without_paths(model: SpatialModel) -> SpatialModel:
+    """The robot alone: joints hold, nothing is followed."""
+    return replace(model, rows=tuple(row for row in model.rows if not row.is_trajectory))
+
+
 def modal_direction(model: SpatialModel, body: str, on_modes: Array) -> Array:
     """Along v of the tree (n_v,): forces (n,) on the modes of the file of a body."""
     node, direction = model.tree.nodes[model.tree.index[body]], np.zeros(model.tree.n_v)
@@ -133,8 +138,8 @@ def _loop_rows(scene: SpatialMechanismScene, tree: SpatialTree, joint: SpatialJo
     loaded = [f"load no. {k}" for k, load in enumerate(scene.load, 1) if load.joint == joint.name]
     if found := [*joint.acts_along, *loaded]:
         raise InputError(
-            f"{scene.path}: {joint.label}: expected a loop with a joint along which nothing acts, where it is cut, found"
-            f" {quoted(found)} here and something in each of the others: not available in space yet"
+            f"{scene.path}: {joint.label}: expected a loop with a joint along which nothing acts, where it is cut,"
+            f" found {quoted(found)} here and something in each of the others: not available in space yet"
         )
     if joint.held is None:
         raise InputError(

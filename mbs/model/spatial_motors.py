@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.rotations import left_jacobian
+from ...common.rotations import left_jacobian, left_jacobian_slope
 from .spatial_model import SpatialModel
 from .spatial_tree import Motion, Section
 
@@ -73,16 +73,47 @@ def _move_to_frames(
 ) -> None:
     """Motors that turn frames, not sections: what they do less on the modes, modal forces do more."""
     tree = model.tree
-    for joint in model.scene.motor_joints:
-        if joint.units != ("rad",):
-            continue
-        node = tree.nodes[tree.carried[joint.name]]
+    for joint in turning_motors(model):
+        node = tree.nodes[tree.carried[joint]]
         axis = tree.motion(node.inner, q, frames).F[:, :, 2]
-        along = model.sign(joint.name) * moments[joint.name]
+        along = model.sign(joint) * moments[joint]
         for section, sign in ((node.outer, 1.0), (node.inner, -1.0)):
             if section.body >= 0:
                 turn = np.einsum("ti,tij->tj", axis, spin_of_modes(model, q, frames, section))
                 left[:, tree.nodes[section.body].p_v] += sign * along * turn
+
+
+def turning_motors(model: SpatialModel) -> list[str]:
+    """Joints whose motors can turn frames in place of sections: those with one angle."""
+    return [joint.name for joint in model.scene.motor_joints if joint.units == ("rad",)]
+
+
+class FrameShare(NamedTuple):
+    """What a unit moment of a motor on frames, along the tree's coordinate, does on modes beside.
+
+    `direction` (n_v,), and `slope` (n_v, n_v), its derivative along v: the axis turns with the section.
+    """
+
+    direction: Array
+    slope: Array
+
+
+def frame_share(model: SpatialModel, joint: str, q: Array) -> FrameShare:
+    """Of the motor of a revolute joint at q (n_q,): −Φ_rᵀ J_l(φ) z of both its sections.
+
+    Why: core/recursion/frame_motor.h.
+    """
+    tree = model.tree
+    direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))
+    node = tree.nodes[tree.carried[joint]]
+    for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
+        if section.body >= 0 and section.point:
+            of = tree.nodes[section.body]
+            Phi_r, axis = of.body.points[section.point].rotation, side * section.triad[:, 2]
+            phi = Phi_r @ q[of.p_q]
+            direction[of.p_v] -= Phi_r.T @ left_jacobian(phi) @ axis
+            slope[of.p_v, of.p_v] -= Phi_r.T @ left_jacobian_slope(phi, axis) @ Phi_r
+    return FrameShare(direction, slope)
 
 
 def spin_of_modes(model: SpatialModel, q: Array, frames: Sequence[Motion], section: Section) -> Array:

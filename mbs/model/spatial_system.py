@@ -19,7 +19,7 @@ from .spatial_drives import NO_DRIVES, Command, Drive, Drives, FrameDrive, Point
 from .spatial_model import SpatialModel, SpatialRow
 from .spatial_parts import Placed, SpatialParts, carried_body, moves, rows_of, standing_marker
 from .spatial_plane import Plane, in_plane
-from .spatial_transmission import resistance, resistance_slope
+from .spatial_transmission import gear_forces, resistance, resistance_slope
 from .spatial_tree import Section
 
 ZERO = _core.TimeFunction.constant(0.0)
@@ -30,7 +30,8 @@ class Derivatives(NamedTuple):
     """By increments δ of q, by v and by generalized forces, all along v (n_v).
 
     Attributes:
-        a_q, a_v, a_f: (n_v, n_v) of accelerations; joints with friction resist more the faster they are.
+        a_q, a_v, a_f: (n_v, n_v) of accelerations; joints with friction resist more the faster they are. Springs in
+            gears are left as they are: see `gear_matrices`.
         value_q: (rows, n_v) of the values of rows, and of their rates by v.
         rate_q: (rows, n_v) of their rates.
     """
@@ -182,11 +183,13 @@ class SpatialSystem:
     def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> Derivatives:
         """How accelerations and rows answer to small changes of q, v and forces, at time t under the scene's loads.
 
-        `supplied` (n_v,) acts beside loads and friction. Rows that depend on others at q, v are left out.
+        `supplied` (n_v,) acts beside loads, friction and springs in gears. Rows that depend on others at q, v are left
+        out.
         """
         self.turn_markers(t)
         self.core.keep_independent_rows(q, v)
-        rest = -resistance(self.model.tree, v[None])[0]
+        tree = self.model.tree
+        rest = gear_forces(tree, q[None], v[None])[0] - resistance(tree, v[None])[0]
         loads = self.force(t)
         force = supplied + rest + (0.0 if loads is None else loads)
         wrench = np.zeros((len(self._wrenches), len(OF_POINT)))
@@ -194,9 +197,8 @@ class SpatialSystem:
             for name, magnitude in components.items():
                 wrench[number, OF_POINT.index(name)] += magnitude(t)[0]
         found = self.core.derivatives(q, v, self.target(t), force, wrench.ravel())
-        slope = resistance_slope(self.model.tree, v[None])[0]
         signs = self.row_signs[:, None]
-        by_v = found.a_v - found.a_f * slope
+        by_v = found.a_v - found.a_f * resistance_slope(tree, v[None])[0]
         return Derivatives(found.a_q, by_v, found.a_f, signs * found.value_q, signs * found.rate_q)
 
     def _follow(self, plane: Plane | None) -> _core.TreeScene:

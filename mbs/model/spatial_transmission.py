@@ -48,7 +48,7 @@ def compliance(node: Node) -> tuple[float, float] | None:
 
 
 def rotor_mass(node: Node) -> float:
-    """J N² in kg of the rotor in a prismatic joint, along its coordinate; 0 without one. That its side turns is left out."""
+    """J N² in kg of the rotor in a prismatic joint, 0 without one; that the side it sits on turns is left out."""
     inertia, ratio = rotor(node)
     return inertia * ratio**2 if node.joint.type == "prismatic" else 0.0
 
@@ -106,6 +106,17 @@ def resistance_slope(tree: SpatialTree, v: Array) -> Array:
             steady = np.tanh(v[:, column] / friction.speed)
             found[:, column] = friction.viscous + friction.coulomb / friction.speed * (1.0 - steady**2)
     return found
+
+
+def gear_matrices(tree: SpatialTree) -> tuple[Array, Array]:
+    """K and D (n_v, n_v) of gears that give, along v."""
+    K, D = np.zeros((2, tree.n_v, tree.n_v))
+    for gear in tree.gears:
+        twist = np.zeros(tree.n_v)
+        twist[gear.motor.v.start], twist[gear.joint.v.start] = 1.0, -gear.sign
+        K += gear.stiffness * np.outer(twist, twist)
+        D += gear.damping * np.outer(twist, twist)
+    return K, D
 
 
 def gear_forces(tree: SpatialTree, q: Array, v: Array) -> Array:

@@ -6,8 +6,9 @@ It is the core's. All functions take states (…, n_q) at once; what comes out i
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -121,6 +122,12 @@ class SpatialTree:
             return Section(-1, "", triad, np.array(at, dtype=float))
         body, _, point = side.partition(".")
         return Section(self.index[body], point, triad, np.zeros(3))
+
+    def with_bodies(self, bodies: Sequence[SpatialBody]) -> SpatialTree:
+        """The tree with other bodies of the same names, modes and points, in its order."""
+        found = copy.copy(self)
+        found.nodes = tuple(replace(node, body=body) for node, body in zip(self.nodes, bodies, strict=True))
+        return found
 
     @property
     def joint_columns(self) -> Booleans:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ..model.model import Model
+from ..model.planar_body import PlanarBody
+from ..model.spatial_body import SpatialBody
+from ..model.spatial_model import SpatialModel, without_paths
 from ..model.system import MechanismSystem
 from .initial_state import undeformed_state
+from .spatial_frequencies import vibrations_in_space, without_rows
+from .spatial_posture import undeformed_posture
 from .vibration import vibrations
+
+B = TypeVar("B", PlanarBody, SpatialBody)
 
 
 def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
@@ -21,23 +30,41 @@ def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
     """
     if not ratios:
         return model
-    wanted, bodies, first = unit_damping(model), [], 0
-    for body in model.bodies:
-        block = slice(first, first + body.n_modes)
-        first = block.stop
-        if body.name in ratios:
-            body = replace(body, damping=ratios[body.name] * wanted[block, block])
-        bodies.append(body)
-    return replace(model, bodies=tuple(bodies))
-
-
-def unit_damping(model: Model) -> Array:
-    """D (modes of all bodies)², 1/s, under which all vibrations have the damping ratio 1: ΦᵀDΦ = diag(2ω).
-
-    Φ are the rows p of their shapes. Rigid motion is free of it; motion of p that the joints do not allow, too.
-    """
     start = undeformed_state(MechanismSystem(model, [*model.joints, *model.trajectories]))
     assembly = MechanismSystem(model, model.joints)
     modes = vibrations(assembly, start)
-    inverse = np.linalg.pinv(np.delete(modes.shape, assembly.frame_coordinates, axis=0))
-    return as_floats(inverse.T @ (2 * modes.frequency[:, None] * inverse))
+    wanted = unit_damping(modes.frequency, np.delete(modes.shape, assembly.frame_coordinates, axis=0))
+    return replace(model, bodies=_damped(model.bodies, wanted, ratios))
+
+
+def with_robot_damping_in_space(model: SpatialModel, ratios: Mapping[str, float]) -> SpatialModel:
+    """The same of a robot in space, whose gears are firm here as they are there."""
+    if not ratios:
+        return model
+    start, tree = undeformed_posture(model), model.tree
+    modes = vibrations_in_space(without_paths(model), without_rows(model), 0.0, start.q)
+    wanted = unit_damping(modes.frequency, modes.shape[~tree.joint_columns])
+    bodies = _damped([node.body for node in tree.nodes], wanted, ratios)
+    return replace(model, tree=tree.with_bodies(bodies))
+
+
+def unit_damping(frequency: Array, shape: Array) -> Array:
+    """D (modes of all bodies)², 1/s, under which all vibrations have the damping ratio 1: ΦᵀDΦ = diag(2ω).
+
+    Rigid motion is free of it; motion of p that the joints do not allow, too.
+
+    Args:
+        frequency: ω (n,) rad/s of the vibrations.
+        shape: Φ (modes of all bodies, n), the rows p of their M-orthonormal shapes, body by body.
+    """
+    inverse = np.linalg.pinv(shape)
+    return as_floats(inverse.T @ (2 * frequency[:, None] * inverse))
+
+
+def _damped(bodies: Sequence[B], wanted: Array, ratios: Mapping[str, float]) -> tuple[B, ...]:
+    """With their blocks on the diagonal of `wanted` (modes of all bodies)², ζ times; bodies not named as they are."""
+    ends = np.cumsum([0, *(body.n_modes for body in bodies)])
+    return tuple(
+        replace(body, damping=ratios[body.name] * wanted[first:last, first:last]) if body.name in ratios else body
+        for body, (first, last) in zip(bodies, pairwise(ends), strict=True)
+    )

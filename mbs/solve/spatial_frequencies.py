@@ -13,7 +13,7 @@ from ...common.validation import quoted
 from ..model.spatial_gears import with_held_motors
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_system import SpatialSystem
-from ..model.spatial_tree import ElasticGearInSpace
+from ..model.spatial_transmission import gear_matrices
 from .path_frequencies import INSTANTS, PathFrequencies, common_modes
 from .spatial_posture import relaxed_gears, solve_posture, undeformed_posture
 from .spatial_redundancy import resolved
@@ -81,21 +81,10 @@ def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q:
 
 def _springs(model: SpatialModel) -> tuple[Array, Array]:
     """K and D (n_v, n_v) of modes, gears and viscous friction."""
-    K, D = np.zeros((2, model.tree.n_v, model.tree.n_v))
+    K, D = gear_matrices(model.tree)
     for node in model.tree.nodes:
         K[node.p_v, node.p_v] = np.diag(node.body.stiffness)
         D[node.p_v, node.p_v] = node.body.damping
         for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
             D[column, column] += friction.viscous
-    for gear in model.tree.gears:
-        twist = _twist(gear, model.tree.n_v)
-        K += gear.stiffness * np.outer(twist, twist)
-        D += gear.damping * np.outer(twist, twist)
     return K, D
-
-
-def _twist(gear: ElasticGearInSpace, n_v: int) -> Array:
-    """By v (n_v,)."""
-    found = np.zeros(n_v)
-    found[gear.motor.v.start], found[gear.joint.v.start] = 1.0, -gear.sign
-    return found

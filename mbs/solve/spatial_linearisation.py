@@ -5,11 +5,14 @@ rotation vectors in body axes for orientations, δ̇ = δv + B δ with B = −ω
 δ = H δs and δv = H δv_s + N δs, where v_s are the rates of the independent coordinates s. So
 
     δv = H δṡ + Ḣ δs,  Ḣ = N − H B_s H;    δs̈ = a_v,s (H δṡ + Ḣ δs) + a_q,s H δs + d/dt (B_s δ).
+
+Held are the forces along s that drive the motion; moments of motors that turn frames are held in their place, and what
+these do on modes turns with the sections at them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -20,23 +23,27 @@ from ...common.rotations import skew
 from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_inverse import required_forces
 from ..model.spatial_model import SpatialModel, row_values
+from ..model.spatial_motors import FrameShare, frame_share, turning_motors
 from ..model.spatial_system import SpatialSystem
-from ..model.spatial_transmission import compliance
-from ..model.spatial_tree import Node
+from ..model.spatial_transmission import gear_matrices
+from ..model.spatial_tree import ElasticGearInSpace, Node
 from .linearisation import DEPENDENT, LinearMechanism
 
 
 class SpatialLinearisation:
     """What is the same at every posture: joints alone hold; given forces along s act, and loads.
 
-    `model` has no rows of trajectories. Independent are the motors' coordinates where loops leave them so, then other
-    joint coordinates, and modes, those first that the loops determine worst at `q` (QR with pivoting). `points`
-    ("BODY.POINT") are in- and outputs.
+    `model` has no rows of trajectories; its gears give where its tree has them. Independent are the motors' coordinates
+    where loops leave them so, then other joint coordinates, and modes, those first that the loops determine worst at
+    `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs; a mapping says where each is in the model,
+    where that is another body's point (of a link in pieces).
     """
 
-    def __init__(self, model: SpatialModel, q: Array, points: Sequence[str] = ()) -> None:
+    def __init__(self, model: SpatialModel, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:
         _check(model)
-        self.model, self.points, self.system = model, tuple(points), SpatialSystem(model)
+        self.points = dict(points) if isinstance(points, Mapping) else {point: point for point in points}
+        self.model, self.system = model, SpatialSystem(model)
+        self._on_frames = turning_motors(model) if model.scene.motors == "frame" else []
         self.independent = _independent(model, q)
         names, signs = _coordinates(model)
         self.names = tuple(names[k] for k in self.independent)
@@ -62,9 +69,17 @@ class SpatialLinearisation:
         M = np.linalg.inv(core.a_f[np.ix_(s, s)])
         sides: Array = self._signs[:, None] * self._signs
         H, H_dot = H * self._signs, H_dot * self._signs
+        shares = {joint: frame_share(self.model, joint, q) for joint in self._on_frames}
+        moments = {joint: along_s[self.model.motors[joint][0]] for joint in shares}
+        on_modes = sum((moments[joint] * shares[joint].direction for joint in shares), np.zeros(tree.n_v))
+        # Not by way of M⁻¹, whose rounding is that of the stiffest modes
+        K_more, D_more = gear_matrices(tree)
+        K_more -= sum((moments[joint] * shares[joint].slope for joint in shares), np.zeros_like(K_more))
         return LinearMechanism(
-            t, q, v, a, sides * (M + M.T) / 2, -sides * (M @ by_rate), -sides * (M @ by_s),
-            self._inputs(state, H), self._outputs(state, H), H, H_dot, self._signs * force, np.zeros(0), self.names,
+            t, q, v, a, sides * (M + M.T) / 2, H.T @ D_more @ H - sides * (M @ by_rate),
+            H.T @ (K_more @ H + D_more @ H_dot) - sides * (M @ by_s),
+            self._inputs(state, H, shares), self._outputs(state, H), H, H_dot,
+            self._signs * force - on_modes @ H, np.zeros(0), self.names,
         )  # fmt: skip
 
     def _followers(self, state: Accelerated, t: float) -> tuple[Array, Array]:
@@ -87,56 +102,55 @@ class SpatialLinearisation:
         H[others] = -determine @ C_v[:, s]
         return H, determine
 
-    def _inputs(self, state: Accelerated, H: Array) -> Mapping[str, Array]:
+    def _inputs(self, state: Accelerated, H: Array, shares: Mapping[str, FrameShare]) -> Mapping[str, Array]:
         """By s: a unit of each motor, and of forces on points along x, y, z."""
-        motors = self._along(self.model.motors, H)
-        return MappingProxyType(motors | {f"force/{name}": row for name, row in self._places(state, H).items()})
+        found = {}
+        for joint, columns in self.model.motors.items():
+            beside = shares[joint].direction @ H if joint in shares else 0.0
+            for name, k in _labelled(joint, columns):
+                found[name] = self.model.sign(joint) * (H[k] + beside)
+        return MappingProxyType(found | {f"force/{name}": row for name, row in self._places(state, H).items()})
 
     def _outputs(self, state: Accelerated, H: Array) -> Mapping[str, Array]:
-        """By s: joint coordinates, and places of points."""
-        joints = self._along((joint.name for joint in self.model.scene.joint), H)
-        return MappingProxyType(joints | {f"point/{name}": row for name, row in self._places(state, H).items()})
-
-    def _along(self, joints: Iterable[str], H: Array) -> dict[str, Array]:
-        return {
-            name: self.model.sign(joint) * H[k]
-            for joint in joints
-            if joint in self.model.tree.carried
-            for name, k in labelled(self.model, joint)
-        }
+        """By s: joint coordinates, those of motors behind gears that give, and places of points."""
+        tree, found = self.model.tree, dict[str, Array]()
+        for joint in self.model.scene.joint:
+            if joint.name in tree.carried:
+                sign = -1.0 if tree.nodes[tree.carried[joint.name]].backwards else 1.0
+                found |= {name: sign * H[k] for name, k in labelled(self.model, joint.name)}
+        found |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
+        return MappingProxyType(found | {f"point/{name}": row for name, row in self._places(state, H).items()})
 
     def _places(self, state: Accelerated, H: Array) -> dict[str, Array]:
         found: dict[str, Array] = {}
-        for point in self.points:
-            L = self.model.tree.motion(self.model.tree.section(point, np.eye(3)), state.q, state.frames).L[0]
+        for point, place in self.points.items():
+            L = self.model.tree.motion(self.model.tree.section(place, np.eye(3)), state.q, state.frames).L[0]
             found |= {f"{point}/{axis}": L[k] @ H for k, axis in enumerate("xyz")}
         return found
 
 
 def _check(model: SpatialModel) -> None:
-    path = model.scene.path
-    if model.scene.motors == "frame" and model.motors:
-        raise InputError(
-            f'{path}: motors: expected "section" for linear models in space, found "frame": not available yet'
-        )
     for node in model.tree.nodes:
-        if compliance(node) is not None:
-            raise InputError(
-                f"{path}: {node.joint.label}: stiffness: expected gears that do not give for linear models in space,"
-                " found one that does: not available yet"
-            )
         if node.backwards and node.joint.type == "planar":  # its coordinates are not linear in the tree's
             raise InputError(
-                f"{path}: {node.joint.label}: between: expected the side nearer to the ground first for linear models,"
-                " found it second"
+                f"{model.scene.path}: {node.joint.label}: between: expected the side nearer to the ground first for"
+                " linear models, found it second"
             )
 
 
 def labelled(model: SpatialModel, joint: str) -> Iterator[tuple[str, int]]:
     """Coordinates of a joint, "joint/NAME", or "joint/NAME 1", "joint/NAME 2" of several, and where each is in v."""
-    columns = model.columns(joint)
+    return _labelled(joint, model.columns(joint))
+
+
+def _labelled(joint: str, columns: Array) -> Iterator[tuple[str, int]]:
     for number, k in enumerate(columns, 1):
         yield f"joint/{joint}" + (f" {number}" if len(columns) > 1 else ""), int(k)
+
+
+def _of_motor(gear: ElasticGearInSpace) -> str:
+    """Of the coordinate of a motor behind a gear that gives."""
+    return f"motor/{gear.joint.joint.name}"
 
 
 def _coordinates(model: SpatialModel) -> tuple[list[str], Array]:
@@ -144,14 +158,16 @@ def _coordinates(model: SpatialModel) -> tuple[list[str], Array]:
     names, signs = [""] * model.tree.n_v, np.ones(model.tree.n_v)
     joints = {joint.name for joint in model.scene.joint}
     for node in model.tree.nodes:
-        kind = "joint" if node.joint.name in joints else "frame"
         for number, k in enumerate(range(node.v.start, node.v.stop), 1):
+            kind = "joint" if node.joint.name in joints else "frame"
             names[k] = f"{kind}/{node.joint.name} {number}"  # of orientations: about axes of the body
         for number, k in enumerate(range(node.p_v.start, node.p_v.stop), 1):
             names[k] = f"modal/{node.body.name}/{number}"
-        if kind == "joint":
+        if node.joint.name in joints:
             for name, k in labelled(model, node.joint.name):
-                names[k], signs[k] = name, model.sign(node.joint.name)
+                names[k], signs[k] = name, -1.0 if node.backwards else 1.0
+    for gear in model.tree.gears:
+        names[gear.motor.v.start] = _of_motor(gear)
     return names, signs
 
 

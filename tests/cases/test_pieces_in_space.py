@@ -263,8 +263,9 @@ MISTAKES = {
         "body": [{"name": "beam", "link": link(), "pieces": 2, "modes": 2}]
     },
     r'motors: expected "section" beside bodies in pieces \("beam"\), found "frame"': {"motors": "frame"},
-    r'kind: expected one of "pcid", "forward", "static" beside bodies in pieces \("beam"\) in space, found "linear"': {
-        "analysis": [{"name": "poles", "kind": "linear"}]
+    r'"static", "linear", "closed-loop" beside bodies in pieces \("beam"\) in space, found "fcid"': {
+        "analysis": [{"name": "straight", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.1}],
+        "trajectory": [{"name": "tip", "point": "beam.tip", "x": "t"}],
     },
     r'body: expected one that is not in pieces, found "beam": not available in space yet': {
         "pzt": [{"body": "beam", "count": 2, "length": 0.05, "width": 0.01, "thickness": 1e-3, "modulus": 6e10,

@@ -105,9 +105,11 @@ PLANAR = {
     },
 }  # fmt: skip
 SCENES = PLANAR | {
-    # flexible links, an outer first side, a rotor behind a stiff gear, friction, patches, three analyses to choose from
+    # flexible links, damped as the robot shall be, an outer first side, a rotor behind a stiff gear, friction, patches,
+    # three analyses to choose from
     "arm": {
-        "body": [{"name": "upper", "link": link("upper", 2)}, {"name": "fore", "rigid": box(root=ROOT, tip=TIP)}],
+        "body": [{"name": "upper", "link": link("upper", 2, damping={"ratio": 0.02, "of": "robot"})},
+                 {"name": "fore", "rigid": box(root=ROOT, tip=TIP)}],
         "joint": [
             pin("shoulder", "ground", "upper.root", (0.1, 1.0, 0.2), viscous_friction=0.05),
             pin("elbow", "fore.root", "upper.tip", rotor_inertia=2e-5, gear_ratio=50.0),

@@ -2,47 +2,13 @@
 
 import numpy as np
 import pytest
+from damped_arms import RATIO, planar_arm, vibrations_of
 
-import ffrobot as library
-from ffrobot.run.solve import solve
-
-RATIO = 0.01
 CHOICES = [("simply-supported", "simply-supported"), ("simply-supported", "cantilever"), ("cantilever", "cantilever")]
 
 
-def link(name, condition, of):
-    return {
-        "name": name,
-        "material": {"youngs_modulus": 2.068e11, "density": 7850.0},
-        "geometry": {
-            "kind": "beam", "length": 1.0, "section": {"shape": "rectangle", "height": 0.015, "width": 0.025},
-        },
-        "mesh": {"elements": 20},
-        "reference": {"condition": condition},
-        "modes": {"count": 10, "family": "in-plane-bending", "attachment_modes": False},
-        "damping": {"ratio": RATIO, "of": of},
-    }  # fmt: skip
-
-
-def linear(conditions, of, **keys):
-    """Modes of the two-link arm of docs/theory.md, Damping."""
-    names = ("link1", "link2")
-    scene = library.make_scene(
-        name="arm",
-        space="planar",
-        gravity=[0.0, 0.0],
-        body=[{"name": n, "link": link(n, c, of)} for n, c in zip(names, conditions, strict=True)],
-        joint=[
-            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
-            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
-        ],
-        payload=[{"point": "link2.tip", "mass": 2.0}],
-        initial={"angles": {"link1": 0.4, "link2": -0.6}},
-        analysis=[{"name": "at_rest", "kind": "linear"}],
-        **keys,
-    )
-    modes = solve(scene).outcomes["at_rest"].details.modes[0]
-    return modes.frequency[modes.frequency > 0.0], modes.damping_ratio[modes.frequency > 0.0]
+def linear(conditions, of):
+    return vibrations_of(planar_arm(conditions, of))
 
 
 @pytest.mark.parametrize("conditions", CHOICES)

@@ -1,5 +1,7 @@
 """Motors that turn frames in space: what the core makes of them is the virtual work of two frames."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from spatial_scenes import as_scene, coordinates, tree_model
@@ -10,6 +12,7 @@ from ffrobot.mbs.model.spatial_accelerations import Accelerated
 from ffrobot.mbs.model.spatial_drives import Drive, Drives, FrameDrive
 from ffrobot.mbs.model.spatial_inverse import required_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.solve.spatial_linearisation import SpatialLinearisation
 
 MOMENT = 0.7  # N·m
 
@@ -56,3 +59,35 @@ def test_sections_have_no_part_of_it():
     expected = np.zeros(model.tree.n_v)
     expected[model.tree.nodes[1].v] = MOMENT
     np.testing.assert_allclose(found, expected, atol=1e-9 * MOMENT)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_linear_models_are_those_of_motions_beside_it(turned):
+    """Under a moment that stays as it is the motion itself is one of them, begun a little later: δ = v.
+
+    Its jerk is found by differences of accelerations along it. Of what drives it, the moment alone is left.
+    """
+    size = _core.TimeFunction.constant(MOMENT)
+    model, state = state_of(turned, lambda model: Drives(on_frames=(FrameDrive(1, 1.0, size),)))
+    on_frames = replace(model, scene=model.scene.model_copy(update={"motors": "frame"}))
+    q, v, a = state.q[0], state.v[0], state.a[0]
+    linearisation = SpatialLinearisation(on_frames, q)
+    found, tree = linearisation.at(0.0, q, v, a), model.tree
+    expected = np.zeros(tree.n_v)
+    joint = tree.nodes[1].joint.name
+    expected[found.names.index(f"joint/{joint}")] = model.sign(joint) * MOMENT
+    np.testing.assert_allclose(found.force, expected, atol=1e-8)
+
+    system = SpatialSystem(model, Drives(on_frames=(FrameDrive(1, 1.0, size),)))
+
+    def acceleration(dt):
+        beside = np.concatenate([tree.integrate(q, dt * v), v + dt * a])
+        return _core.tree_outputs(system.core, system.scene, [0.0], beside[None]).accelerations[0]
+
+    h = 1e-4  # of a straight line through the state, along which the motion begins
+    s, signs = linearisation.independent, found.transformation[linearisation.independent].diagonal()
+    jerk = (acceleration(-2 * h) - 8 * acceleration(-h) + 8 * acceleration(h) - acceleration(2 * h)) / (12 * h)
+    terms = [found.M @ (signs * jerk[s]), found.D @ (signs * a[s]), found.K @ (signs * v[s])]
+    np.testing.assert_allclose(sum(terms), 0, atol=1e-6 * max(np.abs(term).max() for term in terms))
+    held = SpatialLinearisation(model, q).at(0.0, q, v, a)  # with sections driven K is another
+    assert np.abs(held.K - found.K).max() > 1e-4 * MOMENT

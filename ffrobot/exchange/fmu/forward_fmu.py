@@ -13,9 +13,10 @@ from ...common.errors import InputError
 from ...common.validation import quoted
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
-from ...mbs.analysis.spatial_run import without_paths
 from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import SpatialModel, build_spatial_model
+from ...mbs.model.spatial_model import SpatialModel, build_spatial_model, without_paths
+from ...mbs.solve.robot_damping import with_robot_damping_in_space
+from ...run.loaded_body import robot_damping_ratios
 from ...run.spatial_actuation import patches_in_space
 from ...run.spatial_bodies import load_spatial_bodies
 from ...run.spatial_mode_choice import mode_levels_in_space
@@ -76,7 +77,8 @@ def _unit_in_space(scene: SpatialScene, analysis: Forward) -> tuple[SpatialModel
     loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
     fewer = mode_levels_in_space(scene, loaded)[-1]  # "auto": all of them
     spatial = [fewer.get(name, part.spatial) for name, part in loaded.items()]
-    model = with_compliance_in_space(without_paths(build_spatial_model(scene, spatial)))
+    damped = with_robot_damping_in_space(build_spatial_model(scene, spatial), robot_damping_ratios(loaded))
+    model = with_compliance_in_space(without_paths(damped))
     links = {name: part.modal for name, part in loaded.items() if part.modal is not None}
     voltages = voltages_in_space(model, patches_in_space(scene, loaded))
     return model, held_unit(model, voltages, links, analysis)

@@ -1,0 +1,87 @@
+"""What analyses in space have to know of whole links where the equations are those of their pieces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ..actuation.spatial_context import WholeLinksInSpace
+from ..common.arrays import Array
+from ..common.errors import InputError
+from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.model.divided_link import DividedLink, SpatialPiece, divided_link_in_space
+from ..mbs.model.spatial_model import SpatialModel
+from ..mbs.model.spatial_tree import Node
+from ..scene.pieces import places_on_pieces
+from .spatial_pieces import MotionOfLinks, divided_links
+from .spatial_solution import SpatialSolution
+
+STEP = 1e-5  # s, along a motion, of central differences of modal velocities
+
+
+def whole_links_in_space(solution: SpatialSolution) -> WholeLinksInSpace | None:
+    """The links of a solution in which some are in pieces; None where none is."""
+    if solution.whole is None:
+        return None
+    divided = {name: _divided(solution, name) for name in solution.divided}
+    return WholeLinksInSpace(solution.whole, divided, places_on_pieces(solution.divided), partial(_told, solution))
+
+
+def _divided(solution: SpatialSolution, name: str) -> DividedLink:
+    link, body = solution.bodies[name], solution.divided[name]
+    pieces = []
+    for piece, start in zip(body.names, body.cut.starts, strict=True):
+        modal = solution.parts[piece].modal
+        assert modal is not None
+        pieces.append(SpatialPiece(start, modal, solution.parts[piece].spatial))
+    assert link.modal is not None
+    return divided_link_in_space(link.modal, link.spatial, pieces)
+
+
+def _told(solution: SpatialSolution, run: SpatialRun) -> SpatialRun:
+    """A run of the pieces in the coordinates of the robot with whole links: those of joints, and the nearest shapes.
+
+    Its multipliers and what drives it stay behind. Raises `InputError` for joints that have no coordinates there.
+    """
+    whole = solution.whole
+    assert whole is not None
+    q = np.zeros((len(run.time), whole.tree.n_q))
+    v, a = np.zeros((2, len(run.time), whole.tree.n_v))
+    now, *beside = (_modal(solution, run, step) for step in (0.0, -STEP, STEP))
+    for node in whole.tree.nodes:
+        if node.joint.freedoms:
+            _take_joint(whole, node, run, (q, v, a))
+        name, to_own = node.body.name, np.linalg.pinv(node.body.modal_transform).T
+        if node.body.n_modes:
+            q[:, node.p_q], v[:, node.p_v] = (values @ to_own for values in now[name])
+            behind, ahead = (of[name][1] for of in beside)
+            a[:, node.p_v] = (ahead - behind) @ to_own / (2 * STEP)
+    multipliers = np.zeros((len(run.time), len(whole.rows)))
+    return replace(run, model=whole, q=q, v=v, a=a, multipliers=multipliers, required=None, again=None)
+
+
+def _modal(solution: SpatialSolution, run: SpatialRun, step: float) -> dict[str, tuple[Array, Array]]:
+    """By body, modal coordinates and velocities (T, n) in the modes of its file, `step` (s) later."""
+    tree, divided = run.model.tree, divided_links(solution)
+    q, v = tree.integrate(run.q, step * run.v), run.v + step * run.a
+    motion = MotionOfLinks(run.model, run.time, q, v, run.a, run.multipliers, divided=divided)
+    found = {name: motion.body(name) for name in motion.points}
+    return {name: (body.modal, body.modal_velocity) for name, body in found.items()}
+
+
+def _take_joint(whole: SpatialModel, node: Node, run: SpatialRun, states: tuple[Array, Array, Array]) -> None:
+    """Coordinates, rates and accelerations of the joint of `node`, from the tree of the pieces to that of the links."""
+    tree = run.model.tree
+    number = tree.carried.get(node.joint.name)
+    same = number is not None and tree.nodes[number].backwards == node.backwards
+    if number is None or not (same or len(node.joint.units) == 1):
+        raise InputError(
+            f"{whole.scene.path}: {node.joint.label}: expected joints that stand in the tree the same way with links in"
+            " pieces as with whole ones where these are controlled, found it otherwise: list it before the others of"
+            " its loop"
+        )
+    sign, other = 1.0 if same else -1.0, tree.nodes[number]
+    for to, values, slices in zip(states, (run.q, run.v, run.a), ("q", "v", "v"), strict=True):
+        to[:, getattr(node, slices)] = sign * values[:, getattr(other, slices)]

@@ -1,0 +1,57 @@
+"""Arms whose links have the damping ratio RATIO, of their own modes or of the robot's vibrations."""
+
+import ffrobot
+from ffrobot.mbs.scene.in_space import keys
+
+RATIO = 0.01
+
+
+def link(name, condition, of, section=None, **modes):
+    """A steel beam of 1 m that bends in the plane, unless `modes` says otherwise."""
+    return {
+        "name": name,
+        "material": {"youngs_modulus": 2.068e11, "poissons_ratio": 0.3, "density": 7850.0},
+        "geometry": {
+            "kind": "beam", "length": 1.0,
+            "section": section or {"shape": "rectangle", "height": 0.015, "width": 0.025},
+        },
+        "mesh": {"elements": 20},
+        "reference": {"condition": condition},
+        "modes": modes or {"count": 10, "family": "in-plane-bending", "attachment_modes": False},
+        "damping": {"ratio": RATIO, "of": of},
+    }  # fmt: skip
+
+
+def planar_arm(conditions, of, **keys):
+    """The two-link arm of docs/theory.md, Damping."""
+    names = ("link1", "link2")
+    return {
+        "name": "arm",
+        "space": "planar",
+        "gravity": [0.0, 0.0],
+        "body": [{"name": n, "link": link(n, c, of)} for n, c in zip(names, conditions, strict=True)],
+        "joint": [
+            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
+            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
+        ],
+        "payload": [{"point": "link2.tip", "mass": 2.0}],
+        "initial": {"angles": {"link1": 0.4, "link2": -0.6}},
+        "analysis": [{"name": "at_rest", "kind": "linear"}],
+    } | keys
+
+
+def in_space(arm, joints):
+    """The same in space, its joints at the coordinates `joints`."""
+    return arm | {
+        "space": "spatial",
+        "gravity": keys.place(arm["gravity"]),
+        "joint": [keys.joint_keys(joint) for joint in arm["joint"]],
+        "initial": {"joints": joints},
+    }
+
+
+def vibrations_of(scene):
+    """Frequencies (Hz) and damping ratios of the linear model of a scene, without rigid motion."""
+    with ffrobot.solve(ffrobot.make_scene(**scene)) as results:
+        frequency, ratio = (results[f"at_rest/linear/{key}"][0] for key in ("frequency", "damping_ratio"))
+    return frequency[frequency > 0.0], ratio[frequency > 0.0]
