@@ -43,6 +43,9 @@ class Record(BaseModel):
 
 R = TypeVar("R", bound=Record)
 
+USED: set[type[Record]] = set()
+"""Records that this process has validated with: their validators are built."""
+
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:
     """Resolve `path` against the folder of the input file it is written in, and make sure that it is there."""
@@ -71,6 +74,7 @@ def validate(record: type[R], data: dict[str, Any], path: Path, objects: Mapping
     context.
     """
     check_limits(data, path)
+    USED.add(record)
     context = {"path": path, "folder": path.parent, "objects": objects or {}}
     try:
         # By way of JSON, whose strict mode reads lists as tuples and text as paths; TOML has no types for these either.

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import h5py
 import numpy as np
@@ -20,6 +20,8 @@ from .modal_body import Interface, MeasuredValues, ModalBody, OutlinedPatches, P
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+Found = TypeVar("Found")
 
 FORMAT = "ffrobot-modal-body"
 FORMAT_VERSION = 1
@@ -60,12 +62,22 @@ def read_modal_body(path: Path) -> ModalBody:
         InputError: there is no such file, it is not a modal body file, is damaged or newer than this program, or what
             it holds is not a valid modal body; names the file and what is wrong.
     """
+    return _read(path, _body)
+
+
+def read_mass(path: Path) -> float:
+    """The mass of the modal body in the file at `path`, kg. Raises `InputError` likewise."""
+    return _read(path, lambda file: float(_array(file, _DATASETS["mass"])))
+
+
+def _read(path: Path, reader: Callable[[h5py.File], Found]) -> Found:
+    """What `reader` finds in a modal body file. Raises `InputError` as of `read_modal_body`."""
     if not path.is_file():
         raise InputError(f"{path}: modal body file not found")
     try:
         with open_checked(path) as file:
             _check_format(path, file.attrs)
-            return _body(file)
+            return reader(file)
     except InputError as error:
         raise InputError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from None
     except KeyError as error:

@@ -23,12 +23,14 @@ from types import FrameType
 from typing import BinaryIO, NoReturn
 
 from .common.interrupts import SIGNALS, EndOfCommand
+from .common.validation import USED
 
 LOADED = (  # by every run; what else a run has loaded, the next one finds
     "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write", "ffrobot.results.resume",
     "ffrobot.results.stopped", "ffrobot.present.progress", "ffrobot.present.summary", "ffrobot.fe_models.link",
     "ffrobot.scene.spatial",
 )  # fmt: skip
+KEPT = ("ffrobot.", "scipy.")  # packages of which the next run finds what one has loaded
 PIPE = 1 << 15  # bytes that a pipe takes without a reader
 
 
@@ -84,7 +86,8 @@ def _run(arguments: Sequence[str], report: int) -> NoReturn:
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else 1
     loaded = set(sys.modules) - before
-    names = sorted(name for name in loaded if name.startswith("ffrobot."))
+    names = sorted(name for name in loaded if name.startswith(KEPT))
+    names += [f"{record.__module__}:{record.__qualname__}" for record in USED]
     os.write(report, " ".join(names).encode()[:PIPE])
     if "mpi4py.MPI" in loaded:  # it has to be finished where it was begun
         sys.exit(code)
@@ -117,10 +120,13 @@ def _fork() -> int:
 
 
 def _load(names: Sequence[str]) -> None:
-    """Modules of the program; what one fails of, the run that needs it says."""
+    """Modules, and with MODULE:RECORD validators of records; what one fails of, the run that needs it says."""
     for name in names:
+        module, _, record = name.partition(":")
         with suppress(Exception):
-            import_module(name)
+            loaded = import_module(module)
+            if record:
+                getattr(loaded, record).model_rebuild()
 
 
 def _seed() -> None:

@@ -12,7 +12,7 @@ from ..common.arrays import Array
 from ..sweep.sweep import Key
 from .designs import Design, Point
 from .differences import LEVELS, derivative
-from .goals import Followed, Goal, Reading
+from .readings import Followed, Goal, Reading
 
 SIZES = (1.0, 0.5, 0.25)  # of the first steps
 REPEATED = (-0.01, 0.01, 0.02)  # likewise, to either side, where steps of integrations are taken again
@@ -25,7 +25,8 @@ class Base:
     """The place where derivatives are taken: k `keys` with their values `point`, and g `goals` with their `readings`.
 
     `steps` (k) are the largest ones. `changes`: what differs there from the scene, by key. `repeats`: the tolerance of
-    runs that take the steps of the scene's own again; 0 where they choose their own.
+    runs that take the steps of the scene's own again; 0 where they choose their own. `again`: the changes of their
+    scenes with which they do.
     """
 
     goals: tuple[Goal, ...]
@@ -35,6 +36,7 @@ class Base:
     steps: tuple[float, ...]
     changes: Mapping[Key, Any] = field(default_factory=dict)
     repeats: float = 0.0
+    again: Mapping[Key, Any] = field(default_factory=dict)
 
     def moved(self, k: int, offset: float) -> Point:
         """The point with one value changed."""

@@ -13,6 +13,7 @@ from ..common.files import check_folder
 from ..common.python_files import allowed_python
 from ..common.tables import DEEPEST
 from ..results.file import Results
+from ..run.inputs import changed, digest_of_file, files_of
 from ..run.watcher import Watcher
 from ..sweep import Sweep, forget_failures, run_sweep
 from ..sweep.runs import RESULTS, Row
@@ -68,15 +69,20 @@ class Designs:
         self._sweep = Sweep(path, variations, (), folder, (), allowed, fixed, own, growing=True)
         self._processes, self._watcher, self._retry = processes, watcher, retry
         self._workers = Workers()
+        self._designs: dict[Path, Design] = {}
+        self._inputs = _digests(path)
 
     @property
     def table(self) -> Path:
         """The file with a row for every design."""
         return self._sweep.table
 
-    def change_beside(self, changes: Mapping[Key, Any]) -> None:
-        """Have these changes in all designs from now on but the scene's own."""
-        self._sweep = replace(self._sweep, beside=changes)
+    def folders(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Path]:
+        """Of the designs at `points`, with these `changes` beside."""
+        return [run.folder for run in self._lot(points, changes).runs]
+
+    def _lot(self, points: Sequence[Point], changes: Mapping[Key, Any] | None) -> Sweep:
+        return replace(self._sweep, points=tuple(points), fixed={**self._sweep.fixed, **(changes or {})})
 
     def problem(self, point: Point) -> str:
         """What is wrong with the scene or a link file at a point, before any run; empty where nothing is seen."""
@@ -86,17 +92,30 @@ class Designs:
             return str(error)
         return ""
 
-    def run(self, points: Sequence[Point]) -> list[Design]:
-        """The designs at `points`, failed ones too; what earlier calls or commands have run is not run again."""
+    def run(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Design]:
+        """The designs at `points`, failed ones too, with these `changes` beside; none is run twice in one folder.
+
+        Raises `InputError` where the scene or its files are others than at first.
+        """
         claim_folder(self._sweep)
-        if self._retry:
-            forget_failures(replace(self._sweep, points=tuple(set(points) - set(self._sweep.points))))
-        known = dict.fromkeys((*self._sweep.points, *points))
-        self._sweep = replace(self._sweep, points=tuple(known))
-        done = run_sweep(self._sweep, self._processes, self._watcher, self._workers)
-        rows = {row.values: row for row in done}
-        folders = {run.values: run.folder for run in self._sweep.runs}
-        return [Design(point, rows[point], folders[point]) for point in points]
+        if what := changed(self._inputs, _digests(self._sweep.scene)):
+            raise InputError(f"{self._sweep.folder}: {' and '.join(what)} changed while designs were run")
+        wanted, folders = self._lot(points, changes), self.folders(points, changes)
+        new = {folder: point for folder, point in zip(folders, points, strict=True) if folder not in self._designs}
+        if new:
+            earlier = tuple(design.row for design in self._designs.values())
+            lot = replace(wanted, points=tuple(new.values()), earlier=earlier)
+            if self._retry:
+                forget_failures(lot)
+            rows = run_sweep(lot, self._processes, self._watcher, self._workers)
+            triples = zip(new.items(), rows, strict=True)
+            self._designs |= {folder: Design(point, row, folder) for (folder, point), row in triples}
+        return [self._designs[folder] for folder in folders]
+
+
+def _digests(path: Path) -> dict[str, str]:
+    """Of the scene and the files it is made from, by their names."""
+    return {str(file): digest_of_file(file) for file in files_of(path)}
 
 
 def parse_key(text: str, option: str) -> Key:

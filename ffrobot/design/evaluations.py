@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ..common.errors import InputError
 from ..common.files import write_atomically
+from ..sweep.runs import RESULTS
+from ..sweep.sweep import Key
 from .designs import Design, Designs, Point
-from .goals import Followed, Reading
 from .problem import Problem
+from .readings import Followed, Reading
+from .scenes import repeated_steps
 from .variables import Place, Space
 
 
@@ -22,12 +26,16 @@ class SpentError(Exception):
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A design at a place: the `readings` of all goals, none where it failed, for which `failure` says why."""
+    """A design at a place: the `readings` of all goals, none where it failed, for which `failure` says why.
+
+    `again`: changes of scenes beside it with which runs take its steps again; None where they choose their own.
+    """
 
     place: Place
     design: Design
     readings: tuple[Reading, ...]
     failure: str = ""
+    again: Mapping[Key, Any] | None = None
 
     @property
     def completed(self) -> bool:
@@ -46,7 +54,8 @@ class Evaluations:
     def __init__(self, designs: Designs, space: Space, problem: Problem, most: int) -> None:
         self.designs, self.space, self.problem, self.most = designs, space, problem, most
         self._searched: dict[Point, Evaluated] = {}
-        self._designs: dict[Point, Design] = {}
+        self._designs: dict[Path, Design] = {}
+        self._followed: dict[tuple[Place, Path], tuple[Followed, ...]] = {}
 
     @property
     def runs(self) -> int:
@@ -54,7 +63,7 @@ class Evaluations:
         return len(self._designs)
 
     @property
-    def points(self) -> set[Point]:
+    def folders(self) -> set[Path]:
         """Of all runs."""
         return set(self._designs)
 
@@ -73,24 +82,28 @@ class Evaluations:
     def at(self, places: Sequence[Place]) -> list[Evaluated]:
         """The designs there. Raises `SpentError` where that would be too many."""
         points = [self.space.point(place) for place in places]
-        self._run([point for point in points if point not in self._searched])
-        for place, point in zip(places, points, strict=True):
-            if point not in self._searched:
-                self._searched[point] = self._read(place, self._designs[point])
+        new = {point: place for place, point in zip(places, points, strict=True) if point not in self._searched}
+        for (point, place), design in zip(new.items(), self._run(list(new)), strict=True):
+            self._searched[point] = self._read(place, design)
         return [self._searched[point] for point in points]
 
-    def beside(self, base: Evaluated, places: Sequence[Place]) -> list[tuple[Followed, ...]]:
-        """Goals at places beside `base`, peaks at their time there; nothing where the design failed."""
-        points = [self.space.point(place) for place in places]
-        self._run(points)
-        return [self._follow(base, self._designs[point]) for point in points]
+    def beside(
+        self, base: Evaluated, places: Sequence[Place], again: Mapping[Key, Any] | None
+    ) -> list[tuple[Followed, ...]]:
+        """Goals at places beside `base`, peaks at their time there; nothing where the design failed.
 
-    def _run(self, points: Sequence[Point]) -> None:
-        new = [point for point in dict.fromkeys(points) if point not in self._designs]
-        if self.runs + len(new) > self.most:
+        `again`: changes with which runs take the steps of the base.
+        """
+        points = [self.space.point(place) for place in places]
+        return [self._follow(base, design) for design in self._run(points, again)]
+
+    def _run(self, points: Sequence[Point], again: Mapping[Key, Any] | None = None) -> list[Design]:
+        folders = self.designs.folders(points, again)
+        if len(set(folders) - set(self._designs)) > self.most - self.runs:
             raise SpentError
-        if new:
-            self._designs |= dict(zip(new, self.designs.run(new), strict=True))
+        found = self.designs.run(points, again)
+        self._designs |= {design.folder: design for design in found}
+        return found
 
     def _read(self, place: Place, design: Design) -> Evaluated:
         if not design.completed:
@@ -98,7 +111,9 @@ class Evaluations:
         first = not any(one.completed for one in self._searched.values())
         try:
             with design.results() as results:
-                found = Evaluated(place, design, tuple(goal.read(results) for goal in self.problem.goals))
+                readings = tuple(goal.read(results) for goal in self.problem.goals)
+                again = repeated_steps(results, design.folder / RESULTS)
+                found = Evaluated(place, design, readings, again=again)
         except InputError as error:
             if first:  # a goal that means nothing
                 raise
@@ -110,9 +125,12 @@ class Evaluations:
     def _follow(self, base: Evaluated, design: Design) -> tuple[Followed, ...]:
         if not design.completed:
             return ()
-        with design.results() as results:
-            pairs = zip(self.problem.goals, base.readings, strict=True)
-            return tuple(goal.follow(results, reading) for goal, reading in pairs)
+        known = base.place, design.folder
+        if known not in self._followed:
+            with design.results() as results:
+                pairs = zip(self.problem.goals, base.readings, strict=True)
+                self._followed[known] = tuple(goal.follow(results, reading) for goal, reading in pairs)
+        return self._followed[known]
 
     def _words(self, point: Point) -> str:
         return ", ".join(f"{'.'.join(key)} = {_number(v)}" for key, v in zip(self.space.keys, point, strict=True))

@@ -17,7 +17,8 @@ from ..fe_models.link_records import BeamLink
 from ..sweep.files import LINKS
 from .derivatives import SIZES, Base, Entry, Exact
 from .differences import derivative
-from .goals import Frequency, Reading
+from .goals import Frequency
+from .readings import Reading
 from .scenes import link_with
 
 FINE = 0.1  # of the steps of runs: there is no noise but rounding

@@ -16,14 +16,15 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
 from ..run.watcher import Watcher
-from .designs import Designs, Point
+from .designs import Designs
 from .evaluations import Evaluated, Evaluations, SpentError
-from .goals import Goal, Reading, parse_goal
+from .goals import parse_goal
 from .local_search import AIM, search_from
 from .optimality import Optimality
 from .optimise import MOST, TOLERANCE, check_bounds, check_start
 from .problem import KEPT, Limit, Problem, read_problem
-from .scenes import changes_for
+from .readings import Goal, Reading
+from .scenes import changes_for, may_repeat
 from .slopes import Differentiation
 from .variables import Place, Space, read_space
 
@@ -102,7 +103,7 @@ def trade_off(
     if catalogue := next((v for v in space.variables if v.is_catalogue), None):
         raise InputError(f"--against: expected numbers between bounds, found the catalogue of {catalogue.name}")
     check_start(path, space, "slsqp")
-    fixed = changes_for(path, (*problem.goals, other), tolerance)
+    fixed = changes_for(path, (*problem.goals, other), tolerance, keep_steps=may_repeat(space.keys))
     designs = Designs(path, space.keys, space.own, folder, fixed, processes=processes, watcher=watcher, retry=retry)
     check_bounds(designs, space)
     return _Searches(path, space, designs, problem, other, most, tolerance, watcher).front(points)
@@ -110,7 +111,7 @@ def trade_off(
 
 @dataclass
 class _Searches:
-    """What the searches of a front share; `ran`: the points of all their runs."""
+    """What the searches of a front share; `ran`: the folders of all their runs."""
 
     path: Path
     space: Space
@@ -120,7 +121,7 @@ class _Searches:
     most: int
     tolerance: float
     watcher: Watcher
-    ran: set[Point] = field(default_factory=set)
+    ran: set[Path] = field(default_factory=set)
 
     def front(self, count: int) -> Front:
         """The ends, then from the first one on to the second."""
@@ -154,7 +155,7 @@ class _Searches:
             raise SolveError(
                 f"{self.path}: ended before {title} points after {self.most} runs, as many as allowed"
             ) from None
-        self.ran |= evaluations.points
+        self.ran |= evaluations.folders
         if not found.best.completed:
             raise SolveError(f"{self.path}: no design could be run to its end: {found.message}")
         return Search(found.best, found.optimality, found.message, evaluations.problem)

@@ -1,79 +1,25 @@
-"""Scalars that a design is judged by: what `--of` and `--minimise` may say, and their values by results.
-
-A peak belongs to a time and a column: its derivative by a parameter is that of the history there (envelope theorem,
-Danskin 1966), as long as no other time overtakes it.
-"""
+"""Scalars that a design is judged by: what `--of` and `--minimise` may say, and their values by results."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.validation import did_you_mean, either, quoted
 from ..fe_models.modal_body import ModalBody
 from ..results.file import Results
 from ..sweep.files import value_of
 from .histories import POWER, History, read_history
+from .peaks import Peak
+from .readings import Followed, Goal, Reading
 
 FORMS = (
     "peak HISTORY", "rms HISTORY", "mean HISTORY", "integral HISTORY", "at TIME HISTORY", "energy joints.NAME",
     "frequency NUMBER BODY", "mass", "mass BODY", "value KEY",
 )  # fmt: skip
-
-NOISE = 1e-6  # of a peak: a valley that is less deep lies between no two peaks
-
-
-@dataclass(frozen=True)
-class Reading:
-    """A goal's value by results. Of a peak also where it is.
-
-    Attributes:
-        value: of the goal.
-        unit: empty where it is not known.
-        time: of a peak, s; NaN of all else.
-        edge: "first" or "last" where that is an end of the run, which may move.
-        column, sign: of its history, and of the value there.
-        mode: of a frequency, the family and its number in it.
-    """
-
-    value: float
-    unit: str = ""
-    time: float = float("nan")
-    edge: Literal["", "first", "last"] = ""
-    column: int = 0
-    sign: float = 1.0
-    mode: str = ""
-
-
-@dataclass(frozen=True)
-class Followed:
-    """The value of a goal by other results, a peak at its own place; `elsewhere`: where the largest value is now."""
-
-    value: float
-    elsewhere: str = ""
-
-
-class Goal:
-    """One scalar; `text` is what the user calls it."""
-
-    text: str
-    analysis: str | None = None
-    """Name that its history begins with, where that may be one of an analysis."""
-    needs_motion = True
-    """Whether an analysis has to be run for it."""
-
-    def read(self, results: Results) -> Reading:
-        """Its value. Raises `InputError` where the results do not have it."""
-        raise NotImplementedError
-
-    def follow(self, results: Results, nominal: Reading) -> Followed:
-        """Its value by results of a changed scene."""
-        return Followed(self.read(results).value)
 
 
 @dataclass(frozen=True)
@@ -99,41 +45,6 @@ class OfHistory(Goal):
             )
         joined = " ".join(part for part in (history.unit, self.times) if part) if history.unit else ""
         return Reading(self.reduce(history), {"W s": "J"}.get(joined, joined))
-
-
-@dataclass(frozen=True)
-class Peak(Goal):
-    """The largest absolute value of a history, of any of its columns; of vectors their length."""
-
-    text: str
-    name: str
-
-    @property
-    def analysis(self) -> str:  # type: ignore[override]
-        """The first part of the name."""
-        return self.name.replace("/", ".").partition(".")[0]
-
-    def read(self, results: Results) -> Reading:
-        """The value, when it is reached, and in which column."""
-        history = self._history(results)
-        k, column = _largest(history.values)
-        value = history.values[k, column]
-        edge: Literal["", "first", "last"] = "first" if k == 0 else "last" if k == history.time.size - 1 else ""
-        return Reading(
-            float(abs(value)), history.unit, float(history.time[k]), edge, column, -1.0 if value < 0.0 else 1.0
-        )
-
-    def follow(self, results: Results, nominal: Reading) -> Followed:
-        """At the time, in the column and with the sign of the `nominal` peak."""
-        history = self._history(results)
-        time = {"first": history.time[0], "last": history.time[-1]}.get(nominal.edge, nominal.time)
-        if not history.time[0] <= time <= history.time[-1]:
-            return Followed(float("nan"), f"the run ends at t = {history.time[-1]:g} s")
-        value = nominal.sign * history.at(float(time), nominal.column)
-        return Followed(value, _overtaken(history, nominal, float(time), value))
-
-    def _history(self, results: Results) -> History:
-        return read_history(results, self.name, f'"{self.text}"')
 
 
 @dataclass(frozen=True)
@@ -260,26 +171,6 @@ def _number(text: str) -> float | None:
         return None
 
 
-def _largest(values: Array) -> tuple[int, int]:
-    """Output and column of the largest absolute value, the first one."""
-    k, column = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
-    return int(k), int(column)
-
-
-def _overtaken(history: History, nominal: Reading, time: float, value: float) -> str:
-    """Where the largest value is, if that is another peak: in another column, of the other sign, or past a valley."""
-    k, column = _largest(history.values)
-    now = history.values[k, column]
-    if abs(now) <= value * (1.0 + NOISE):
-        return ""
-    between = (history.time - time) * (history.time - history.time[k]) <= 0.0
-    same = column == nominal.column and now * nominal.sign > 0.0
-    if same and np.min(nominal.sign * history.values[between, column]) >= value * (1.0 - NOISE):
-        return ""  # the same peak, which moves
-    where = f", column {column}" if history.values.shape[1] > 1 else ""
-    return f"{abs(now):.6g} at t = {history.time[k]:g} s{where}"
-
-
 def _modes(body: ModalBody) -> list[str]:
     """Family and number in it, from 1, of the eigenmodes."""
     families = body.family[: body.eigenmode_count]
@@ -298,6 +189,6 @@ def _flexible(results: Results, text: str, body: str) -> str:
 def _mass(results: Results, body: Mapping[str, object]) -> float:
     name = str(body["name"])
     if name in results.modal_files:
-        return float(results.modal_body(name).mass)
+        return results.modal_mass(name)
     rigid = body.get("rigid")
     return float(rigid.get("mass", 0.0)) if isinstance(rigid, Mapping) else 0.0

@@ -21,8 +21,8 @@ from .variables import Place
 
 FAILED = 1e3  # how much worse a design that fails reads than the last good one, of the objective's size
 AIM = 1e-4  # gradient of the Lagrangian, of the objective over a number's range, at an optimum
-ENOUGH = 0.5  # times that: where a search ends, before central pairs judge it
-DOWN = 0.05  # of the gradient since the last central pairs: takes pairs again
+ENOUGH = 0.5  # times that: where a search ends, before more runs judge it
+DOWN = 0.05  # of the gradient since it was judged last: is judged again
 KINK = "peaks take turns here, which gradients do not see: --method differential-evolution goes on from any design"
 ITERATIONS = 200
 FTOL = 1e-9  # of the objective, and of excesses
@@ -62,7 +62,7 @@ def rank(evaluations: Evaluations, one: Evaluated) -> tuple[int, float]:
 
 
 def search_from(start: Place, method: str, differentiation: Differentiation, tell: Callable[[str], None]) -> Local:
-    """With a design at each step, and one beside it for each number; with central pairs where these do not do.
+    """With a design at each step, and one beside it for each number; with judged gradients where these do not do.
 
     What SLSQP then leaves, whose line search may come to nothing where a limit trades for the goal almost linearly,
     trust-constr goes on with.
@@ -73,15 +73,15 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
         return Local(first, first, None, first.failure)
     best, found, message = first, None, ""
     try:
-        for optimiser, pairs in ((method, False), (method, True), ("trust-constr", True)):
-            steps = _Steps(differentiation, best, tell, pairs=pairs)
+        for optimiser, judged in ((method, False), (method, True), ("trust-constr", True)):
+            steps = _Steps(differentiation, best, tell, judged=judged)
             try:
                 message = OPTIMISERS[optimiser](steps)
             except ReachedError:
                 message = ""
             finally:
                 best = steps.best
-            found = optimality(evaluations, best, differentiation.slopes(best, pairs=True))
+            found = optimality(evaluations, best, differentiation.slopes(best, judged=True))
             if found.reached(AIM):
                 return Local(first, best, found)
             if found.kinks:
@@ -97,15 +97,15 @@ class _Steps:
     """The functions that optimisers call, of the coordinates x that are no catalogue's."""
 
     def __init__(
-        self, differentiation: Differentiation, start: Evaluated, tell: Callable[[str], None], *, pairs: bool
+        self, differentiation: Differentiation, start: Evaluated, tell: Callable[[str], None], *, judged: bool
     ) -> None:
-        self._differentiation, self._tell, self._pairs = differentiation, tell, pairs
+        self._differentiation, self._tell, self._judged = differentiation, tell, judged
         self._evaluations = differentiation.evaluations
         variables = self._evaluations.space.variables
         self._free = [j for j, variable in enumerate(variables) if not variable.is_catalogue]
         self._place, self.best, self._good = np.array(start.place), start, start
         self._gradients: dict[Place, Array] = {}
-        self._residual = np.inf  # where there were pairs last
+        self._residual = np.inf  # where they were judged last
 
     @property
     def start(self) -> Array:
@@ -141,9 +141,9 @@ class _Steps:
         return self._gradients[one.place]
 
     def _gradients_at(self, one: Evaluated) -> Array:
-        """Of the goals; those with pairs where the gradient has come down since there were some."""
-        for pairs in (self._pairs, True):
-            slopes = self._differentiation.slopes(one, pairs=pairs)
+        """Of the goals; judged ones where the gradient has come down since there were some."""
+        for judged in (self._judged, True):
+            slopes = self._differentiation.slopes(one, judged=judged)
             if np.isnan(slopes.gradient[:, self._free]).any():
                 raise StuckError("ended where no design beside the last one completes: see the table of runs")
             stands = optimality(self._evaluations, one, slopes)

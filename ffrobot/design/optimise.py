@@ -24,7 +24,7 @@ from .evaluations import Evaluations, SpentError, write_designs
 from .local_search import Local, best_of, rank, search_from
 from .optimum import Optimum
 from .problem import read_problem
-from .scenes import changes_for
+from .scenes import changes_for, may_repeat
 from .slopes import Differentiation
 from .variables import Place, Space, read_space
 from .whole_search import combinations, evolve, try_all
@@ -71,7 +71,7 @@ def optimise(
     problem, space, watcher = read_problem(minimise, maximise, subject_to), read_space(path, vary), watcher or Watcher()
     chosen = _method(space, method, most)
     check_start(path, space, chosen)
-    fixed = changes_for(path, problem.goals, tolerance)
+    fixed = changes_for(path, problem.goals, tolerance, keep_steps=may_repeat(space.keys))
     designs = Designs(path, space.keys, space.own, folder, fixed, processes=processes, watcher=watcher, retry=retry)
     check_bounds(designs, space)
     evaluations = Evaluations(designs, space, problem, most)

@@ -16,10 +16,10 @@ from ..common.files import write_atomically
 from ..present.tables import plain_table
 from ..results.verdict import Verdict
 from .evaluations import Evaluated
-from .goals import Reading
 from .local_search import AIM, Local
 from .optimality import Optimality
 from .problem import KEPT, Problem
+from .readings import Reading
 from .variables import Space
 
 SHARE = 0.01  # of a limit: the room that prices are told for

@@ -11,7 +11,8 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.tables import shown
-from .goals import Goal, Reading, parse_goal
+from .goals import parse_goal
+from .readings import Goal, Reading
 
 LIMIT = re.compile(r"(?P<goal>.*\S)\s*(?P<sense><=|>=)\s*(?P<bound>\S+)\s*")
 

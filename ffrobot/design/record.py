@@ -15,7 +15,7 @@ from ..common.arrays import Array, as_floats
 from ..common.files import write_atomically
 from ..present.tables import plain_table
 from .derivatives import Entry
-from .goals import Reading
+from .readings import Reading
 
 COLUMNS = (
     "goal", "value", "unit", "time", "key", "key_value", "derivative", "error", "percent_per_percent", "method", "step",

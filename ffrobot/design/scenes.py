@@ -14,7 +14,10 @@ from ..results.file import Results
 from ..scene.any_space import AnyScene, load_any_scene
 from ..sweep.files import run_files
 from ..sweep.sweep import Key
-from .goals import Goal
+from .readings import Goal
+
+ALGEBRAIC = ("static", "pcid")
+"""Kinds of analysis that, where they take no steps, solve equations to rounding at every time."""
 
 
 def changes_for(
@@ -37,14 +40,22 @@ def changes_for(
     return {("analysis",): tables}
 
 
-def repeated_steps(results: Results, path: Path) -> dict[Key, Any]:
+def may_repeat(keys: Sequence[Key]) -> bool:
+    """Whether runs with other values of `keys` can take the same steps: where analyses end, for example, steps end."""
+    return not any(key[0] == "analysis" for key in keys)
+
+
+def repeated_steps(results: Results, path: Path) -> dict[Key, Any] | None:
     """Changes of a scene with which its integrations take the steps of a run again, whose `results` are at `path`.
 
-    Nothing where one of them cannot be repeated.
+    None where one of them cannot be repeated; nothing where none is integrated, and differences are smooth anyway.
     """
-    stepping = [name for name in results.analyses if results.attributes(name)["steps"]]
-    if not all(results.has(f"{name}/{DATASET}") for name in stepping):
-        return {}
+    about = {name: results.attributes(name) for name in results.analyses}
+    stepping = [name for name in about if about[name]["steps"]]
+    repeated = all(results.has(f"{name}/{DATASET}") for name in stepping)
+    smooth = all(about[name]["kind"] in ALGEBRAIC for name in about if name not in stepping)
+    if not (repeated and smooth):
+        return None
     return {("analysis", name, "repeat_steps"): str(path.absolute()) for name in stepping}
 
 

@@ -27,9 +27,10 @@ from ..sweep.sweep import Key
 from .derivatives import REPEATED, SIZES, Base, Exact, Sample, entries, sample, wants_larger_steps, wants_smaller_steps
 from .designs import Designs, Point, parse_key
 from .frequencies import exact_entries
-from .goals import Goal, Reading, parse_goal
+from .goals import parse_goal
+from .readings import Goal, Reading
 from .record import Sensitivity
-from .scenes import changes_for, repeated_steps
+from .scenes import changes_for, may_repeat, repeated_steps
 
 STEP = 0.01  # of a key's value, the largest; of keys that are 0, in their unit
 FINER = ((0.125, 0.0625), (0.03125, 0.015625))  # of those that follow where these are too large
@@ -72,9 +73,9 @@ def sensitivity(
     def designs_with(fixed: Mapping[Key, Any]) -> Designs:
         return Designs(path, keys, point, folder, fixed, processes=processes, watcher=watcher or Watcher(), retry=retry)
 
-    designs, readings, repeats = _base(path, goals, keys, point, tolerance, designs_with)
+    designs, readings, repeats, again = _base(path, goals, keys, point, tolerance, designs_with)
     tolerance = repeats or tolerance or TOLERANCE
-    base = Base(goals, readings, keys, point, steps, repeats=repeats)
+    base = Base(goals, readings, keys, point, steps, repeats=repeats, again=again)
     _check_steps(designs, base)
     exact = exact_entries(path, base)
     samples = _samples(designs, base, exact)
@@ -94,23 +95,25 @@ def _base(
     point: Point,
     tolerance: float | None,
     designs_with: Callable[[Mapping[Key, Any]], Designs],
-) -> tuple[Designs, tuple[Reading, ...], float]:
-    """Designs, the goals of the scene's own, and the tolerance of runs that repeat its steps, 0 where they cannot."""
-    if not any(key[0] == "analysis" for key in keys):  # of which steps depend by more than their errors
+) -> tuple[Designs, tuple[Reading, ...], float, Mapping[Key, Any]]:
+    """Designs, the goals of the scene's own, the tolerance of runs that repeat its steps, 0 where they cannot, and how.
+
+    That is by changes of their scenes.
+    """
+    if may_repeat(keys):
         repeats = tolerance or TOLERANCE_REPEATED
         designs = designs_with(changes_for(path, goals, repeats, keep_steps=True))
         readings, steps = _nominal(path, designs, goals, point)
         if steps:
-            designs.change_beside(steps)
-            return designs, readings, repeats
+            return designs, readings, repeats, steps
     designs = designs_with(changes_for(path, goals, tolerance or TOLERANCE))
     readings, _ = _nominal(path, designs, goals, point)
-    return designs, readings, 0.0
+    return designs, readings, 0.0, {}
 
 
 def _nominal(
     path: Path, designs: Designs, goals: Sequence[Goal], point: Point
-) -> tuple[tuple[Reading, ...], dict[Key, Any]]:
+) -> tuple[tuple[Reading, ...], dict[Key, Any] | None]:
     """The goals of the scene's own design, and what has its steps taken again."""
     (design,) = designs.run([point])
     if not design.completed:
@@ -156,5 +159,5 @@ def _both_sides(sizes: Sequence[float]) -> list[float]:
 def _beside(designs: Designs, base: Base, which: Sequence[int], parts: Sequence[float]) -> list[Sample]:
     """Runs with one key changed by these parts of its largest step."""
     places = [(k, part * base.steps[k]) for k in which for part in parts]
-    found = designs.run([base.moved(k, offset) for k, offset in places])
+    found = designs.run([base.moved(k, offset) for k, offset in places], base.again)
     return [sample(base, k, offset, design) for (k, offset), design in zip(places, found, strict=True)]

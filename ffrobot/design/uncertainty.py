@@ -19,9 +19,10 @@ from ..common.errors import InputError, SolveError
 from ..common.parallel import processes as of_mpi
 from ..run.watcher import Watcher
 from .designs import Design, Designs, Point
-from .goals import Goal, Reading, parse_goal
+from .goals import parse_goal
 from .histories import History, read_history
 from .linear_spread import LinearModel
+from .readings import Goal, Reading
 from .scenes import changes_for
 from .spreads import Spread, parse_spread, spread_points
 from .statistics import Indices, Statistics, regression_shares, sobol_indices, statistics

@@ -26,7 +26,7 @@ from ..common.files import write_atomically
 from ..common.hdf5 import blaming, numbers, open_checked
 from ..common.validation import did_you_mean, quoted
 from ..fe_models.modal_body import ModalBody
-from ..fe_models.modal_body_file import read_modal_body
+from ..fe_models.modal_body_file import read_mass, read_modal_body
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -198,13 +198,20 @@ class Results:
         Its file is looked for where it was, then beside the results; its hash tells whether it is the same.
         Raises `InputError` where `name` is no flexible body, or its file cannot be found.
         """
+        return read_modal_body(self._modal_path(name))
+
+    def modal_mass(self, name: str) -> float:
+        """Its mass, kg, without reading the rest of the file."""
+        return read_mass(self._modal_path(name))
+
+    def _modal_path(self, name: str) -> Path:
         files = self.modal_files
         if name not in files:
             raise InputError(f'{self.path}: expected a flexible body, found "{name}"{did_you_mean(name, files)}')
         file = files[name]
         for path in (file.path, self.path.parent / file.path.name):  # a folder that has been moved keeps both
             if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == file.sha256:
-                return read_modal_body(path)
+                return path
         found = "another" if file.path.is_file() else "none"
         raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with, found {found}')
 

@@ -36,9 +36,9 @@ class Sweep:
     """The runs of a scene: `points` are the combinations of the `variations`' values, one run each.
 
     `collect` names histories whose reductions become columns beside the standard ones; see `runs.REDUCTIONS`. `fixed`
-    are changes that all points share, `own` the values that the scene has itself, which change nothing, `beside`
-    changes of all points but that one. `growing`: points may be added later, by a search; folders of runs are then
-    named by what their scenes have changed, and their results stay, to be read.
+    are changes that all points share, `own` the values that the scene has itself, which change nothing. `growing`: of
+    the points of a search, which has `earlier` rows and may have later ones; folders of runs are then named by what
+    their scenes have changed, and their results stay, to be read.
     """
 
     scene: Path
@@ -49,8 +49,8 @@ class Sweep:
     allow_python: tuple[Path, ...] = ()
     fixed: Mapping[Key, Value] = field(default_factory=dict)
     own: tuple[Value, ...] = ()
-    beside: Mapping[Key, Value] = field(default_factory=dict)
     growing: bool = False
+    earlier: tuple[Row, ...] = ()
 
     @property
     def keys(self) -> list[str]:
@@ -72,14 +72,13 @@ class Sweep:
         """In the order of the table."""
         return [
             Run(k, values, self.folder / "runs" / self._name(k, values), self.collect, {}, self.allow_python)
-            for k, values in enumerate(self.points)
+            for k, values in enumerate(self.points, start=len(self.earlier))
         ]
 
     def changes(self, values: Sequence[Value]) -> dict[Key, Value]:
         """What is changed in the scene of one run, by key."""
         points = zip(self.variations, values, self.own or (None,) * len(values), strict=True)
-        shared = {**self.fixed, **({} if values == self.own else self.beside)}
-        return {**shared, **{v.key: value for v, value, own in points if value != own}}
+        return {**self.fixed, **{v.key: value for v, value, own in points if value != own}}
 
     def _name(self, number: int, values: Sequence[Value]) -> str:
         """Of the run's folder."""
@@ -125,8 +124,13 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Worker
         with _performed([], side_by_side, Workers()):
             return []
     rows, waiting = _rows_and_runs(sweep)
+    before = len(sweep.earlier)
+
+    def tabulate() -> None:
+        write_table(sweep.table, sweep.keys, [*sweep.earlier, *(rows[k] for k in sorted(rows))])
+
     if rows or sweep.table.exists():
-        write_table(sweep.table, sweep.keys, [rows[k] for k in sorted(rows)])
+        tabulate()
     watcher.stage(f"{len(waiting)} runs" + (f", {len(rows)} done before" if rows else ""))
     with _performed(list(waiting.values()), side_by_side, workers or Workers()) as finished:
         for row in finished:
@@ -140,8 +144,8 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Worker
                 )
             keep_row(run.folder, row)
             rows[row.number] = row
-            watcher.advance(len(rows), len(sweep.points))
-            write_table(sweep.table, sweep.keys, [rows[k] for k in sorted(rows)])
+            watcher.advance(before + len(rows), before + len(sweep.points))
+            tabulate()
     return [rows[k] for k in sorted(rows)]
 
 

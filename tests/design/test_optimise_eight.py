@@ -70,5 +70,5 @@ def test_lightest_stepped_cantilever(tmp_path):
     assert found.limits[0] <= DEFLECTION * (1.0 + 1e-6)
     assert found.prices[0] == pytest.approx(-found.value / (3.0 * DEFLECTION), rel=1e-3)
     assert found.converged
-    assert found.runs <= 200
+    assert found.runs <= 150
     assert lightest_sample(100_000) > 1.08 * best.sum()

@@ -1,0 +1,83 @@
+"""Gradients in a search: one run for each number with the steps of the design's own, against `ffrobot sensitivity`."""
+
+from copy import deepcopy
+
+import numpy as np
+import pytest
+import tomli_w
+
+import ffrobot
+from ffrobot.design.designs import Designs
+from ffrobot.design.evaluations import Evaluations
+from ffrobot.design.problem import read_problem
+from ffrobot.design.scenes import changes_for
+from ffrobot.design.slopes import Differentiation
+from ffrobot.design.variables import read_space
+from ffrobot.run.watcher import Watcher
+
+LINK = {
+    "name": "arm",
+    "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
+    "mesh": {"elements": 6},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
+    "damping": {"ratio": 0.02},
+}
+SCENE = {
+    "name": "arm",
+    "gravity": [0.0, -9.81],
+    "body": [{"name": "arm", "link": LINK}],
+    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+    "payload": [{"point": "arm.tip", "mass": 0.5}],
+    "initial": {"state": "static"},
+    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
+}
+OUTER, LOAD = "links.arm.geometry.section.outer", "payload.0.mass"
+GOALS = ("rms joints.shoulder.moment", "rms points.arm.tip.deflection")
+
+
+def differentiation(tmp_path, scene):
+    """Of `GOALS` by the tube's diameter and the payload; and its first design."""
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps(scene), encoding="utf-8")
+    problem = read_problem(GOALS[0], None, [f"{GOALS[1]} <= 1"])
+    space = read_space(path, [f"{OUTER}=0.018:0.03", f"{LOAD}=0.1:1:log"])
+    fixed = changes_for(path, problem.goals, 1e-7, keep_steps=True)
+    designs = Designs(path, space.keys, space.own, tmp_path / "runs", fixed, processes=2, watcher=Watcher())
+    evaluations = Evaluations(designs, space, problem, 100)
+    (first,) = evaluations.at([tuple(float(u) for u in space.start())])
+    return Differentiation(path, evaluations, 1e-7), first
+
+
+def by_keys(found, first):
+    """∂goal/∂key from ∂goal/∂u."""
+    variables = found.evaluations.space.variables
+    return np.array([variable.slope(u) for variable, u in zip(variables, first.place, strict=True)])
+
+
+def test_one_run_for_each_number(tmp_path):
+    """Steps of 6e-6 of a number: truncation is 1e-5 of the derivative or so, and the estimate says so."""
+    found, first = differentiation(tmp_path, SCENE)
+    slopes = found.slopes(first)
+    assert found.evaluations.runs == 1 + 2 + 1
+    expected = ffrobot.sensitivity(tmp_path / "scene.toml", GOALS, [OUTER, LOAD], processes=2)
+    scale = np.abs(expected.derivative * by_keys(found, first))
+    difference = np.abs(slopes.gradient - expected.derivative * by_keys(found, first))
+    assert np.all(difference <= 1e-4 * scale)
+    assert np.all(difference <= slopes.error + 1e-6 * scale)
+    assert np.all(slopes.error <= 1e-3 * scale)
+    assert found.slopes(first).gradient == pytest.approx(slopes.gradient, rel=0, abs=0)
+    assert found.evaluations.runs == 4
+
+
+def test_integrators_that_cannot_repeat_steps(tmp_path):
+    """Radau IIA chooses its own steps: central pairs."""
+    scene = deepcopy(SCENE)
+    scene["analysis"][0]["integrator"] = "radau"
+    found, first = differentiation(tmp_path, scene)
+    slopes = found.slopes(first)
+    assert found.evaluations.runs == 1 + 4
+    assert np.isfinite(slopes.gradient).all()
+    assert np.isfinite(found.curvature).all()
