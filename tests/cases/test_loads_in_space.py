@@ -98,9 +98,8 @@ def test_motors_carry_loads_friction_and_rotors(tmp_path, ffrobot):
         moment[:, 2], 0.05 + 1e-3 * 20 - 0.3 - arm * 4 * np.cos(t), atol=1e-7
     )  # the rotor's, too
     np.testing.assert_allclose(dissipated, friction * rate + 0.2 * t**2, atol=1e-7)
-    np.testing.assert_allclose(
-        kinetic, 0.5 * (3.0 + of_rotor) * rate**2 + 0.5 * (0.05 + 1e-3 * 20**2) * t**2, atol=1e-7
-    )
+    turning = 0.05 + 1e-3 * 20**2
+    np.testing.assert_allclose(kinetic, 0.5 * (3.0 + of_rotor) * rate**2 + 0.5 * turning * t**2, atol=1e-7)
     np.testing.assert_allclose(reaction[:, 0], -4 * np.cos(t), atol=1e-7)
 
 
@@ -145,9 +144,8 @@ def test_friction_and_rotors_in_every_joint_of_a_loop(name):
     rate, body = built[f"inverse/joints/{name}/rate"], SIDES[name][0].partition(".")[0]
     spin = rate if body == "ground" else rate + built[f"inverse/bodies/{body}/angular_velocity"][:, 2]
     power, energy = 2.0 * rate**2, 0.35 * spin**2
-    moment, kinetic = (
-        built[f"inverse/{key}"] - plain[f"inverse/{key}"] for key in ("joints/A/moment", "energy/kinetic")
-    )
+    keys = ("joints/A/moment", "energy/kinetic")
+    moment, kinetic = (built[f"inverse/{key}"] - plain[f"inverse/{key}"] for key in keys)
     assert np.ptp(rate) > 0.1
     np.testing.assert_allclose(built["inverse/energy/dissipated_power"], power, atol=1e-9)
     np.testing.assert_allclose(kinetic, energy, atol=1e-9)
@@ -159,7 +157,7 @@ def test_friction_and_rotors_in_every_joint_of_a_loop(name):
 
 def test_a_loop_in_whose_joints_something_acts_everywhere_is_refused():
     with pytest.raises(ffrobot.InputError, match=r"a joint along which nothing acts, where it is cut, found .viscous_"):
-        ffrobot.solve(four_bar(**dict.fromkeys(SIDES, {"viscous_friction": 2.0})))
+        ffrobot.solve(four_bar(**{name: {"viscous_friction": 2.0} for name in SIDES}))
 
 
 def test_links_whose_joints_stick(tmp_path, ffrobot):
