@@ -63,6 +63,12 @@ LACKS = (
         "ffrobot.mbs.model.spatial_system",
     ),
     Lack(
+        "motors, friction, rotors, gears that give, `position_limit` and loads of the joint at which a loop is cut: a"
+        " spherical one, else the last",
+        "another joint of the loop as its last",
+        "ffrobot.mbs.model.spatial_model",
+    ),
+    Lack(
         "more rows of paths and cut loops than the core takes (`MOST_ROWS`)",
         "fewer loops",
         "ffrobot.mbs.model.spatial_system",

@@ -23,6 +23,12 @@ from .spatial_drives import Drive
 from .spatial_payloads import welded_payloads
 from .spatial_tree import Motion, Node, Section, SpatialTree
 
+ALONG_COORDINATES = ("viscous_friction", "coulomb_friction", "rotor_inertia", "stiffness", "position_limit")
+"""Keys of joints that are about their coordinates, which the tree has to have."""
+OF_THE_TREE = (
+    "expected a joint of the tree, found the one at which the loop is cut; list it before the others of its loop"
+)
+
 RowKind = Literal["point", "slide", "dot", "rotation", "coordinate"]
 
 
@@ -78,10 +84,7 @@ class SpatialModel:
         found = {}
         for joint in self.scene.motor_joints:
             if joint.name not in self.tree.carried:
-                raise InputError(
-                    f"{self.scene.path}: {joint.label}: motor: expected a joint of the tree, found the one at which the"
-                    " loop is cut; list it before the others of its loop"
-                )
+                raise InputError(f"{self.scene.path}: {joint.label}: motor: {OF_THE_TREE}")
             found[joint.name] = _in_order(self.driven(joint.name))
         return found
 
@@ -129,9 +132,21 @@ def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBo
     names = [*(body.name for body in scene.body), *(body.name for body, _ in carried)]
     topology = spanning_forest(names, [Edge(joint.between, joint.locates) for joint in joints])
     tree = SpatialTree([*(body for body, _ in carried), *bodies], joints, topology)
+    _check_cut_joints(scene, tree)
     rows = [row for joint in tree.loops for row in _loop_rows(scene, tree, joint)]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
     return SpatialModel(scene, tree, tuple(rows))
+
+
+def _check_cut_joints(scene: SpatialMechanismScene, tree: SpatialTree) -> None:
+    """Raise `InputError` for what acts along the coordinates of a joint at which a loop is cut, or limits them."""
+    for joint in tree.loops:
+        for key in ALONG_COORDINATES:
+            if getattr(joint, key, None):
+                raise InputError(f"{scene.path}: {joint.label}: {key}: {OF_THE_TREE}")
+        for k, load in enumerate(scene.load, 1):
+            if load.joint == joint.name:
+                raise InputError(f'{scene.path}: load no. {k}: joint: {OF_THE_TREE} ("{joint.name}")')
 
 
 def _loop_rows(scene: SpatialMechanismScene, tree: SpatialTree, joint: SpatialJoint) -> Iterator[SpatialRow]:
