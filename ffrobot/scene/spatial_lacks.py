@@ -28,6 +28,11 @@ LACKS = (
         "ffrobot.scene.spatial",
     ),
     Lack(
+        "rotors of prismatic joints (`gear_ratio`, `rotor_inertia`)",
+        "a point mass of what slides, where its weight and turning do not count",
+        "ffrobot.mbs.joints.spatial.revolute",
+    ),
+    Lack(
         '`coupling = "surface"` of patches on ±z, of fibres and of twist: link files outline patches on ±y',
         '`coupling = "rotation"`',
         "ffrobot.actuation.patches.spatial_records",
