@@ -60,6 +60,17 @@ def test_one_flexible_link_has_the_ratio_in_all_its_vibrations(condition):
     assert np.abs(of_link[:6] / RATIO - 1).max() > 0.3
 
 
+def test_a_slender_link_on_a_stout_one():
+    """The square of the highest frequency is 2e10 times that of the lowest: slow vibrations are damped all the same."""
+    arm = spatial_arm(SIDES[1:] * 2, "robot")
+    for body, length, diameter in zip(arm["body"][1:], (0.1, 1.0), (0.05, 0.004), strict=True):
+        section = {"shape": "circle", "diameter": diameter}
+        body["link"]["geometry"] = body["link"]["geometry"] | {"length": length, "section": section}
+    frequency, ratio = vibrations_of(arm)
+    assert (frequency[-1] / frequency[0]) ** 2 > 1e10
+    np.testing.assert_allclose(ratio[:6], RATIO, rtol=1e-3)
+
+
 def test_ratios_of_two_links_do_not_depend_on_their_frames():
     """Damping between links is left out: of two vibrations that twist the same link one gets more, the other less."""
     (_, first), (_, second) = (vibrations_of(spatial_arm(sides, "robot")) for sides in (SIDES, SIDES[1:] * 2))
