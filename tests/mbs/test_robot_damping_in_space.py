@@ -21,6 +21,22 @@ def test_a_planar_arm_in_space_has_the_numbers_of_the_plane(changes):
     assert abs(found[1][1] - 0.0164) > 1e-3
 
 
+def test_gears_that_give_and_links_in_pieces_have_the_numbers_of_the_plane():
+    """Gears are firm in the vibrations that are damped; a link in pieces has the damping of its material."""
+    for of_joints, pieces in (({"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3}, None), ({}, 2)):
+        planar = planar_arm(SIDES, "robot")
+        planar["joint"] = [joint | of_joints for joint in planar["joint"]]
+        if pieces:
+            first = planar["body"][0]
+            planar["body"][0] = first | {
+                "pieces": pieces,
+                "link": first["link"] | {"damping": {"rayleigh": [0.0, 1e-5]}},
+            }
+        expected, found = vibrations_of(planar), vibrations_of(in_space(planar, START))
+        for one, other in zip(expected, found, strict=True):
+            np.testing.assert_allclose(other, one, rtol=1e-6)
+
+
 def spatial_arm(conditions, of):
     """Yaw, pitch and, with two links, pitch; tubes that bend in both planes, stretch and twist."""
     modes = {"family": "all", "count": 6}
