@@ -239,6 +239,18 @@ MISTAKES = {
         lambda data: data.update(load=[{"point": "hand.tip", "force": "f"}]),
         'load: force: expected no such key in space = "spatial", found it: forces that depend on the motion',
     ),
+    "angles of bodies": (
+        lambda data: data.update(initial={"angles": {"upper": 0.1}}),
+        'initial: angles: expected no such key in space = "spatial", found it: the guess is of joint coordinates',
+    ),
+    "angle of a point": (
+        put("trajectory", angle="hand.tip"),
+        'trajectory: angle: expected no such key in space = "spatial", found it: the orientation of a point is',
+    ),
+    "rotor of a joint that slides and turns": (
+        put("joint", type="cylindrical", rotor_inertia=1e-3),
+        'expected the key "rotor_inertia" only in',
+    ),
     "gear that gives without a rotor": (
         put("joint", stiffness=100.0),
         "expected a rotor_inertia above 0 beside stiffness, found none",

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.validation import quoted
 from ..link_records import SolidLink
 from ..modal_body.attachment_modes import DEFAULT_COUNT, ResidualModes
 from .eigen import Inverse, Mass, lowest_modes
@@ -51,17 +52,17 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
     a batch follows from the share of wanted ones so far.
 
     Raises:
-        InputError: more are asked for than the mesh has.
+        InputError: more are asked for than the mesh has, or than can be found in reasonable time.
         SolveError: the eigensolver did not converge.
     """
     family, model = "all" if link.modes.family == "all" else link.families, flexibility.model
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
     needed, available = (int(numbers[-1]) + 1 if numbers.size else _default_count(link)), flexibility.rank
     batch = needed + 2 if family == "all" else 2 * needed + 2
+    key = "count" if link.modes.indices is None else "indices"
     X: Array = np.empty((3 * model.owned, 0))
     while True:
         if (family == "all" and needed > available) or X.shape[1] == available:
-            key = "count" if link.modes.indices is None else "indices"
             raise InputError(
                 f"{where}: modes.{key}: expected at most the number of modes available in family "
                 f'"{" + ".join(link.families) if family != "all" else family}" on this mesh, which has {available} of'
@@ -79,6 +80,11 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
         if len(hits) >= needed:
             chosen = np.array(hits)[numbers] if numbers.size else np.array(hits)
             return _chosen(omega2, X, Q[:, chosen], [kinds[k] for k in chosen])
+        if X.shape[1] >= 40 * needed + 200:  # far more than slender parts need
+            raise InputError(
+                f"{where}: modes.{key}: expected {needed} modes of family {quoted(link.families)} among the lowest"
+                f" {X.shape[1]}, found {len(hits)} (short, wide parts hardly bend): ask for fewer"
+            )
         share = max(len(hits), 1) / X.shape[1]
         batch = int(np.ceil((needed - len(hits)) / share)) + 2
 

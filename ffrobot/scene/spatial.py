@@ -27,8 +27,22 @@ from .actuation_times import with_times_of_actuation
 from .kinds import KINDS, AnalysisInSpace
 
 # Keys of planar scenes that scenes in space do not have, by the table in which they stand, and what there is instead.
-UNAVAILABLE = {"load": {"force": "forces that depend on the motion (functions of Python) are those of planar scenes;"
-                                " what depends on time alone is x, y, z, mx, my, mz"}}  # fmt: skip
+_AXES = "forces at points are along x, y and z, axes of the body"
+UNAVAILABLE = {
+    "load": {
+        "force": "forces that depend on the motion (functions of Python) are those of planar scenes; what depends on"
+        " time alone is x, y, z, mx, my, mz"
+    },
+    "trajectory": {
+        "angle": "the orientation of a point is rotation_vector, rpy or tool_axis with direction, that of a joint its"
+        " value"
+    },
+    "initial": {
+        "angles": "the guess is of joint coordinates, joints = { … }",
+        "rates": "the guess is of joint coordinates, joint_rates = { … }",
+    },
+    "actuation_points": {"transverse": _AXES, "axial": _AXES},
+}
 
 
 class SpatialSceneKeys(SpatialMechanismKeys):
@@ -109,8 +123,8 @@ def spatial_scene(
 def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
     """Keys that only planar scenes have so far, before they are called unknown."""
     for table, keys in UNAVAILABLE.items():
-        entries = data.get(table, [])
-        for entry in entries if isinstance(entries, list) else []:
+        found = data.get(table, [])
+        for entry in found if isinstance(found, list) else [found]:
             for key, instead in keys.items():
                 if isinstance(entry, dict) and key in entry:
                     yield f'{table}: {key}: expected no such key in space = "spatial", found it: {instead}'

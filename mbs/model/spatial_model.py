@@ -75,15 +75,7 @@ class SpatialModel:
     @property
     def motors(self) -> dict[str, Array]:
         """By joint with motors: indices in v of its coordinates, in the scene's order."""
-        found = {}
-        for joint in self.scene.motor_joints:
-            if joint.name not in self.tree.carried:
-                raise InputError(
-                    f"{self.scene.path}: {joint.label}: motor: expected a joint of the tree, found the one at which the"
-                    " loop is cut; list it before the others of its loop"
-                )
-            found[joint.name] = _in_order(self.driven(joint.name))
-        return found
+        return {joint.name: _in_order(self.driven(joint.name)) for joint in self.scene.motor_joints}
 
     def columns(self, joint: str) -> Array:
         """Indices in v of the coordinates of a joint of the tree, in the scene's order; none of a spherical one."""
@@ -129,18 +121,24 @@ def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBo
     names = [*(body.name for body in scene.body), *(body.name for body, _ in carried)]
     topology = spanning_forest(names, [*scene.edges, *(Edge(weld.between) for _, weld in carried)])
     tree = SpatialTree([*(body for body, _ in carried), *bodies], joints, topology)
+    _check_cut_joints(scene, tree)
     rows = [row for joint in tree.loops for row in _loop_rows(scene, tree, joint)]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
     return SpatialModel(scene, tree, tuple(rows))
 
 
+def _check_cut_joints(scene: SpatialMechanismScene, tree: SpatialTree) -> None:
+    """Raise `InputError` for what acts along the coordinates of a joint at which a loop is cut, or limits them."""
+    for joint in tree.loops:
+        loads = [f"load no. {k}" for k, load in enumerate(scene.load, 1) if load.joint == joint.name]
+        if found := [*joint.acts_along, *loads]:
+            raise InputError(
+                f"{scene.path}: {joint.label}: expected a loop with a joint along which nothing acts, where it is cut,"
+                f" found {quoted(found)} here and something in each of the others: not available in space yet"
+            )
+
+
 def _loop_rows(scene: SpatialMechanismScene, tree: SpatialTree, joint: SpatialJoint) -> Iterator[SpatialRow]:
-    loaded = [f"load no. {k}" for k, load in enumerate(scene.load, 1) if load.joint == joint.name]
-    if found := [*joint.acts_along, *loaded]:
-        raise InputError(
-            f"{scene.path}: {joint.label}: expected a loop with a joint along which nothing acts, where it is cut,"
-            f" found {quoted(found)} here and something in each of the others: not available in space yet"
-        )
     if joint.held is None:
         raise InputError(
             f"{scene.path}: {joint.label}: expected another type of joint where a loop closes, found a {joint.type}"

@@ -18,8 +18,9 @@ from .path_frequencies import INSTANTS, PathFrequencies, common_modes
 from .spatial_posture import relaxed_gears, solve_posture, undeformed_posture
 from .spatial_redundancy import resolved
 from .state import State
+from .vibration import strained
 
-STIFF = 1e-9  # of the largest ω²: below it motion is rigid
+DEPENDENT = 1e-9  # of the largest singular value: below it a row repeats others
 
 
 def spatial_path_frequencies(model: SpatialModel, begin: float, end: float, modes: int) -> PathFrequencies:
@@ -69,11 +70,11 @@ def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q:
     M = np.linalg.inv(unheld.derivatives(t, q, np.zeros(model.tree.n_v), np.zeros(model.tree.n_v)).a_f)
     C_v = row_values(model, q[None], np.array([t]))[1][0]
     _, sizes, V = np.linalg.svd(C_v) if len(C_v) else (None, np.zeros(0), np.eye(len(M)))
-    free = V[int(np.count_nonzero(sizes > STIFF * sizes.max(initial=0.0))) :].T
+    free = V[int(np.count_nonzero(sizes > DEPENDENT * sizes.max(initial=0.0))) :].T
     K, D = _springs(model)
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ ((M + M.T) / 2) @ free))
     squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)
-    stiff = squares > STIFF * squares.max(initial=0.0)
+    stiff = slice(len(squares) - strained(K, free), None)
     omega, shape = np.sqrt(squares[stiff]), free @ L_inverse.T @ vectors[:, stiff]
     ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
     return SpatialVibrations(as_floats(omega), as_floats(ratio), shape, K)

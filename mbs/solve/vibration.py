@@ -12,6 +12,8 @@ from ..model.masses import block_diagonal, system_mass_matrix
 from ..model.system import MechanismSystem
 from .state import State
 
+RIGID = 1e-9  # of the largest strain of a unit motion, each in units of its spring: below it there is none
+
 
 @dataclass(frozen=True)
 class Vibrations:
@@ -39,11 +41,22 @@ def vibrations(assembly: MechanismSystem, state: State) -> Vibrations:
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
     squares, vectors = np.linalg.eigh(L_inverse @ (free.T @ (K[:, None] * free)) @ L_inverse.T)
     shape = L_inverse.T @ vectors
-    stiff = squares > 1e-9 * squares.max(initial=0.0)
+    stiff = slice(len(squares) - strained(np.diag(K), free), None)
     omega, shape = np.sqrt(squares[stiff]), free @ shape[:, stiff]
     unbalanced = M @ shape * omega**2 - K[:, None] * shape  # = C_qᵀ λ
     force = np.linalg.lstsq(C_q.T, unbalanced, rcond=None)[0] if len(C_q) else np.zeros((0, len(omega)))
     return Vibrations(omega, np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega), shape, force, M)
+
+
+def strained(K: Array, free: Array) -> int:
+    """How many independent motions of those in the columns of `free` (n, m) strain springs K (n, n).
+
+    Each spring counts by its own size: a soft link beside a stiff one vibrates, however slowly.
+    """
+    own = np.sqrt(K.diagonal())
+    unit = np.divide(1.0, own, out=np.zeros_like(own), where=own > 0.0)
+    sizes = np.linalg.svd((unit[:, None] * K * unit) @ free, compute_uv=False)
+    return int(np.count_nonzero(sizes > RIGID * sizes.max(initial=0.0)))
 
 
 def _stiffness(assembly: MechanismSystem) -> Array:

@@ -21,6 +21,22 @@ def test_a_planar_arm_in_space_has_the_numbers_of_the_plane(changes):
     assert abs(found[1][1] - 0.0164) > 1e-3
 
 
+def test_gears_that_give_and_links_in_pieces_have_the_numbers_of_the_plane():
+    """Gears are firm in the vibrations that are damped; a link in pieces has the damping of its material."""
+    for of_joints, pieces in (({"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3}, None), ({}, 2)):
+        planar = planar_arm(SIDES, "robot")
+        planar["joint"] = [joint | of_joints for joint in planar["joint"]]
+        if pieces:
+            first = planar["body"][0]
+            planar["body"][0] = first | {
+                "pieces": pieces,
+                "link": first["link"] | {"damping": {"rayleigh": [0.0, 1e-5]}},
+            }
+        expected, found = vibrations_of(planar), vibrations_of(in_space(planar, START))
+        for one, other in zip(expected, found, strict=True):
+            np.testing.assert_allclose(other, one, rtol=1e-6)
+
+
 def spatial_arm(conditions, of):
     """Yaw, pitch and, with two links, pitch; tubes that bend in both planes, stretch and twist."""
     modes = {"family": "all", "count": 6}
@@ -58,6 +74,17 @@ def test_one_flexible_link_has_the_ratio_in_all_its_vibrations(condition):
     _, of_link = vibrations_of(spatial_arm([condition], "link"))
     np.testing.assert_allclose(ratio, RATIO, rtol=1e-6)
     assert np.abs(of_link[:6] / RATIO - 1).max() > 0.3
+
+
+def test_a_slender_link_on_a_stout_one():
+    """The square of the highest frequency is 2e10 times that of the lowest: slow vibrations are damped all the same."""
+    arm = spatial_arm(SIDES[1:] * 2, "robot")
+    for body, length, diameter in zip(arm["body"][1:], (0.1, 1.0), (0.05, 0.004), strict=True):
+        section = {"shape": "circle", "diameter": diameter}
+        body["link"]["geometry"] = body["link"]["geometry"] | {"length": length, "section": section}
+    frequency, ratio = vibrations_of(arm)
+    assert (frequency[-1] / frequency[0]) ** 2 > 1e10
+    np.testing.assert_allclose(ratio[:6], RATIO, rtol=1e-3)
 
 
 def test_ratios_of_two_links_do_not_depend_on_their_frames():

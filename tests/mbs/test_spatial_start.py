@@ -8,6 +8,7 @@ from rotations import quaternion
 from spatial_checkpoints import CASES, load
 from spatial_scenes import checkpoint_scene
 
+import ffrobot
 from ffrobot.mbs.model.spatial_model import build_spatial_model, row_values, target_rates
 from ffrobot.mbs.solve.spatial_posture import check_path, mobility, solve_posture, undeformed_posture
 from ffrobot.mbs.solve.spatial_statics import static_equilibrium
@@ -67,6 +68,49 @@ def test_loops_are_cut_at_the_spherical_joint():
     model = model_of("slider_crank_3d")
     assert [joint.name for joint in model.tree.loops] == ["rod_tip"]
     assert [row.kind for row in model.rows] == ["point"] * 4
+
+
+def bar(name, length):
+    points = {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0]}
+    return {
+        "name": name,
+        "rigid": {"mass": 1.0, "center": [length / 2, 0.0, 0.0], "inertia": [0.01, 0.01, 0.01], "points": points},
+    }
+
+
+@pytest.mark.parametrize(
+    ("of_joint", "load", "found"),
+    [
+        ({"viscous_friction": 0.1}, None, "viscous_friction"),
+        ({"coulomb_friction": 0.1}, None, "coulomb_friction"),
+        ({"position_limit": [-1.0, 1.0]}, None, "position_limit"),
+        ({"rotor_inertia": 1e-4, "gear_ratio": 9.0, "stiffness": 10.0}, None, "rotor_inertia"),
+        ({"motor": True}, None, "motor"),
+        ({}, {"joint": "last", "moment": "t"}, "load no. 1"),
+    ],
+)
+def test_what_acts_in_all_joints_of_a_loop_is_refused(of_joint, load, found):
+    """The coordinate of the joint at which it is cut is none of the tree's."""
+    pins = [
+        ("first", "ground", "crank.root"), ("second", "crank.tip", "coupler.root"),
+        ("third", "ground", "rocker.root"), ("last", "rocker.tip", "coupler.tip"),
+    ]  # fmt: skip
+    joints = [
+        {"name": name, "type": "revolute", "between": list(sides), "axis": [0.0, 0.0, 1.0]} for name, *sides in pins
+    ]
+    joints[2]["at"] = [0.5, 0.0, 0.0]
+    for joint in joints[:3]:
+        joint["viscous_friction"] = 0.1
+    joints[3] |= of_joint
+    scene = ffrobot.make_scene(
+        name="four bars", space="spatial", gravity=[0.0, -9.81, 0.0],
+        body=[bar("crank", 0.2), bar("coupler", 0.5), bar("rocker", 0.4)], joint=joints,
+        load=[load] if load else [], initial={"joints": {"first": 1.0, "second": -0.8, "third": 1.8}},
+        analysis=[{"name": "swing", "kind": "forward", "end": 0.1, "output_step": 0.1}],
+    )  # fmt: skip
+    message = f'joint "last": expected a loop with a joint along which nothing acts, where it is cut, found "{found}"'
+    with pytest.raises(ffrobot.InputError, match=message):
+        ffrobot.solve(scene)
 
 
 def test_a_search_that_leaves_all_bounds_ends_in_silence():
