@@ -60,6 +60,7 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
     needed, available = (int(numbers[-1]) + 1 if numbers.size else _default_count(link)), flexibility.rank
     batch = needed + 2 if family == "all" else 2 * needed + 2
     key = "count" if link.modes.indices is None else "indices"
+    most = min(available, 40 * needed + 200)  # far more than slender parts need
     X: Array = np.empty((3 * model.owned, 0))
     while True:
         if (family == "all" and needed > available) or X.shape[1] == available:
@@ -68,7 +69,7 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
                 f'"{" + ".join(link.families) if family != "all" else family}" on this mesh, which has {available} of'
                 f" all families, found {needed}"
             )
-        X = lowest_modes(flexibility, mass, min(batch, available - X.shape[1]), X)
+        X = lowest_modes(flexibility, mass, min(batch, most - X.shape[1]), X)
         omega2, X = _ritz(model, X)
         motion = read(X)
         Q = aligned(omega2, motion, family)
@@ -80,7 +81,7 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
         if len(hits) >= needed:
             chosen = np.array(hits)[numbers] if numbers.size else np.array(hits)
             return _chosen(omega2, X, Q[:, chosen], [kinds[k] for k in chosen])
-        if X.shape[1] >= 40 * needed + 200:  # far more than slender parts need
+        if X.shape[1] == most:
             raise InputError(
                 f"{where}: modes.{key}: expected {needed} modes of family {quoted(link.families)} among the lowest"
                 f" {X.shape[1]}, found {len(hits)} (short, wide parts hardly bend): ask for fewer"
