@@ -19,13 +19,14 @@ from ..run.watcher import Watcher
 from .designs import Designs
 from .evaluations import Evaluated, Evaluations, SpentError
 from .goals import parse_goal
-from .local_search import AIM, search_from
+from .local_search import search_from
 from .optimality import Optimality
 from .optimise import MOST, TOLERANCE, check_bounds, check_start
 from .problem import KEPT, Limit, Problem, read_problem
 from .readings import Goal, Reading
 from .scenes import changes_for, may_repeat
 from .slopes import Differentiation
+from .steps import AIM
 from .variables import Place, Space, read_space
 
 POINTS = 8
