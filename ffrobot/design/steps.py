@@ -25,6 +25,7 @@ DOWN = 0.05  # of the gradient since it was judged last: is judged again
 FAR = 1e-2  # violation up to which an optimiser is left to itself: limits that it follows are always exceeded a little
 NEARER = 0.9  # of the violation: much less
 PATIENCE = 4  # gradients without that: the violation itself is made less
+SHORTEST = 1e-6  # step of SLSQP, of a number's range: its line search refuses steps where a limit trades for the goal
 ITERATIONS = 200
 FTOL = 1e-9  # of the objective, and of excesses
 GTOL, XTOL = 1e-7, 1e-9  # of trust-constr
@@ -39,7 +40,7 @@ class StuckError(Exception):
 
 
 class StalledError(Exception):
-    """Limits are exceeded, and have not come much nearer in the last steps."""
+    """Steps are none, or limits are exceeded and have not come much nearer in the last ones."""
 
 
 class ConflictError(Exception):
@@ -84,6 +85,7 @@ class Steps:
         self._place, self.best, self._good = np.array(start.place), start, start
         self._gradients: dict[Place, Array] = {}
         self._residual = np.inf  # where they were judged last
+        self.shortest = 0.0  # step between gradients: what is less is none
         self._violation, self._waited = np.inf, 0  # when it last became much less, and gradients since
 
     @property
@@ -148,6 +150,8 @@ class Steps:
         if one.place not in self._gradients:
             if not one.completed:
                 raise StuckError(f"ended at a design that fails: {one.failure}")
+            if self._gradients and np.abs(np.subtract(one.place, self._good.place)).max() < self.shortest:
+                raise StalledError
             self._good = one
             self._told(one)
             factors = self._evaluations.split.factors(self._evaluations.row_values(one))
@@ -197,6 +201,7 @@ class Steps:
 
 def _slsqp(steps: Steps) -> str:
     """Sequential quadratic programming (Kraft 1988)."""
+    steps.shortest = SHORTEST
     limits = {
         "type": "ineq",
         "fun": lambda x: -steps.excesses(x),
