@@ -152,10 +152,11 @@ class _Searches:
         differentiation = Differentiation(self.path, evaluations, self.tolerance)
         try:
             found = search_from(start, "slsqp", differentiation, lambda text: self.watcher.stage(f"{title}: {text}"))
+            spent = found.spent
         except SpentError:
-            raise SolveError(
-                f"{self.path}: ended before {title} points after {self.most} runs, as many as allowed"
-            ) from None
+            spent = True
+        if spent:
+            raise SolveError(f"{self.path}: ended before {title} points after {self.most} runs, as many as allowed")
         self.ran |= evaluations.folders
         if not found.best.completed:
             raise SolveError(f"{self.path}: no design could be run to its end: {found.message}")

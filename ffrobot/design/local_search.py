@@ -20,7 +20,8 @@ KINK = "more peaks take turns here than are told apart: --method differential-ev
 class Local:
     """One search: where it began, the best of its designs, how that stands, and why it ended where not there.
 
-    `conflict`: limits that no design near the best one keeps together.
+    `conflict`: limits that no design near the best one keeps together. `spent`: whether it wanted
+    more runs than there were.
     """
 
     start: Evaluated
@@ -28,6 +29,7 @@ class Local:
     optimality: Optimality | None
     message: str = ""
     conflict: Conflict | None = None
+    spent: bool = False
 
 
 def search_from(start: Place, method: str, differentiation: Differentiation, tell: Callable[[str], None]) -> Local:
@@ -54,6 +56,7 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
         message = KINK if found is not None and found.kinks else message
     except SpentError:
         message = f"ended after {evaluations.runs} runs, as many as were allowed"
+        return Local(first, best, found, message, spent=True)
     except StuckError as error:
         message = str(error)
     except ConflictError as error:

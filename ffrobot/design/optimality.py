@@ -25,6 +25,7 @@ from .slopes import Slopes
 
 ACTIVE = 1e-4  # of a limit, or of a number's range: what is nearer counts as reached
 TIED = 1e-5  # of the largest one: peaks that are equal
+CLOSED = 1e-2  # of the gradient that an optimum may have: room that limits may have there, in the objective
 HEAVY = 1e3  # row of the sum of multipliers, beside the largest gradient
 SHARE = 1e-3  # of the multipliers' sum: a limit that matters
 
@@ -39,6 +40,7 @@ class Optimality:
         residual: the largest entry of the gradient of the Lagrangian: the part of the objective that the range of one
             number would change if all were linear.
         gradient_error: the largest estimate of an error in the gradient of F, in the same measure.
+        gap: how much lower the objective would be, if all were linear, with no room left in limits that are reached.
         violation: the largest excess, of its limit.
         kinks: of peaks, in words.
     """
@@ -46,13 +48,14 @@ class Optimality:
     limits: Array
     bounds: Array
     residual: float
+    gap: float
     gradient_error: float
     violation: float
     kinks: tuple[str, ...]
 
     def reached(self, aim: float) -> bool:
         """Whether this is an optimum, with no larger gradient than `aim`."""
-        return self.residual <= aim and self.violation <= KEPT
+        return self.residual <= aim and self.gap <= CLOSED * aim and self.violation <= KEPT
 
 
 @dataclass(frozen=True)
@@ -76,9 +79,11 @@ def optimality(evaluations: Evaluations, design: Evaluated, slopes: Slopes) -> O
     for owner, value, multiplier in zip(split.owners, excess, found.limits, strict=True):
         if value > -ACTIVE:
             limits[owner] = np.nan_to_num(limits[owner]) + multiplier
+    gap = float(found.tops[split.objective_rows] @ (largest - values[split.objective_rows]))
+    gap += float(found.limits @ np.maximum(-excess, 0.0))
     error = _largest((slopes.error * np.abs(found.factors))[np.ix_(np.array(tops), found.free)])
     violation = evaluations.problem.violation(design.readings)
-    return Optimality(limits, found.bounds, found.residual, error, violation, slopes.kinks)
+    return Optimality(limits, found.bounds, found.residual, gap, error, violation, slopes.kinks)
 
 
 def conflict(evaluations: Evaluations, design: Evaluated, slopes: Slopes, aim: float) -> Conflict | None:

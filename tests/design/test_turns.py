@@ -138,7 +138,7 @@ def test_limits_that_no_design_keeps_together(write):
     assert found.conflict.bounds == (0,)
     assert found.violation == pytest.approx(excess, rel=1e-3)
     assert found.violation == found.conflict.violation
-    assert found.runs <= 40
+    assert found.runs <= 60  # before such an end was known the search went on beyond 150
     text = str(found)
     assert f'keeps "peak points.beam.tip.deflection <= {deflection}" and "mass <= {mass}" together' in text
     assert f"within the bounds of {HEIGHT}: at the least violation that was found they are exceeded by" in text
