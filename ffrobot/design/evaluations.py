@@ -17,6 +17,7 @@ from .designs import Design, Designs, Point
 from .problem import Problem
 from .readings import Followed, Reading
 from .scenes import repeated_steps
+from .split import Split, split
 from .variables import Place, Space
 
 
@@ -55,7 +56,9 @@ class Evaluations:
         self.designs, self.space, self.problem, self.most = designs, space, problem, most
         self._searched: dict[Point, Evaluated] = {}
         self._designs: dict[Path, Design] = {}
+        self._rows: dict[Path, tuple[Reading, ...]] = {}
         self._followed: dict[tuple[Place, Path], tuple[Followed, ...]] = {}
+        self._split: Split | None = None
 
     @property
     def runs(self) -> int:
@@ -79,6 +82,34 @@ class Evaluations:
         unrun = {d.point: f"{d.row.status}: {d.row.message}" for d in self._designs.values() if not d.completed}
         return [f"{self._words(point)}: {why}" for point, why in (unread | unrun).items()]
 
+    @property
+    def split(self) -> Split:
+        """The problem as searches along gradients take it."""
+        assert self._split is not None
+        return self._split
+
+    def split_at(self, design: Evaluated) -> bool:
+        """Divide peaks by the local ones of a design that completed; whether that changes anything."""
+        with design.design.results() as results:
+            found = split(self.problem, results)
+        if found == self._split:
+            return False
+        self._split = found
+        self._rows.clear()
+        self._followed.clear()
+        return True
+
+    def rows(self, one: Evaluated) -> tuple[Reading, ...]:
+        """Of all rows of `split`, in a design that completed."""
+        if one.design.folder not in self._rows:
+            with one.design.results() as results:
+                self._rows[one.design.folder] = tuple(goal.read(results) for goal in self.split.goals)
+        return self._rows[one.design.folder]
+
+    def row_values(self, one: Evaluated) -> tuple[float, ...]:
+        """Likewise, the numbers."""
+        return tuple(reading.value for reading in self.rows(one))
+
     def at(self, places: Sequence[Place]) -> list[Evaluated]:
         """The designs there. Raises `SpentError` where that would be too many."""
         points = [self.space.point(place) for place in places]
@@ -90,7 +121,7 @@ class Evaluations:
     def beside(
         self, base: Evaluated, places: Sequence[Place], again: Mapping[Key, Any] | None
     ) -> list[tuple[Followed, ...]]:
-        """Goals at places beside `base`, peaks at their time there; nothing where the design failed.
+        """Rows of `split` at places beside `base`, peaks at their time there; nothing where the design failed.
 
         `again`: changes with which runs take the steps of the base.
         """
@@ -128,7 +159,7 @@ class Evaluations:
         known = base.place, design.folder
         if known not in self._followed:
             with design.results() as results:
-                pairs = zip(self.problem.goals, base.readings, strict=True)
+                pairs = zip(self.split.goals, self.rows(base), strict=True)
                 self._followed[known] = tuple(goal.follow(results, reading) for goal, reading in pairs)
         return self._followed[known]
 

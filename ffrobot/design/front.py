@@ -19,13 +19,14 @@ from ..run.watcher import Watcher
 from .designs import Designs
 from .evaluations import Evaluated, Evaluations, SpentError
 from .goals import parse_goal
-from .local_search import AIM, search_from
+from .local_search import search_from
 from .optimality import Optimality
 from .optimise import MOST, TOLERANCE, check_bounds, check_start
 from .problem import KEPT, Limit, Problem, read_problem
 from .readings import Goal, Reading
 from .scenes import changes_for, may_repeat
 from .slopes import Differentiation
+from .steps import AIM
 from .variables import Place, Space, read_space
 
 POINTS = 8
@@ -151,10 +152,11 @@ class _Searches:
         differentiation = Differentiation(self.path, evaluations, self.tolerance)
         try:
             found = search_from(start, "slsqp", differentiation, lambda text: self.watcher.stage(f"{title}: {text}"))
+            spent = found.spent
         except SpentError:
-            raise SolveError(
-                f"{self.path}: ended before {title} points after {self.most} runs, as many as allowed"
-            ) from None
+            spent = True
+        if spent:
+            raise SolveError(f"{self.path}: ended before {title} points after {self.most} runs, as many as allowed")
         self.ran |= evaluations.folders
         if not found.best.completed:
             raise SolveError(f"{self.path}: no design could be run to its end: {found.message}")

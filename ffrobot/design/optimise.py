@@ -21,11 +21,12 @@ from ..run.watcher import Watcher
 from ..sweep.files import run_files
 from .designs import Designs
 from .evaluations import Evaluations, SpentError, write_designs
-from .local_search import Local, best_of, rank, search_from
+from .local_search import Local, best_of, search_from
 from .optimum import Optimum
 from .problem import read_problem
 from .scenes import changes_for, may_repeat
 from .slopes import Differentiation
+from .steps import rank
 from .variables import Place, Space, read_space
 from .whole_search import combinations, evolve, try_all
 
@@ -157,7 +158,8 @@ def _search(
     if not best.completed or all(variable.is_catalogue for variable in evaluations.space.variables):
         return [Local(first, best, None, message)]
     found = search_from(best.place, "slsqp", differentiation, watcher.stage)
-    return [Local(first, found.best, found.optimality, "; ".join(text for text in (message, found.message) if text))]
+    words = "; ".join(text for text in (message, found.message) if text)
+    return [Local(first, found.best, found.optimality, words, found.conflict)]
 
 
 def _from_starts(
@@ -187,6 +189,7 @@ def _optimum(
     changes = {key: value for key, value, own in zip(space.keys, point, space.own, strict=True) if value != own}
     scene = run_files(path, changes, folder / BEST).write(folder / BEST)
     return Optimum(
-        path, problem, space, method, best.start, best.best, best.optimality, best.message, tuple(searches),
-        evaluations.runs, tuple(evaluations.failures), tolerance, verdict, scene, designs=folder / "designs.csv",
+        path, problem, space, method, best.start, best.best, best.optimality, best.conflict, best.message,
+        tuple(searches), evaluations.runs, tuple(evaluations.failures), tolerance, verdict, scene,
+        designs=folder / "designs.csv",
     )  # fmt: skip

@@ -16,10 +16,11 @@ from ..common.files import write_atomically
 from ..present.tables import plain_table
 from ..results.verdict import Verdict
 from .evaluations import Evaluated
-from .local_search import AIM, Local
-from .optimality import Optimality
+from .local_search import Local
+from .optimality import Conflict, Optimality
 from .problem import KEPT, Problem
 from .readings import Reading
+from .steps import AIM
 from .variables import Space
 
 SHARE = 0.01  # of a limit: the room that prices are told for
@@ -35,6 +36,7 @@ class Optimum:
         method: the optimiser; `message`: why it ended where that was not at an optimum.
         start, best: designs; of the search that has found the best one. `searches`: all of them.
         optimality: how the best one stands; None without gradients.
+        conflict: limits that no design near the best one keeps together; None where it keeps all, or that is not known.
         runs: in all; `failures` of them in words. `tolerance`: of the runs, at most.
         verdict: of the best design.
         best_scene: the scene file of the best design, whole; None where it was not kept.
@@ -48,6 +50,7 @@ class Optimum:
     start: Evaluated
     best: Evaluated
     optimality: Optimality | None
+    conflict: Conflict | None
     message: str
     searches: tuple[Local, ...]
     runs: int

@@ -1,12 +1,15 @@
-"""Peaks of histories.
+"""Peaks of histories, and the local ones that may take turns as the largest.
 
 A peak belongs to a time and a column: its derivative by a parameter is that of the history there (envelope theorem,
-Danskin 1966), as long as no other time overtakes it.
+Danskin 1966), as long as no other time overtakes it. Where others do, the largest of several is no smooth function of
+the parameters, but each local peak is one: `parts` divides the outputs of a history into windows with one of them each,
+whose largest values together are the peak wherever they move.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -16,6 +19,8 @@ from ..results.file import Results
 from .histories import History, read_history
 from .readings import Followed, Goal, Reading
 
+NEAR = 0.5  # of the largest value: local peaks that have a window of their own
+MOST = 12  # of them: vibrations have thousands
 NOISE = 1e-6  # of a peak: a valley that is less deep lies between no two peaks
 
 
@@ -34,7 +39,7 @@ class Peak(Goal):
     def read(self, results: Results) -> Reading:
         """The value, when it is reached, and in which column."""
         history = self._history(results)
-        k, column = _largest(history.values)
+        k, column = _largest(self._seen(history).values)
         value = history.values[k, column]
         edge: Literal["", "first", "last"] = "first" if k == 0 else "last" if k == history.time.size - 1 else ""
         return Reading(
@@ -48,10 +53,73 @@ class Peak(Goal):
         if not history.time[0] <= time <= history.time[-1]:
             return Followed(float("nan"), f"the run ends at t = {history.time[-1]:g} s")
         value = nominal.sign * history.at(float(time), nominal.column)
-        return Followed(value, _overtaken(history, nominal, float(time), value))
+        return Followed(value, _overtaken(self._seen(history), nominal, float(time), value))
+
+    def _seen(self, history: History) -> History:
+        """What the largest value is sought in."""
+        return history
 
     def _history(self, results: Results) -> History:
         return read_history(results, self.name, f'"{self.text}"')
+
+
+@dataclass(frozen=True)
+class Window:
+    """Outputs of one column after the time `first` and up to `last`, s."""
+
+    column: int
+    first: float
+    last: float
+
+    def mask(self, history: History) -> Array:
+        """(T, columns) 1 within, 0 elsewhere."""
+        of_column = np.arange(history.values.shape[1]) == self.column
+        return np.outer((history.time > self.first) & (history.time <= self.last), of_column).astype(np.float64)
+
+
+@dataclass(frozen=True)
+class PartOfPeak(Peak):
+    """The largest absolute value within a window, or with `outside` in what several windows leave; 0 of nothing."""
+
+    windows: tuple[Window, ...] = ()
+    outside: bool = False
+
+    def follow(self, results: Results, nominal: Reading) -> Followed:
+        """As of any peak; where there is nothing to follow, nothing."""
+        return super().follow(results, nominal) if nominal.value else Followed(0.0)
+
+    def _seen(self, history: History) -> History:
+        mask = np.sum([window.mask(history) for window in self.windows], axis=0)
+        return replace(history, values=history.values * (1.0 - mask if self.outside else mask))
+
+
+def parts(peak: Peak, results: Results) -> tuple[Peak, ...]:
+    """Windows of local peaks that are at least `NEAR` the largest, the `MOST` highest, and what they leave.
+
+    The least values between two of them part their windows, so that each local peak may move within its own.
+    """
+    history = peak._history(results)
+    size = np.abs(history.values)
+    found = [(k, column) for column in range(size.shape[1]) for k in _local(size[:, column], NEAR * float(size.max()))]
+    found = sorted(sorted(found, key=lambda one: -size[one])[:MOST], key=lambda one: (one[1], one[0]))
+    if len(found) < 2:
+        return (peak,)
+    windows: list[Window] = []
+    for column in dict.fromkeys(column for _, column in found):
+        places = [k for k, of in found if of == column]
+        valleys = [a + int(np.argmin(size[a : b + 1, column])) for a, b in pairwise(places)]
+        ends = [-np.inf, *(float(history.time[k]) for k in valleys), np.inf]
+        windows += [Window(column, first, last) for first, last in pairwise(ends)]
+    inner = tuple(PartOfPeak(peak.text, peak.name, (window,)) for window in windows)
+    whole = {window.column for window in windows} == set(range(size.shape[1]))
+    return inner if whole else (*inner, PartOfPeak(peak.text, peak.name, tuple(windows), outside=True))
+
+
+def _local(size: Array, least: float) -> list[int]:
+    """Outputs (T,) where a value of at least `least` > 0 is not below those beside it; of equal ones the first."""
+    padded = np.concatenate([[-np.inf], size, [-np.inf]])
+    high = (padded[1:-1] > padded[:-2]) & (padded[1:-1] >= padded[2:]) & (size >= least) & (size > 0.0)
+    return [int(k) for k in np.flatnonzero(high)]
 
 
 def _largest(values: Array) -> tuple[int, int]:

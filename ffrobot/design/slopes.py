@@ -39,7 +39,7 @@ EXACT_STEP = 0.01  # of a number: the largest where frequencies are differentiat
 
 @dataclass(frozen=True)
 class Slopes:
-    """At one design: `gradient` (1 + m, n) of goals by coordinates of the unit cube, and the estimate of its `error`.
+    """At one design: `gradient` (r, n) of rows of `Split` by coordinates of the unit cube; its `error`, estimated.
 
     Coordinates of catalogues have NaN, and those without a design beside that completes. `kinks`: peaks that others
     overtake beside the design, in words.
@@ -55,7 +55,7 @@ class Differentiation:
     """Gradients in one search of the scene at `path`; `tolerance` of its runs.
 
     `repeats`: whether designs beside take the steps of the base again, where they can: until differences so made turn
-    out to be none. `curvature` (1 + m, n) holds the second derivatives that the last central pairs gave, NaN before.
+    out to be none. `curvature` (r, n) holds the second derivatives that the last central pairs gave, NaN before.
     """
 
     path: Path
@@ -65,9 +65,14 @@ class Differentiation:
     curvature: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        shape = len(self.evaluations.problem.goals), len(self.evaluations.space.variables)
-        self.curvature = np.full(shape, np.nan)
+        self.curvature = np.zeros((0, 0))
         self._tried = False
+
+    def split_at(self, design: Evaluated) -> None:
+        """Take the problem with the local peaks of a design from now on."""
+        if self.evaluations.split_at(design):
+            shape = len(self.evaluations.split.goals), len(self.evaluations.space.variables)
+            self.curvature = np.full(shape, np.nan)
 
     def slopes(self, base: Evaluated, *, judged: bool = False) -> Slopes:
         """At a design that completed; `judged`: with an estimate of the error by further runs."""
@@ -89,25 +94,26 @@ class Differentiation:
         step = {j: self._step(base, j, ROUNDING) for j in wanted}
         samples = self._samples(base, {j: [_side(base, j, h) * h] for j, h in step.items()}, base.again)
         gradient, error = exact.copy(), np.where(np.isnan(exact), np.nan, 0.0)
+        own = np.array(self.evaluations.row_values(base))
         for j, beside in samples.items():
-            _differentiate(base, j, beside, gradient, error, ROUNDING)
+            _differentiate(own, j, beside, gradient, error, ROUNDING)
         if judged and all(samples.values()):
             left = self._left_of_sum(base, samples)
             moved = sum(np.abs(gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
-            self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUNDING * np.abs(base.values)))
+            self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUNDING * np.abs(own)))
             for j, beside in samples.items():
                 missing = np.isnan(exact[:, j])
                 error[missing, j] += left[missing] / abs(next(iter(beside)))
         return Slopes(gradient, error, self._kinks(samples))
 
     def _left_of_sum(self, base: Evaluated, samples: Mapping[int, Beside]) -> Array:
-        """(1 + m) |F(u − Σ h_j e_j) − F(u) + Σ (F(u + h_j e_j) − F(u))|, of second order in h; 0 if there is no run."""
+        """(r) |F(u − Σ h_j e_j) − F(u) + Σ (F(u + h_j e_j) − F(u))|, of second order in h; 0 if there is no run."""
         back = {j: -x for j, beside in samples.items() for x in beside if 0.0 <= base.place[j] - x <= 1.0}
         place = tuple(u + back.get(j, 0.0) for j, u in enumerate(base.place))
         (whole,) = self.evaluations.beside(base, [place], base.again)
+        own = np.array(self.evaluations.row_values(base))
         if not whole:
-            return np.zeros(len(base.values))
-        own = np.array(base.values)
+            return np.zeros_like(own)
         left = np.array([one.value for one in whole]) - own
         for j in back:
             (values,) = samples[j].values()
@@ -119,9 +125,10 @@ class Differentiation:
         offsets = {j: self._offsets(base, j, pairs=pairs) for j in wanted}
         samples = self._samples(base, offsets, None)
         gradient, error = exact.copy(), np.where(np.isnan(exact), np.nan, 0.0)
+        own = np.array(self.evaluations.row_values(base))
         for j, beside in samples.items():
             bent = np.nan_to_num(self.curvature[:, j])
-            curvature = _differentiate(base, j, beside, gradient, error, self.tolerance, bent)
+            curvature = _differentiate(own, j, beside, gradient, error, self.tolerance, bent)
             self.curvature[:, j] = self.curvature[:, j] if curvature is None else curvature
         return Slopes(gradient, error, self._kinks(samples))
 
@@ -152,14 +159,14 @@ class Differentiation:
         return self.evaluations.space.variables[j].step(base.place[j], 2.0 * float(np.sqrt(noise)))
 
     def _exact(self, base: Evaluated) -> Array:
-        """(1 + m, n) what is known without runs, NaN elsewhere."""
-        space, goals = self.evaluations.space, self.evaluations.problem.goals
+        """(r, n) what is known without runs, NaN elsewhere."""
+        space, goals = self.evaluations.space, self.evaluations.split.goals
         point, numbers = space.point(base.place), [v for v in space.variables if not v.is_catalogue]
         changes = {k: x for k, x, own in zip(space.keys, point, space.own, strict=True) if x != own}
         values = dict(zip(space.keys, point, strict=True))
         keys = [key for variable in numbers for key in variable.keys]
         steps = tuple(EXACT_STEP * (abs(values[key]) or 1.0) for key in keys)
-        at = Base(goals, base.readings, tuple(keys), tuple(values[key] for key in keys), steps, changes)
+        at = Base(goals, self.evaluations.rows(base), tuple(keys), tuple(values[key] for key in keys), steps, changes)
         entries = exact_entries(self.path, at)
         found = np.full((len(goals), len(space.variables)), np.nan)
         for g in range(len(goals)):
@@ -171,7 +178,7 @@ class Differentiation:
         return found
 
     def _kinks(self, samples: Mapping[int, Beside]) -> tuple[str, ...]:
-        goals = self.evaluations.problem.goals
+        goals = self.evaluations.split.goals
         found = [
             f"{goal.text}: beside this design another peak is the largest, {one.elsewhere}"
             for beside in samples.values()
@@ -183,16 +190,17 @@ class Differentiation:
 
 
 def _differentiate(
-    base: Evaluated, j: int, beside: Beside, gradient: Array, error: Array, noise: float, bent: Array | float = 0.0
+    own: Array, j: int, beside: Beside, gradient: Array, error: Array, noise: float, bent: Array | float = 0.0
 ) -> Array | None:
-    """Fill column j of what is not exact; NaN stays where no design beside completed. The curvature (1 + m), by pairs.
+    """Fill column j of what is not exact; NaN stays where no design beside completed. The curvature (r), by pairs.
 
+    `own` (r): values at the design itself.
     `bent`: the curvature that is known before, of which one-sided differences are freed.
     """
     if not beside:
         return None
     x = np.array([0.0, *beside])
-    f = np.array([base.values, *([one.value for one in values] for values in beside.values())])  # (x, goals)
+    f = np.array([own, *([one.value for one in values] for values in beside.values())])  # (x, goals)
     h = float(np.abs(x).min(where=x != 0.0, initial=np.inf))
     slope, uncertain = weights(x) @ (f - f[0]), noise * np.abs(f).max(axis=0) / h
     curvature = None

@@ -259,3 +259,6 @@ def test_no_design_keeps_the_limits(ffrobot, write):
     height, width = 0.02, 0.03
     deflection = 4.0 * FORCE * L**3 / (E * width * height**3)
     assert f"exceeded by {100 * (deflection / 1e-5 - 1):.3g} %" in done.stdout
+    assert (
+        'no design near this one keeps "peak points.beam.tip.deflection <= 1e-05", within the bounds of' in done.stdout
+    )

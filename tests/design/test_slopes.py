@@ -48,7 +48,9 @@ def differentiation(tmp_path, scene):
     designs = Designs(path, space.keys, space.own, tmp_path / "runs", fixed, processes=2, watcher=Watcher())
     evaluations = Evaluations(designs, space, problem, 100)
     (first,) = evaluations.at([tuple(float(u) for u in space.start())])
-    return Differentiation(path, evaluations, 1e-7), first
+    found = Differentiation(path, evaluations, 1e-7)
+    found.split_at(first)
+    return found, first
 
 
 def by_keys(found, first):
