@@ -11,16 +11,44 @@ from scipy.sparse.csgraph import connected_components
 
 from ..common.arrays import Array, Booleans
 from ..common.errors import InputError
-from .jacobian import SLIVER, cell_quality, jacobians, reference_nodes
+from .jacobian import SLIVER, cell_quality, jacobians, reference_nodes, volume_of_tetrahedra
 from .part_mesh import PartMesh, facet_keys
 from .records import SolidGeometry
 
 # Smallest determinant of a curved cell's Jacobian relative to its largest.
 _CURVED = 0.005
+# Largest relative change of the volume by straightening.
+_VOLUME = 0.005
+MOST_CELLS = 1e7  # far more than fit into the memory of the machines this runs on
 METRES = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
 _NAMES = {"m": "metres", "mm": "millimetres", "in": "inches"}
 # A part may reach beyond its interfaces (bosses around joints); farther out than this it is taken for a slip.
 _LENGTHS = (0.2, 5.0)
+
+
+def check_size(size: float, volume: float, where: str) -> None:
+    """Check that tetrahedra of so many m can fill a `volume` in m³ before the end of time.
+
+    Raises:
+        InputError: there would be more than `MOST_CELLS`.
+    """
+    cubes = volume / size**3
+    side = cubes ** (1 / 3) * size
+    check_count(
+        6 * 2**0.5 * cubes,  # regular tetrahedra
+        f"{size:.3g} m for the volume of a cube of {side:.3g} m",
+        where,
+        ' Is it drawn in another unit (unit = "mm")?',
+    )
+
+
+def check_count(count: float, found: str, where: str, hint: str = "") -> None:
+    """Raise `InputError` for a mesh of more than `MOST_CELLS` cells; `found` says what makes so many."""
+    if count > MOST_CELLS:
+        raise InputError(
+            f"{where}: expected a mesh.size that fits the part, found {found}: about {count:.2g} cells,"
+            f" {MOST_CELLS:.0e} at most.{hint}"
+        )
 
 
 def check_shape(part: PartMesh, geometry: SolidGeometry, where: str) -> None:
@@ -116,6 +144,23 @@ def straightened(part: PartMesh) -> PartMesh:
         straight = points[ends[once]].mean(axis=1)
         points[middle] = straight + 0.7 * (points[middle] - straight)
     return part.moved(points)
+
+
+def check_volume(part: PartMesh, curved: PartMesh, where: str) -> None:
+    """Check that `straightened` has left `part` the volume that it had as `curved` by gmsh.
+
+    Raises:
+        InputError: cells are too long for a thin curved wall, and the link would not have its mass.
+    """
+    if curved.degree == 1:
+        return
+    volume = volume_of_tetrahedra(curved.points[curved.cells], curved.degree)
+    change = volume_of_tetrahedra(part.points[part.cells], part.degree) / volume - 1
+    if abs(change) > _VOLUME:
+        raise InputError(
+            f"{where}: expected a mesh.size at which cells follow curved faces, found a volume {100 * change:+.1f} %"
+            " off where cells that fold are straightened: cells are too long for a thin curved wall"
+        )
 
 
 def _determinants(part: PartMesh) -> Array:

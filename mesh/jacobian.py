@@ -12,6 +12,9 @@ from .cells import CELLS, CellName
 
 # Quality below which a cell is flat.
 SLIVER = 1e-3
+# Quadrature on the reference tetrahedron that is exact for cubics.
+_CUBIC_POINTS = np.array([[3, 3, 3], [2, 2, 2], [6, 2, 2], [2, 6, 2], [2, 2, 6]]) / 12
+_CUBIC_WEIGHTS = np.array([-4 / 5, *[9 / 20] * 4]) / 6
 
 
 @lru_cache
@@ -38,6 +41,12 @@ def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:
     slopes = _monomial_slopes(cell, degree, X) @ _coefficients(cell, degree)  # (3, q, v)
     J: Array = np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
     return J
+
+
+def volume_of_tetrahedra(nodes: Array, degree: int) -> float:
+    """Of tetrahedra with `nodes` (c, v, 3): the determinant of their Jacobian is a cubic at most."""
+    determinants = np.linalg.det(jacobians(nodes, "tetrahedron", degree, _CUBIC_POINTS))
+    return float(np.sum(determinants @ _CUBIC_WEIGHTS))
 
 
 def cell_quality(corners: Array, cell: CellName) -> Array:

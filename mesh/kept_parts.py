@@ -25,7 +25,7 @@ from .part_mesh import PartMesh
 from .records import Outlines, PlaceRecord, SolidGeometry, SolidMeshRecord
 
 # To be raised whenever the same keys make another mesh.
-MESH_VERSION = 1
+MESH_VERSION = 2
 
 _ARRAYS = ("points", "cells", "cell_tag", "facets", "facet_tag")
 _NAMES = ("regions", "faces")

@@ -7,13 +7,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import prod
 from pathlib import Path
 
 import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError
-from .checks import METRES, check_connected, check_quality, check_shape, oriented, straightened
+from .checks import (
+    METRES,
+    check_connected,
+    check_count,
+    check_quality,
+    check_shape,
+    check_volume,
+    oriented,
+    straightened,
+)
 from .defaults import default_order, default_size
 from .faces import named_faces
 from .kept_parts import keep_part, kept_part, kept_path
@@ -76,7 +86,8 @@ def part_mesh(
     check_shape(part, geometry, where)
     part = oriented(part)
     if geometry.file is None or _is_step(geometry.file):
-        part = straightened(part)
+        curved, part = part, straightened(part)
+        check_volume(part, curved, where)
     check_quality(part, where)
     check_connected(part, where)
     return named_faces(replace(source, part=part), geometry, places, outlines, path)
@@ -99,7 +110,7 @@ def _source(
     file = geometry.file
     if file is None:
         if not _is_meshed(geometry, record):
-            return Source(_box(geometry, record), {}, {})
+            return Source(_box(geometry, record, where), {}, {})
         from .shapes import mesh_shape
 
         return mesh_shape(geometry, record, outlines, path)
@@ -121,7 +132,7 @@ def _source(
     return source_from(read_foreign(file, where), where)
 
 
-def _box(geometry: SolidGeometry, record: SolidMeshRecord) -> PartMesh:
+def _box(geometry: SolidGeometry, record: SolidMeshRecord, where: str) -> PartMesh:
     """Structured cells; without `divisions`, as many as their size makes."""
     root = geometry.section
     tip = geometry.tip_section or root
@@ -130,6 +141,8 @@ def _box(geometry: SolidGeometry, record: SolidMeshRecord) -> PartMesh:
     cell = record.cell or "tetrahedron"
     ends = (root.height, root.width), (tip.height, tip.width)
     divisions = record.divisions or _divisions(geometry.length, np.array(ends), record)
+    count = prod(divisions) * (1 if cell == "hexahedron" else 6)
+    check_count(count, " × ".join(map(str, divisions)) + " divisions", where)
     return structured_box(geometry.length, *ends, divisions, cell)
 
 

@@ -8,6 +8,7 @@ from typing import NoReturn
 import gmsh
 
 from ..common.errors import InputError
+from .checks import check_size
 from .defaults import BAR, CIRCLE, default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
 from .records import (
@@ -39,7 +40,9 @@ def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outli
         if outlines is not None:
             _outline(body, geometry, outlines)
         gmsh.model.occ.synchronize()
-        size = record.size or default_size(*volume_and_surface(), record.order or default_order("tetrahedron"))
+        volume, surface = volume_and_surface()
+        size = record.size or default_size(volume, surface, record.order or default_order("tetrahedron"))
+        check_size(size, volume, f"{path}: geometry")
         around = BAR if isinstance(geometry.section, CircleSection) else CIRCLE
         mesh_model(size, f"{path}: geometry", around)
         return source_from(extract_mesh(), f"{path}: geometry")

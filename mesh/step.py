@@ -10,12 +10,11 @@ import gmsh
 
 from ..common.arrays import as_floats
 from ..common.errors import InputError
+from .checks import check_size
 from .defaults import default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
 from .records import SolidMeshRecord
 from .source import Source, source_from
-
-MOST_CELLS = 1e7  # far more than fit into the memory of the machines this runs on
 
 # Units of length that a STEP file can declare, in mm: OpenCASCADE turns all numbers into millimetres.
 _SI_PREFIXES = {"$": 1e3, ".MILLI.": 1.0, ".CENTI.": 10.0, ".DECI.": 100.0, ".MICRO.": 1e-3, ".KILO.": 1e6}
@@ -50,8 +49,10 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
         _join()
         _name_groups()
         order = record.order or default_order("tetrahedron")
-        size = record.size / scale * declared if record.size else default_size(*volume_and_surface(), order)
-        _check_count(size, size * scale / declared, where)
+        volume, surface = volume_and_surface()
+        size = record.size / scale * declared if record.size else default_size(volume, surface, order)
+        metres = scale / declared
+        check_size(size * metres, volume * metres**3, where)
         mesh_model(size, where)
         source = source_from(extract_mesh(), where)
     return replace(source, part=source.part.moved(as_floats(source.part.points / declared)))
@@ -67,18 +68,6 @@ def _declared_unit(file: Path) -> float:
             return _OTHER_UNITS[other[1]]
     prefixes = [found[1] for entity in units if (found := re.search(r"SI_UNIT\((\$|\.\w+\.),\.METRE\.\)", entity))]
     return _SI_PREFIXES.get(prefixes[0], 1.0) if prefixes else 1.0
-
-
-def _check_count(size: float, metres: float, where: str) -> None:
-    """Refuse a mesh that gmsh would never end making: `size` in the model's unit, and in m."""
-    volume, _ = volume_and_surface()
-    count = 6 * 2**0.5 * volume / size**3  # regular tetrahedra
-    if count > MOST_CELLS:
-        side = volume ** (1 / 3) * metres / size
-        raise InputError(
-            f"{where}: expected a mesh.size that fits the part, found {metres:.3g} m for the volume of a cube of"
-            f' {side:.3g} m: about {count:.2g} tetrahedra. Is it drawn in another unit (unit = "mm")?'
-        )
 
 
 def _check_volumes(where: str) -> None:

@@ -1,6 +1,7 @@
 """Commands of ffrobot in forked processes with limits of time and memory, and what becomes of them."""
 
 import os
+import re
 import resource
 import signal
 import sys
@@ -13,6 +14,7 @@ PATIENCE = 600  # s of wall time: something waits for ever
 MEMORY = 8 << 30  # bytes of address space
 GOOD = ("solved", "refused", "stopped")
 BAD = ("traceback", "crash", "hang", "no file named", "noise")
+PROGRESS = re.compile(r"ffrobot: .* \(\d+ s\)")  # what commands tell of long work, now and then
 LOADED_ONCE = (
     "h5py",
     "scipy.linalg",
@@ -76,7 +78,7 @@ def run(arguments: list[str], folder: Path, patience: float = PATIENCE) -> tuple
 
 def outcome(code: int, told: str, files: list[str]) -> str:
     """What became of one command."""
-    lines = [line for line in told.splitlines() if line.strip()]
+    lines = [line for line in told.splitlines() if line.strip() and not PROGRESS.fullmatch(line)]
     if "Traceback" in told:
         return "traceback"
     if told == "no end" or code == -signal.SIGXCPU or (code == -signal.SIGKILL and not told):

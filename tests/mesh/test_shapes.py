@@ -52,6 +52,30 @@ def test_round_sections_are_met_by_curved_cells(solid, mesh_part, section, area,
     assert face_area(part, "root") < (1 - 5 * error) * area
 
 
+def test_cells_too_long_for_a_thin_curved_wall_are_refused(solid, mesh_part):
+    """gmsh's curved cells fold there; straightened they would give the tube more mass than it has."""
+    tube = solid(length=0.3, section=TubeSection(shape="tube", outer=0.04, inner=0.0372))
+    with pytest.raises(InputError, match=r"mesh\.size at which cells follow curved faces, found a volume .* % off"):
+        mesh_part(tube, size=0.01)
+    assert integrate(mesh_part(tube, size=0.006)) == pytest.approx(0.3 * np.pi / 4 * (0.04**2 - 0.0372**2), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("section", "mesh"),
+    [
+        (rectangle(1e-5, 0.025, wall=1e-6), {}),
+        (rectangle(0.015, 0.025), {"size": 1e-5}),
+        (rectangle(1e-4, 1e-4), {"size": 1e-6, "cell": "hexahedron"}),
+        (rectangle(), {"divisions": (1000, 1000, 1000)}),
+    ],
+)
+def test_meshes_that_would_never_be_made_are_refused_at_once(solid, mesh_part, section, mesh):
+    with pytest.raises(
+        InputError, match=r"link\.toml: geometry: expected a mesh\.size that fits the part, found .* cells"
+    ):
+        mesh_part(solid(section=section), **mesh)
+
+
 def test_holes_are_cut_out(solid, mesh_part):
     holes = tuple(Hole(position=x, diameter=0.04, offset=0.002) for x in (0.2, 0.5, 0.8))
     part = mesh_part(solid(section=rectangle(0.06, 0.01), hole=holes))

@@ -1,11 +1,12 @@
 #include "core/integrate/integrate.h"
 
+#include "core/integrate/delivery.h"
 #include "core/integrate/jump.h"
 #include "core/integrate/step_control.h"
 #include "core/integrate/step_limit.h"
+#include "core/integrate/watch.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <memory>
@@ -16,29 +17,6 @@ namespace ffrobot {
 
 namespace {
 
-constexpr unsigned long steps_between_questions = 1000;
-constexpr std::chrono::milliseconds time_between_questions{200}; // where steps take long
-
-// A step size that collapses never quite reaches rounding where noise feeds its estimates. Nothing that the equations
-// describe asks for a thousand steps in a row so much shorter, in the mean, than the first one to try, a tenth of the
-// fastest vibration's radian.
-constexpr double shortest_steps = 1e-5;
-
-// The reserve is a second tolerance, as large as the first, for errors that happen once and not at every step. There
-// are two kinds. A load that jumps leaves an error in proportion to the step across it, more than that step's share of
-// the tolerance however short it is: steps that are that much shorter than the usual ones may take from the reserve. A
-// small part of it, as estimates may see a twentieth of a jump late in a step; a larger one where steps near rounding.
-// Vibrations below the tolerance that a step damps away are gone after it: a method that damps begins with the longest
-// step there is, and may take from the reserve until these are gone.
-constexpr double much_shorter = 1e-3, part_at_jump = 0.03;
-constexpr double near_rounding = 1e-8, part_of_reserve = 0.25;
-
-// Part of the tolerance that the iterations of a step are measured by at least. The share of very short steps is below
-// the noise of forces, which no iteration gets through: they would stay as short as they are.
-constexpr double least_to_iterate = 1e-4;
-
-constexpr double rounding = 2e-14; // what error estimates see of it: shorter steps would not help
-
 // What is judged of dense output: steps of this many radians of the fastest vibration are too long for it. Their
 // estimates hardly see it, and most harm is done between their ends. Only where it may be a notable part of the
 // tolerance.
@@ -47,7 +25,6 @@ constexpr double radians_too_long = 5, notable = 0.1;
 // Steps that are rejected until they are this part of the usual ones may have met a jump, which is looked for. Steps
 // end before it and begin behind it, and are as long as usual.
 constexpr double may_have_met_jump = 0.1;
-constexpr double no_time = 1e-13; // of the time, or of the run: no step is made for it before or behind a jump
 
 // Length of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
 double next_step(double h, double left, bool lands) {
@@ -64,22 +41,17 @@ struct Attempt {
   bool is_limited; // shorter than asked for, by what is prescribed
 };
 
-// How large its error may be: as parts of the tolerance, and in the unit of errors.
-struct Allowance {
-  double regular_part, part;
-  double regular_error, error;
-};
-
 class Integration {
 public:
   Integration(OdeSystem &system, const std::vector<double> &times, const Eigen::VectorXd &y,
               const IntegrationControls &controls, const StateFunctionOfTime &output,
               const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks)
-      : system_(system), times_(times), controls_(controls), output_(output), carry_on_(carry_on),
-        recording_(recording), breaks_(breaks), limit_(system, times.front(), times.back(), controls.tolerance),
+      : system_(system), controls_(controls), breaks_(breaks), delivery_(system, times, output, recording),
+        watch_(system, times.front(), times.back(), controls.max_steps, carry_on),
+        limit_(system, times.front(), times.back(), controls.tolerance),
         methods_(controls.methods, times.front(), times.back()), method_(make_method(methods_.at_work(), system)),
-        control_(method_->error_order()), t_(times.front()), t_asked_(t_), end_(times.back()),
-        duration_(times.back() - times.front()), z_(system.size()), error_(system.size()), z_output_(system.size()) {
+        control_(method_->error_order()), t_(times.front()), end_(times.back()),
+        duration_(times.back() - times.front()), z_(system.size()), error_(system.size()) {
     is_repeatable_ = !breaks && !method_->lands_on_outputs();
     system_.local().set_centre(y.data());
     system_.local().from_state(y.data(), z_.data());
@@ -89,22 +61,23 @@ public:
     pass_breaks();
     begin_method();
     system_.accepted(t_, z_.data(), method_->first_slope());
-    record();
-    record_method();
-    output_(report_.outputs++, t_, state(z_.data()));
+    delivery_.record(t_, z_.data());
+    delivery_.record_method(methods_.at_work());
+    delivery_.output(z_.data());
   }
 
   void go_on(const IntegrationCheckpoint &checkpoint) {
     pass_breaks(); // those at the start
     system_.local().set_centre(checkpoint.state.data());
     system_.local().from_state(checkpoint.state.data(), z_.data());
-    t_ = t_asked_ = checkpoint.time;
+    t_ = checkpoint.time;
+    watch_.begin_at(t_);
     methods_.go_on(checkpoint.methods);
     make_method_at_work();
     steps_ = checkpoint.steps;
     control_.go_on(steps_.previous_step, steps_.previous_error);
     system_.slope(t_, z_.data(), method_->first_slope());
-    report_.outputs = checkpoint.outputs;
+    delivery_.go_on(checkpoint.outputs);
   }
 
   IntegrationReport run() {
@@ -113,6 +86,7 @@ public:
     else
       repeat_steps();
     report_.time = t_;
+    report_.outputs = delivery_.outputs();
     report_.evaluations = system_.evaluations();
     if (!is_repeatable_ || report_.status != IntegrationStatus::completed)
       report_.step_ends.clear();
@@ -127,22 +101,23 @@ public:
     StepHistory steps = steps_;
     steps.previous_step = control_.previous_step();
     steps.previous_error = control_.previous_error();
-    return {t_, final_state(), steps, report_.outputs, methods_.history()};
+    return {t_, final_state(), steps, delivery_.outputs(), methods_.history()};
   }
 
 private:
   const double *state(const double *z) const { return system_.local().state(z); }
 
   void choose_steps() {
-    while (report_.outputs < times_.size() && may_go_on()) {
+    while (!delivery_.is_complete() && may_go_on()) {
       if (jump_ && jump_->before <= at_once()) {
         pass_jump();
-        if (report_.outputs == times_.size())
+        if (delivery_.is_complete())
           break;
       }
       steps_.next_step = std::min(steps_.next_step, duration_);
       const Attempt attempt = next_attempt();
-      const Allowance allowance = allowance_of(attempt.step);
+      const Allowance allowance =
+          allowance_of(attempt.step, method_->error_share(attempt.step / duration_), steps_, controls_.tolerance);
       const double size = try_step(attempt, allowance);
       report_.last_step = attempt.step;
       report_.last_error = size;
@@ -153,7 +128,7 @@ private:
         steps_.next_step = control_.after_rejected(attempt.step, size);
         look_for_jump(attempt);
       }
-      if (report_.outputs < times_.size() && methods_.takes_over(t_, method_->damps()))
+      if (!delivery_.is_complete() && methods_.takes_over(t_, method_->damps()))
         change_method();
     }
   }
@@ -167,13 +142,13 @@ private:
       steps_.next_step = report_.last_step = attempt.step;
       if (!may_go_on())
         return;
-      if (!method_->step(t_, z_.data(), attempt.step, rounding) || !method_->correct(attempt.end)) {
+      if (!method_->step(t_, z_.data(), attempt.step, rounding_of_errors) || !method_->correct(attempt.end)) {
         report_.last_error = NAN;
         report_.status = IntegrationStatus::step_underflow;
         return;
       }
       system_.slope(attempt.end, method_->end(), method_->last_slope());
-      if (report_.outputs < times_.size() && times_[report_.outputs] < attempt.end)
+      if (!delivery_.is_complete() && delivery_.next_time() < attempt.end)
         method_->prepare_dense(t_, z_.data(), attempt.step);
       take(attempt);
     }
@@ -198,40 +173,20 @@ private:
   void change_method() {
     make_method_at_work();
     begin_method();
-    record_method();
+    delivery_.record_method(methods_.at_work());
     report_.changes.push_back({t_, methods_.before().kind, methods_.at_work().kind, methods_.mean_step()});
   }
 
   // False where the run ends here, with its status set.
   bool may_go_on() {
-    const auto end_as = [&](IntegrationStatus status) {
-      report_.status = status;
-      return false;
-    };
-    if (report_.status != IntegrationStatus::completed)
-      return false;
-    const auto taken = report_.steps + report_.rejected;
-    if (controls_.max_steps && taken >= controls_.max_steps)
-      return end_as(IntegrationStatus::too_many_steps);
-    const double left = end_ - t_;
-    bool collapsed = steps_.next_step < no_time * std::max(std::abs(t_), left);
-    const bool counted = taken % steps_between_questions == 0;
-    if (const auto now = std::chrono::steady_clock::now(); counted || now - asked_ > time_between_questions) {
-      asked_ = now;
-      if (!carry_on_(t_))
-        return end_as(IntegrationStatus::interrupted);
-    }
-    if (counted) {
-      const double mean_step = (t_ - t_asked_) / static_cast<double>(steps_between_questions);
-      collapsed = collapsed || (taken > 0 && mean_step < shortest_steps * system_.initial_step());
-      t_asked_ = t_;
-    }
-    return collapsed ? end_as(IntegrationStatus::step_underflow) : true;
+    if (report_.status == IntegrationStatus::completed)
+      report_.status = watch_.look(t_, steps_.next_step, report_.steps + report_.rejected);
+    return report_.status == IntegrationStatus::completed;
   }
 
   Attempt next_attempt() const {
     bool lands = method_->lands_on_outputs();
-    double target = lands ? times_[report_.outputs] : end_;
+    double target = lands ? delivery_.next_time() : end_;
     const auto end_at = [&](double t) {
       lands = lands || t <= target;
       target = std::min(t, target);
@@ -245,26 +200,14 @@ private:
     return {target, step, step == target - t_ ? target : t_ + step, step < wanted};
   }
 
-  Allowance allowance_of(double step) const {
-    const double regular = method_->error_share(step / duration_);
-    const double of_reserve = steps_.in_transient || step < near_rounding * steps_.usual_step ? part_of_reserve
-                              : step < much_shorter * steps_.usual_step                       ? part_at_jump
-                                                                                              : 0.0;
-    const double part = std::max(regular, of_reserve * steps_.reserve);
-    const auto error = [&](double of_tolerance) { return std::max(controls_.tolerance * of_tolerance, rounding); };
-    return {regular, part, error(regular), error(part)};
-  }
-
   // Size of the step's error relative to the largest one allowed; NaN where it could not be made.
   double try_step(const Attempt &attempt, const Allowance &allowance) {
-    const double allowed = steps_.in_transient ? allowance.regular_error : allowance.error;
-    const double to_iterate = std::max(allowed, least_to_iterate * controls_.tolerance);
-    if (!method_->step(t_, z_.data(), attempt.step, to_iterate) || !method_->correct(attempt.end))
+    if (!method_->step(t_, z_.data(), attempt.step, allowance.to_iterate) || !method_->correct(attempt.end))
       return NAN;
     system_.slope(attempt.end, method_->end(), method_->last_slope());
     method_->estimate(attempt.step, error_);
     const double size = system_.error_size(attempt.end, method_->end(), error_.data()) / allowance.error;
-    const bool is_dense = size <= 1 && times_[report_.outputs] < attempt.end;
+    const bool is_dense = size <= 1 && delivery_.next_time() < attempt.end;
     return is_dense ? std::max(dense_size(attempt), size) : size; // keeps NaN
   }
 
@@ -280,7 +223,7 @@ private:
   }
 
   void accept(const Attempt &attempt, const Allowance &allowance, double size) {
-    size = take_from_reserve(attempt.step, allowance, size);
+    size = take_from_reserve(attempt.step, allowance, size, steps_);
     if (!take(attempt))
       return;
     // A step that was shortened to land on an output tells what the step asked for would have cost. One that was
@@ -299,38 +242,13 @@ private:
   // False where the run ends with the step just made.
   bool take(const Attempt &attempt) {
     ++report_.steps;
-    deliver_outputs(attempt);
+    delivery_.outputs_of_step(*method_, attempt.end);
     move_to_end(attempt);
     if (controls_.keep_steps)
       report_.step_ends.push_back(t_);
     if (!system_.is_sensible(z_.data()))
       report_.status = IntegrationStatus::diverged;
     return report_.status == IntegrationStatus::completed;
-  }
-
-  // The size of the error for the control of the next step, which should do without the reserve.
-  double take_from_reserve(double step, const Allowance &allowance, double size) {
-    steps_.usual_step = std::max(step, 0.95 * steps_.usual_step);
-    if (allowance.part > allowance.regular_part &&
-        (!steps_.in_transient || size * allowance.error > allowance.regular_error))
-      steps_.reserve -= size * allowance.part;
-    if (steps_.in_transient) {
-      size *= allowance.error / allowance.regular_error;
-      steps_.in_transient = size > 1;
-    }
-    return size;
-  }
-
-  void deliver_outputs(const Attempt &attempt) {
-    for (; report_.outputs < times_.size() && times_[report_.outputs] <= attempt.end; ++report_.outputs) {
-      const double t = times_[report_.outputs];
-      if (t == attempt.end) {
-        output_(report_.outputs, t, state(method_->end()));
-        continue;
-      }
-      method_->interpolate(t, z_output_.data());
-      output_(report_.outputs, t, state(z_output_.data()));
-    }
   }
 
   void move_to_end(const Attempt &attempt) {
@@ -341,7 +259,7 @@ private:
     if (system_.local().recentre(z_.data(), method_->first_slope()))
       method_->recentred();
     system_.accepted(t_, z_.data(), method_->first_slope());
-    record();
+    delivery_.record(t_, z_.data());
   }
 
   void look_for_jump(const Attempt &attempt) {
@@ -363,9 +281,8 @@ private:
     is_repeatable_ = false;
     t_ = jump_->after;
     jump_.reset();
-    record();
-    for (; report_.outputs < times_.size() && times_[report_.outputs] <= at_once(); ++report_.outputs)
-      output_(report_.outputs, times_[report_.outputs], state(z_.data()));
+    delivery_.record(t_, z_.data());
+    delivery_.outputs_at(at_once(), z_.data());
     pass_breaks();
     system_.slope(t_, z_.data(), method_->first_slope());
     method_->restart();
@@ -381,39 +298,23 @@ private:
     return next_break_ > before;
   }
 
-  void record_method() {
-    if (recording_)
-      recording_->methods.emplace_back(recording_->times.size() - 1, methods_.at_work());
-  }
-
-  void record() {
-    if (!recording_)
-      return;
-    const double *y = state(z_.data());
-    recording_->times.push_back(t_);
-    recording_->states.insert(recording_->states.end(), y, y + system_.local().state_size());
-  }
-
   OdeSystem &system_;
-  const std::vector<double> &times_;
   const IntegrationControls &controls_;
-  const StateFunctionOfTime &output_;
-  const std::function<bool(double)> &carry_on_;
-  Recording *recording_;
   const Breaks *breaks_;
+  Delivery delivery_;
+  Watch watch_;
   StepLimit limit_;
   FasterMethod methods_;
   std::unique_ptr<Method> method_;
   StepControl control_;
   StepHistory steps_;
   IntegrationReport report_;
-  double t_, t_asked_, end_, duration_;
-  std::chrono::steady_clock::time_point asked_ = std::chrono::steady_clock::now();
+  double t_, end_, duration_;
   std::size_t next_break_ = 0;
-  bool is_repeatable_;                   // by the ends of steps alone
-  std::optional<Jump> jump_;             // the next one that is known
-  double searched_until_ = t_;           // there is no other before
-  Eigen::VectorXd z_, error_, z_output_; // local coordinates (ode.h)
+  bool is_repeatable_;         // by the ends of steps alone
+  std::optional<Jump> jump_;   // the next one that is known
+  double searched_until_ = t_; // there is no other before
+  Eigen::VectorXd z_, error_;  // local coordinates (ode.h)
 };
 
 } // namespace

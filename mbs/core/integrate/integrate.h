@@ -2,6 +2,7 @@
 // method.h say.
 #pragma once
 
+#include "core/integrate/error_allowance.h"
 #include "core/integrate/faster_method.h"
 #include "core/integrate/ode.h"
 
@@ -19,15 +20,6 @@ struct Recording {
   std::vector<std::pair<std::size_t, MethodChoice>> methods; // from the step that begins at times[first] on
 
   const MethodChoice &method_of(std::size_t step) const;
-};
-
-// What the size of the next step follows from.
-struct StepHistory {
-  double next_step = 0;                         // s
-  double usual_step = 0;                        // s, the largest of the last ones
-  double reserve = 1;                           // what is left of it, in terms of the tolerance
-  double previous_step = 0, previous_error = 1; // s, and relative to the largest error allowed; of StepControl
-  bool in_transient = false;                    // vibrations of the start are still being damped away
 };
 
 // Where an integration has stopped, and all that its next step depends on: the same candidates given, it goes on with

@@ -7,6 +7,8 @@
 
 namespace ffrobot {
 
+constexpr double no_time = 1e-13; // of the time, or of the run: no step is made for it
+
 class StepControl {
 public:
   // order: the error shrinks as step^order

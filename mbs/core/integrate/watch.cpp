@@ -1,0 +1,40 @@
+#include "core/integrate/watch.h"
+
+#include "core/integrate/step_control.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ffrobot {
+
+namespace {
+
+constexpr unsigned long steps_between_questions = 1000;
+constexpr std::chrono::milliseconds time_between_questions{200}; // where steps take long
+
+// A step size that collapses never quite reaches rounding where noise feeds its estimates. Nothing that the equations
+// describe asks for a thousand steps in a row so much shorter, in the mean, than the first one to try, a tenth of the
+// fastest vibration's radian.
+constexpr double shortest_steps = 1e-5;
+
+} // namespace
+
+IntegrationStatus Watch::look(double t, double next_step, unsigned long taken) {
+  if (max_steps_ && taken >= max_steps_)
+    return IntegrationStatus::too_many_steps;
+  bool collapsed = next_step < no_time * std::max(std::abs(t), end_ - t);
+  const bool counted = taken % steps_between_questions == 0;
+  if (const auto now = std::chrono::steady_clock::now(); counted || now - asked_ > time_between_questions) {
+    asked_ = now;
+    if (!carry_on_(t))
+      return IntegrationStatus::interrupted;
+  }
+  if (counted) {
+    const double mean_step = (t - t_asked_) / static_cast<double>(steps_between_questions);
+    collapsed = collapsed || (taken > 0 && mean_step < shortest_steps * system_.initial_step());
+    t_asked_ = t;
+  }
+  return collapsed ? IntegrationStatus::step_underflow : IntegrationStatus::completed;
+}
+
+} // namespace ffrobot
