@@ -57,11 +57,6 @@ CANTILEVER = stepped(
     "weld", 0.1, gravity=[0.0, 0.0], load=[{"point": "s7.tip", "y": "1.0"}], initial={"state": "static"},
     analysis=[{"name": "still", "kind": "static"}],
 )  # fmt: skip
-ARM = stepped(
-    "revolute", 0.1, gravity=[0.0, -9.81], payload=[{"point": "s7.tip", "mass": 0.2}], initial={"state": "static"},
-    trajectory=[{"name": "tip", "joint": "j0", "value": "0.4*(1 - cos(pi*t))"}],
-    analysis=[{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.005}],
-)  # fmt: skip
 
 
 def optimised(limit: str) -> Callable[[Path], int]:
@@ -87,7 +82,6 @@ def differentiated(scene: Path) -> int:
 LINK_KEYS = ("geometry.section.height", "geometry.section.width", "material.density", "material.youngs_modulus")
 TASKS: Mapping[str, tuple[Mapping[str, Any] | Path, Callable[[Path], int]]] = {
     "cantilever": (CANTILEVER, optimised("peak points.s7.tip.position[1] <= 2e-4")),
-    "arm": (ARM, optimised("at 0.5 points.s7.tip.position[1] >= 0.3085")),
     "two_link": (TWO_LINK, differentiated),
 }
 
