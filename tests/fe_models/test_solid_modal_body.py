@@ -104,3 +104,10 @@ def test_more_modes_than_there_are(tmp_path):
     path = write_solid(tmp_path, cell="hexahedron", order=1, divisions=(1, 1, 1), family="all", count=100)
     with pytest.raises(InputError, match=r"modes.count: expected at most .* which has 18 "):
         body_of(path)
+
+
+def test_a_search_for_modes_that_hardly_exist_ends(tmp_path):
+    """A plate across the link's axis: of ever more modes that would be computed almost none bends."""
+    path = write_solid(tmp_path, length=0.0016, cell="hexahedron", order=1, divisions=(2, 6, 8), count=4)
+    with pytest.raises(InputError, match=r"modes.count: expected 4 modes of .* among the lowest 360, found [0-3] "):
+        body_of(path)
