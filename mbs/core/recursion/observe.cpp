@@ -52,9 +52,7 @@ Inertia inertia_of(const planar::Body &b, const double *p, const double *v, plan
 
 Inertia inertia_of(const spatial::Body &b, const double *, const double *v, spatial::State<double> &s) {
   Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
-  Pack<double, 6> M[6];
-  double bias[6];
-  spatial::FrameTerms<double> frame(M, bias);
+  spatial::FrameTerms<double> frame;
   inertia(b, s, frame);
   to.s = vector(s.s);
   for (int i = 0; i < 3; ++i)
