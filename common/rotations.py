@@ -9,7 +9,7 @@ from math import factorial
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, as_floats
 
 TERMS = 20  # of the series below: rounding for |φ| up to 2π
 # Σ (−x)ᵏ/(2k + m)! by m, the highest power of x = φ² first: sin φ/φ, (1 − cos φ)/φ², (φ − sin φ)/φ³.
@@ -39,7 +39,7 @@ def left_jacobian_slope(vector: Array, of: Array) -> Array:
 
     J_l = I + a φ~ + b φ~², a' and b' by φ².
     """
-    across = np.cross(vector, of)
+    across = as_floats(np.cross(vector, of))
     (a, a_slope), (b, b_slope) = series(2, vector @ vector), series(3, vector @ vector)
     by_size = a_slope * across + b_slope * np.cross(vector, across)
     turning = a * skew(of) + b * (skew(across) + skew(vector) @ skew(of))

@@ -123,7 +123,8 @@ def _multipliers(
     split, variables = evaluations.split, evaluations.space.variables
     factors = split.factors(evaluations.row_values(design))[:, None]
     scaled = slopes.gradient * factors
-    free = np.flatnonzero(~np.isnan(scaled).any(axis=0) & [not variable.is_catalogue for variable in variables])
+    is_number = np.array([not variable.is_catalogue for variable in variables])
+    free = np.flatnonzero(~np.isnan(scaled).any(axis=0) & is_number)
     place = np.array(design.place)
     low, high = (np.intersect1d(free, np.flatnonzero(near)) for near in (place < ACTIVE, place > 1.0 - ACTIVE))
     unit = np.eye(place.size)
