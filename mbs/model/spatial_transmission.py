@@ -77,8 +77,8 @@ def rotor_forces(state: Accelerated) -> Array:
     """Generalized forces (T, n_v) that the motion of all rotors takes."""
     found = np.zeros_like(state.v)
     for node in state.tree.nodes:
-        if node.joint.type == "prismatic":
-            found[:, node.v] += rotor_mass(node) * state.a[:, node.v]
+        if mass := rotor_mass(node):
+            found[:, node.v] += mass * state.a[:, node.v]
     for one in rotors(state):
         on_second = one.ratio * one.torque[:, None] * one.axis
         on_first = one.gyroscopic - (one.ratio - 1) * one.torque[:, None] * one.axis

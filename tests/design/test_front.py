@@ -5,28 +5,11 @@ import csv
 import numpy as np
 import pytest
 import tomli_w
+from small_robots import BEAM, CANTILEVER, FORCE, RHO, E, L
 
 import ffrobot
 
-L, E, RHO, FORCE, WIDTH = 0.5, 70e9, 2700.0, 20.0, 0.02
-BEAM = {
-    "name": "beam",
-    "material": {"youngs_modulus": E, "density": RHO, "poissons_ratio": 0.3},
-    "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.02, "width": WIDTH}},
-    "mesh": {"elements": 2},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 2, "family": "in-plane-bending"},
-    "damping": {"ratio": 0.01},
-}
-CANTILEVER = {
-    "name": "cantilever",
-    "gravity": [0.0, 0.0],
-    "body": [{"name": "beam", "link": BEAM}],
-    "joint": [{"name": "clamp", "type": "weld", "between": ["ground", "beam.root"]}],
-    "load": [{"point": "beam.tip", "y": str(FORCE)}],
-    "initial": {"state": "static"},
-    "analysis": [{"name": "still", "kind": "static"}],
-}
+WIDTH = BEAM["geometry"]["section"]["width"]
 HEIGHT = "links.beam.geometry.section.height=0.01:0.04:log"
 TIP = "peak points.beam.tip.deflection"
 

@@ -7,6 +7,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import tomli_w
+from small_robots import BEAM, CANTILEVER, FORCE, RHO, E, L
 
 import ffrobot
 
@@ -31,25 +32,7 @@ ARM = {
 MOTOR = "peak joints.shoulder.motor_moment"
 RATIO = "joint.shoulder.gear_ratio"
 
-L, E, RHO, FORCE, DEFLECTION = 0.5, 70e9, 2700.0, 20.0, 1e-3
-BEAM = {
-    "name": "beam",
-    "material": {"youngs_modulus": E, "density": RHO, "poissons_ratio": 0.3},
-    "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.02, "width": 0.02}},
-    "mesh": {"elements": 2},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 2, "family": "in-plane-bending"},
-    "damping": {"ratio": 0.01},
-}
-CANTILEVER = {
-    "name": "cantilever",
-    "gravity": [0.0, 0.0],
-    "body": [{"name": "beam", "link": BEAM}],
-    "joint": [{"name": "clamp", "type": "weld", "between": ["ground", "beam.root"]}],
-    "load": [{"point": "beam.tip", "y": str(FORCE)}],
-    "initial": {"state": "static"},
-    "analysis": [{"name": "still", "kind": "static"}],
-}
+DEFLECTION = 1e-3
 HEIGHT, WIDTH, OUTER, INNER = (f"links.beam.geometry.section.{key}" for key in ("height", "width", "outer", "inner"))
 STIFF = f"peak points.beam.tip.deflection <= {DEFLECTION}"
 

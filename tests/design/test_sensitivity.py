@@ -6,40 +6,17 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import tomli_w
+from small_robots import SWING, TUBE
 
 import ffrobot
 from ffrobot.design.histories import read_history
 from ffrobot.sweep.files import set_key, value_of
 
-LINK = {
-    "name": "arm",
-    "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
-    "mesh": {"elements": 6},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
-    "damping": {"ratio": 0.02},
-}
-PLANE = {
-    "name": "arm",
-    "gravity": [0.0, -9.81],
-    "body": [{"name": "arm", "link": LINK}],
-    "joint": [
-        {
-            "name": "shoulder",
-            "type": "revolute",
-            "between": ["ground", "arm.root"],
-            "gear_ratio": 40.0,
-            "rotor_inertia": 2e-5,
-            "viscous_friction": 0.2,
-        }
-    ],
-    "payload": [{"point": "arm.tip", "mass": 0.5}],
-    "initial": {"state": "static"},
-    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
+PLANE = SWING | {
+    "joint": [SWING["joint"][0] | {"gear_ratio": 40.0, "rotor_inertia": 2e-5, "viscous_friction": 0.2}],
     "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005}],
 }
-SPACE_LINK = LINK | {"modes": {"count": 4, "family": ["in-plane-bending", "out-of-plane-bending"]}}
+SPACE_LINK = TUBE | {"modes": {"count": 4, "family": ["in-plane-bending", "out-of-plane-bending"]}}
 SPACE = {
     "name": "arm",
     "space": "spatial",
@@ -158,7 +135,7 @@ def test_against_differences_by_hand(write, scene, keys):
 def test_frequencies_of_a_cantilever(write):
     """f ∝ h/L² √(E/ρ), whatever the width, also on the mesh: to 1e-9, without a run beside the scene's own."""
     section = {"shape": "rectangle", "height": 0.02, "width": 0.03}
-    link = LINK | {"geometry": {"kind": "beam", "length": 0.6, "section": section}}
+    link = TUBE | {"geometry": {"kind": "beam", "length": 0.6, "section": section}}
     scene = PLANE | {"body": [{"name": "arm", "link": link}], "analysis": [{"name": "still", "kind": "static"}]}
     keys = {
         "links.arm.geometry.section.height": 1.0,

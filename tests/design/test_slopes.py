@@ -5,6 +5,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import tomli_w
+from small_robots import SWING
 
 import ffrobot
 from ffrobot.design.designs import Designs
@@ -15,25 +16,6 @@ from ffrobot.design.slopes import Differentiation
 from ffrobot.design.variables import read_space
 from ffrobot.run.watcher import Watcher
 
-LINK = {
-    "name": "arm",
-    "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
-    "mesh": {"elements": 6},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
-    "damping": {"ratio": 0.02},
-}
-SCENE = {
-    "name": "arm",
-    "gravity": [0.0, -9.81],
-    "body": [{"name": "arm", "link": LINK}],
-    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
-    "payload": [{"point": "arm.tip", "mass": 0.5}],
-    "initial": {"state": "static"},
-    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
-}
 OUTER, LOAD = "links.arm.geometry.section.outer", "payload.0.mass"
 GOALS = ("rms joints.shoulder.moment", "rms points.arm.tip.deflection")
 
@@ -61,7 +43,7 @@ def by_keys(found, first):
 
 def test_one_run_for_each_number(tmp_path):
     """Steps of 6e-6 of a number: truncation is 1e-5 of the derivative or so, and the estimate says so."""
-    found, first = differentiation(tmp_path, SCENE)
+    found, first = differentiation(tmp_path, SWING)
     slopes = found.slopes(first)
     assert found.evaluations.runs == 1 + 2 + 1
     expected = ffrobot.sensitivity(tmp_path / "scene.toml", GOALS, [OUTER, LOAD], processes=2)
@@ -76,7 +58,7 @@ def test_one_run_for_each_number(tmp_path):
 
 def test_integrators_that_cannot_repeat_steps(tmp_path):
     """Radau IIA chooses its own steps: central pairs."""
-    scene = deepcopy(SCENE)
+    scene = deepcopy(SWING)
     scene["analysis"][0]["integrator"] = "radau"
     found, first = differentiation(tmp_path, scene)
     slopes = found.slopes(first)

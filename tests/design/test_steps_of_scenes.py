@@ -5,36 +5,17 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import tomli_w
+from small_robots import SWING, TUBE
 
 import ffrobot
 
-LINK = {
-    "name": "arm",
-    "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
-    "mesh": {"elements": 6},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
-    "damping": {"ratio": 0.02},
-}
-SCENE = {
-    "name": "arm",
-    "gravity": [0.0, -9.81],
-    "body": [{"name": "arm", "link": LINK}],
-    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
-    "payload": [{"point": "arm.tip", "mass": 0.5}],
-    "initial": {"state": "static"},
-    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
-    "analysis": [
-        {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01},
-        {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints"},
-    ],
-}
+FORWARD = {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints"}
+SCENE = SWING | {"analysis": [*SWING["analysis"], FORWARD]}
 IN_SPACE = {
     "space": "spatial",
     "gravity": [0.0, 0.0, -9.81],
     "joint": [SCENE["joint"][0] | {"axis": [0.3, 0.8, 0.5]}],
-    "body": [{"name": "arm", "link": LINK | {"modes": LINK["modes"] | {"family": "in-plane-bending"}}}],
+    "body": [{"name": "arm", "link": TUBE | {"modes": TUBE["modes"] | {"family": "in-plane-bending"}}}],
 }
 
 

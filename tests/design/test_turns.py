@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import tomli_w
 from scipy.optimize import minimize
+from small_robots import CANTILEVER, FORCE, RHO, E, L
 
 import ffrobot
 
@@ -96,25 +97,6 @@ def test_a_limit_of_peaks_that_take_turns(write):
     assert found.converged
 
 
-L, E, RHO, FORCE = 0.5, 70e9, 2700.0, 20.0
-BEAM = {
-    "name": "beam",
-    "material": {"youngs_modulus": E, "density": RHO, "poissons_ratio": 0.3},
-    "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.02, "width": 0.02}},
-    "mesh": {"elements": 2},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 2, "family": "in-plane-bending"},
-    "damping": {"ratio": 0.01},
-}
-CANTILEVER = {
-    "name": "cantilever",
-    "gravity": [0.0, 0.0],
-    "body": [{"name": "beam", "link": BEAM}],
-    "joint": [{"name": "clamp", "type": "weld", "between": ["ground", "beam.root"]}],
-    "load": [{"point": "beam.tip", "y": str(FORCE)}],
-    "initial": {"state": "static"},
-    "analysis": [{"name": "still", "kind": "static"}],
-}
 HEIGHT, WIDTH = (f"links.beam.geometry.section.{key}" for key in ("height", "width"))
 
 

@@ -1,0 +1,41 @@
+"""What designs are sought for in these tests: a tube that swings, and a cantilever under a force at its tip."""
+
+TUBE = {
+    "name": "arm",
+    "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
+    "mesh": {"elements": 6},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
+    "damping": {"ratio": 0.02},
+}
+SWING = {
+    "name": "arm",
+    "gravity": [0.0, -9.81],
+    "body": [{"name": "arm", "link": TUBE}],
+    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+    "payload": [{"point": "arm.tip", "mass": 0.5}],
+    "initial": {"state": "static"},
+    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
+}
+
+L, E, RHO, FORCE = 0.5, 70e9, 2700.0, 20.0
+BEAM = {
+    "name": "beam",
+    "material": {"youngs_modulus": E, "density": RHO, "poissons_ratio": 0.3},
+    "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.02, "width": 0.02}},
+    "mesh": {"elements": 2},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 2, "family": "in-plane-bending"},
+    "damping": {"ratio": 0.01},
+}
+CANTILEVER = {
+    "name": "cantilever",
+    "gravity": [0.0, 0.0],
+    "body": [{"name": "beam", "link": BEAM}],
+    "joint": [{"name": "clamp", "type": "weld", "between": ["ground", "beam.root"]}],
+    "load": [{"point": "beam.tip", "y": str(FORCE)}],
+    "initial": {"state": "static"},
+    "analysis": [{"name": "still", "kind": "static"}],
+}
