@@ -152,7 +152,7 @@ def test_motors_behind_gears_carry_out_an_inverse_analysis(tmp_path):
 
 
 def wrist_at_rest():
-    """A tube that carries a wrist and a tool straight down behind stiff gears; the motors set out as smoothly as can be.
+    """A tube that carries a wrist and a tool straight down behind stiff gears; motors set out smoothly.
 
     The springs make more accelerations of the rounding of angles than a share of the tolerance that falls with the step
     has room for.
