@@ -6,9 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <exception>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -57,13 +56,22 @@ std::string folder_of(const std::string &uri) {
   return path;
 }
 
-HeldModel model_in(const std::string &uri) {
-  const std::string path = folder_of(uri) + "/model.bin";
-  std::ifstream file(path, std::ios::binary);
+// Not by streams of the C++ library, which would make the library half as large again: all locales come with them.
+std::string bytes_in(const std::string &path) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(path.c_str(), "rb"), std::fclose);
   if (!file)
     throw std::runtime_error("expected the file " + path + " of the FMU, found none");
+  std::string bytes;
+  char part[4096];
+  while (const std::size_t count = std::fread(part, 1, sizeof part, file.get()))
+    bytes.append(part, count);
+  return bytes;
+}
+
+HeldModel model_in(const std::string &uri) {
+  const std::string path = folder_of(uri) + "/model.bin", bytes = bytes_in(path);
   try {
-    return held_model_of({std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()});
+    return held_model_of(bytes);
   } catch (const std::exception &error) {
     throw std::runtime_error(path + ": " + error.what());
   }
