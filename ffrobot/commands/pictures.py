@@ -100,7 +100,9 @@ def _tell(paths: Iterable[Path], notes: Iterable[str] = ()) -> None:
 
 @click.command()
 @click.argument("results_files", metavar="RESULTS.h5|FOLDER …", nargs=-1, required=True, type=FILE)
-@click.option("-o", "--output", metavar="FILE.html", type=FILE, help="Where to write [RESULTS.html, of the first].")
+@click.option(
+    "-o", "--output", metavar="FILE.html", type=FILE, help="Where to write [RESULTS.html or FOLDER.html, of the first]."
+)
 def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     """Write one self-contained HTML page: motion, histories, modes, tables.
 
@@ -113,9 +115,9 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     from ..pictures.report import write_report
     from ..pictures.studies.study import study_files
 
-    first = results_files[0]
-    path = output or (first.with_name(f"{first.name}.html") if first.is_dir() else first.with_suffix(".html"))
     studies = {file: study_files(file) for file in results_files}
+    first = results_files[0]
+    path = output or (first.parent / f"{first.resolve().name}.html" if first.is_dir() else first.with_suffix(".html"))
     solved = [file for file, found in studies.items() if not found]
     with protected(file for found in studies.values() for file in found), reading(*solved):
         write_report(results_files, path)

@@ -55,7 +55,8 @@ def folder(tmp_path_factory):
     )  # fmt: skip
     band = Band(
         name="band_moment", title="moment", y_label="moment (N m)", time=TIME, nominal=history(1.0),
-        median=history(1.01), low=history(0.9), high=history(1.1), lowest=history(0.8), highest=history(1.2), band_label="5% to 95%",
+        median=history(1.01), low=history(0.9), high=history(1.1), lowest=history(0.8), highest=history(1.2),
+        band_label="5% to 95%",
         worst_label="lowest and highest sample",
     )  # fmt: skip
     write_study(study("uncertainty", indices, band), folder)

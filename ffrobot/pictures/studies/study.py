@@ -53,7 +53,7 @@ def write_study(study: Study, folder: Path) -> Path:
     """Beside the tables of the command; the file written."""
     path = folder / f"{study.name}.json"
     text = json.dumps(study.model_dump(), ensure_ascii=False, separators=(",", ":"))
-    write_atomically(path, text.encode(), "study", ours=True)
+    write_atomically(path, text.encode(), "study", make_folder=True, ours=True)
     return path
 
 
