@@ -60,6 +60,7 @@ def test_labels_break_at_dots_and_blanks():
     lines = wrapped(label, 16)
     assert "".join(lines).replace(" ", "") == label.replace(" ", "")
     assert max(map(len, lines)) <= 16
+    assert wrapped("peak joints.shoulder.moment (N m)", 20)[-1] == "(N m)"
 
 
 def test_all_designs_of_a_search(searched):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,20 +15,23 @@ from ..studies.looks import LOOKS, Look
 from .charts import encoded, plain
 
 AXIS = "#8b95a3"  # of parallel coordinates, on light and on dark pages
-LETTERS = 20  # of a label, in a line
+LETTERS, LINE = 15, 15  # of a label, in a line; pixels that a line takes
 BAR, REST = 34, 120  # pixels: of a bar, of what is round them
 Trace = dict[str, Any]
 
 
 @dataclass
 class DrawnDiagram:
-    """One chart of the page; `broad` over its whole width, `height` in pixels where it has one of its own."""
+    """One chart of the page; `height` in pixels where it has one of its own.
+
+    `shape`: "broad" over the whole width, "long" on paper alone, where names leave no room for bars.
+    """
 
     name: str
     traces: list[Trace]
     layout: dict[str, Any]
-    broad: bool = False
-    height: int | None = field(default=None)
+    shape: Literal["", "broad", "long"] = ""
+    height: int | None = None
 
 
 def drawn(diagram: Diagram, name: str) -> DrawnDiagram:
@@ -76,7 +79,7 @@ def _bars(diagram: Bars, name: str) -> DrawnDiagram:
     layout = _layout(diagram.title, diagram.x_label, "", legend=len(traces) > 1)
     layout["yaxis"] |= {"autorange": "reversed", "type": "category"}
     layout |= {"bargap": 0.25, "barmode": "group"}
-    return DrawnDiagram(name, traces, layout, height=REST + BAR * len(diagram.labels) * len(traces))
+    return DrawnDiagram(name, traces, layout, "long", REST + BAR * len(diagram.labels) * len(traces))
 
 
 def _parallel(diagram: Parallel, name: str) -> DrawnDiagram:
@@ -95,14 +98,16 @@ def _parallel(diagram: Parallel, name: str) -> DrawnDiagram:
         {"type": "line", "x0": k, "x1": k, "y0": 0, "y1": 1, "layer": "below", "line": {"color": AXIS, "width": 1.5}}
         for k in range(len(diagram.axes))
     ]
+    lines = max(len(wrapped(axis.label, LETTERS)) for axis in diagram.axes)
     hidden = {"visible": False, "fixedrange": True}
     layout = {
         "title": {"text": plain(diagram.title)}, "shapes": axes,
         "annotations": [text for k, axis in enumerate(diagram.axes) for text in _texts(k, axis)],
         "xaxis": hidden | {"range": [-0.4, len(diagram.axes) - 0.6]}, "yaxis": hidden | {"range": [-0.04, 1.04]},
-        "margin": {"l": 40, "r": 40, "t": 105, "b": 30}, "showlegend": True, "legend": {"orientation": "h", "y": -0.06},
+        "margin": {"l": 40, "r": 40, "t": 50 + LINE * lines, "b": 30}, "showlegend": True,
+        "legend": {"orientation": "h", "y": -0.06},
     }  # fmt: skip
-    return DrawnDiagram(name, traces, layout, broad=True)
+    return DrawnDiagram(name, traces, layout, "broad")
 
 
 def _lines(diagram: Parallel, places: Array, rows: list[int], look: Look, label: str) -> Trace:
@@ -209,7 +214,7 @@ def _points(diagram: Points) -> Trace:
     mode = "+".join(["lines"] * diagram.joined + ["markers"] + ["text"] * diagram.named)
     trace: Trace = {
         "type": "scatter", "mode": mode, "x": list(diagram.x), "y": list(diagram.y),
-        "text": [plain(label) for label in diagram.labels], "textposition": "top center",
+        "text": [plain(label) for label in diagram.labels], "textposition": _sides(diagram),
         "hovertemplate": "%{text}<br>%{x:.6g}, %{y:.6g}<extra></extra>", "cliponaxis": False,
         "line": {"color": COLORS[0]},
         "marker": {"size": 8, "color": COLORS[0], "symbol": ["circle" if one else "circle-open" for one in sure]},
@@ -217,3 +222,9 @@ def _points(diagram: Points) -> Trace:
     if diagram.x_errors:
         trace["error_x"] = {"type": "data", "array": list(diagram.x_errors), "thickness": 1}
     return trace
+
+
+def _sides(diagram: Points) -> list[str]:
+    """Names stay within the chart: to the left of points in its right half."""
+    middle = 0.5 * max(diagram.x, default=0.0)
+    return [f"top {'left' if x > middle else 'right'}" for x in diagram.x]

@@ -14,7 +14,7 @@ from .diagrams import Axis, Parallel, wrapped
 from .looks import LOOKS, Look
 
 WIDTH, HEIGHT = 1.25, 3.4  # inches: of an axis, of the figure
-LETTERS = 18  # of a name, in a line
+LETTERS, LINE = 18, 9  # of a name, in a line; points that a line takes
 FAINT = 0.35  # opacity of many lines
 
 
@@ -23,7 +23,8 @@ def draw_parallel(diagram: Parallel) -> Figure:
     count = len(diagram.axes)
     figure = Figure(figsize=(max(3.5, WIDTH * (count + 0.3)), HEIGHT), layout="constrained")
     axes = figure.subplots()
-    axes.set_title(diagram.title, loc="left", pad=34)
+    lines = max(len(wrapped(axis.label, LETTERS)) for axis in diagram.axes)
+    axes.set_title(diagram.title, loc="left", pad=8 + LINE * lines)
     axes.set_axis_off()
     axes.set_xlim(-0.35, count - 0.75)
     axes.set_ylim(-0.03, 1.03)
