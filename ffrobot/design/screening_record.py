@@ -16,7 +16,7 @@ from ..pictures.studies.study import Study
 from ..present.tables import plain_table
 from .screening import Screening
 from .study_parts import file_name, floats, make_study, table, with_unit
-from .uncertainty_record import goal_line, with_error
+from .uncertainty_record import UNCHANGED, goal_line, with_error
 
 HEADINGS = ("key", "spread", "μ*", "σ", "μ")
 COLUMNS = ("goal", "unit", "middle", "key", "mu_star", "mu_star_error", "sigma", "mu", "effects")
@@ -37,6 +37,9 @@ def print_screening(found: Screening, console: Console) -> None:
 
 def remarks(found: Screening) -> Iterator[str]:
     """What there is to mind, and how it was found."""
+    for goal, sizes in zip(found.goals, found.effects.mu_star, strict=True):
+        if not np.nan_to_num(sizes).any():
+            yield f"note       {goal}: {UNCHANGED}"
     for goal, counts in zip(found.goals, found.effects.count, strict=True):
         for one, count in zip(found.spreads, counts, strict=True):
             if count < len(found.values):

@@ -19,6 +19,8 @@ from .study_parts import file_name
 from .uncertainty import Band, Uncertainty
 
 NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
+ROUNDING = 1e-13  # of a goal: smaller deviations are none
+UNCHANGED = "none of the keys changes it"
 LINEAR = 0.9  # of a variance: below, shares by regression are told to be few
 
 
@@ -106,7 +108,12 @@ def band_rows(found: Uncertainty) -> Iterator[tuple[str, ...]]:
 
 def remarks(found: Uncertainty) -> Iterator[str]:
     """What there is to mind, and how it was found."""
-    for goal, explained in zip(found.goals, found.explained, strict=True):
+    deviations = found.statistics.deviation
+    for goal, reading, explained, deviation in zip(
+        found.goals, found.readings, found.explained, deviations, strict=True
+    ):
+        if deviation <= ROUNDING * abs(reading.value):
+            yield f"note       {goal}: {UNCHANGED}"
         if explained < LINEAR and found.indices is None:
             yield (
                 f"note       {goal}: a linear function of the keys makes {100.0 * explained:.0f} % of the variance:"

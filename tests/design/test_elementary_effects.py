@@ -118,6 +118,17 @@ def test_screening_of_a_rigid_arm(scene):
     assert not found.failures
 
 
+@pytest.mark.parametrize(
+    "by", [("gradients",), ("samples", "--samples", 8, "--indices"), ("screening", "--trajectories", 2)]
+)
+def test_keys_that_change_nothing(ffrobot, scene, by):
+    """Payloads are not counted in the mass: no division by a variance of 0."""
+    done = ffrobot("uncertainty", scene, "--of", "mass", "--spread", f"{PAYLOAD}=±5%", "--no-figures", "--by", *by)
+    assert done.returncode == 0, done.stderr
+    assert "note       mass: none of the keys changes it" in done.stdout
+    assert "nan" not in done.stdout
+
+
 def test_failed_runs_are_told_and_left_out(ffrobot, tmp_path):
     """Tubes whose hole is wider than they are: only with both keys at their worse ends, which runs alone show."""
     path = tmp_path / "scene.toml"

@@ -66,11 +66,12 @@ def _layout(title: str, x: str, y: str, *, legend: bool = True, logarithmic: boo
 def _bars(diagram: Bars, name: str) -> DrawnDiagram:
     """The first label on top, a colour for each series, of a signed one for each sign."""
     traces = []
+    form = "+.3g" if diagram.signed else ".3g"
     for k, series in enumerate(diagram.series):
         values = [value or 0.0 for value in series.values]
         traces.append({
             "type": "bar", "orientation": "h", "name": plain(series.label), "x": values,
-            "y": [plain(label) for label in diagram.labels], "text": [f"{value:.3g}" for value in values],
+            "y": [plain(label) for label in diagram.labels], "text": [f"{value:{form}}" for value in values],
             "marker": {"color": [COLORS[1] if diagram.signed and value < 0.0 else COLORS[k] for value in values]},
             "hovertemplate": "%{y}: %{x:.5g}<extra></extra>",
         })  # fmt: skip

@@ -27,7 +27,7 @@ def draw_bars(diagram: Bars) -> Figure:
     height = 0.8 / count
     for k, series in enumerate(diagram.series):
         at = np.arange(len(labels)) + (k - 0.5 * (count - 1)) * height
-        _label(axes, _bars(axes, diagram, series, at, height, COLORS[k]), series)
+        _label(axes, _bars(axes, diagram, series, at, height, COLORS[k]), series, "+" if diagram.signed else "")
     axes.margins(x=ROOM)
     axes.locator_params(axis="x", nbins=7)
     axes.set_yticks(range(len(labels)), labels)
@@ -51,9 +51,8 @@ def _bars(axes: Axes, diagram: Bars, series: Series, at: Array, height: float, c
     )  # fmt: skip
 
 
-def _label(axes: Axes, bars: BarContainer, series: Series) -> None:
+def _label(axes: Axes, bars: BarContainer, series: Series, sign: str) -> None:
     """The number of each bar at its end."""
-    sign = "+" if any(value is not None and value < 0.0 for value in series.values) else ""
     numbers = [_number(value, sign) for value in series.values[:MOST]]
     axes.bar_label(bars, numbers, padding=2, fontsize=7)
 
