@@ -10,6 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
+from .interpolation import interpolate
 from .parts import Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint, freeze
 from .unit_loads import unit_load_names
 
@@ -144,43 +145,7 @@ class ModalBody:
                 f"modal body {self.name}: x: expected {positions[0]:g} … {positions[-1]:g} m, the body's, found {x:g} m"
             )
         x = float(np.clip(x, positions[0], positions[-1]))
-        element = self.stations.element
-        if element is None:
-            return _hermite(self.stations, x)
-        index = np.clip(np.searchsorted(positions[element[:, 0]], x, side="right") - 1, 0, len(element) - 1)
-        return _through(self.stations, element[index], x)
-
-
-def _through(stations: Stations, members: Integers, x: float) -> Interface:
-    """The polynomial through the stations `members`, at x (Lagrange)."""
-    nodes = stations.position[members, 0]
-    others = ~np.eye(len(nodes), dtype=bool)
-    weights = np.prod((x - nodes) / (nodes[:, None] - nodes + ~others), axis=1, where=others)
-    return Interface(
-        weights @ stations.position[members],
-        np.einsum("i,ikn->kn", weights, stations.translation[members]),
-        np.einsum("i,ikn->kn", weights, stations.rotation[members]),
-    )
-
-
-def _hermite(stations: Stations, x: float) -> Interface:
-    """Cubic Hermite on v with v' = rotation_z and on w with w' = −rotation_y; the rest through four stations."""
-    positions = stations.position[:, 0]
-    k = positions.size
-    i = int(np.clip(np.searchsorted(positions, x, side="right") - 1, 0, k - 2))
-    first = min(max(i - 1, 0), max(k - 4, 0))
-    near = _through(stations, np.arange(first, min(first + 4, k)), x)
-    h = positions[i + 1] - positions[i]
-    s = (x - positions[i]) / h
-    translation, rotation = near.translation.copy(), near.rotation.copy()
-    for axis, turn, sign in ((1, 2, 1.0), (2, 1, -1.0)):
-        values = stations.translation[i : i + 2, axis]
-        slopes = sign * h * stations.rotation[i : i + 2, turn]
-        rise = values[1] - values[0]
-        translation[axis] = values[0] + rise * s**2 * (3 - 2 * s) + s * (1 - s) * ((1 - s) * slopes[0] - s * slopes[1])
-        derivative = 6 * s * (1 - s) * rise + (1 - s) * (1 - 3 * s) * slopes[0] + s * (3 * s - 2) * slopes[1]
-        rotation[turn] = sign * derivative / h
-    return Interface(near.position, translation, rotation)
+        return interpolate(self.stations, x)
 
 
 def _check(body: ModalBody) -> None:
