@@ -15,7 +15,8 @@ from ...mbs.analysis.spatial_gears import wound_up
 from ...mbs.analysis.spatial_run import SpatialRun
 from ...mbs.analysis.spatial_static import run_spatial_static
 from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import SpatialModel, SpatialRow, without_paths
+from ...mbs.model.spatial_model import SpatialModel, without_paths
+from ...mbs.model.spatial_rows import SpatialRow
 from ...mbs.scene.analysis import Analysis
 from ...mbs.solve.linearisation import LinearMechanism
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation

@@ -10,7 +10,8 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...mbs.model.spatial_body import SpatialBody, SpatialPoint
-from ...mbs.model.spatial_model import SpatialModel, SpatialRow, build_spatial_model, row_values
+from ...mbs.model.spatial_model import SpatialModel, build_spatial_model, row_values
+from ...mbs.model.spatial_rows import SpatialRow
 from ...mbs.model.spatial_system import ZERO, SpatialSystem
 from ...mbs.model.spatial_transmission import resistance
 
@@ -73,7 +74,7 @@ class SpatialRigidArm:
         rates[self._motors] = gamma_dot
         v: Array = np.linalg.pinv(C_v) @ rates
         self._system.core.keep_independent_rows(q, v)
-        friction = -resistance(self._model.tree, v[None])[0]
+        friction = -resistance(self._model, q[None], v[None])[0]
 
         def moments(target: Array) -> Array:
             signs = self._system.row_signs

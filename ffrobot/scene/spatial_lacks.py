@@ -63,8 +63,8 @@ LACKS = (
         "ffrobot.mbs.model.spatial_system",
     ),
     Lack(
-        "closed loops in each of whose joints something acts: friction, a motor, a rotor, a load, limits of its"
-        " position",
+        "closed loops in each of whose joints there is a motor or a rotor, or a trajectory is followed (friction, loads"
+        " and limits of positions may be in all)",
         "one joint of the loop without: the loop is cut there",
         "ffrobot.mbs.model.spatial_model",
     ),

@@ -83,7 +83,7 @@ def spatial_drive(
     in_posture = _ends_in_posture(run)
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
     cause = f"{posture}: move the path, or start in another posture" if in_posture else ""
-    told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q))
+    told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q, v))
 
     def again(others: Array) -> SpatialRun:
         return spatial_drive(model, analysis, start, progress, drives=drives, times=others)

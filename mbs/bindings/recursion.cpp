@@ -11,7 +11,7 @@
 #include <chrono>
 #include <optional>
 
-#include "bindings/recursion/recursion.h"
+#include "bindings/recursion/tree_run.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -59,11 +59,19 @@ std::tuple<VectorXd, VectorXd> row_values(Model<Space> &model, const VectorXd &q
 }
 
 Derivatives derivatives_at(Model<Spatial> &model, const VectorXd &q, const VectorXd &v, const VectorXd &target,
-                           const std::optional<VectorXd> &force, const std::optional<VectorXd> &wrench) {
+                           const std::optional<VectorXd> &force, const std::optional<VectorXd> &wrench,
+                           const Scene *given, double t) {
+  const Scene none{}, &scene = given ? *given : none;
   model.check_state(q, v);
   check_size("target", target.size(), model.rows());
+  if (given)
+    check_scene(model, scene);
   const Forces<double> forces = checked_forces(model, force, wrench);
-  return derivatives(model.mechanism, model.w, q.data(), v.data(), forces, target.data());
+  VectorXd along_cuts = VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()));
+  for (const CutLoad &load : scene.cut_loads)
+    along_cuts[load.joint] += load.share * load.magnitude(t).value;
+  const LoadedCuts cuts{scene.cut_joints, along_cuts.data()};
+  return derivatives(model.mechanism, model.w, q.data(), v.data(), forces, cuts, target.data());
 }
 
 template <class Space> VectorXd answer_of(Model<Space> &model, const VectorXd &q, const VectorXd &residual) {
@@ -166,7 +174,9 @@ void bind_recursion(nb::module_ &m) {
       .def_ro("rate_q", &Derivatives::rate_q);
   bind_model<Spatial>(m, "SpatialModel", "SpatialBody", "A mechanism in space, in joint coordinates.")
       .def("derivatives", &derivatives_at, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
-           "At a state under given forces, while rows follow `target` (rows): exact.");
+           "scene"_a.none() = nb::none(), "t"_a = 0.0,
+           "At a state under given forces and what acts along the cut joints of a scene at time t, while rows follow "
+           "`target` (rows): exact.");
   bind_tree_motion(m);
   bind_tree_sampled(m);
   bind_held_motion(m);

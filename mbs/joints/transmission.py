@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...common.arrays import Array
 from .measure import Measure
 
 
@@ -26,6 +27,16 @@ class Friction:
     viscous: float
     coulomb: float
     speed: float
+
+    def resistance(self, rate: Array) -> Array:
+        """C γ̇ + τ_c tanh(γ̇/γ̇_s) at rates γ̇ of any shape."""
+        found: Array = self.viscous * rate + self.coulomb * np.tanh(rate / self.speed)
+        return found
+
+    def slope(self, rate: Array) -> Array:
+        """Its derivative by γ̇: c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s)."""
+        found: Array = self.viscous + self.coulomb / self.speed * (1.0 - np.tanh(rate / self.speed) ** 2)
+        return found
 
 
 class Rotor(NamedTuple):

@@ -16,7 +16,8 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.rotations import left_jacobian, left_jacobian_rate
 from .spatial_bending import bent_section, curvature
-from .spatial_model import SpatialModel, SpatialRow
+from .spatial_model import SpatialModel
+from .spatial_rows import SpatialRow
 from .spatial_tree import Motion, Node, Section, SpatialTree
 
 

@@ -12,7 +12,8 @@ from ...common.errors import InputError
 from ..scene.analysis import Analysis
 from .spatial_body import rigid_body
 from .spatial_drives import Drive
-from .spatial_model import SpatialModel, SpatialRow
+from .spatial_model import SpatialModel
+from .spatial_rows import SpatialRow
 from .spatial_transmission import compliance
 from .spatial_tree import ElasticGearInSpace, Node, Section, SpatialTree
 

@@ -15,6 +15,7 @@ from ...common.arrays import Array
 from .spatial_accelerations import Accelerated, Acceleration
 from .spatial_bending import affine_motions
 from .spatial_body import SpatialBody
+from .spatial_cut import cut_loads
 from .spatial_model import SpatialModel
 from .spatial_transmission import gear_forces, resistance, rotor_forces
 from .spatial_tree import Motion, Node
@@ -69,7 +70,8 @@ def body_forces(node: Node, state: Accelerated, of_frame: Acceleration, gravity:
 def required_forces(model: SpatialModel, state: Accelerated, times: Array) -> Array:
     """M v̇ − Q (T, n_v) along v: what gravity, elasticity, friction and given loads leave for others to supply."""
     gravity = np.array(model.scene.gravity)
-    found = resistance(model.tree, state.v) + rotor_forces(state) - given_forces(model, state.q, state.frames, times)
+    found = resistance(model, state.q, state.v, state.frames) + rotor_forces(state)
+    found -= given_forces(model, state.q, state.frames, times)
     found -= gear_forces(model.tree, state.q, state.v)
     for node, frame, of_frame in zip(model.tree.nodes, state.frames, state.of_frames(), strict=True):
         needed = body_forces(node, state, of_frame, gravity)
@@ -81,7 +83,7 @@ def required_forces(model: SpatialModel, state: Accelerated, times: Array) -> Ar
 
 def given_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], times: Array) -> Array:
     """Generalized forces (T, n_v) of all given loads at q (T, n_q) and `times` (T,)."""
-    tree, found = model.tree, np.zeros((len(q), model.tree.n_v))
+    tree, found = model.tree, cut_loads(model.tree, model.cut, q, frames, times)
     for direction, size in model.modal_loads:
         found += size.sample(times)[0][:, None] * direction
     for load in model.scene.load:
@@ -91,7 +93,7 @@ def given_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], times:
             none = np.zeros(len(times))
             wrench = np.stack([values.get(name, none) for name in ("x", "y", "z", "mx", "my", "mz")], axis=1)
             found += np.einsum("tij,ti->tj", L, wrench)
-        elif load.joint is not None:
+        elif load.joint in tree.carried:
             found += np.stack([*values.values()], axis=1) @ model.along(load.joint)
     return found
 

@@ -4,67 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from ...common.arrays import Array, Booleans
 from ...common.errors import InputError
-from ...common.rotations import logarithm
 from ...common.validation import did_you_mean, quoted
-from .._core import TimeFunction
-from ..fields.orientations import OrientationLaw
 from ..joints.spatial.joint import SpatialJoint
 from ..scene.spatial.mechanism import SpatialMechanismScene
 from ..scene.spatial.trajectories import SpatialTrajectory
 from ..scene.topology import Edge, spanning_forest
 from .spatial_body import SpatialBody
+from .spatial_cut import CutCoordinate, cut_coordinates
 from .spatial_drives import Drive
 from .spatial_payloads import welded_payloads
+from .spatial_rows import SpatialRow, value_and_gradient
 from .spatial_tree import Motion, Node, Section, SpatialTree
-
-RowKind = Literal["point", "slide", "dot", "rotation", "coordinate"]
-
-
-@dataclass(frozen=True)
-class SpatialRow:
-    """One constraint: a measure of section b on section a that follows `target`, or is 0.
-
-    Attributes:
-        owner: the joint or trajectory.
-        kind: "point", f·(r_b − r_a) with f in global axes; "slide", the same with f in axes of a; "dot", f·g with f in
-            axes of a and g in axes of b; "rotation", the turn of b against a about f, global axes; "coordinate", the
-            joint coordinate v[coordinate], `sign` times.
-        target: of points and coordinates.
-        law: an orientation in time: of "rotation" rows that of a, whose triad is then A(t); of "dot" rows that of b.
-    """
-
-    owner: str
-    kind: RowKind
-    a: Section
-    b: Section
-    f: Array
-    g: Array
-    is_trajectory: bool = True
-    coordinate: int = -1
-    q_index: int = -1
-    sign: float = 1.0
-    target: TimeFunction | None = None
-    law: OrientationLaw | None = None
-
-    @property
-    def carries_moment(self) -> bool:
-        """Whether its multiplier is a moment."""
-        return self.kind in ("dot", "rotation")
 
 
 @dataclass(frozen=True)
 class SpatialModel:
-    """A scene in space with its bodies: everything analyses share. `modal_loads` act beside the loads of the scene."""
+    """A scene in space with its bodies: everything analyses share.
+
+    `cut` are the coordinates of joints at which loops are cut; `modal_loads` act beside the loads of the scene.
+    """
 
     scene: SpatialMechanismScene
     tree: SpatialTree
     rows: tuple[SpatialRow, ...]
+    cut: tuple[CutCoordinate, ...] = ()
     modal_loads: tuple[Drive, ...] = ()
 
     @property
@@ -124,17 +92,17 @@ def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBo
     _check_cut_joints(scene, tree)
     rows = [row for joint in tree.loops for row in _loop_rows(scene, tree, joint)]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
-    return SpatialModel(scene, tree, tuple(rows))
+    return SpatialModel(scene, tree, tuple(rows), tuple(cut_coordinates(scene, tree)))
 
 
 def _check_cut_joints(scene: SpatialMechanismScene, tree: SpatialTree) -> None:
-    """Raise `InputError` for what acts along the coordinates of a joint at which a loop is cut, or limits them."""
+    """Raise `InputError` for a motor or rotor in the joint at which a loop is cut."""
     for joint in tree.loops:
-        loads = [f"load no. {k}" for k, load in enumerate(scene.load, 1) if load.joint == joint.name]
-        if found := [*joint.acts_along, *loads]:
+        if found := joint.asks_for_coordinate:
             raise InputError(
-                f"{scene.path}: {joint.label}: expected a loop with a joint along which nothing acts, where it is cut,"
-                f" found {quoted(found)} here and something in each of the others: not available in space yet"
+                f"{scene.path}: {joint.label}: expected a loop with a joint that has no motor, no rotor and no"
+                f" trajectory, where it is cut, found {quoted(found)} here and one of them in each of the others: not"
+                " available in space yet"
             )
 
 
@@ -197,7 +165,7 @@ def row_values(
     values, gradients = np.zeros((len(q), len(model.rows))), np.zeros((len(q), len(model.rows), model.tree.n_v))
     for k, row in enumerate(model.rows):
         a, b = (model.tree.motion(section, q, frames) for section in (row.a, row.b))
-        values[:, k], gradients[:, k] = _row(row, a, b, q, times)
+        values[:, k], gradients[:, k] = value_and_gradient(row, a, b, q, times)
     return values, gradients
 
 
@@ -215,29 +183,6 @@ def target_rates(model: SpatialModel, q: Array, times: Array) -> Array:
                 f = np.einsum("tij,j->ti", model.tree.motion(row.a, q, frames).F, row.f)
                 found[:, k] = -np.sum(f * np.cross(omega, row.law.sample(times)[:, :, 2]), axis=-1)
     return found
-
-
-def _row(row: SpatialRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
-    target = 0.0 if row.target is None else row.target.sample(times)[0]
-    if row.kind == "coordinate":
-        gradient = np.zeros((len(q), a.L.shape[-1]))
-        gradient[:, row.coordinate] = row.sign
-        return row.sign * q[:, row.q_index] - target, gradient
-    if row.kind == "rotation":
-        assert row.law is not None
-        residual = logarithm(b.F @ np.swapaxes(row.law.sample(times), -1, -2))
-        return residual @ row.f, np.einsum("i,tij->tj", row.f, b.L[:, 3:])
-    if row.kind == "dot":
-        f = np.einsum("tij,j->ti", a.F, row.f)
-        g = b.F @ row.g if row.law is None else row.law.sample(times)[:, :, 2]
-        across = np.cross(f, g)
-        return np.sum(f * g, axis=-1), np.einsum("ti,tij->tj", across, a.L[:, 3:] - b.L[:, 3:])
-    f = np.einsum("tij,j->ti", a.F, row.f) if row.kind == "slide" else np.broadcast_to(row.f, a.r.shape)
-    d = b.r - a.r
-    gradient = np.einsum("ti,tij->tj", f, b.L[:, :3] - a.L[:, :3])
-    if row.kind == "slide":
-        gradient = gradient + np.einsum("ti,tij->tj", np.cross(f, d), a.L[:, 3:])
-    return np.sum(f * d, axis=-1) - target, gradient
 
 
 def _check_points(scene: SpatialMechanismScene, bodies: dict[str, SpatialBody]) -> None:

@@ -15,14 +15,37 @@ from .spatial_tree import Node, Section
 Placed = tuple[int, int]  # body, −1 the ground, and number of its marker
 
 
+class CutPlace(NamedTuple):
+    """Where a coordinate of a joint at which a loop is cut is measured, and what acts along it acts.
+
+    Attributes:
+        a, b: its sections, by numbers of wrenches.
+        turns: whether it is an angle.
+        axis: (3,) of it, in axes of a.
+    """
+
+    a: int
+    b: int
+    turns: bool
+    axis: Array
+
+
 class SpatialParts(NamedTuple):
-    """A mechanism in space as the core takes it; `wrenches` are the markers on which forces act."""
+    """A mechanism in space as the core takes it.
+
+    `wrenches` are the markers on which forces act, `cut` joints at which loops are cut and along which something acts.
+    """
 
     bodies: list[_core.SpatialBody]
     ground: list[_core.SpatialMarker]
     rows: list[_core.RowModel]
     wrenches: list[_core.MarkerAt]
     gravity: Array
+    cut: tuple[CutPlace, ...]
+
+    def model(self) -> _core.SpatialModel:
+        """Of the core."""
+        return _core.SpatialModel(self.bodies, self.ground, self.rows, self.wrenches, self.gravity)
 
 
 def carried_body(node: Node, inner: Placed, outer: Placed, markers: list[Section], driven: bool) -> _core.SpatialBody:

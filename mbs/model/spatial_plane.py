@@ -14,10 +14,8 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Integers, as_floats
 from .. import _core
-from .spatial_parts import SpatialParts
-
-EXACT = 1e-12  # of unit vectors, and of shapes relative to the largest: what rounding leaves of axes that are the same
-UPRIGHT = 0.437  # of the normal along z of a triad: below it z is nearer to the plane (an angle that nobody draws)
+from .spatial_parts import CutPlace, SpatialParts
+from .spatial_plane_bodies import EXACT, AcrossError, axes_across, axes_of_triad, planar_data, planar_marker
 
 PLANAR = {
     _core.JointKind.revolute: _core.JointKind.revolute,
@@ -35,22 +33,20 @@ class Plane(NamedTuple):
         axes: (3, 3) rows: its axes x and y and its normal, global axes.
         followed: by its rows: which row of the mechanism in space says what they follow.
         spread: (rows in space, its rows) multipliers of the rows in space by its own; 0 of those that do nothing in it.
+        cut: joints at which loops are cut, with axes of planar markers: of angles the component along the normal.
     """
 
     model: _core.PlanarModel
     axes: Array
     followed: Integers
     spread: Array
+    cut: tuple[CutPlace, ...]
 
     def shares(self, component: int) -> list[tuple[int, float]]:
         """Of a force (0, 1, 2) or moment (3, 4, 5) along a global axis: components of a planar wrench, with shares."""
         along = self.axes[:, component % 3]
         found = [(2, along[2])] if component >= 3 else [(0, along[0]), (1, along[1])]
         return [(k, float(share)) for k, share in found if abs(share) > EXACT]
-
-
-class _AcrossError(Exception):
-    """Something moves across the plane."""
 
 
 def in_plane(parts: SpatialParts, is_path: Booleans) -> Plane | None:
@@ -61,7 +57,7 @@ def in_plane(parts: SpatialParts, is_path: Booleans) -> Plane | None:
     for normal in _normals(parts, frames):
         try:
             return _Reduction(parts, frames, normal).plane(is_path)
-        except _AcrossError:
+        except AcrossError:
             continue
     return None
 
@@ -93,26 +89,6 @@ def _normals(parts: SpatialParts, frames: Sequence[_Frame]) -> list[Array]:
     return axes[:1] or list(np.eye(3)[::-1])
 
 
-def _axes(normal: Array) -> Array:
-    """(3, 3) rows x, y and the normal; x is the axis x where the normal is square to it."""
-    x = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
-    x = x - normal * (normal @ x)
-    x /= np.linalg.norm(x)
-    return np.array([x, np.cross(normal, x), normal])
-
-
-def _axes_of_triad(normal: Array) -> Array:
-    """(3, 3) rows: of a planar marker x, y and the normal, in axes of the triad that it stands for.
-
-    Revolute and planar joints have z along the normal and keep x and y, prismatic ones slide along z: it becomes x.
-    """
-    if abs(normal[2]) >= UPRIGHT:
-        return _axes(normal)
-    z = np.eye(3)[2] - normal * normal[2]
-    z /= np.linalg.norm(z)
-    return np.array([z, np.cross(normal, z), normal])
-
-
 def _ends(row: _core.RowModel) -> tuple[int, int, int, int]:
     return row.a.body, row.a.marker, row.b.body, row.b.marker
 
@@ -130,27 +106,29 @@ def _is_mixed(f: Array) -> bool:
     return bool(np.linalg.norm(f[:2]) > EXACT and abs(f[2]) > EXACT)
 
 
-def _is_small(across: Array, whole: Array) -> bool:
-    return bool(np.abs(across).max(initial=0.0) <= EXACT * np.abs(whole).max(initial=0.0))
-
-
 class _Reduction:
-    """To the plane across `normal` (3,), global axes; raises `_AcrossError` for what does not move in it."""
+    """To the plane across `normal` (3,), global axes; raises `AcrossError` for what does not move in it."""
 
     def __init__(self, parts: SpatialParts, frames: Sequence[_Frame], normal: Array) -> None:
         self._parts = parts
-        self._ground = _axes(normal)
-        self._axes = [_axes(frame.R.T @ normal) for frame in frames]
+        self._ground = axes_across(normal)
+        self._axes = [axes_across(frame.R.T @ normal) for frame in frames]
         self._frames, self._normal = frames, normal
         self._shifted: list[_core.PlanarMarker] = []
 
     def plane(self, is_path: Booleans) -> Plane:
         bodies = [self._body(number) for number in range(len(self._parts.bodies))]
         rows, followed, spread = self._rows(is_path)
-        ground = [_marker(marker, self._ground) for marker in self._parts.ground]
+        ground = [planar_marker(marker, self._ground) for marker in self._parts.ground]
         gravity = np.ascontiguousarray(self._ground[:2] @ self._parts.gravity)
         model = _core.PlanarModel(bodies, ground + self._shifted, rows, self._parts.wrenches, gravity)
-        return Plane(model, self._ground, np.array(followed, dtype=int), np.column_stack(spread))
+        cut = tuple(self._cut(place) for place in self._parts.cut)
+        return Plane(model, self._ground, np.array(followed, dtype=int), np.column_stack(spread), cut)
+
+    def _cut(self, place: CutPlace) -> CutPlace:
+        axis = self._of_marker(self._parts.wrenches[place.a]) @ place.axis
+        axis[slice(0, 2) if place.turns else 2] = 0.0
+        return place._replace(axis=axis)
 
     def _rows(self, is_path: Booleans) -> tuple[list[_core.RowModel], list[int], list[Array]]:
         """Rows of the plane, which ones in space they follow, and columns of `spread`."""
@@ -162,7 +140,7 @@ class _Reduction:
             if not group:
                 in_plane = self._row(row)
                 if in_plane is None and is_path[k]:
-                    raise _AcrossError
+                    raise AcrossError
                 of_row = [] if in_plane is None else [(in_plane, unit[k])]
             else:
                 of_row = list(self._together(group)) if group[0] == k else []
@@ -184,7 +162,7 @@ class _Reduction:
         rows = self._parts.rows
         F = np.array([self._direction(rows[i]) for i in group])
         if abs(float(F[:, 2] @ F[:, 2]) - 1.0) > EXACT:
-            raise _AcrossError
+            raise AcrossError
         held, directions = np.linalg.eigh(F[:, :2].T @ F[:, :2])
         for size, direction in zip(held, directions.T, strict=True):
             if size > 0.5:  # 1: held, 0: left free
@@ -203,7 +181,7 @@ class _Reduction:
         inboard = data.markers[body.inboard_marker]
         self._check_joint(body.joint, self._normal @ self._frames[number].carrier)
         if body.joint == _core.JointKind.planar and np.any(inboard.Phi):
-            raise _AcrossError  # the core takes coordinates of free bodies for those of their frames
+            raise AcrossError  # the core takes coordinates of free bodies for those of their frames
         found = _core.PlanarBody()
         for key in (
             "name",
@@ -216,7 +194,7 @@ class _Reduction:
             "of_section",
         ):
             setattr(found, key, getattr(body, key))
-        found.joint, found.data = PLANAR[body.joint], _data(data, axes)
+        found.joint, found.data = PLANAR[body.joint], planar_data(data, axes)
         return found
 
     @staticmethod
@@ -227,7 +205,7 @@ class _Reduction:
         slides = kind == _core.JointKind.prismatic
         off = abs(normal[2]) if slides else np.linalg.norm(normal - np.eye(3)[2])
         if off > EXACT:
-            raise _AcrossError
+            raise AcrossError
 
     def _row(self, row: _core.RowModel) -> _core.RowModel | None:
         """In axes of planar markers; None where it does nothing in the plane."""
@@ -248,7 +226,7 @@ class _Reduction:
     def _shifted_for(self, row: _core.RowModel, f: Array) -> _core.MarkerAt:
         """A point of the ground from which f in the plane measures what it does in space: d_n is a constant."""
         if row.kind != _core.RowKind.point or row.a.body >= 0:
-            raise _AcrossError
+            raise AcrossError
         a = self._ground @ self._parts.ground[row.a.marker].position
         marker = _core.PlanarMarker()
         marker.position = a[:2] - f[:2] * (f[2] * (self._height(row.b) - a[2]) / (f[:2] @ f[:2]))
@@ -265,44 +243,6 @@ class _Reduction:
     def _of_marker(self, at: _core.MarkerAt) -> Array:
         """(3, 3) rows: axes of a planar marker in those of its triad."""
         if at.body < 0:
-            return _axes_of_triad(self._parts.ground[at.marker].triad.T @ self._normal)
+            return axes_of_triad(self._parts.ground[at.marker].triad.T @ self._normal)
         markers = self._parts.bodies[at.body].data.markers
-        return _axes_of_triad(markers[at.marker].triad.T @ self._axes[at.body][2])
-
-
-def _marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarker:
-    """`axes` (3, 3): rows x, y of the plane and its normal, in axes of the body."""
-    found, Phi, Phi_r = _core.PlanarMarker(), axes @ marker.Phi[:3], axes @ marker.Phi[3:]
-    if not (_is_small(Phi[2], Phi) and _is_small(Phi_r[:2], Phi_r)):
-        raise _AcrossError
-    x = axes @ marker.triad @ _axes_of_triad(marker.triad.T @ axes[2])[0]
-    found.position, found.angle = np.ascontiguousarray((axes @ marker.position)[:2]), float(np.arctan2(x[1], x[0]))
-    found.Phi = np.vstack([Phi[:2], Phi_r[2:]])
-    return found
-
-
-def _data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
-    """The constants of a body in the plane. Raises `_AcrossError` where it bends otherwise, twists, or is stiffened."""
-    found, normal = _core.PlanarData(), axes[2]
-    along = float(normal @ data.spin_axis)
-    found.mass, found.first_moment = data.mass, np.ascontiguousarray(axes[:2] @ data.first_moment)
-    found.inertia = float(np.trace(data.J2) - normal @ data.J2 @ normal + data.J_spin * along**2)
-    if len(data.stiffness):
-        if data.K_s or np.any(data.h_spin) or np.any(data.S_spin):
-            raise _AcrossError
-        n = len(data.stiffness)
-        S = _turned(np.array(data.S_bar_kl).reshape(3, 3, n, n), axes)
-        # ∫ρ u_n² dV of modes with ∫ρ u² dV = 1
-        if np.diag(S[2, 2]).max() > EXACT or not _is_small(normal @ data.S_bar, data.S_bar):
-            raise _AcrossError
-        I_bar = _turned(data.I_bar.reshape(3, 3, n), axes)
-        found.stiffness, found.damping = data.stiffness, data.damping
-        found.S_bar = np.ascontiguousarray(axes[:2] @ data.S_bar)
-        found.h, found.j = I_bar[0, 1] - I_bar[1, 0], I_bar[0, 0] + I_bar[1, 1]
-        found.S_tilde, found.m_xy = S[0, 1] - S[1, 0], S[0, 0] + S[1, 1]
-    found.markers = [_marker(marker, axes) for marker in data.markers]
-    return found
-
-
-def _turned(tensor: Array, axes: Array) -> Array:
-    return as_floats(np.einsum("ik,jl,kl...->ij...", axes, axes, tensor))
+        return axes_of_triad(markers[at.marker].triad.T @ self._axes[at.body][2])

@@ -14,12 +14,15 @@ from ...common.rotations import exponential
 from .. import _core
 from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
+from ..joints.transmission import Friction
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
-from .spatial_drives import NO_DRIVES, Command, Drive, Drives, FrameDrive, PointDrive
-from .spatial_model import SpatialModel, SpatialRow
-from .spatial_parts import Placed, SpatialParts, carried_body, moves, rows_of, standing_marker
+from .spatial_drives import NO_DRIVES, Command, Drive, Drives, PointDrive
+from .spatial_frame_motors import held_forces, turn_frames
+from .spatial_model import SpatialModel
+from .spatial_parts import CutPlace, Placed, SpatialParts, carried_body, moves, standing_marker
 from .spatial_plane import Plane, in_plane
-from .spatial_transmission import gear_forces, resistance, resistance_slope
+from .spatial_rows import SpatialRow
+from .spatial_transmission import gear_forces, tree_resistance, tree_resistance_slope
 from .spatial_tree import Section
 
 ZERO = _core.TimeFunction.constant(0.0)
@@ -72,8 +75,10 @@ class SpatialSystem:
         self._wrenches: list[Placed] = []
         loads = [PointDrive(load.point, load.components) for load in model.scene.load if load.point is not None]
         self._at_points = [self._point_drive(drive) for drive in (*loads, *drives.at_points)]
+        self._cut = [one for one in model.cut if one.is_loaded]
+        cut = tuple(self._cut_place(one.row) for one in self._cut)
         self._check()
-        moments = [drive for load in model.scene.load if load.joint is not None for drive in self._drives(load)]
+        moments = [drive for load in model.scene.load if load.joint in tree.carried for drive in self._drives(load)]
         self._along = [*moments, *model.modal_loads, *drives.along]
         self._on_frames = drives.on_frames
         driven = self._driven(commands)
@@ -84,12 +89,12 @@ class SpatialSystem:
         turning = [number for number, _ in self._turning]
         ground = [standing_marker(section, number in turning) for number, section in enumerate(self._ground)]
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
-        self._parts = SpatialParts(bodies, ground, rows, wrenches, np.array(model.scene.gravity))
+        self._parts = SpatialParts(bodies, ground, rows, wrenches, np.array(model.scene.gravity), cut)
 
     @cached_property
     def core(self) -> _core.SpatialModel:
         """In space."""
-        return _core.SpatialModel(*self._parts)
+        return self._parts.model()
 
     @cached_property
     def scene(self) -> _core.TreeScene:
@@ -115,8 +120,8 @@ class SpatialSystem:
 
     def held_model(self) -> _core.HeldModel:
         """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
-        bodies, ground, rows, _, gravity = self._parts
-        return _core.HeldModel(bodies, ground, rows, gravity, self.scene)
+        parts = self._parts
+        return _core.HeldModel(parts.bodies, parts.ground, parts.rows, parts.wrenches, parts.gravity, self.scene)
 
     def _driven(self, commands: Sequence[Command]) -> Booleans:
         """(n_v,) along which coordinates given forces act, of which inverse analyses have none."""
@@ -183,22 +188,22 @@ class SpatialSystem:
     def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> Derivatives:
         """How accelerations and rows answer to small changes of q, v and forces, at time t under the scene's loads.
 
-        `supplied` (n_v,) acts beside loads, friction and springs in gears. Rows that depend on others at q, v are left
-        out.
+        `supplied` (n_v,) acts beside loads, friction and springs in gears; the core knows what acts along cut joints.
+        Rows that depend on others at q, v are left out.
         """
         self.turn_markers(t)
         self.core.keep_independent_rows(q, v)
         tree = self.model.tree
-        rest = gear_forces(tree, q[None], v[None])[0] - resistance(tree, v[None])[0]
+        rest = gear_forces(tree, q[None], v[None])[0] - tree_resistance(tree, v[None])[0]
         loads = self.force(t)
         force = supplied + rest + (0.0 if loads is None else loads)
         wrench = np.zeros((len(self._wrenches), len(OF_POINT)))
         for number, components in self._at_points:
             for name, magnitude in components.items():
                 wrench[number, OF_POINT.index(name)] += magnitude(t)[0]
-        found = self.core.derivatives(q, v, self.target(t), force, wrench.ravel())
+        found = self.core.derivatives(q, v, self.target(t), force, wrench.ravel(), self.scene, t)
         signs = self.row_signs[:, None]
-        by_v = found.a_v - found.a_f * resistance_slope(tree, v[None])[0]
+        by_v = found.a_v - found.a_f * tree_resistance_slope(tree, v[None])[0]
         return Derivatives(found.a_q, by_v, found.a_f, signs * found.value_q, signs * found.rate_q)
 
     def _follow(self, plane: Plane | None) -> _core.TreeScene:
@@ -214,7 +219,7 @@ class SpatialSystem:
                 for along, share in [(component, 1.0)] if plane is None else plane.shares(component):
                     scene.add_point_load(wrench, along, magnitude, share)
         for drive in self._on_frames:
-            self._turn_frames(scene, drive)
+            turn_frames(scene, self.model, drive)
         for node in self.model.tree.nodes:
             for number, friction in enumerate(node.joint.frictions):  # the same along all of a joint's coordinates
                 at = node.q.start + number, node.v.start + number
@@ -222,36 +227,22 @@ class SpatialSystem:
         for gear in self.model.tree.gears:
             motor, joint = ((node.q.start, node.v.start) for node in (gear.motor, gear.joint))
             scene.add_gear(motor, joint, gear.sign, gear.stiffness, gear.damping)
+        self._act_along_cut(scene, self._parts.cut if plane is None else plane.cut)
         for number, law in self._turning:
             scene.turn_marker(number, _turning_law(law))
         return scene
 
-    def _turn_frames(self, scene: _core.TreeScene, drive: FrameDrive) -> None:
-        """A moment along the joint, less what the sections at it would do on the modes of its two bodies."""
-        node, direction = self.model.tree.nodes[drive.body], np.zeros(self.model.tree.n_v)
-        direction[node.v] = drive.sign
-        scene.add_load(direction, drive.size)
-        for share in self._frame_shares(drive.body, drive.sign):
-            scene.add_frame_motor(*share, drive.size)
-
-    def _frame_shares(self, body: int, sign: float) -> Iterator[tuple[int, int, Array, Array]]:
-        """Of the motor on frames along the joint that carries a body, for each side with modes.
-
-        Where the modes are in q and in v, Φ_r (3, n) of the section and the joint's axis there.
-        """
-        node = self.model.tree.nodes[body]
-        for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
-            if section.body >= 0 and (of := self.model.tree.nodes[section.body]).body.n_modes:
-                axis = sign * side * section.triad[:, 2]
-                yield of.p_q.start, of.p_v.start, rows_of(of.body, section)[0][3:], axis
+    def _act_along_cut(self, scene: _core.TreeScene, places: Sequence[CutPlace]) -> None:
+        """Friction and loads of joints at which loops are cut."""
+        for number, (one, place) in enumerate(zip(self._cut, places, strict=True)):
+            friction = one.friction or Friction(0.0, 0.0, 1.0)
+            scene.add_cut_joint(*place, friction.viscous, friction.coulomb, friction.speed)
+            for load in one.loads:
+                scene.add_cut_load(number, load, one.row.sign)
 
     def held_forces(self, commands: Sequence[Command]) -> _core.HeldForces:
         """Forces of commands that are held, in their order."""
-        found = _core.HeldForces(np.reshape([c.direction for c in commands], (len(commands), self.model.tree.n_v)).T)
-        for number, command in enumerate(commands):
-            for share in self._frame_shares(*command.frame) if command.frame is not None else ():
-                found.add_frame_motor(number, *share)
-        return found
+        return held_forces(self.model, commands)
 
     def _drives(self, load: SpatialLoad) -> Iterator[Drive]:
         """Directions (n_v,) and sizes of the moments of a joint."""
@@ -261,8 +252,15 @@ class SpatialSystem:
 
     def _point_drive(self, drive: PointDrive) -> tuple[int, Mapping[str, TimeFunction]]:
         """Number of the wrench, and its components over time."""
-        self._wrenches.append(self._place(self.model.tree.section(drive.point, np.eye(3))))
-        return len(self._wrenches) - 1, drive.components
+        return self._wrench(self.model.tree.section(drive.point, np.eye(3))), drive.components
+
+    def _cut_place(self, row: SpatialRow) -> CutPlace:
+        return CutPlace(self._wrench(row.a), self._wrench(row.b), row.kind == "turn", row.f)
+
+    def _wrench(self, section: Section) -> int:
+        """Number of a wrench on a section, made for it."""
+        self._wrenches.append(self._place(section))
+        return len(self._wrenches) - 1
 
     def _turning_marker(self, law: OrientationLaw) -> int:
         """Number of the ground's marker that turns as `law` says; made where it is new."""

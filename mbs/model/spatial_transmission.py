@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +10,9 @@ import numpy as np
 from ...common.arrays import Array
 from ..joints.spatial.revolute import SpatialRevolute
 from .spatial_accelerations import Accelerated
-from .spatial_tree import Node, Section, SpatialTree
+from .spatial_cut import cut_resistance
+from .spatial_model import SpatialModel
+from .spatial_tree import Motion, Node, Section, SpatialTree
 
 
 class RotorMotion(NamedTuple):
@@ -88,23 +90,29 @@ def rotor_forces(state: Accelerated) -> Array:
     return found
 
 
-def resistance(tree: SpatialTree, v: Array) -> Array:
-    """Friction (T, n_v) along all coordinates, c γ̇ + τ_c tanh(γ̇/γ̇_s); what it dissipates is v times that."""
+def resistance(model: SpatialModel, q: Array, v: Array, frames: Sequence[Motion] | None = None) -> Array:
+    """Generalized forces (T, n_v) by which friction in all joints resists; what it dissipates is v times that.
+
+    `frames` of q where known.
+    """
+    return tree_resistance(model.tree, v) + cut_resistance(model.tree, model.cut, q, v, frames)
+
+
+def tree_resistance(tree: SpatialTree, v: Array) -> Array:
+    """The same of the joints that have coordinates, along these."""
     found = np.zeros_like(v)
     for node in tree.nodes:
         for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
-            rate = v[:, column]
-            found[:, column] = friction.viscous * rate + friction.coulomb * np.tanh(rate / friction.speed)
+            found[:, column] = friction.resistance(v[:, column])
     return found
 
 
-def resistance_slope(tree: SpatialTree, v: Array) -> Array:
-    """Its derivative (T, n_v) by v, coordinate by coordinate: c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s)."""
+def tree_resistance_slope(tree: SpatialTree, v: Array) -> Array:
+    """Its derivative (T, n_v) by v, coordinate by coordinate."""
     found = np.zeros_like(v)
     for node in tree.nodes:
         for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
-            steady = np.tanh(v[:, column] / friction.speed)
-            found[:, column] = friction.viscous + friction.coulomb / friction.speed * (1.0 - steady**2)
+            found[:, column] = friction.slope(v[:, column])
     return found
 
 

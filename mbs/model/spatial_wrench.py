@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
-from .spatial_model import SpatialRow
+from .spatial_rows import SpatialRow
 from .spatial_tree import Motion, SpatialTree
 
 
@@ -43,6 +43,8 @@ def row_wrenches(
     elif row.kind in ("point", "slide"):
         f = np.einsum("tij,j->ti", a.F, row.f) if row.kind == "slide" else np.broadcast_to(row.f, a.r.shape)
         on_b = Wrench(size[:, None] * f, zero).seen_from(b.r)
+    elif row.kind == "turn":
+        on_b = Wrench(zero, size[:, None] * np.einsum("tij,j->ti", a.F, row.f))
     elif row.kind == "rotation":
         on_b = Wrench(zero, size[:, None] * row.f)
     else:

@@ -55,7 +55,7 @@ def energies(motion: SpatialMotion) -> Energies:
         dissipated += np.einsum("ti,ij,tj->t", p_dot, body.damping, p_dot)
     of_gears = gear_energy(motion.model.tree, motion.q, motion.v)
     strain, dissipated = strain + of_gears[0], dissipated + of_gears[1]
-    dissipated += np.sum(motion.v * resistance(motion.model.tree, motion.v), axis=1)
+    dissipated += np.sum(motion.v * resistance(motion.model, motion.q, motion.v, motion.frames), axis=1)
     for node in motion.model.tree.nodes:
         kinetic += 0.5 * rotor_mass(node) * np.sum(motion.v[:, node.v] ** 2, axis=1)
     for rotor in rotors(motion.accelerated):

@@ -15,9 +15,9 @@ from ...common.arrays import Array
 from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names
 from ..fields.field_types import split_point
 from ..model.spatial_inverse import BodyForces, body_forces, required_forces
-from ..model.spatial_model import SpatialRow
 from ..model.spatial_motors import split_forces
 from ..model.spatial_payloads import turns_as_a_body
+from ..model.spatial_rows import SpatialRow
 from ..model.spatial_transmission import rotors
 from ..model.spatial_tree import Section
 from ..model.spatial_wrench import Wrench, row_wrenches
@@ -48,7 +48,7 @@ def _link_loads(
     tree, state = motion.model.tree, motion.accelerated
     of_frames, gravity = state.of_frames(), np.array(motion.model.scene.gravity)
     needed = [body_forces(n, state, of, gravity) for n, of in zip(tree.nodes, of_frames, strict=True)]
-    acting, found = _wrenches(motion, needed, of_rows), {}
+    acting, found = _wrenches(motion, needed, (*of_rows, *motion.along_cut)), {}
     for name in bodies:
         number = tree.index[name]
         node, frame = tree.nodes[number], motion.frames[number]

@@ -16,9 +16,12 @@ from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import gears_of_motion
 from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_bending import bent_section
+from ..model.spatial_cut import CutCoordinate
+from ..model.spatial_cut_motion import CutMotion, cut_motions
 from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
+from ..model.spatial_rows import SpatialRow
 from ..model.spatial_tree import Motion, Node
 from ..scene.spatial.trajectories import SpatialTrajectory
 
@@ -81,6 +84,17 @@ class SpatialMotion:
         return row_values(self.model, self.q, self.time, self.frames)
 
     @cached_property
+    def cut(self) -> list[tuple[CutCoordinate, CutMotion]]:
+        """Coordinates of joints at which loops are cut."""
+        motions = cut_motions(self.model, self.q, self.v, self.time, self.frames)
+        return list(zip(self.model.cut, motions, strict=True))
+
+    @property
+    def along_cut(self) -> list[tuple[SpatialRow, Array]]:
+        """Rows of these along which something acts, each with its force (T,), N·m or N."""
+        return [(one.row, one.row.sign * motion.force) for one, motion in self.cut if one.is_loaded]
+
+    @cached_property
     def violation(self) -> Array:
         """(T, 2) largest of |C| (m, rad) and |Ċ| of all rows; of the one state of a static analysis, C alone."""
         C, C_v = self.rows
@@ -122,7 +136,10 @@ class SpatialMotion:
         return PointMotion(found.r, deflection, continuous(quaternions(found.F)))
 
     def joint(self, name: str) -> tuple[Array, Array] | None:
-        """Coordinates, unwrapped, and rates (T, k) of a joint; None where it has none, or closes a loop."""
+        """Coordinates, unwrapped, and rates (T, k) of a joint; None where it has none."""
+        if of_cut := [motion for one, motion in self.cut if one.joint.name == name]:
+            x, x_dot, _ = (np.array(values).T for values in zip(*of_cut, strict=True))
+            return x, x_dot
         number = self.model.tree.carried.get(name)
         if number is None or not self.model.tree.nodes[number].joint.units:
             return None

@@ -17,20 +17,22 @@ def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
     """By joint: force on its second side, and moment about where that side is, N and N·m.
 
     A joint of the tree carries what its body and all that hangs on it need, less what else acts there; one that closes
-    a loop has its multipliers.
+    a loop has its multipliers, and what acts along it.
     """
     tree, state, gravity, totals = motion.model.tree, motion.accelerated, np.array(motion.model.scene.gravity), []
     for node, of_frame, frame in zip(tree.nodes, state.of_frames(), motion.frames, strict=True):
         needed = body_forces(node, state, of_frame, gravity)
         totals.append(Wrench(needed.force, needed.moment).seen_from(frame.r))
     loops: dict[str, Wrench] = {}
-    for k, row in enumerate(motion.model.rows):
-        on_a, on_b = row_wrenches(tree, row, -motion.multipliers[:, k], motion.q, motion.time, motion.frames)
+    # What acts along a joint that closes a loop is part of what it carries, as in the tree.
+    for row, size in (*zip(motion.model.rows, -motion.multipliers.T, strict=True), *motion.along_cut):
+        on_a, on_b = row_wrenches(tree, row, size, motion.q, motion.time, motion.frames)
         for section, acting in ((row.a, on_a), (row.b, on_b)):
             if section.body >= 0:
                 totals[section.body] = totals[section.body].plus(acting, -1.0)
         if not row.is_trajectory:
-            at_joint = on_b.seen_from(-tree.motion(row.b, motion.q, motion.frames).r)
+            second, on_second = (row.b, on_b) if row.sign > 0 else (row.a, on_a)
+            at_joint = on_second.seen_from(-tree.motion(second, motion.q, motion.frames).r)
             loops[row.owner] = loops[row.owner].plus(at_joint) if row.owner in loops else at_joint
     loads = [(load.point, load.components) for load in motion.model.scene.load if load.point is not None]
     for point, components in (*loads, *motion.applied):

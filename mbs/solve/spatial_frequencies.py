@@ -10,6 +10,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.validation import quoted
+from ..model.spatial_cut import cut_damping
 from ..model.spatial_gears import with_held_motors
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_system import SpatialSystem
@@ -71,7 +72,7 @@ def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q:
     C_v = row_values(model, q[None], np.array([t]))[1][0]
     _, sizes, V = np.linalg.svd(C_v) if len(C_v) else (None, np.zeros(0), np.eye(len(M)))
     free = V[int(np.count_nonzero(sizes > DEPENDENT * sizes.max(initial=0.0))) :].T
-    K, D = _springs(model)
+    K, D = _springs(model, q)
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ ((M + M.T) / 2) @ free))
     squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)
     stiff = slice(len(squares) - strained(K, free), None)
@@ -80,9 +81,10 @@ def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q:
     return SpatialVibrations(as_floats(omega), as_floats(ratio), shape, K)
 
 
-def _springs(model: SpatialModel) -> tuple[Array, Array]:
-    """K and D (n_v, n_v) of modes, gears and viscous friction."""
+def _springs(model: SpatialModel, q: Array) -> tuple[Array, Array]:
+    """K and D (n_v, n_v) of modes, gears and viscous friction at q (n_q,)."""
     K, D = gear_matrices(model.tree)
+    D += cut_damping(model.tree, model.cut, q)
     for node in model.tree.nodes:
         K[node.p_v, node.p_v] = np.diag(node.body.stiffness)
         D[node.p_v, node.p_v] = node.body.damping

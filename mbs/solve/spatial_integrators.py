@@ -59,7 +59,8 @@ def choose_integrator_in_space(
 
 def _sticks(model: SpatialModel) -> bool:
     nodes = model.tree.nodes
-    has_friction = any(friction.coulomb > 0 for node in nodes for friction in node.joint.frictions)
+    joints = (*(node.joint for node in nodes), *model.tree.loops)
+    has_friction = any(friction.coulomb > 0 for joint in joints for friction in joint.frictions)
     return has_friction and any(node.body.n_modes for node in nodes)
 
 

@@ -21,6 +21,7 @@ from ...common.arrays import Array, Indices
 from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
 from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_cut import measured
 from ..model.spatial_inverse import required_forces
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import FrameShare, frame_share, turning_motors
@@ -118,6 +119,10 @@ class SpatialLinearisation:
             if joint.name in tree.carried:
                 sign = -1.0 if tree.nodes[tree.carried[joint.name]].backwards else 1.0
                 found |= {name: sign * H[k] for name, k in labelled(self.model, joint.name)}
+        gradients = measured(tree, self.model.cut, state.q, state.frames)[1][0]
+        for cut in tree.loops:
+            own = [G @ H for one, G in zip(self.model.cut, gradients, strict=True) if one.joint is cut]
+            found |= dict(zip(_names(cut.name, len(own)), own, strict=True))
         found |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
         return MappingProxyType(found | {f"point/{name}": row for name, row in self._places(state, H).items()})
 
@@ -144,8 +149,11 @@ def labelled(model: SpatialModel, joint: str) -> Iterator[tuple[str, int]]:
 
 
 def _labelled(joint: str, columns: Array) -> Iterator[tuple[str, int]]:
-    for number, k in enumerate(columns, 1):
-        yield f"joint/{joint}" + (f" {number}" if len(columns) > 1 else ""), int(k)
+    yield from zip(_names(joint, len(columns)), map(int, columns), strict=True)
+
+
+def _names(joint: str, count: int) -> list[str]:
+    return [f"joint/{joint}" + (f" {number}" if count > 1 else "") for number in range(1, count + 1)]
 
 
 def _of_motor(gear: ElasticGearInSpace) -> str:

@@ -16,7 +16,8 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, SolveError
 from ..fields.waypoints import spline
-from ..model.spatial_model import SpatialModel, SpatialRow, row_values, target_rates
+from ..model.spatial_model import SpatialModel, row_values, target_rates
+from ..model.spatial_rows import SpatialRow
 from ..model.spatial_tree import Node
 from .spatial_posture import Mobility, joint_scales, mobility, undeformed_posture
 from .spatial_prescribed import joint_places, prescribed_motion

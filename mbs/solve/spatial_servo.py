@@ -20,8 +20,9 @@ from ...common.errors import InputError
 from .._core import TimeFunction
 from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_inverse import required_forces
-from ..model.spatial_model import SpatialModel, SpatialRow, row_values
+from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import SplitForces, split_forces
+from ..model.spatial_rows import SpatialRow
 from .internal_dynamics import Target
 from .spatial_posture import BoolArray, mobility, solve_posture, undeformed_posture
 from .spatial_prescribed import modal_places, motion_near

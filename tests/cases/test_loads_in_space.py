@@ -103,58 +103,6 @@ def test_motors_carry_loads_friction_and_rotors(tmp_path, ffrobot):
     np.testing.assert_allclose(reaction[:, 0], -4 * np.cos(t), atol=1e-7)
 
 
-FOUR_BAR = {
-    "name": "four_bar", "space": "spatial", "gravity": [0.0, -9.81, 0.0],
-    "body": [
-        {
-            "name": name,
-            "rigid": {
-                "mass": 1.0, "center": [length / 2, 0.0, 0.0], "inertia": [1e-4, 1e-3, 1e-3],
-                "points": {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0]},
-            },
-        }
-        for name, length in (("crank", 0.2), ("coupler", 0.5), ("rocker", 0.4))
-    ],
-    "initial": {"joints": {"A": 1.0, "B": -0.5, "D": 1.6}},
-    "trajectory": [{"name": "turn", "joint": "A", "value": "1 + 0.3*(1 - cos(3*t))"}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.01, "tolerance": 1e-9}],
-}  # fmt: skip
-SIDES = {
-    "A": ["ground", "crank.root"], "B": ["crank.tip", "coupler.root"], "C": ["coupler.tip", "rocker.tip"],
-    "D": ["ground", "rocker.root"],
-}  # fmt: skip
-
-
-def four_bar(**of_joints):
-    keys = {"type": "revolute", "axis": [0.0, 0.0, 1.0]}
-    places = {"A": {"motor": True}, "D": {"at": [0.5, 0.0, 0.0]}}
-    joints = [
-        {"name": name, "between": sides} | keys | places.get(name, {}) | of_joints.get(name, {})
-        for name, sides in SIDES.items()
-    ]
-    return ffrobot.make_scene(**FOUR_BAR, joint=joints)
-
-
-@pytest.mark.parametrize("name", SIDES)
-def test_friction_and_rotors_in_every_joint_of_a_loop(name):
-    """The loop is cut elsewhere, and the motor gives what friction takes and the rotor gains."""
-    plain, built = (
-        ffrobot.solve(four_bar(**{name: keys})) for keys in ({}, {"viscous_friction": 2.0, "rotor_inertia": 0.7})
-    )
-    rate, body = built[f"inverse/joints/{name}/rate"], SIDES[name][0].partition(".")[0]
-    spin = rate if body == "ground" else rate + built[f"inverse/bodies/{body}/angular_velocity"][:, 2]
-    power, energy = 2.0 * rate**2, 0.35 * spin**2
-    keys = ("joints/A/moment", "energy/kinetic")
-    moment, kinetic = (built[f"inverse/{key}"] - plain[f"inverse/{key}"] for key in keys)
-    assert np.ptp(rate) > 0.1
-    np.testing.assert_allclose(built["inverse/energy/dissipated_power"], power, atol=1e-9)
-    np.testing.assert_allclose(kinetic, energy, atol=1e-9)
-    t, work = built["inverse/time"], moment * built["inverse/joints/A/rate"]
-    gained = CubicSpline(t, energy)(t, 1)
-    inside = slice(5, -5)  # where the spline has neighbours on both sides
-    np.testing.assert_allclose(work[inside], (power + gained)[inside], atol=1e-5 * np.abs(work).max())
-
-
 def test_links_whose_joints_stick(tmp_path, ffrobot):
     """Dry friction near rest, a stiff damper at light ends of links: "auto" is implicit, and finds the same moments."""
     scene = write_scene("arm6_static", tmp_path)

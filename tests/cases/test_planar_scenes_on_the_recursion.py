@@ -24,6 +24,10 @@ TIMES = {"end": 0.05, "output_step": 0.001, "tolerance": 1e-10}
 ANALYSES = [{"name": "inverse", "kind": "pcid"} | TIMES, {"name": "released", "kind": "forward"} | TIMES]
 AS_BUILT = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.5, "rotor_inertia": 1e-4,
             "gear_ratio": 30.0}  # fmt: skip
+FRICTION = {"viscous_friction": 0.02, "coulomb_friction": 0.05, "friction_speed": 0.5}
+LOADS_OF_LOOP = [
+    {"joint": joint, "moment": f"{size}*sin(30*t)"} for joint, size in (("O", 0.2), ("guide", 0.1), ("B", 0.3))
+]
 LOADS = [{"point": "link2.mid", "x": "3*t", "moment": "0.5"}, {"joint": "A", "moment": "2*sin(30*t)"}]
 CASES_OF = {
     "beams": ("two_link", {}),
@@ -38,7 +42,10 @@ CASES_OF = {
     ),
     "solids": ("two_link_solid", {}),
     "a loop": ("slider_crank", {}),
-    "a loop, joints as built": ("slider_crank", {"of joint": {"guide": AS_BUILT, "A": AS_BUILT}}),
+    "a loop, cut at a slide with friction": ("slider_crank", {"of joints": FRICTION, "load": LOADS_OF_LOOP}),
+    "a loop, joints as built": (
+        "slider_crank", {"of joints": FRICTION, "of joint": {"guide": AS_BUILT, "A": AS_BUILT}, "load": LOADS_OF_LOOP}
+    ),
 }  # fmt: skip
 
 

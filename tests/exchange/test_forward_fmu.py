@@ -91,15 +91,17 @@ PLANAR = {
                   {"name": "bend", "type": "weld", "between": ["upper.tip", "fore.root"]}],
         "initial": {"state": "static", "joints": {"pin": -1.9}, "angles": {"fore": -0.8}},
     },
-    # a crank that drives a slider, from a guess of angles that does not close the loop
+    # a crank that drives a slider, from a guess of angles that does not close the loop, with friction where it is cut
     "flat loop": PLANE | {
         "body": [{"name": "slider", "rigid": flat_box(pin=[0.0, 0.0])},
                  {"name": "crank", "rigid": flat_box(a=[0.0, 0.0], b=[0.1, 0.0])},
                  {"name": "rod", "link": flat_link("rod", 1)}, {"name": "flyer", "rigid": flat_box()}],
         "joint": [
-            {"name": "guide", "type": "prismatic", "between": ["ground", "slider.pin"], "axis": [1.0, 0.2]},
-            flat_pin("drive", "ground", "crank.a", motor=True), flat_pin("knee", "crank.b", "rod.root"),
-            flat_pin("out", "slider.pin", "rod.tip"),
+            {"name": "guide", "type": "prismatic", "between": ["ground", "slider.pin"], "axis": [1.0, 0.2],
+             "viscous_friction": 0.4},
+            flat_pin("drive", "ground", "crank.a", motor=True),
+            flat_pin("knee", "crank.b", "rod.root", viscous_friction=0.002),
+            flat_pin("out", "slider.pin", "rod.tip", viscous_friction=0.003),
         ],
         "initial": {"angles": {"crank": 1.2, "rod": -0.3}},
     },

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from rotations import quaternion
 from spatial_checkpoints import CASES, load
-from spatial_scenes import checkpoint_scene
+from spatial_scenes import checkpoint_scene, tree_model
+from spatial_trees import Tree
 
-import ffrobot
+from ffrobot.mbs.model.spatial_body import rigid_body
 from ffrobot.mbs.model.spatial_model import build_spatial_model, row_values, target_rates
 from ffrobot.mbs.solve.spatial_posture import check_path, mobility, solve_posture, undeformed_posture
 from ffrobot.mbs.solve.spatial_statics import static_equilibrium
@@ -70,47 +71,31 @@ def test_loops_are_cut_at_the_spherical_joint():
     assert [row.kind for row in model.rows] == ["point"] * 4
 
 
-def bar(name, length):
-    points = {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0]}
-    return {
-        "name": name,
-        "rigid": {"mass": 1.0, "center": [length / 2, 0.0, 0.0], "inertia": [0.01, 0.01, 0.01], "points": points},
-    }
-
-
 @pytest.mark.parametrize(
-    ("of_joint", "load", "found"),
+    ("of_joints", "cut"),
     [
-        ({"viscous_friction": 0.1}, None, "viscous_friction"),
-        ({"coulomb_friction": 0.1}, None, "coulomb_friction"),
-        ({"position_limit": [-1.0, 1.0]}, None, "position_limit"),
-        ({"rotor_inertia": 1e-4, "gear_ratio": 9.0, "stiffness": 10.0}, None, "rotor_inertia"),
-        ({"motor": True}, None, "motor"),
-        ({}, {"joint": "last", "moment": "t"}, "load no. 1"),
+        ({}, "last"),
+        ({"second": {}}, "second"),
+        ({"last": {"rotor_inertia": 1e-4}}, "third"),
+        ({"third": {"motor": True}, "last": {"rotor_inertia": 1e-4}}, "second"),
+        ({"first": {"rotor_inertia": 1e-4}, "second": {"position_limit": (-1.0, 1.0)}}, "second"),
     ],
 )
-def test_what_acts_in_all_joints_of_a_loop_is_refused(of_joint, load, found):
-    """The coordinate of the joint at which it is cut is none of the tree's."""
-    pins = [
-        ("first", "ground", "crank.root"), ("second", "crank.tip", "coupler.root"),
-        ("third", "ground", "rocker.root"), ("last", "rocker.tip", "coupler.tip"),
-    ]  # fmt: skip
+def test_loops_are_cut_where_nothing_acts_then_where_there_is_neither_motor_nor_rotor(of_joints, cut):
+    """There is friction in all joints that are not named."""
+    pins = {
+        "first": ("ground", "crank.root"), "second": ("crank.tip", "coupler.root"), "third": ("ground", "rocker.root"),
+        "last": ("rocker.tip", "coupler.tip"),
+    }  # fmt: skip
+    keys = {"type": "revolute", "axis": (0.0, 0.0, 1.0)}
     joints = [
-        {"name": name, "type": "revolute", "between": list(sides), "axis": [0.0, 0.0, 1.0]} for name, *sides in pins
+        {"name": name, "between": sides} | keys | of_joints.get(name, {"viscous_friction": 0.1})
+        for name, sides in pins.items()
     ]
-    joints[2]["at"] = [0.5, 0.0, 0.0]
-    for joint in joints[:3]:
-        joint["viscous_friction"] = 0.1
-    joints[3] |= of_joint
-    scene = ffrobot.make_scene(
-        name="four bars", space="spatial", gravity=[0.0, -9.81, 0.0],
-        body=[bar("crank", 0.2), bar("coupler", 0.5), bar("rocker", 0.4)], joint=joints,
-        load=[load] if load else [], initial={"joints": {"first": 1.0, "second": -0.8, "third": 1.8}},
-        analysis=[{"name": "swing", "kind": "forward", "end": 0.1, "output_step": 0.1}],
-    )  # fmt: skip
-    message = f'joint "last": expected a loop with a joint along which nothing acts, where it is cut, found "{found}"'
-    with pytest.raises(ffrobot.InputError, match=message):
-        ffrobot.solve(scene)
+    points = dict.fromkeys(("root", "tip"), (0.0, 0.0, 0.0))
+    bodies = [rigid_body(name, 1.0, np.zeros(3), np.eye(3), points) for name in ("crank", "coupler", "rocker")]
+    model = tree_model(Tree(bodies, []), joints)
+    assert [joint.name for joint in model.tree.loops] == [cut]
 
 
 def test_a_search_that_leaves_all_bounds_ends_in_silence():

@@ -32,13 +32,15 @@ void bind_held_motion(nb::module_ &m) {
       .def(
           "__init__",
           [](HeldModel *model, const std::vector<BodyModel<SpatialData>> &bodies,
-             const std::vector<SpatialMarker> &ground, const std::vector<RowModel> &rows, const VectorXd &gravity,
-             const Scene &scene) {
+             const std::vector<SpatialMarker> &ground, const std::vector<RowModel> &rows,
+             const std::vector<MarkerAt> &wrenches, const VectorXd &gravity, const Scene &scene) {
             new (model) HeldModel();
             model->bodies = bodies, model->ground = ground, model->rows = rows, model->gravity = gravity;
+            model->wrenches = wrenches, model->cut_joints = scene.cut_joints;
             model->joint_forces = scene.joint_forces, model->gears = scene.gears;
           },
-          "bodies"_a, "ground"_a, "rows"_a, "gravity"_a, "scene"_a, "Of the scene joint forces and gears.")
+          "bodies"_a, "ground"_a, "rows"_a, "wrenches"_a, "gravity"_a, "scene"_a,
+          "Of the scene joint forces, gears and cut joints.")
       .def_rw("guid", &HeldModel::guid)
       .def_rw("inputs", &HeldModel::inputs)
       .def_rw("linear", &HeldModel::linear)

@@ -213,6 +213,21 @@ void bind_tree_motion(nb::module_ &m) {
           "a"_a, "b"_a, "ratio"_a, "stiffness"_a, "damping"_a,
           "Spring and damper between two coordinates, indices in q and v each: of the twist a - ratio b.")
       .def(
+          "add_cut_joint",
+          [](Scene &s, int a, int b, bool turns, const Eigen::Vector3d &axis, double viscous, double coulomb,
+             double speed) { s.cut_joints.push_back({a, b, turns, axis, {viscous, coulomb, speed}}); },
+          "a"_a, "b"_a, "turns"_a, "axis"_a, "viscous"_a, "coulomb"_a, "speed"_a,
+          "Friction in a joint at which a loop is cut, between two wrenches of the model: of the turn of b about an "
+          "axis "
+          "of a, or of its way along it.")
+      .def(
+          "add_cut_load",
+          [](Scene &s, int joint, const TimeFunction &magnitude, double share) {
+            s.cut_loads.push_back({joint, magnitude, share});
+          },
+          "joint"_a, "magnitude"_a, "share"_a = 1.0,
+          "share magnitude(t) along the coordinate of a joint of add_cut_joint, by its number.")
+      .def(
           "watch_posture",
           [](Scene &s, const std::vector<bool> &is_path, double length) {
             s.watch = PostureWatch{{is_path.begin(), is_path.end()}, length};

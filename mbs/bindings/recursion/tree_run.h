@@ -44,6 +44,11 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
   for (const GearSpring &gear : scene.gears)
     for (const GearSpring::Side &side : {gear.a, gear.b})
       check_index("q of a gear", side.q, n_q), check_index("v of a gear", side.v, n_v);
+  for (const CutJoint &cut : scene.cut_joints)
+    for (const int wrench : {cut.a, cut.b})
+      check_index("wrench of a cut joint", wrench, model.mechanism.wrenches.size());
+  for (const CutLoad &load : scene.cut_loads)
+    check_index("joint of a load", load.joint, scene.cut_joints.size());
   if (scene.watch)
     check_size("is_path", static_cast<Eigen::Index>(scene.watch->is_path.size()), model.rows());
   for (const DrivenMarker &driven : scene.driven)

@@ -31,13 +31,17 @@ template <class Archive> void fields(Archive &a, GearSpring &x) {
   archived_all(a, x.a.q, x.a.v, x.b.q, x.b.v, x.ratio, x.stiffness, x.damping);
 }
 
+template <class Archive> void fields(Archive &a, CutJoint &x) {
+  archived_all(a, x.a, x.b, x.turns, x.axis, x.friction.viscous, x.friction.coulomb, x.friction.speed);
+}
+
 } // namespace recursion
 
 template <class Archive> void fields(Archive &a, LinearOutput &x) { archived_all(a, x.entries, x.weights); }
 template <class Archive> void fields(Archive &a, PlaceOutput &x) { archived_all(a, x.body, x.position, x.Phi); }
 template <class Archive> void fields(Archive &a, HeldModel &x) {
-  archived_all(a, x.guid, x.bodies, x.ground, x.rows, x.gravity, x.joint_forces, x.gears, x.inputs, x.linear, x.places,
-               x.q, x.v, x.method, x.spectral_radius, x.tolerance, x.duration);
+  archived_all(a, x.guid, x.bodies, x.ground, x.rows, x.gravity, x.joint_forces, x.gears, x.wrenches, x.cut_joints,
+               x.inputs, x.linear, x.places, x.q, x.v, x.method, x.spectral_radius, x.tolerance, x.duration);
 }
 
 namespace {
@@ -46,7 +50,7 @@ using namespace recursion;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-const std::string head = "ffrobot held motion 3\n"; // another number wherever fields() change
+const std::string head = "ffrobot held motion 4\n"; // another number wherever fields() change
 
 VectorXd joined(const VectorXd &q, const VectorXd &v) {
   VectorXd y(q.size() + v.size());
@@ -82,7 +86,7 @@ HeldModel held_model_of(const std::string &bytes) {
 }
 
 HeldMotion::HeldMotion(HeldModel model)
-    : model_(std::move(model)), mechanism_(model_.bodies, model_.ground, model_.rows, {}, model_.gravity),
+    : model_(std::move(model)), mechanism_(model_.bodies, model_.ground, model_.rows, model_.wrenches, model_.gravity),
       scene_(scene_of(model_)), y_(joined(model_.q, model_.v)), inputs_(model_.inputs.size(), 0.0),
       outputs_(output_count(), 0.0) {
   motion_.emplace(mechanism_, scene_, 0, model_.q.data(), model_.v.data());
@@ -112,6 +116,10 @@ Scene HeldMotion::scene_of(const HeldModel &model) {
     check(output.body >= 0 && output.body < static_cast<int>(model.bodies.size()), "places on bodies");
   scene.joint_forces = model.joint_forces;
   scene.gears = model.gears;
+  scene.cut_joints = model.cut_joints;
+  for (const CutJoint &cut : model.cut_joints)
+    for (const int wrench : {cut.a, cut.b})
+      check(wrench >= 0 && wrench < static_cast<int>(model.wrenches.size()), "cut joints between wrenches");
   return scene;
 }
 

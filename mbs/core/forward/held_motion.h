@@ -33,6 +33,8 @@ struct HeldModel {
   Eigen::VectorXd gravity; // (3) m/s^2
   std::vector<recursion::JointForce> joint_forces;
   std::vector<recursion::GearSpring> gears;
+  std::vector<recursion::MarkerAt> wrenches; // those of cut joints
+  std::vector<recursion::CutJoint> cut_joints;
   std::vector<Eigen::VectorXd> inputs; // (n_v) generalized forces of a unit of each
   std::vector<LinearOutput> linear;    // outputs, before those of `places`
   std::vector<PlaceOutput> places;

@@ -20,7 +20,7 @@ GeneralizedAlpha::GeneralizedAlpha(ImplicitSystem &system, double spectral_radiu
       alpha_f_(spectral_radius / (spectral_radius + 1)), beta_(0.25 * std::pow(1 + alpha_f_ - alpha_m_, 2)),
       gamma_(0.5 + alpha_f_ - alpha_m_), leading_((1 - alpha_m_) / (1 - alpha_f_)), v_dot_(n_), next_v_dot_(n_),
       previous_v_dot_(n_), drift_(n_), a_(n_), next_a_(n_), position_correction_(n_), end_(2 * n_), start_(2 * n_),
-      first_slope_(2 * n_), last_slope_(2 * n_), change_(2 * n_), excess_(n_), force_(n_), x_(n_),
+      first_slope_(2 * n_), last_slope_(2 * n_), change_(2 * n_), excess_(n_), force_(system.n_stiff()), x_(n_),
       value_(system.constraints()), rate_(value_), c_(value_) {}
 
 // Consistent initial accelerations, C_tt included, are the first slope. The method's own lie alpha_m - alpha_f steps
@@ -43,7 +43,8 @@ void GeneralizedAlpha::advance(const double *y, double h) {
 }
 
 void GeneralizedAlpha::stiff_force(const VectorXd &x) {
-  force_ = (damping_factor_ * system_.damping() + stiffness_factor_ * system_.stiffness()).cwiseProduct(x);
+  force_ << x, system_.coupling().transpose() * x;
+  force_.array() *= (damping_factor_ * system_.damping() + stiffness_factor_ * system_.stiffness()).array();
 }
 
 bool GeneralizedAlpha::step(double t, const double *y, double h, double tolerance) {

@@ -36,7 +36,7 @@ public:
 private:
   void start(double t, const double *y, double h);
   void advance(const double *y, double h);    // end_ from the accelerations
-  void stiff_force(const Eigen::VectorXd &x); // force_ = (N - M) x
+  void stiff_force(const Eigen::VectorXd &x); // force_, with B^T force_ = (N - M) x
 
   ImplicitSystem &system_;
   ImplicitProjection project_;

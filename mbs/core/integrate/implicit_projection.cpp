@@ -4,11 +4,11 @@ namespace ffrobot {
 
 using Eigen::VectorXd;
 ImplicitProjection::ImplicitProjection(ImplicitSystem &system)
-    : system_(system), none_(VectorXd::Zero(system.n_v())), value_(system.constraints()), rate_(system.constraints()),
-      correction_(system.n_v()) {}
+    : system_(system), none_(VectorXd::Zero(system.n_stiff())), value_(system.constraints()),
+      rate_(system.constraints()), correction_(system.n_v()) {}
 
 bool ImplicitProjection::operator()(double t, double *y) {
-  const auto n = none_.size();
+  const auto n = system_.n_v();
   const auto move_positions = [&](const VectorXd &step) { system_.local().shift(y, -1, step.data()); };
   const auto move_velocities = [&](const VectorXd &step) { VectorMap(y + n, n) -= step; };
   // Positions first: moving them changes velocities, not the other way round.

@@ -57,24 +57,27 @@ private:
 
 // What implicit methods need besides: M v_dot + C_q^T lambda = Q under constraints, and its stiff terms.
 //
-// The stiff terms of Q are -K q - D v with diagonals K and D, zero on rotations; D is as at the last factorisation,
-// where friction is among them. Newton's method on the equations of a step meets the block-arrow matrix
-// N = M + damping_factor D + stiffness_factor K, real or complex, under C_q.
+// The stiff terms of Q are -B^T (K B q + D B v) with diagonals K and D, zero on rotations, and B the identity over the
+// rows of coupling()^T: along coordinates that v does not have. D is as at the last factorisation, where friction is
+// among them. Newton's method on the equations of a step meets N = M + B^T (damping_factor D + stiffness_factor K) B,
+// real or complex, under C_q: block-arrow without coupling.
 class ImplicitSystem : public OdeSystem {
 public:
-  using OdeSystem::OdeSystem;
+  explicit ImplicitSystem(const ConfigurationSpace &space) : OdeSystem(space), uncoupled_(n_v(), 0) {}
   using Complex = std::complex<double>;
 
-  virtual Eigen::Index constraints() const = 0;         // rows of C, and of multipliers
-  virtual const Eigen::VectorXd &stiffness() const = 0; // (n_v), zero where nothing is stiff
-  virtual const Eigen::VectorXd &damping() const = 0;   // (n_v)
+  virtual Eigen::Index constraints() const = 0;                          // rows of C, and of multipliers
+  virtual const Eigen::VectorXd &stiffness() const = 0;                  // (n_stiff), zero where nothing is stiff
+  virtual const Eigen::VectorXd &damping() const = 0;                    // (n_stiff)
+  virtual const Eigen::MatrixXd &coupling() const { return uncoupled_; } // (n_v, n_stiff - n_v)
+  Eigen::Index n_stiff() const { return n_v() + coupling().cols(); }
 
   // M and C_q are those of the last slope(): there has to be one.
   virtual void factorise(double damping_factor, double stiffness_factor) = 0;
   virtual void factorise(Complex damping_factor, Complex stiffness_factor) = 0;
 
-  // Solves N x + C_q^T nu = r, C_q x = c with the last factorisation of that kind: r (n_v), only where the stiffness or
-  // damping is not zero; c (constraints) may be null for 0.
+  // Solves N x + C_q^T nu = B^T r, C_q x = c with the last factorisation of that kind: r (n_stiff), only where the
+  // stiffness or damping is not zero; c (constraints) may be null for 0.
   virtual void solve(const double *r, const double *c, double *x) = 0;
   virtual void solve(const Complex *r, Complex *x) = 0;
 
@@ -83,6 +86,9 @@ public:
 
   // C and C_dot, both (constraints)
   virtual void constraint_values(double t, const double *z, double *value, double *rate) = 0;
+
+private:
+  Eigen::MatrixXd uncoupled_;
 };
 
 } // namespace ffrobot

@@ -50,8 +50,8 @@ constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton'
 Radau::Radau(ImplicitSystem &system)
     : system_(system), project_(system), n_(system.n_v()), Z_(Eigen::MatrixXd::Zero(2 * n_, 3)), W_(Z_), F_(Z_),
       change_(Z_), collocation_(Z_), slopes_(Z_), previous_slopes_(Z_), stage_(2 * n_), end_(2 * n_), start_(2 * n_),
-      first_slope_(2 * n_), last_slope_(2 * n_), real_(2 * n_), force_(n_), unknown_(n_), complex_(2 * n_),
-      complex_force_(n_), complex_unknown_(n_) {}
+      first_slope_(2 * n_), last_slope_(2 * n_), real_(2 * n_), force_(system.n_stiff()), unknown_(n_),
+      complex_(2 * n_), complex_force_(system.n_stiff()), complex_unknown_(n_) {}
 
 // With b = r_v + mu r_q the equation (mu I - J) (dq, dv) = (r_q, r_v) is N dq + C_q^T nu = (M b + D r_q) / mu^2,
 // C_q dq = C_q b / mu^2, N = M + D / mu + K / mu^2; dq = b / mu^2 + x leaves forces on the modes alone.
@@ -73,8 +73,15 @@ template <class Scalar> void Radau::solve(Scalar mu, Eigen::Matrix<Scalar, Eigen
   auto r_q = x.head(n_), b = x.tail(n_);
   b += mu * r_q;
   const auto &k = system_.stiffness(), &d = system_.damping();
+  const auto stiff_force = [&](Index i, const Scalar &of_r, const Scalar &of_b) {
+    return (d[i] * of_r - (d[i] * inverse + k[i] * inverse_square) * of_b) * inverse_square;
+  };
   for (Index i = 0; i < n_; ++i)
-    force[i] = (d[i] * r_q[i] - (d[i] * inverse + k[i] * inverse_square) * b[i]) * inverse_square;
+    force[i] = stiff_force(i, r_q[i], b[i]);
+  for (Index i = n_; i < force.size(); ++i) {
+    const auto row = system_.coupling().col(i - n_).transpose().template cast<Scalar>();
+    force[i] = stiff_force(i, (row * r_q).value(), (row * b).value());
+  }
   if constexpr (is_real)
     system_.solve(force.data(), nullptr, unknown.data());
   else

@@ -42,6 +42,10 @@ void seed_increment(const ConfigurationSpace &space, const double *q, Index i, I
   }
 }
 
+Dual resistance(const Friction &friction, const Dual &rate) {
+  return {friction.resistance(rate.value), friction.slope(rate.value) * rate.rate};
+}
+
 // Rates of x, in up to eight directions, to columns of `to` from `first` on
 template <class Values> void take(const Values &x, Index first, Index count, MatrixXd &to) {
   for (Index j = 0; j < to.rows(); ++j)
@@ -52,7 +56,7 @@ template <class Values> void take(const Values &x, Index first, Index count, Mat
 } // namespace
 
 Derivatives derivatives(const Mechanism<Spatial> &m, const Workspace<Spatial, double> &kept, const double *q,
-                        const double *v, const Forces<double> &forces, const double *target) {
+                        const double *v, const Forces<double> &forces, const LoadedCuts &cuts, const double *target) {
   const ConfigurationSpace space(m.n_v, m.rotations);
   const Index n = m.n_v, rows = static_cast<Index>(m.rows.size());
   const auto n_v = static_cast<std::size_t>(n), n_rows = m.rows.size();
@@ -61,11 +65,19 @@ Derivatives derivatives(const Mechanism<Spatial> &m, const Workspace<Spatial, do
   const Duals q0 = constants(q, static_cast<std::size_t>(m.n_q)), v0 = constants(v, n_v);
   const Duals force0 = constants(forces.generalized, n_v), held = constants(target, n_rows);
   const Duals wrench = constants(forces.wrench, Spatial::dim * m.wrenches.size());
-  Duals a(n_v), value(n_rows), rate(n_rows);
+  Duals a(n_v), value(n_rows), rate(n_rows), along(cuts.joints.size()), acting_wrench;
   const auto answer = [&](const Duals &at_q, const Duals &at_v, const Duals &force) {
     Forces<Dual> acting;
     acting.generalized = force.data();
     acting.wrench = forces.wrench ? wrench.data() : nullptr;
+    if (!cuts.joints.empty()) {
+      acting_wrench = wrench;
+      acting.wrench = acting_wrench.data();
+      cut_rates(m, cuts.joints, at_q.data(), at_v.data(), w, along.data());
+      for (std::size_t k = 0; k < along.size(); ++k)
+        along[k] = Dual(cuts.loads[k]) - resistance(cuts.joints[k].friction, along[k]);
+      add_along_cuts(m, cuts.joints, along.data(), w, acting_wrench.data());
+    }
     accelerations(m, at_q.data(), at_v.data(), acting, held.data(), w, a.data());
   };
   Derivatives found{MatrixXd(n, n), MatrixXd(n, n), MatrixXd(n, n), MatrixXd(rows, n), MatrixXd(rows, n)};

@@ -2,7 +2,7 @@
 // directions at a time.
 #pragma once
 
-#include "core/recursion/workspace.h"
+#include "core/recursion/cut.h"
 
 #include <Eigen/Core>
 
@@ -15,9 +15,15 @@ struct Derivatives {
   Eigen::MatrixXd rate_q;        // (rows, n_v) of their rates
 };
 
-// At q, v under `forces` and second derivatives `target` (rows) of the rows that `kept` keeps; markers of the ground
-// stand and turn as there.
+// Joints at which loops are cut, with the loads that are given along them: N m, N, as many.
+struct LoadedCuts {
+  const std::vector<CutJoint> &joints;
+  const double *loads;
+};
+
+// At q, v under `forces`, those along `cuts` and second derivatives `target` (rows) of the rows that `kept` keeps;
+// markers of the ground stand and turn as there. Friction in cut joints changes with q and v.
 Derivatives derivatives(const Mechanism<Spatial> &m, const Workspace<Spatial, double> &kept, const double *q,
-                        const double *v, const Forces<double> &forces, const double *target);
+                        const double *v, const Forces<double> &forces, const LoadedCuts &cuts, const double *target);
 
 } // namespace ffrobot::recursion

@@ -31,6 +31,7 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       held_(held), workspace_(mechanism), measured_(mechanism), newton_(mechanism),
       force_(VectorXd::Zero(mechanism.n_v)),
       wrench_(VectorXd::Zero(Space::dim * static_cast<Index>(mechanism.wrenches.size()))),
+      along_cuts_(VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()))),
       target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
       correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
       target_time_(std::numeric_limits<double>::quiet_NaN()), norm_(mechanism),
@@ -79,13 +80,26 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
       held_->add(q, force_.data());
     forces.generalized = force_.data();
   }
-  if (!scene_.point_loads.empty()) {
+  if (!scene_.point_loads.empty() || !scene_.cut_joints.empty()) {
     wrench_.setZero();
     for (const PointLoad &load : scene_.point_loads)
       wrench_[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
+    if (!scene_.cut_joints.empty())
+      act_along_cuts(t, q, v);
     forces.wrench = wrench_.data();
   }
   accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
+}
+
+template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t, const double *q, const double *v) {
+  cut_rates(mechanism_, scene_.cut_joints, q, v, measured_, along_cuts_.data());
+  for (std::size_t k = 0; k < scene_.cut_joints.size(); ++k) {
+    double &along = along_cuts_[static_cast<Index>(k)];
+    along = -scene_.cut_joints[k].friction.resistance(along);
+  }
+  for (const CutLoad &load : scene_.cut_loads)
+    along_cuts_[load.joint] += load.share * load.magnitude(t).value;
+  add_along_cuts(mechanism_, scene_.cut_joints, along_cuts_.data(), measured_, wrench_.data());
 }
 
 template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {

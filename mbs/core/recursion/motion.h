@@ -6,6 +6,7 @@
 
 #include "core/constraint/constraint.h"
 #include "core/integrate/ode.h"
+#include "core/recursion/cut.h"
 #include "core/recursion/frame_motor.h"
 #include "core/recursion/held_forces.h"
 #include "core/recursion/motion_norm.h"
@@ -61,6 +62,13 @@ struct GearSpring {
   double stiffness = 0, damping = 0; // N m/rad, N m s/rad
 };
 
+// `share` times `magnitude`(t), N m or N, along the coordinate of a joint at which a loop is cut.
+struct CutLoad {
+  int joint = 0; // of the scene's cut joints
+  TimeFunction magnitude;
+  double share = 1;
+};
+
 // What a row follows: sign * law(t), with rate and acceleration.
 struct Target {
   TimeFunction law;
@@ -79,6 +87,8 @@ struct Scene {
   std::vector<JointForce> joint_forces;
   std::vector<FrameMotor> frame_motors;
   std::vector<GearSpring> gears;
+  std::vector<CutJoint> cut_joints;
+  std::vector<CutLoad> cut_loads;
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;
 };
@@ -113,6 +123,7 @@ public:
   Eigen::Index constraints() const override { return target_.size(); }
   const Eigen::VectorXd &stiffness() const override { return stiffness_; }
   const Eigen::VectorXd &damping() const override { return damping_; }
+  const Eigen::MatrixXd &coupling() const override { return coupling_; }
   void factorise(double damping_factor, double stiffness_factor) override;
   void factorise(Complex damping_factor, Complex stiffness_factor) override;
   void solve(const double *r, const double *c, double *x) override;
@@ -143,8 +154,11 @@ public:
 private:
   void update_targets(double t);
   void residuals(double t, const double *q, const double *v);
+  void act_along_cuts(double t, const double *q, const double *v); // adds to wrench_
   void find_stiff_terms();
   void find_compliance();
+  void find_coupling();
+  Eigen::VectorXd stiff_rates() const;
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
@@ -152,7 +166,7 @@ private:
   // of accelerations; of rows and of Newton's method, which must not disturb
   // these
   Workspace<Space, double> workspace_, measured_, newton_;
-  Eigen::VectorXd force_, wrench_, target_, value_, rate_, correction_, state_;
+  Eigen::VectorXd force_, wrench_, along_cuts_, target_, value_, rate_, correction_, state_;
   std::vector<Jet> jets_;
   double target_time_;
   double fastest_ = 1; // 1/s
@@ -164,8 +178,9 @@ private:
   unsigned long accepted_ = 0, steps_between_postures_ = 1; // many where steps follow vibrations
   double watched_at_ = 0, determinant_ = 0;                 // of the posture before
 
-  Eigen::VectorXd stiffness_, damping_; // diagonals (n_v); of friction as at the last factorisation
+  Eigen::VectorXd stiffness_, damping_; // diagonals (n_v, then cut joints); of friction as at the last factorisation
   std::vector<Eigen::Index> stiff_;     // where they are not zero
+  Eigen::MatrixXd coupling_;            // (n_v, cut joints) their rates are coupling^T v
   Eigen::MatrixXd compliance_;          // (n_v, stiff) what unit forces there do under the rows
   Eigen::VectorXd evaluated_, base_;    // q of the last slope(), of the compliance
   Eigen::VectorXd rates_;               // v of the last slope()

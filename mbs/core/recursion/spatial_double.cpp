@@ -1,4 +1,5 @@
 #include "core/recursion/accelerations.h"
+#include "core/recursion/cut_forces.h"
 
 namespace ffrobot::recursion {
 
@@ -10,5 +11,7 @@ template void accelerations(const M &, const double *, const double *, const For
                             double *);
 template void response(const M &, const double *, const double *, W &, double *);
 template void measure(const M &, const double *, const double *, W &, double *, double *);
+template void cut_rates(const M &, const std::vector<CutJoint> &, const double *, const double *, W &, double *);
+template void add_along_cuts(const M &, const std::vector<CutJoint> &, const double *, const W &, double *);
 
 } // namespace ffrobot::recursion

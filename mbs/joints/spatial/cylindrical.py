@@ -8,7 +8,7 @@ import numpy as np
 
 from ....common.arrays import Array
 from ....common.rotations import about
-from .joint import GUIDED, Place
+from .joint import GUIDED, Along, Place
 from .moving_joint import AxialJoint
 
 
@@ -21,6 +21,7 @@ class SpatialCylindrical(AxialJoint):
     q_count = 2
     freedoms = 2
     held = GUIDED
+    along = (Along("turn", 2), Along("slide", 2))
 
     def place(self, q: Array) -> Place:
         """By q[0] along z, turned by q[1] about it."""

@@ -39,6 +39,18 @@ class Held(NamedTuple):
     g: int = 0
 
 
+class Along(NamedTuple):
+    """A coordinate of a joint where it closes a loop; axes of the inner triad, or of the outer one if `of_outer`.
+
+    "slide": the way along f; "turn": the angle about f by which the outer triad's axis g has left the inner one's.
+    """
+
+    kind: Literal["slide", "turn"]
+    f: int
+    g: int = 0
+    of_outer: bool = False
+
+
 POINT = Held("point")
 ALIGNED = (Held("dot", 0, 2), Held("dot", 1, 2))  # the axes z
 GUIDED = (Held("slide", 0), Held("slide", 1), *ALIGNED)
@@ -59,6 +71,7 @@ class SpatialJoint(JointKeys):
     q_count: ClassVar[int] = 0
     freedoms: ClassVar[int] = 0
     held: ClassVar[tuple[Held, ...] | None] = None  # None where it cannot close a loop
+    along: ClassVar[tuple[Along, ...]] = ()  # its coordinates where it does, in the scene's order
 
     @property
     def orientation(self) -> Array:
@@ -125,10 +138,9 @@ class SpatialJoint(JointKeys):
         return ()
 
     @property
-    def acts_along(self) -> tuple[str, ...]:
-        """Keys of what acts along its coordinates, which the joint at which a loop is cut does not have."""
-        keys = ("motor", "viscous_friction", "coulomb_friction", "rotor_inertia", "position_limit")
-        return tuple(key for key in keys if getattr(self, key, None))
+    def asks_for_coordinate(self) -> tuple[str, ...]:
+        """Keys that ask for its coordinate in the tree, as the joint at which a loop is cut has none."""
+        return tuple(key for key in ("motor", "rotor_inertia") if getattr(self, key, None))
 
 
 def with_axis(axis: Vector3, orientation: Array) -> tuple[Array, Array]:

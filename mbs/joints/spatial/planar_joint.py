@@ -8,7 +8,7 @@ import numpy as np
 
 from ....common.arrays import Array
 from ....common.rotations import about
-from .joint import ALIGNED, Held, Place
+from .joint import ALIGNED, Along, Held, Place
 from .moving_joint import AxialJoint
 
 
@@ -25,6 +25,7 @@ class SpatialPlanar(AxialJoint):
     q_count = 3
     freedoms = 3
     held = (Held("slide", 2), *ALIGNED)
+    along = (Along("slide", 0), Along("slide", 1), Along("turn", 2))
 
     def place(self, q: Array) -> Place:
         """By q[0], q[1] along x, y, turned by q[2] about z."""

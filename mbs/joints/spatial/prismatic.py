@@ -8,7 +8,7 @@ import numpy as np
 
 from ....common.arrays import Array
 from ...fields.field_types import NotNegative, Positive
-from .joint import GUIDED, NOT_TURNED, Place
+from .joint import GUIDED, NOT_TURNED, Along, Place
 from .moving_joint import AxialJoint
 
 
@@ -29,6 +29,7 @@ class SpatialPrismatic(AxialJoint):
     q_count = 1
     freedoms = 1
     held = (*GUIDED, NOT_TURNED)
+    along = (Along("slide", 2),)
 
     def place(self, q: Array) -> Place:
         """By q[0] along z."""

@@ -10,7 +10,7 @@ from pydantic import model_validator
 from ....common.arrays import Array
 from ....common.rotations import about
 from ...fields.field_types import NotNegative, Positive
-from .joint import ALIGNED, POINT, Place
+from .joint import ALIGNED, POINT, Along, Place
 from .moving_joint import AxialJoint
 
 
@@ -44,6 +44,7 @@ class SpatialRevolute(AxialJoint):
     q_count = 1
     freedoms = 1
     held = (POINT, *ALIGNED)
+    along = (Along("turn", 2),)
 
     def place(self, q: Array) -> Place:
         """Turned by q[0] about z."""

@@ -10,7 +10,7 @@ from pydantic import model_validator
 from ....common.arrays import Array
 from ....common.rotations import about
 from ...fields.field_types import Vector3
-from .joint import NOT_TURNED, POINT, Place
+from .joint import NOT_TURNED, POINT, Along, Place
 from .moving_joint import AxialJoint, check_direction
 
 SQUARE = 1e-6  # largest cosine between the two axes at zero coordinates
@@ -31,6 +31,7 @@ class SpatialUniversal(AxialJoint):
     q_count = 2
     freedoms = 2
     held = (POINT, NOT_TURNED)
+    along = (Along("turn", 0, 1), Along("turn", 1, 0, of_outer=True))
 
     @model_validator(mode="after")
     def _axes_are_square(self) -> SpatialUniversal:

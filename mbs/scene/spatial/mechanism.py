@@ -52,12 +52,20 @@ class SpatialMechanismKeys(Record):
 
     @property
     def edges(self) -> list[Edge]:
-        """The joints for a spanning forest: loops are cut at spherical ones, then at one along which nothing acts."""
-        named = {trajectory.coordinate_of for trajectory in self.trajectory} | {load.joint for load in self.load}
-        return [
-            Edge(joint.between, 2 if not joint.locates else 0 if joint.name in named or joint.acts_along else 1)
-            for joint in self.joint
-        ]
+        """The joints for a spanning forest.
+
+        Loops are cut at spherical joints, then where nothing acts along the joint, then where friction or loads do. The
+        tree needs the coordinates of motors, rotors and trajectories.
+        """
+        return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
+
+    def _rank(self, joint: AnySpatialJoint) -> int:
+        followed = any(trajectory.coordinate_of == joint.name for trajectory in self.trajectory)
+        if not joint.locates:
+            return 3
+        if joint.held is None or joint.asks_for_coordinate or followed:
+            return 0
+        return 1 if joint.frictions or any(load.joint == joint.name for load in self.load) else 2
 
     @property
     def topology(self) -> Topology:

@@ -1,0 +1,113 @@
+"""Joints at which loops are cut: the tree has no coordinate of theirs, but what acts along it acts on its two sides.
+
+With γ the joint's coordinate, γ̇ = G v: a force f along it is Gᵀf. Friction and loads act so; rotors, whose forces are
+those of accelerations, do not. States (T, …), SI units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from .._core import TimeFunction
+from ..joints.spatial.joint import Along, SpatialJoint
+from ..joints.transmission import Friction
+from ..scene.spatial.mechanism import SpatialMechanismScene
+from .spatial_rows import SpatialRow, value_and_gradient
+from .spatial_tree import Motion, SpatialTree
+
+
+class CutCoordinate(NamedTuple):
+    """A coordinate of a joint at which a loop is cut.
+
+    Attributes:
+        joint: whose it is; of the second of its sides on the first.
+        row: measures `row.sign` times the coordinate.
+        friction: along it.
+        loads: given forces of time along it, N·m or N.
+    """
+
+    joint: SpatialJoint
+    row: SpatialRow
+    friction: Friction | None
+    loads: tuple[TimeFunction, ...]
+
+    @property
+    def is_loaded(self) -> bool:
+        """Whether something acts along it."""
+        return self.friction is not None or bool(self.loads)
+
+    def resistance(self, rate: Array) -> Array:
+        """Friction (T,) at the coordinate's rate, N·m or N."""
+        return np.zeros_like(rate) if self.friction is None else self.friction.resistance(rate)
+
+    def given(self, times: Array) -> Array:
+        """The sum of loads (T,) along the coordinate, N·m or N."""
+        return sum((load.sample(times)[0] for load in self.loads), np.zeros(len(times)))
+
+
+def cut_coordinates(scene: SpatialMechanismScene, tree: SpatialTree) -> Iterator[CutCoordinate]:
+    """Of all joints at which loops are cut."""
+    for joint in tree.loops:
+        frictions = joint.frictions or (None,) * len(joint.along)
+        for number, (along, friction) in enumerate(zip(joint.along, frictions, strict=True)):
+            loads = tuple(load.moments[number] for load in scene.load if load.joint == joint.name)
+            yield CutCoordinate(joint, _row(tree, joint, along), friction, loads)
+
+
+def _row(tree: SpatialTree, joint: SpatialJoint, along: Along) -> SpatialRow:
+    sides = [tree.section(side, triad, joint.at) for side, triad in zip(joint.between, joint.triads(), strict=True)]
+    a, b = sides[::-1] if along.of_outer else sides
+    f, g = np.eye(3)[[along.f, along.g]]
+    sign = -1.0 if along.of_outer else 1.0  # of the first side on the second
+    return SpatialRow(joint.name, along.kind, a, b, f, g, is_trajectory=False, sign=sign)
+
+
+def measured(
+    tree: SpatialTree, cut: Sequence[CutCoordinate], q: Array, frames: Sequence[Motion]
+) -> tuple[Array, Array]:
+    """Coordinates γ (T, cut), angles within ±π, and G (T, cut, n_v)."""
+    values, gradients = np.zeros((len(q), len(cut))), np.zeros((len(q), len(cut), tree.n_v))
+    for k, one in enumerate(cut):
+        a, b = (tree.motion(section, q, frames) for section in (one.row.a, one.row.b))
+        value, gradient = value_and_gradient(one.row, a, b, q, np.zeros(len(q)))
+        values[:, k], gradients[:, k] = one.row.sign * value, one.row.sign * gradient
+    return values, gradients
+
+
+def cut_resistance(
+    tree: SpatialTree, cut: Sequence[CutCoordinate], q: Array, v: Array, frames: Sequence[Motion] | None = None
+) -> Array:
+    """Generalized forces (T, n_v) by which friction in cut joints resists; `frames` of q where known."""
+    rough, found = [one for one in cut if one.friction is not None], np.zeros_like(v)
+    if rough:
+        _, gradients = measured(tree, rough, q, tree.frames(q) if frames is None else frames)
+        for k, one in enumerate(rough):
+            G = gradients[:, k]
+            found += one.resistance(np.einsum("tj,tj->t", G, v))[:, None] * G
+    return found
+
+
+def cut_loads(
+    tree: SpatialTree, cut: Sequence[CutCoordinate], q: Array, frames: Sequence[Motion], times: Array
+) -> Array:
+    """Generalized forces (T, n_v) of given loads along cut joints at `times` (T,)."""
+    loaded, found = [one for one in cut if one.loads], np.zeros((len(q), tree.n_v))
+    if loaded:
+        _, gradients = measured(tree, loaded, q, frames)
+        for k, one in enumerate(loaded):
+            found += one.given(times)[:, None] * gradients[:, k]
+    return found
+
+
+def cut_damping(tree: SpatialTree, cut: Sequence[CutCoordinate], q: Array) -> Array:
+    """D (n_v, n_v) of viscous friction in cut joints at q (n_q,)."""
+    rough, found = [one for one in cut if one.friction is not None], np.zeros((tree.n_v, tree.n_v))
+    _, gradients = measured(tree, rough, q[None], tree.frames(q[None]))
+    for one, G in zip(rough, gradients[0], strict=True):
+        assert one.friction is not None
+        found += one.friction.viscous * np.outer(G, G)
+    return found

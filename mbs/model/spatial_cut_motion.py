@@ -1,0 +1,49 @@
+"""How joints at which loops are cut move, and what acts along them: read off the motion of their two sides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from .spatial_cut import measured
+from .spatial_model import SpatialModel
+from .spatial_tree import Motion
+
+
+class CutMotion(NamedTuple):
+    """Coordinate (T,), full turns counted, rate (T,), and the force (T,) of friction and loads along it, N·m or N."""
+
+    coordinate: Array
+    rate: Array
+    force: Array
+
+
+def cut_motions(
+    model: SpatialModel, q: Array, v: Array, times: Array, frames: Sequence[Motion] | None = None
+) -> list[CutMotion]:
+    """Of each of `model.cut` at q (T, n_q), v (T, n_v) and `times` (T,); angles begin nearest to their guesses."""
+    tree, found = model.tree, []
+    values, gradients = measured(tree, model.cut, q, tree.frames(q) if frames is None else frames)
+    for one, value, G, guess in zip(model.cut, values.T, gradients.swapaxes(0, 1), _guesses(model), strict=True):
+        rate = np.einsum("tj,tj->t", G, v)
+        coordinate = _unwound(value, rate, times, guess) if one.row.kind == "turn" else value
+        found.append(CutMotion(coordinate, rate, one.given(times) - one.resistance(rate)))
+    return found
+
+
+def _guesses(model: SpatialModel) -> Iterator[float]:
+    """The coordinates as [initial] gives them, else 0."""
+    given = model.scene.initial.joints
+    for joint in model.tree.loops:
+        yield from np.atleast_1d(np.array(given.get(joint.name, np.zeros(len(joint.along))), dtype=float)).tolist()
+
+
+def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> Array:
+    """The angle (T,) with full turns: each the nearest to where the rates lead from the one before."""
+    way = np.diff(times) * (rate[1:] + rate[:-1]) / 2
+    turns = np.round((np.append(guess, way) - np.append(angle[0], np.diff(angle))) / (2 * np.pi))
+    found: Array = angle + 2 * np.pi * np.cumsum(turns)
+    return found

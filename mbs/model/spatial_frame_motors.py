@@ -1,0 +1,43 @@
+"""Motors that turn frames of bodies in space, not sections, as the core takes them: core/recursion/frame_motor.h."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...common.arrays import Array
+from .. import _core
+from .spatial_drives import Command, FrameDrive
+from .spatial_model import SpatialModel
+from .spatial_parts import rows_of
+
+
+def turn_frames(scene: _core.TreeScene, model: SpatialModel, drive: FrameDrive) -> None:
+    """A moment along the joint, less what the sections at it would do on the modes of its two bodies."""
+    node, direction = model.tree.nodes[drive.body], np.zeros(model.tree.n_v)
+    direction[node.v] = drive.sign
+    scene.add_load(direction, drive.size)
+    for share in _shares(model, drive.body, drive.sign):
+        scene.add_frame_motor(*share, drive.size)
+
+
+def held_forces(model: SpatialModel, commands: Sequence[Command]) -> _core.HeldForces:
+    """Forces of commands that are held, in their order."""
+    found = _core.HeldForces(np.reshape([c.direction for c in commands], (len(commands), model.tree.n_v)).T)
+    for number, command in enumerate(commands):
+        for share in _shares(model, *command.frame) if command.frame is not None else ():
+            found.add_frame_motor(number, *share)
+    return found
+
+
+def _shares(model: SpatialModel, body: int, sign: float) -> Iterator[tuple[int, int, Array, Array]]:
+    """Of the motor on frames along the joint that carries a body, for each side with modes.
+
+    Where the modes are in q and in v, Φ_r (3, n) of the section and the joint's axis there.
+    """
+    node = model.tree.nodes[body]
+    for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
+        if section.body >= 0 and (of := model.tree.nodes[section.body]).body.n_modes:
+            axis = sign * side * section.triad[:, 2]
+            yield of.p_q.start, of.p_v.start, rows_of(of.body, section)[0][3:], axis

@@ -1,0 +1,78 @@
+"""Rows of constraints between sections of a tree in space: what they measure, and how it changes with velocities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import logarithm
+from .._core import TimeFunction
+from ..fields.orientations import OrientationLaw
+from .spatial_tree import Motion, Section
+
+RowKind = Literal["point", "slide", "dot", "rotation", "turn", "coordinate"]
+
+
+@dataclass(frozen=True)
+class SpatialRow:
+    """One constraint: a measure of section b on section a that follows `target`, or is 0.
+
+    Attributes:
+        owner: the joint or trajectory.
+        kind: "point", f·(r_b − r_a) with f in global axes; "slide", the same with f in axes of a; "dot", f·g with f in
+            axes of a and g in axes of b; "rotation", the turn of b against a about f, global axes; "turn", the angle of
+            b against a about f in axes of a, of g in axes of both; "coordinate", the joint coordinate v[coordinate],
+            `sign` times.
+        target: of points and coordinates.
+        law: an orientation in time: of "rotation" rows that of a, whose triad is then A(t); of "dot" rows that of b.
+    """
+
+    owner: str
+    kind: RowKind
+    a: Section
+    b: Section
+    f: Array
+    g: Array
+    is_trajectory: bool = True
+    coordinate: int = -1
+    q_index: int = -1
+    sign: float = 1.0
+    target: TimeFunction | None = None
+    law: OrientationLaw | None = None
+
+    @property
+    def carries_moment(self) -> bool:
+        """Whether its multiplier is a moment."""
+        return self.kind in ("dot", "rotation")
+
+
+def value_and_gradient(row: SpatialRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
+    """C (T,) at q (T, n_q) and `times` (T,), and its derivative C_v (T, n_v), from the motions of its sections."""
+    target = 0.0 if row.target is None else row.target.sample(times)[0]
+    if row.kind == "coordinate":
+        gradient = np.zeros((len(q), a.L.shape[-1]))
+        gradient[:, row.coordinate] = row.sign
+        return row.sign * q[:, row.q_index] - target, gradient
+    if row.kind == "rotation":
+        assert row.law is not None
+        residual = logarithm(b.F @ np.swapaxes(row.law.sample(times), -1, -2))
+        return residual @ row.f, np.einsum("i,tij->tj", row.f, b.L[:, 3:])
+    if row.kind == "turn":
+        axis, zero = np.einsum("tij,j->ti", a.F, row.f), np.einsum("tij,j->ti", a.F, row.g)
+        turned = b.F @ row.g
+        angle = np.arctan2(np.sum(np.cross(axis, zero) * turned, axis=-1), np.sum(zero * turned, axis=-1))
+        return angle, np.einsum("ti,tij->tj", axis, b.L[:, 3:] - a.L[:, 3:])
+    if row.kind == "dot":
+        f = np.einsum("tij,j->ti", a.F, row.f)
+        g = b.F @ row.g if row.law is None else row.law.sample(times)[:, :, 2]
+        across = np.cross(f, g)
+        return np.sum(f * g, axis=-1), np.einsum("ti,tij->tj", across, a.L[:, 3:] - b.L[:, 3:])
+    f = np.einsum("tij,j->ti", a.F, row.f) if row.kind == "slide" else np.broadcast_to(row.f, a.r.shape)
+    d = b.r - a.r
+    gradient = np.einsum("ti,tij->tj", f, b.L[:, :3] - a.L[:, :3])
+    if row.kind == "slide":
+        gradient = gradient + np.einsum("ti,tij->tj", np.cross(f, d), a.L[:, 3:])
+    return np.sum(f * d, axis=-1) - target, gradient

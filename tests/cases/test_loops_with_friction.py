@@ -1,0 +1,137 @@
+"""Friction and loads in all joints of a loop in space, where one of them is cut: the numbers of the planar scene."""
+
+import numpy as np
+import pytest
+from four_bar import SIDES, in_space, planar
+from scipy.interpolate import CubicSpline
+
+import ffrobot
+from ffrobot.actuation.control.spatial_rigid_arm import SpatialRigidArm
+from ffrobot.mbs.model import spatial_system
+from ffrobot.mbs.model.spatial_model import build_spatial_model
+from ffrobot.mbs.solve.spatial_posture import undeformed_posture
+from ffrobot.run.spatial_bodies import load_spatial_bodies
+
+ROUGH = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.05}
+LOADS = [{"joint": "C", "moment": "0.7*sin(5*t)"}, {"joint": "B", "moment": "0.4 + t"}]
+TIMES = {"end": 0.5, "output_step": 0.01, "tolerance": 1e-10}
+INVERSE = {"name": "inverse", "kind": "pcid"} | TIMES
+ANALYSES = [
+    INVERSE,
+    {"name": "replay", "kind": "forward", "actuation": "inverse", "apply": "joints"} | TIMES,
+    {"name": "released", "kind": "forward"} | TIMES,
+    {"name": "implicit", "kind": "forward", "integrator": "radau"} | TIMES | {"tolerance": 1e-8},
+    {"name": "rest", "kind": "static"},
+    {"name": "about rest", "kind": "linear", "points": ["coupler.tip"]},
+    {"name": "in motion", "kind": "linear", "about": "inverse", "times": [0.0, 0.3], "points": ["coupler.tip"]},
+]
+ORDERS = ("ABDC", "CABD", "CDAB")  # cut at the last; A has a motor and a rotor
+
+
+def of_joints(order):
+    return {name: ROUGH | ({"rotor_inertia": 1e-4, "gear_ratio": 30.0} if name == "A" else {}) for name in order}
+
+
+@pytest.fixture(scope="module")
+def in_the_plane():
+    return ffrobot.solve(ffrobot.make_scene(**planar(of_joints("ABDC"), ANALYSES, load=LOADS)))
+
+
+@pytest.fixture(scope="module", params=ORDERS)
+def solved(request, in_the_plane):
+    return in_the_plane, ffrobot.solve(ffrobot.make_scene(**in_space(of_joints(request.param), ANALYSES, load=LOADS)))
+
+
+def close(found, expected, share=1e-9):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=share * max(np.abs(expected).max(), 1e-3))
+
+
+@pytest.mark.parametrize("analysis", ["inverse", "replay", "released", "implicit", "rest"])
+def test_motion_and_forces(solved, analysis):
+    expected, found = solved
+    for joint in SIDES:
+        name = f"{analysis}/joints/{joint}"
+        close(found[f"{name}/coordinate"], expected[f"{name}/coordinate"])
+        close(found[f"{name}/reaction"][:, :2], expected[f"{name}/reaction"])
+        if analysis != "rest":
+            close(found[f"{name}/rate"], expected[f"{name}/rate"])
+    if analysis in ("inverse", "rest"):
+        close(found[f"{analysis}/joints/A/moment"], expected[f"{analysis}/joints/A/moment"])
+    if analysis != "rest":
+        for key in ("kinetic", "dissipated_power"):
+            close(found[f"{analysis}/energy/{key}"], expected[f"{analysis}/energy/{key}"])
+
+
+@pytest.mark.parametrize("analysis", ["about rest", "in motion"])
+def test_linear_models(solved, analysis):
+    """Also in motion, where friction changes with the posture by way of the axes' rates."""
+    for expected, found in zip(*(results.linear(analysis) for results in solved), strict=True):
+        assert found.state_names == expected.state_names
+        close(found.A, expected.A, 1e-8)
+        close(found.B[:, found.inputs("joint/A")], expected.B[:, expected.inputs("joint/A")], 1e-8)
+        names = [*(f"joint/{joint}" for joint in SIDES), "point/coupler.tip/x"]
+        close(found.C[found.outputs(names)], expected.C[expected.outputs(names)], 1e-8)
+
+
+def test_the_plane_is_that_of_space(monkeypatch):
+    """The same cut solved by the core in the plane and by that in space."""
+    scene = ffrobot.make_scene(**in_space(of_joints("ABDC"), ANALYSES[:3], load=LOADS))
+    plane = ffrobot.solve(scene)
+    monkeypatch.setattr(spatial_system, "in_plane", lambda *_: None)
+    space = ffrobot.solve(scene)
+    for name in ("inverse/joints/A/moment", "released/joints/C/rate", "released/joints/C/reaction"):
+        close(plane[name], space[name])
+
+
+@pytest.mark.parametrize("name", SIDES)
+def test_friction_and_rotors_in_every_joint_of_a_loop(name):
+    """The motor gives what friction takes and the rotor gains; the loop is cut elsewhere."""
+    plain, built = (
+        ffrobot.solve(ffrobot.make_scene(**in_space({key: {} for key in SIDES} | {name: keys}, [INVERSE])))
+        for keys in ({}, {"viscous_friction": 2.0, "rotor_inertia": 0.7})
+    )
+    rate, body = built[f"inverse/joints/{name}/rate"], SIDES[name][0].partition(".")[0]
+    spin = rate if body == "ground" else rate + built[f"inverse/bodies/{body}/angular_velocity"][:, 2]
+    power, energy = 2.0 * rate**2, 0.35 * spin**2
+    keys = ("joints/A/moment", "energy/kinetic")
+    moment, kinetic = (built[f"inverse/{key}"] - plain[f"inverse/{key}"] for key in keys)
+    assert np.ptp(rate) > 0.1
+    np.testing.assert_allclose(built["inverse/energy/dissipated_power"], power, atol=1e-9)
+    np.testing.assert_allclose(kinetic, energy, atol=1e-9)
+    t, work = built["inverse/time"], moment * built["inverse/joints/A/rate"]
+    gained = CubicSpline(t, energy)(t, 1)
+    inside = slice(5, -5)  # where the spline has neighbours on both sides
+    np.testing.assert_allclose(work[inside], (power + gained)[inside], atol=1e-5 * np.abs(work).max())
+
+
+@pytest.mark.parametrize("cut", ["D", "C"])
+def test_computed_torque_knows_the_friction_of_the_joint_that_is_cut(cut):
+    own = of_joints([*(name for name in "ABCD" if name != cut), cut])
+    scene = ffrobot.make_scene(**in_space(own, [INVERSE]))
+    results = ffrobot.solve(scene)
+    t, moment, rate = (results[f"inverse/{key}"][30] for key in ("time", "joints/A/moment", "joints/A/rate"))
+    model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
+    assert [joint.name for joint in model.tree.loops] == [cut]
+    arm = SpatialRigidArm(model, undeformed_posture(model).q)
+    found = arm.moments(*(np.array([x]) for x in (1 + 0.3 * (1 - np.cos(3 * t)), rate, 2.7 * np.cos(3 * t))))
+    np.testing.assert_allclose(found, moment, rtol=1e-8)
+
+
+@pytest.mark.parametrize("keys", [{"motor": True}, {"rotor_inertia": 1e-3}])
+def test_a_motor_or_a_rotor_in_all_joints_is_refused(keys):
+    scene = ffrobot.make_scene(**in_space(dict.fromkeys(SIDES, keys), [INVERSE]))
+    expected = 'joint "D": expected a loop with a joint that has no motor, no rotor and no trajectory, where it is cut'
+    with pytest.raises(ffrobot.InputError, match=f'{expected}, found "{next(iter(keys))}"'):
+        ffrobot.solve(scene)
+
+
+@pytest.mark.parametrize(("limits", "is_told"), [([0.0, 1.0], True), ([0.0, 1.5], False)])
+def test_limits_of_the_joint_that_is_cut(limits, is_told):
+    own = of_joints("ABDC")
+    own["C"] = ROUGH | {"position_limit": limits}
+    results = ffrobot.solve(ffrobot.make_scene(**in_space(own, [INVERSE])))
+    peak = results["inverse/joints/C/coordinate"].max()
+    assert 1.0 < peak < 1.5
+    told = [text for text in results.warnings.get("inverse", ()) if 'joint "C": leaves its position_limit' in text]
+    assert len(told) == is_told
+    assert all(f"to {peak:.6g} rad" in text for text in told)

@@ -1,0 +1,84 @@
+"""Random closed chains in space with friction and loads along all joints, cut at the one that a scene lists last."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from spatial_scenes import as_scene, coordinates, rpy, tree_model
+from spatial_trees import Tree, random_tree
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
+from ffrobot.mbs.scene.spatial.loads import SpatialLoad
+
+FRICTION = {"viscous_friction": 0.4, "coulomb_friction": 0.7, "friction_speed": 0.3}
+COUNT = {"revolute": 1, "prismatic": 1, "cylindrical": 2, "universal": 2, "planar": 3}
+NOW = 0.3
+
+
+@dataclass
+class ClosedChain:
+    """Tables of its joints, the last one from the ground to the last body, and a state that closes it.
+
+    Attributes:
+        tree: bodies, and the joints but the last.
+        tables: of all joints, by name.
+        joints: their coordinates by name.
+        p: modal coordinates by body.
+    """
+
+    tree: Tree
+    tables: dict
+    joints: dict
+    p: dict
+
+    def model(self, cut):
+        """Cut at a joint, by name."""
+        order = [*(name for name in self.tables if name != cut), cut]
+        loads = [SpatialLoad(joint=name, moment=_moments(table["type"])) for name, table in self.tables.items()]
+        initial = {"joints": {name: values.tolist() for name, values in self.joints.items()}}
+        model = tree_model(self.tree, [self.tables[name] for name in order], initial, load=loads)
+        assert [joint.name for joint in model.tree.loops] == [cut]
+        return model
+
+    def position(self, model):
+        """The state's q for a model of it."""
+        q = model.tree.at_rest(self.joints)
+        for node in model.tree.nodes:
+            q[node.p_q] = self.p[node.body.name]
+        return q
+
+
+def closed_chain(rng, types, kinds, size=0.01):
+    """Bodies b1, b2, … on joints j1, j2, … of `types`, the last of which stands on the ground at coordinate 0."""
+    tree = random_tree(rng, types[:-1], kinds, chain=True, size=size)
+    plain, tables = as_scene(tree, False)
+    model, mechanism = tree_model(plain, tables), plain.mechanism()
+    joints = coordinates(model, plain, False)
+    p = {body.name: mechanism.coordinates.parts(tree.q, body.name)[2] for body in tree.bodies}
+    q = model.tree.at_rest(joints)
+    for node in model.tree.nodes:
+        q[node.p_q] = p[node.body.name]
+    end = f"b{len(tree.bodies)}.tip"
+    tip = model.tree.motion(model.tree.section(end, np.eye(3)), q[None], model.tree.frames(q[None]))
+    name, type_, axis = f"j{len(types)}", types[-1], rng.standard_normal(3)
+    R = tip.F[0]
+    last = {"name": name, "type": type_, "between": ("ground", end), "at": tip.r[0].tolist(), "rpy": rpy(R)}
+    last["axis"] = axis.tolist()
+    if type_ == "universal":
+        last["second_axis"] = (R.T @ np.cross(axis, rng.standard_normal(3))).tolist()
+    found = {table["name"]: table | FRICTION for table in (*tables, last)}
+    return ClosedChain(plain, found, {**joints, name: np.zeros(COUNT[type_])}, p)
+
+
+def _moments(type_):
+    sizes = [f"{k}.5 + {k}*t" for k in range(1, COUNT[type_] + 1)]
+    return sizes[0] if len(sizes) == 1 else tuple(sizes)
+
+
+def evaluated(model, q, v):
+    """The motion of one instant at q, v, as the core finds it under friction and loads."""
+    system = SpatialSystem(model)
+    run = _core.tree_outputs(system.core, system.scene, [NOW], np.concatenate([q, v])[None])
+    multipliers = run.multipliers * system.row_signs
+    return SpatialMotion(model, np.array([NOW]), q[None], v[None], run.accelerations, multipliers)

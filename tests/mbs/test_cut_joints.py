@@ -1,0 +1,138 @@
+"""Friction and loads along the joint at which a loop is cut are those of a joint of the tree."""
+
+import numpy as np
+import pytest
+from closed_chains import NOW, closed_chain, evaluated
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.model.spatial_inverse import required_forces
+from ffrobot.mbs.model.spatial_model import row_values
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.quantities.spatial_energy import energies
+from ffrobot.mbs.quantities.spatial_reactions import reactions
+
+CHAINS = [
+    (("revolute", "universal", "cylindrical", "universal"), ("rigid",)),
+    (("planar", "universal", "prismatic", "revolute"), ("rigid",)),
+    (("revolute", "cylindrical", "universal"), ("beam",)),
+    (("prismatic", "revolute", "planar"), ("solid", "beam")),
+]  # fmt: skip
+
+
+def case(number):
+    types, kinds = CHAINS[number]
+    return closed_chain(np.random.default_rng(number), types, kinds)
+
+
+def free_velocity(rng, model, q):
+    """One that closes the loop."""
+    v = rng.standard_normal(model.tree.n_v)
+    C_v = row_values(model, q[None], np.zeros(1))[1][0]
+    return v - np.linalg.pinv(C_v, rcond=1e-10) @ (C_v @ v)
+
+
+def moving_chains(number):
+    """The same instant of a chain that is cut at each of its joints in turn, by this joint."""
+    chain, found, seen = case(number), {}, None
+    for cut in chain.tables:
+        model = chain.model(cut)
+        q = chain.position(model)
+        frames = model.tree.frames(q[None])
+        L = {node.body.name: frame.L[0] for node, frame in zip(model.tree.nodes, frames, strict=True)}
+        modes = {node.body.name: np.eye(model.tree.n_v)[node.p_v] for node in model.tree.nodes}
+        along = np.vstack([np.vstack([L[body.name], modes[body.name]]) for body in chain.tree.bodies])
+        if seen is None:
+            seen = along @ free_velocity(np.random.default_rng(7), model, q)
+        v = np.linalg.lstsq(along, seen, rcond=None)[0]
+        np.testing.assert_allclose(along @ v, seen, atol=1e-9)
+        found[cut] = evaluated(model, q, v)
+    return found
+
+
+@pytest.mark.parametrize("number", range(len(CHAINS)))
+def test_it_does_not_matter_where_a_loop_is_cut(number):
+    """Accelerations, what joints carry, where they are and what friction takes: with the same friction in all."""
+    (_, one), *others = moving_chains(number).items()
+    joints = [joint.name for joint in one.model.scene.joint]
+
+    def accelerations(motion):
+        of = dict(
+            zip((node.body.name for node in motion.model.tree.nodes), motion.accelerated.of_frames(), strict=True)
+        )
+        return np.array([np.concatenate(of[body]) for body in sorted(of)])
+
+    expected = accelerations(one)
+    assert energies(one).dissipated_power[0] > 0.1
+    for _, other in others:
+        np.testing.assert_allclose(accelerations(other), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+        np.testing.assert_allclose(vars(energies(other))["dissipated_power"], energies(one).dissipated_power, rtol=1e-9)
+        carried, known = reactions(other), reactions(one)
+        size = max(np.abs(known[joint]).max() for joint in joints)
+        for joint in joints:
+            np.testing.assert_allclose(carried[joint], known[joint], rtol=0, atol=1e-7 * size, err_msg=joint)
+            for found, wanted in zip(other.joint(joint), one.joint(joint), strict=True):
+                np.testing.assert_allclose(found, wanted, atol=1e-9, err_msg=joint)
+
+
+@pytest.mark.parametrize("number", range(len(CHAINS)))
+def test_forces_balance(number):
+    """By inverse dynamics, which asks no core: M v̇ − Q + C_vᵀλ = 0."""
+    for motion in moving_chains(number).values():
+        required = required_forces(motion.model, motion.accelerated, motion.time)
+        held = np.einsum("tij,ti->tj", motion.rows[1], motion.multipliers)
+        np.testing.assert_allclose(required + held, 0, atol=1e-8 * np.abs(required).max())
+
+
+@pytest.mark.parametrize("number", range(len(CHAINS)))
+def test_derivatives(number):
+    """Exact ones against differences of evaluations, cut at the last joint and at another."""
+    chain = case(number)
+    for cut in list(chain.tables)[1::2]:
+        model = chain.model(cut)
+        tree, system, q = model.tree, SpatialSystem(model), chain.position(model)
+        v = free_velocity(np.random.default_rng(1), model, q)
+        force = np.random.default_rng(2).standard_normal(tree.n_v)
+        scene = system.scene
+        for direction in np.eye(tree.n_v):
+            scene.add_load(direction, _core.TimeFunction.constant(float(force @ direction)))
+        found = system.derivatives(NOW, q, v, force)
+
+        def a(q, v, of=(system.core, scene)):
+            states = np.concatenate([q, v])[None]
+            return _core.tree_outputs(*of, [NOW], states).accelerations[0]
+
+        h = 1e-5
+        for derivative, along in ((found.a_q, True), (found.a_v, False)):
+            steps = h * np.eye(tree.n_v)
+            values = [
+                [a(tree.integrate(q, k * step), v) if along else a(q, v + k * step) for k in (-2, -1, 1, 2)]
+                for step in steps
+            ]
+            expected = np.array([(w[0] - 8 * w[1] + 8 * w[2] - w[3]) / (12 * h) for w in values]).T
+            np.testing.assert_allclose(derivative, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+STICKS = {"viscous_friction": 0.1, "coulomb_friction": 5.0, "friction_speed": 1e-4}
+
+
+def swung(system, q, method):
+    """From rest at q, in at most 3000 steps."""
+    controls = _core.IntegrationControls(
+        tolerance=1e-5, max_steps=3000, methods=[(method, 1.0, 0.0)], spectral_radius=1.0
+    )
+    rest = np.zeros(system.model.tree.n_v)
+    return _core.tree_motion(system.core, system.scene, [0.0, 0.05], q, rest, controls, lambda t: True)
+
+
+def test_a_joint_that_sticks_where_the_loop_is_cut():
+    """A stiff damper to a light link: Newton's method of implicit steps knows it, explicit ones end."""
+    chain, ends = case(2), []
+    for table in chain.tables.values():
+        table.update(STICKS)
+    for cut in chain.tables:
+        model = chain.model(cut)
+        system, q = SpatialSystem(model), chain.position(model)
+        implicit, explicit = (swung(system, q, method) for method in (_core.MethodKind.radau, _core.MethodKind.dop853))
+        assert implicit.status == _core.IntegrationStatus.completed != explicit.status
+        ends.append(implicit.energy[-1])
+    np.testing.assert_allclose(ends, np.broadcast_to(ends[0], np.shape(ends)), rtol=1e-4)
