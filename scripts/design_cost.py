@@ -18,9 +18,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import tomli_w
@@ -32,6 +33,7 @@ from ffrobot.sweep.files import run_files
 COMMAND = Path(sys.executable).parent / "ffrobot"
 CASES = Path(__file__).parents[1] / "cases"
 SOLVES = 2  # before, and as many after
+T = TypeVar("T")
 
 
 class Time(NamedTuple):
@@ -41,7 +43,7 @@ class Time(NamedTuple):
     cpu: float
 
 
-def measured(work: Callable[[], Any]) -> tuple[Any, Time]:
+def measured(work: Callable[[], T]) -> tuple[T, Time]:
     """What `work` returns, and its time, that of processes which it has waited for included."""
 
     def cpu() -> float:
@@ -53,7 +55,7 @@ def measured(work: Callable[[], Any]) -> tuple[Any, Time]:
     return found, Time(time.perf_counter() - wall, cpu() - begun)
 
 
-def against_solves(scene: Path, work: Callable[[], Any]) -> tuple[Any, str]:
+def against_solves(scene: Path, work: Callable[[], T]) -> tuple[T, str]:
     """What `work` returns, and what it costs in times of `ffrobot solve`."""
 
     def solve() -> None:
@@ -71,13 +73,12 @@ def against_solves(scene: Path, work: Callable[[], Any]) -> tuple[Any, str]:
     return found, words
 
 
-def pcid_of(case: str, folder: Path, **changes: Any) -> Path:
-    """The scene of a case with its first analysis alone, changed; its link files stay where they are."""
-    path = CASES / case / "scene.toml"
-    scene = run_files(path, {}, folder).scene
-    analysis = scene["analysis"][0] | changes.pop("analysis", {})
+def pcid_of(case: str, folder: Path, changes: Mapping[str, object] | None = None) -> Path:
+    """The scene of a case with its first analysis alone, and tables changed; its link files stay where they are."""
+    scene = run_files(CASES / case / "scene.toml", {}, folder).scene
+    scene |= {"analysis": scene["analysis"][:1], **(changes or {})}
     file = folder / f"{case}.toml"
-    file.write_text(tomli_w.dumps({**scene, "analysis": [analysis], **changes}), encoding="utf-8")
+    file.write_text(tomli_w.dumps(scene), encoding="utf-8")
     return file
 
 
@@ -105,16 +106,76 @@ def sensitivities(folder: Path) -> None:
     ):
         scene = pcid_of(case, folder)
         goals = [f"{what} joints.{joint}.moment" for joint in joints for what in ("rms", "peak")]
-
-        def derivatives(scene: Path = scene, goals: list[str] = goals, keys: tuple[str, ...] = keys) -> Any:
-            return ffrobot.sensitivity(scene, goals, keys, folder / scene.stem, processes=processors())
-
+        derivatives = partial(ffrobot.sensitivity, scene, goals, keys, folder / case, processes=processors())
         found, cost = against_solves(scene, derivatives)
         scale = np.abs(found.values) / np.abs(found.value)[:, None]
         error = (found.error * scale).max(axis=1) / np.maximum(1.0, np.abs(found.logarithmic).max(axis=1))
         print(
             f"{case}: eight derivatives, {found.runs} runs: {cost}; estimated errors {error.max():.1e} of the largest"
         )
+
+
+# --- the best of eight variables ---
+
+HEIGHTS = "links.{}.geometry.section.height=0.004:0.04:log"
+
+
+def segment(name: str, length: float) -> dict[str, object]:
+    """A link with one element of aluminium."""
+    return {
+        "name": name,
+        "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3},
+        "geometry": {
+            "kind": "beam",
+            "length": length,
+            "section": {"shape": "rectangle", "height": 0.012, "width": 0.02},
+        },
+        "mesh": {"elements": 1},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 2, "family": "in-plane-bending"},
+        "damping": {"ratio": 0.01},
+    }
+
+
+CANTILEVER = {
+    "name": "stepped",
+    "gravity": [0.0, 0.0],
+    "body": [{"name": f"s{k}", "link": segment(f"s{k}", 0.1)} for k in range(8)],
+    "joint": [
+        {"name": f"j{k}", "type": "weld", "between": [f"s{k - 1}.tip" if k else "ground", f"s{k}.root"]}
+        for k in range(8)
+    ],
+    "load": [{"point": "s7.tip", "y": "1.0"}],
+    "initial": {"state": "static"},
+    "analysis": [{"name": "still", "kind": "static"}],
+}
+
+
+LONG = (
+    *(f"links.{link}.geometry.section.{side}=0.01:0.03" for link in ("link1", "link2") for side in ("height", "width")),
+    *(f"links.{link}.material.density=4000:9000" for link in ("link1", "link2")),
+    *(f"links.{link}.damping.ratio=0.001:0.05" for link in ("link1", "link2")),
+)
+
+
+def optima(folder: Path) -> None:
+    """Of the stepped cantilever, whose runs are short, and of two_link."""
+    short = folder / "scene.toml"
+    short.write_text(tomli_w.dumps(CANTILEVER), encoding="utf-8")
+    heights = [HEIGHTS.format(f"s{k}") for k in range(8)]
+    optimum("stepped cantilever", short, heights, ["peak points.s7.tip.position[1] <= 2e-4"])
+    optimum("two_link", pcid_of("two_link", folder, {"initial": STILL}), LONG, LONG_LIMITS)
+
+
+def optimum(name: str, scene: Path, vary: Sequence[str], limits: Sequence[str]) -> None:
+    """The least mass within limits: a line."""
+    search = partial(
+        ffrobot.optimise, scene, vary, scene.with_suffix(".runs"), minimise="mass", subject_to=limits,
+        processes=processors(),
+    )  # fmt: skip
+    found, cost = against_solves(scene, search)
+    ending = "" if found.converged else ", NOT CONVERGED"
+    print(f"{name}: {found.runs} runs{ending}: {cost}")
 
 
 def main() -> None:
