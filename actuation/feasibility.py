@@ -25,7 +25,7 @@ class Remedies:
         limit: largest voltage, V, of the patch that needs most.
         layers: number of layers of the same thickness, at the same voltage.
         thickness: of one layer, m, with the voltage raised in proportion (at the same field).
-        count: patches of the same size, evenly spread; 0 where even as many as have room do not do.
+        count: patches of the same size, evenly spread; 0 where even as many as have room do not do, or none are tried.
         most_count: as many as have room.
         most_factor: by how much those still fall short.
     """
@@ -136,11 +136,12 @@ def judge_patches(
     patches: PatchArray,
     voltages: Voltages,
     motion: ModalMotion,
-    with_count: Callable[[int], PatchArray | None],
+    with_count: Callable[[int], PatchArray | None] | None,
 ) -> PatchFeasibility:
     """Required against available of the patches of one layout.
 
-    `with_count(k)` makes an array of k such patches, evenly spread; None where they have no room.
+    `with_count(k)` makes an array of k such patches, evenly spread; None where they have no room. Without it no other
+    numbers of patches are tried.
     """
     time, p, F_p = motion
     required = np.abs(voltages.required).max(axis=0)
@@ -159,7 +160,7 @@ def judge_patches(
 
 
 def _remedies(
-    patches: PatchArray, required: Array, F_p: Array, with_count: Callable[[int], PatchArray | None]
+    patches: PatchArray, required: Array, F_p: Array, with_count: Callable[[int], PatchArray | None] | None
 ) -> Remedies:
     """What limit, layers, thickness or count alone would do, by c ∝ N (t_b + N t_p) for the patch that lacks most."""
     worst = int(np.argmax(required / patches.limit))
@@ -169,7 +170,9 @@ def _remedies(
     layers = max(N, int(np.ceil((-t_b + np.sqrt(t_b**2 + 4 * t_p * lever)) / (2 * t_p) - 1e-9)))
     lever = max(factor, 1.0) * t_p * (t_b + N * t_p)  # of t (t_b + N t), the thickness that would do
     thickness = (-t_b + np.sqrt(t_b**2 + 4 * N * lever)) / (2 * N)
-    count, most, most_factor = _count(patches, F_p, with_count)
+    count, most, most_factor = (
+        (0, len(patches.edges), factor) if with_count is None else _count(patches, F_p, with_count)
+    )
     return Remedies(float(required[worst]), layers, float(thickness), count, most, most_factor)
 
 

@@ -20,6 +20,11 @@ def processes() -> int:
     return _environment(_SIZES, 1)
 
 
+def processors() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
 def is_first() -> bool:
     """Whether this is the process that reads, writes and prints."""
     return _environment(_RANKS, 0) == 0

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import json
+import os
 import platform
 import shutil
 import sys
@@ -73,16 +74,18 @@ def _folders(compiler: str) -> tuple[Path, Path]:
 
 def _forget_unfinished(own: Path) -> None:
     """What an interrupted compilation of this very process has left: FFCx would wait for it."""
-    for source in own.glob("*.c"):
-        if not source.with_suffix(READY).exists():
-            source.unlink()
+    names = set(os.listdir(own))
+    for name in names:
+        if name.endswith(".c") and name.replace(".c", READY) not in names:
+            (own / name).unlink()
 
 
 def _fetch(shared: Path, own: Path) -> None:
     """Bring in forms that others have compiled; damaged ones are left out and removed."""
     with suppress(OSError):
-        for entry in sorted(shared.iterdir()):
-            if entry.name.startswith(".") or not entry.is_dir() or (own / entry.name).with_suffix(READY).exists():
+        there = set(os.listdir(own))
+        for entry in (shared / name for name in sorted(os.listdir(shared)) if name + READY not in there):
+            if entry.name.startswith(".") or not entry.is_dir():
                 continue
             if not _is_sound(entry):
                 shutil.rmtree(entry, ignore_errors=True)
@@ -102,9 +105,9 @@ def _give(file: Path, name: Path) -> None:
 def _publish(own: Path, shared: Path) -> None:
     """Give others what this process has compiled; a cache that cannot be written does no harm."""
     with suppress(OSError):
-        for ready in own.glob(f"*{READY}"):
-            name = ready.name.removesuffix(READY)
-            if (shared / name).exists():
+        known = set(os.listdir(shared))
+        for name in (file.removesuffix(READY) for file in os.listdir(own) if file.endswith(READY)):
+            if name in known:
                 continue
             made = Path(tempfile.mkdtemp(prefix=".new-", dir=own))
             files = [file for file in own.glob(f"{name}.*") if file.suffix in (".c", ".so", ".cached")]

@@ -1,30 +1,126 @@
 #!/usr/bin/env python3
-"""What `ffrobot optimise` costs, in CPU times of one `ffrobot solve`: eight heights of a stepped cantilever.
+"""What designs cost, in wall and CPU times of one `ffrobot solve` of the same scene.
 
-    .venv/bin/python scripts/design_cost.py
+    .venv/bin/python scripts/design_cost.py                     # all of it, half an hour
+    .venv/bin/python scripts/design_cost.py sensitivity         # eight derivatives of PCID, in the plane and in space
+    .venv/bin/python scripts/design_cost.py optimise            # eight variables, of short and of long runs
+    .venv/bin/python scripts/design_cost.py uncertainty 1000    # samples, against single runs and bands by gradients
 
-Processes side by side with others take more CPU time each: the solve is measured before and after, and the mean counts.
+Processes side by side with others take more CPU time each: solves are measured before and after, and their mean counts.
 """
 
 from __future__ import annotations
 
+import argparse
 import gc
 import resource
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple, TypeVar
 
+import numpy as np
 import tomli_w
 
 import ffrobot
+from ffrobot.common.parallel import processors
+from ffrobot.sweep.files import run_files
 
 COMMAND = Path(sys.executable).parent / "ffrobot"
+CASES = Path(__file__).parents[1] / "cases"
+SOLVES = 2  # before, and as many after
+T = TypeVar("T")
+
+
+class Time(NamedTuple):
+    """Seconds."""
+
+    wall: float
+    cpu: float
+
+
+def measured(work: Callable[[], T]) -> tuple[T, Time]:
+    """What `work` returns, and its time, that of processes which it has waited for included."""
+
+    def cpu() -> float:
+        return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+
+    wall, begun = time.perf_counter(), cpu()
+    found = work()
+    gc.collect()  # ends workers
+    return found, Time(time.perf_counter() - wall, cpu() - begun)
+
+
+def against_solves(scene: Path, work: Callable[[], T]) -> tuple[T, str]:
+    """What `work` returns, and what it costs in times of `ffrobot solve`."""
+
+    def solve() -> None:
+        out = scene.with_suffix(".h5")
+        subprocess.run([COMMAND, "solve", scene, "-o", out], check=True, stdout=subprocess.DEVNULL)
+
+    solve()  # and modal bodies
+    solves = [measured(solve)[1] for _ in range(SOLVES)]
+    found, spent = measured(work)
+    solves += [measured(solve)[1] for _ in range(SOLVES)]
+    wall, cpu = np.mean(solves, axis=0)
+    words = (
+        f"{spent.wall / wall:.1f} times its wall time ({wall:.2f} s), {spent.cpu / cpu:.1f} its CPU time ({cpu:.2f} s)"
+    )
+    return found, words
+
+
+def pcid_of(case: str, folder: Path, changes: Mapping[str, object] | None = None) -> Path:
+    """The scene of a case with its first analysis alone, and tables changed; its link files stay where they are."""
+    scene = run_files(CASES / case / "scene.toml", {}, folder).scene
+    scene |= {"analysis": scene["analysis"][:1], **(changes or {})}
+    file = folder / f"{case}.toml"
+    file.write_text(tomli_w.dumps(scene), encoding="utf-8")
+    return file
+
+
+# --- eight derivatives ---
+
+PLANE_KEYS = (
+    "gravity.1",
+    *(f"links.{link}.geometry.section.height" for link in ("link1", "link2")),
+    *(f"links.{link}.material.{key}" for link in ("link1", "link2") for key in ("density", "youngs_modulus")),
+    "links.link1.geometry.section.width",
+)
+SPACE_KEYS = (
+    "gravity.2",
+    *(f"links.{link}.geometry.section.{key}" for link in ("upper", "fore") for key in ("outer", "inner")),
+    *(f"links.{link}.material.density" for link in ("upper", "fore")),
+    "links.upper.material.youngs_modulus",
+)
+
+
+def sensitivities(folder: Path) -> None:
+    """Of two_link and arm_3r: a line for each."""
+    for case, keys, joints in (
+        ("two_link", PLANE_KEYS, ("O", "A")),
+        ("arm_3r", SPACE_KEYS, ("shoulder", "elbow")),
+    ):
+        scene = pcid_of(case, folder)
+        goals = [f"{what} joints.{joint}.moment" for joint in joints for what in ("rms", "peak")]
+        derivatives = partial(ffrobot.sensitivity, scene, goals, keys, folder / case, processes=processors())
+        found, cost = against_solves(scene, derivatives)
+        scale = np.abs(found.values) / np.abs(found.value)[:, None]
+        error = (found.error * scale).max(axis=1) / np.maximum(1.0, np.abs(found.logarithmic).max(axis=1))
+        print(
+            f"{case}: eight derivatives, {found.runs} runs: {cost}; estimated errors {error.max():.1e} of the largest"
+        )
+
+
+# --- the best of eight variables ---
+
 HEIGHTS = "links.{}.geometry.section.height=0.004:0.04:log"
 
 
-def segment(name: str, length: float) -> dict[str, Any]:
+def segment(name: str, length: float) -> dict[str, object]:
     """A link with one element of aluminium."""
     return {
         "name": name,
@@ -55,42 +151,43 @@ CANTILEVER = {
 }
 
 
-def optimised(scene: Path) -> int:
-    """Runs for the lightest cantilever of eight heights whose tip gives way by 0.2 mm at most."""
-    vary = [HEIGHTS.format(f"s{k}") for k in range(8)]
-    limits = ["peak points.s7.tip.position[1] <= 2e-4"]
-    found = ffrobot.optimise(scene, vary, scene.parent / "runs", minimise="mass", subject_to=limits)
-    if not found.converged:
-        sys.exit(f"not converged:\n{found}")
-    return found.runs
+LONG = (
+    *(f"links.{link}.geometry.section.{side}=0.01:0.03" for link in ("link1", "link2") for side in ("height", "width")),
+    *(f"links.{link}.material.density=4000:9000" for link in ("link1", "link2")),
+    *(f"links.{link}.damping.ratio=0.001:0.05" for link in ("link1", "link2")),
+)
 
 
-def cpu() -> float:
-    """Seconds of this process and of those that it has waited for."""
-    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+def optima(folder: Path) -> None:
+    """Of the stepped cantilever, whose runs are short, and of two_link."""
+    short = folder / "scene.toml"
+    short.write_text(tomli_w.dumps(CANTILEVER), encoding="utf-8")
+    heights = [HEIGHTS.format(f"s{k}") for k in range(8)]
+    optimum("stepped cantilever", short, heights, ["peak points.s7.tip.position[1] <= 2e-4"])
+    optimum("two_link", pcid_of("two_link", folder, {"initial": STILL}), LONG, LONG_LIMITS)
 
 
-def solve(scene: Path) -> float:
-    """CPU time of the command."""
-    begun = cpu()
-    subprocess.run([COMMAND, "solve", scene, "-o", scene.with_suffix(".h5")], check=True, stdout=subprocess.DEVNULL)
-    return cpu() - begun
+def optimum(name: str, scene: Path, vary: Sequence[str], limits: Sequence[str]) -> None:
+    """The least mass within limits: a line."""
+    search = partial(
+        ffrobot.optimise, scene, vary, scene.with_suffix(".runs"), minimise="mass", subject_to=limits,
+        processes=processors(),
+    )  # fmt: skip
+    found, cost = against_solves(scene, search)
+    ending = "" if found.converged else ", NOT CONVERGED"
+    print(f"{name}: {found.runs} runs{ending}: {cost}")
 
 
 def main() -> None:
-    """One line."""
-    with tempfile.TemporaryDirectory() as folder:
-        scene = Path(folder) / "scene.toml"
-        scene.write_text(tomli_w.dumps(CANTILEVER), encoding="utf-8")
-        solve(scene)  # and modal bodies
-        one = [solve(scene) for _ in range(2)]
-        begun = cpu()
-        runs = optimised(scene)
-        gc.collect()  # ends the workers
-        spent = cpu() - begun
-        one += [solve(scene) for _ in range(2)]
-    mean = sum(one) / len(one)
-    print(f"{runs} runs, {spent / mean:.1f} solves' worth of CPU time ({mean:.2f} s each)")
+    """What is asked for."""
+    parts: dict[str, Callable[..., None]] = {"sensitivity": sensitivities}
+    parser = argparse.ArgumentParser(description="What designs cost.")
+    parser.add_argument("part", nargs="?", choices=parts)
+    chosen = parser.parse_args().part
+    for name, part in parts.items():
+        if chosen in (None, name):
+            with tempfile.TemporaryDirectory() as folder:
+                part(Path(folder))
 
 
 if __name__ == "__main__":

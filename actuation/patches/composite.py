@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -130,15 +131,22 @@ def stiffness_ratios(placed: Placed, body: ModalBody) -> tuple[Array, Array]:
     """
     layout, edges = placed
     found, sections = np.zeros((len(edges), 3)), link_sections(body)
+    alike = sections.alike
     own, felt = own_row(layout), felt_rows(layout)
-    for at in gauss_points(body, edges):
-        rigidity = sections.rigidity[at.station]
-        C, f = felt_loads(layout, sections, at.station)
+
+    @cache
+    def ratios(station: int) -> Array:
+        """(3,) of a length of one there: 1, ψ and the authority."""
+        rigidity = sections.rigidity[station]
+        C, f = felt_loads(layout, sections, station)
         strain = np.zeros(4)
         strain[felt] = np.linalg.solve(np.diag(rigidity[felt]) + C[np.ix_(felt, felt)], f[felt])
         ratio = rigidity[STRETCH] / (layout.modulus * layout.width * layout.layers * layout.thickness)
-        straight = straight_loads(layout, *place_of(layout, sections, at.station))[own]
-        found[at.interval] += at.weight * np.array([1.0, ratio, strain[own] * rigidity[own] / straight])
+        straight = straight_loads(layout, *place_of(layout, sections, station))[own]
+        return np.array([1.0, ratio, strain[own] * rigidity[own] / straight])
+
+    for at in gauss_points(body, edges):
+        found[at.interval] += at.weight * ratios(int(alike[at.station]))
     return found[:, 1] / found[:, 0], found[:, 2] / found[:, 0]
 
 

@@ -13,7 +13,7 @@ from ...fe_models.modal_body import ModalBody
 from .composite import Placed, composite, place_of
 from .layers import load_per_volt, own_row, straight_loads
 from .records import PatchKeys
-from .sections import link_sections, potentials
+from .sections import LinkSections, link_sections, potentials
 
 STEP = 0.1  # of the extent, from one station to the next; less is a taper
 
@@ -56,7 +56,7 @@ def _straight(key: str, placed: Placed, body: ModalBody) -> Effects:
     extent, c, lever = np.zeros((3, count))
     turn, Phi_V = np.zeros((2, count, body.mode_count))
     for k, (start, end) in enumerate(edges):
-        x, stations = _stretches(key, layout, body, k + 1, start, end)
+        x, stations = _stretches(key, layout, body, sections, k + 1, start, end)
         places = np.array([place_of(layout, sections, station) for station in stations])
         differences = np.diff([potentials(body.interpolate(end)) for end in x], axis=0)
         loads = np.array([straight_loads(layout, *place) for place in places])
@@ -69,7 +69,7 @@ def _straight(key: str, placed: Placed, body: ModalBody) -> Effects:
 
 
 def _stretches(
-    key: str, layout: PatchKeys, body: ModalBody, number: int, start: float, end: float
+    key: str, layout: PatchKeys, body: ModalBody, sections: LinkSections, number: int, start: float, end: float
 ) -> tuple[Array, Array]:
     """The ends (m + 1,) of stretches into which a change of the link's extent cuts a patch, and their stations (m,)."""
     x = body.stations.position[:, 0]
@@ -77,7 +77,7 @@ def _stretches(
     covered = np.flatnonzero((x[1:] > start + slack) & (x[:-1] < end - slack))
     if not len(covered):  # rounding: it begins where it ends
         raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m, found less")
-    extents = link_sections(body).extent(layout.normal)[covered]
+    extents = sections.extent(layout.normal)[covered]
     jump = np.abs(np.diff(extents)) / np.maximum(extents[1:], extents[:-1])
     if jump.max(initial=0.0) > STEP:
         k = int(jump.argmax())

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...fe_models.beam.section_stress import surface_shear
 from ...fe_models.modal_body import Interface, ModalBody
@@ -39,6 +39,14 @@ class LinkSections:
     def extent(self, normal: Literal["y", "z"]) -> Array:
         """(k,) between the faces with that normal, m."""
         return self.height if normal == "y" else self.width
+
+    @property
+    def alike(self) -> Indices:
+        """(k,) of each station the first one with the same section."""
+        of_station = np.column_stack([self.height, self.width, self.is_round, self.rigidity])
+        _, first, same = np.unique(of_station, axis=0, return_index=True, return_inverse=True)
+        found: Indices = first[same.ravel()]
+        return found
 
     def shear_lever(self, station: int, normal: Literal["y", "z"], patch_width: float) -> float:
         """β: mean shear of the surface under a patch, of unit twist, over its distance from the axis.

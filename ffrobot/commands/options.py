@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import click
 
+from ..common.parallel import processors
 from ..present.logs import FILE
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -23,8 +24,8 @@ def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
                 "-j",
                 "--processes",
                 type=click.IntRange(1, 1000),
-                default=1,
-                show_default=True,
+                default=processors,
+                show_default="one for each processor",
                 help="Runs side by side.",
             ),
         ):

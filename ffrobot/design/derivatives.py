@@ -8,15 +8,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..common.arrays import Array
+from ..common.arrays import Array, as_floats
 from ..sweep.sweep import Key
 from .designs import Design, Point
-from .differences import LEVELS, derivative
+from .differences import LEVELS, Derivative, derivative
 from .readings import Followed, Goal, Reading
 
 SIZES = (1.0, 0.5, 0.25)  # of the first steps
-REPEATED = (-0.01, 0.01, 0.02)  # likewise, to either side, where steps of integrations are taken again
-AIM = 1e-6  # error of percent per percent that needs no smaller steps
+AIM = 1e-5  # estimated error, of the largest percent per percent of a goal, or of 1, that needs no other steps
 ROUGH = 1e-2  # of a derivative: beyond, the goal is hardly smooth
 
 
@@ -72,54 +71,95 @@ class Entry:
 
 
 def sample(base: Base, k: int, offset: float, design: Design) -> Sample:
-    """The goals of a design beside the base."""
+    """The goals of a design beside the base with one key changed."""
+    failure = "" if design.completed else f"{design.row.status}: {design.row.message}"
+    return Sample(k, offset, followed(base, design), failure)
+
+
+def followed(base: Base, design: Design) -> tuple[Followed, ...]:
+    """The goals of a design beside the base; nothing where it failed."""
     if not design.completed:
-        return Sample(k, offset, (), f"{design.row.status}: {design.row.message}")
+        return ()
     with design.results() as results:
         pairs = zip(base.goals, base.readings, strict=True)
-        return Sample(k, offset, tuple(goal.follow(results, reading) for goal, reading in pairs))
+        return tuple(goal.follow(results, reading) for goal, reading in pairs)
+
+
+def values_of(goals: Sequence[Followed]) -> Array:
+    """(g,) of them; NaN where there are none."""
+    return np.array([goal.value for goal in goals]) if goals else np.array(np.nan)
 
 
 Exact = Mapping[tuple[int, int], Entry]
 """Entries that are known without runs, by numbers of goal and key."""
 
 
-def entries(base: Base, samples: Sequence[Sample], exact: Exact) -> tuple[tuple[Entry, ...], ...]:
-    """[goal][key]: `exact` ones, and the others by differences."""
-    of_keys = [[one for one in samples if one.k == k] for k in range(len(base.keys))]
+@dataclass
+class Known:
+    """What there is so far: `samples` beside the base, `exact` entries, and of `pairs` what their check has `left`.
+
+    Attributes:
+        pairs: h_k by number of the key: with ±h_k there are samples.
+        left: (g,) how far the sum of central differences is off a difference along the sum of their steps.
+    """
+
+    exact: Exact
+    samples: list[Sample] = field(default_factory=list)
+    pairs: Mapping[int, float] = field(default_factory=dict)
+    left: Array = field(default_factory=lambda: np.zeros(0))
+
+    def of_key(self, k: int) -> list[Sample]:
+        """Those with key number k changed."""
+        return [one for one in self.samples if one.k == k]
+
+    def central(self, k: int) -> Array:
+        """(g,) half of the difference that the pair of key number k makes."""
+        values, h = {one.offset: values_of(one.goals) for one in self.of_key(k)}, self.pairs[k]
+        return as_floats(0.5 * (values[h] - values[-h]))
+
+
+def entries(base: Base, known: Known) -> tuple[tuple[Entry, ...], ...]:
+    """[goal][key]: exact ones, and the others by differences."""
     return tuple(
-        tuple(exact.get((g, k)) or _entry(base, g, k, of_key) for k, of_key in enumerate(of_keys))
+        tuple(known.exact.get((g, k)) or _entry(base, g, k, known) for k in range(len(base.keys)))
         for g in range(len(base.goals))
     )
 
 
-def wants_smaller_steps(base: Base, samples: Sequence[Sample], exact: Exact) -> list[int]:
+def wants_smaller_steps(base: Base, known: Known) -> list[int]:
     """Keys by number with an entry whose error is above `AIM` and least with the smallest steps there are."""
-    return _rough_keys(base, samples, exact, lambda sizes: sizes[-LEVELS:][0])
+    return _rough_keys(base, known, lambda sizes: sizes[-LEVELS:][0])
 
 
-def wants_larger_steps(base: Base, samples: Sequence[Sample], exact: Exact) -> list[int]:
+def wants_larger_steps(base: Base, known: Known) -> list[int]:
     """Likewise, least with the largest ones."""
-    return _rough_keys(base, samples, exact, lambda sizes: sizes[0])
+    return _rough_keys(base, known, lambda sizes: sizes[0])
 
 
-def _rough_keys(base: Base, samples: Sequence[Sample], exact: Exact, best: Callable[[list[float]], float]) -> list[int]:
+def _rough_keys(base: Base, known: Known, best: Callable[[list[float]], float]) -> list[int]:
     """Keys by number with an entry whose error is above `AIM` and least with the step that is `best` of all sizes."""
-    found, rows = [], entries(base, samples, exact)
-    for k in range(len(base.keys)):
-        sizes = sorted({abs(one.offset) for one in samples if one.k == k and one.goals}, reverse=True)
-        if sizes and any(
-            _relative(row[k].error, base, g, k) > AIM and np.isclose(abs(row[k].step), best(sizes))
-            for g, row in enumerate(rows)
-        ):
-            found.append(k)
-    return found
+    rough, rows = set(), entries(base, known)
+    for g, row in enumerate(rows):
+        largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)
+        for k, one in enumerate(row):
+            sizes = sorted({abs(sample.offset) for sample in known.of_key(k) if sample.goals}, reverse=True)
+            is_good = _relative(one.error, base, g, k) <= AIM * max(1.0, np.nan_to_num(largest))
+            if sizes and not is_good and np.isclose(abs(one.step), best(sizes)):
+                rough.add(k)
+    return sorted(rough)
 
 
-def _entry(base: Base, g: int, k: int, samples: Sequence[Sample]) -> Entry:
+def _entry(base: Base, g: int, k: int, known: Known) -> Entry:
+    samples = known.of_key(k)
     whole = [one for one in samples if one.goals and np.isfinite(one.goals[g].value)]
     offsets = np.array([0.0, *(one.offset for one in whole)])
     found = derivative(offsets, np.array([base.readings[g].value, *(one.goals[g].value for one in whole)]))
+    if k in known.pairs and not known.left[g] / known.pairs[k] >= found.error:
+        h = known.pairs[k]
+        above, below = (
+            one.goals[g].value for one in sorted(samples, key=lambda one: -one.offset) if abs(one.offset) == h
+        )
+        found = Derivative((above - below) / (2.0 * h), float(known.left[g]) / h, h)
     # Steps that are the same for all runs err alike: no difference of runs tells of that.
     size = abs(base.readings[g].value) / (abs(base.point[k]) or 1.0)
     found = found._replace(error=found.error + base.repeats * max(abs(found.value), size))
@@ -152,5 +192,5 @@ def _notes(base: Base, g: int, k: int, samples: Sequence[Sample], error: float, 
 
 
 def _relative(error: float, base: Base, g: int, k: int) -> float:
-    """Of percent per percent; of a goal or a key that is 0 in its unit."""
-    return error * (abs(base.point[k]) or 1.0) / (abs(base.readings[g].value) or 1.0)
+    """|`error`| of percent per percent; of a goal or a key that is 0 in its unit."""
+    return abs(error) * (abs(base.point[k]) or 1.0) / (abs(base.readings[g].value) or 1.0)

@@ -77,6 +77,11 @@ class Designs:
         """The file with a row for every design."""
         return self._sweep.table
 
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self._designs)
+
     def folders(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Path]:
         """Of the designs at `points`, with these `changes` beside."""
         return [run.folder for run in self._lot(points, changes).runs]

@@ -7,13 +7,14 @@ Richardson's extrapolation of central differences, of order h⁶.
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from ..common.arrays import Array, as_floats
 
-LEVELS = 3  # sizes of steps that one extrapolation takes
+LEVELS = 3  # sizes of steps that one extrapolation takes at most
 NOISE = 3.0  # times what one divided difference says of it: with luck it says little
 ROUNDING = float(np.finfo(np.float64).eps)
 
@@ -38,15 +39,15 @@ def weights(offsets: Array) -> Array:
 def derivative(offsets: Array, values: Array) -> Derivative:
     """At 0, from `values` (n,) at `offsets` (n,); those that are NaN are left out.
 
-    Steps are taken three sizes at a time, and those whose estimate of the error is least make the derivative (Ridders,
-    Advances in Engineering Software 4, 1982). One side is enough, at a lower order.
+    Steps are taken two and three sizes at a time; those whose estimate of the error is least make the derivative
+    (Ridders, Advances in Engineering Software 4, 1982). One side is enough, at a lower order.
     """
     known = np.isfinite(values)
     offsets, values = offsets[known], values[known]
     sizes = np.unique(np.abs(offsets[offsets != 0.0]))[::-1]
     best = Derivative(np.nan, np.nan, np.nan)
-    for k in range(max(1, sizes.size - LEVELS + 1)):
-        found = _of_window(offsets, values, sizes[k : k + LEVELS])
+    for first, last in combinations(range(sizes.size + 1), 2):
+        found = _of_window(offsets, values, sizes[first:last]) if last - first <= LEVELS else None
         if found is not None and not found.error >= best.error:
             best = found
     return best

@@ -28,7 +28,9 @@ HOW = {
     "differences": "differences: central, extrapolated",
     "exact": "exact: by modes, without runs",
 }
-ERRORS = "errors: how far off the derivative is without the largest step, noise, and the tolerance of repeated steps"
+ERRORS = "errors: by differences of lower order or of all keys at once, noise, and the tolerance of repeated steps"
+    "errors: by differences of lower order, or of all keys at once, by noise, and by the tolerance of repeated steps"
+)
 
 
 @dataclass(frozen=True)

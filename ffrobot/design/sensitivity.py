@@ -1,9 +1,8 @@
 """Derivatives of goals by numbers of a scene and its links: `ffrobot sensitivity`.
 
 Where integrations can be repeated, runs beside the scene's own take its steps again (`mbs/fields/steps.py`). Their
-differences have no noise but rounding, and three runs, with a key changed by -h, h and 2h, h = 1e-4 of it, are enough.
-Where they err by more than `AIM`, smaller changes follow if errors fall with these, as with vibrations that pass
-through many periods, and larger ones if they grow.
+differences have no noise but rounding, and central pairs with small steps are enough, which are checked all together
+(`pairs`). Where they err by more than `AIM`, larger steps follow, as far as these are better.
 
 Otherwise every key takes steps of three sizes to both sides, h, h/2 and h/4 with h one percent, in runs that are
 integrated with a tighter tolerance than the scene's; `differences` has the extrapolation. Where errors are above `AIM`
@@ -24,17 +23,17 @@ from ..run.watcher import Watcher
 from ..sweep.files import number_at
 from ..sweep.runs import RESULTS
 from ..sweep.sweep import Key
-from .derivatives import REPEATED, SIZES, Base, Exact, Sample, entries, sample, wants_larger_steps, wants_smaller_steps
+from .derivatives import SIZES, Base, Exact, Known, Sample, entries, wants_larger_steps, wants_smaller_steps
 from .designs import Designs, Point, parse_key
 from .frequencies import exact_entries
 from .goals import parse_goal
+from .pairs import OTHERS, samples_at, take_pairs
 from .readings import Goal, Reading
 from .record import Sensitivity
 from .scenes import changes_for, may_repeat, repeated_steps
 
 STEP = 0.01  # of a key's value, the largest; of keys that are 0, in their unit
 FINER = ((0.125, 0.0625), (0.03125, 0.015625))  # of those that follow where these are too large
-FINER_REPEATED = ((-0.00125, 0.00125, 0.0025), (-0.00015625, 0.00015625, 0.0003125))  # of runs with the same steps
 TOLERANCE = 1e-9  # of the runs: below, rounding in forces of stiff links is not far
 TOLERANCE_REPEATED = 1e-7  # of those that take the same steps: their noise is none of its
 
@@ -77,14 +76,15 @@ def sensitivity(
     tolerance = repeats or tolerance or TOLERANCE
     base = Base(goals, readings, keys, point, steps, repeats=repeats, again=again)
     _check_steps(designs, base)
-    exact = exact_entries(path, base)
-    samples = _samples(designs, base, exact)
+    known = _all_known(designs, base, exact_entries(path, base))
     failures = tuple(
-        f"{'.'.join(keys[one.k])} = {point[one.k] + one.offset:.6g}: {one.failure}" for one in samples if one.failure
+        f"{'.'.join(keys[one.k])} = {point[one.k] + one.offset:.6g}: {one.failure}"
+        for one in known.samples
+        if one.failure
     )
     return Sensitivity(
         path, tuple(goal.text for goal in goals), base.readings, tuple(map(".".join, keys)), np.array(point),
-        entries(base, samples, exact), failures, tolerance, 1 + len(samples), designs.table,
+        entries(base, known), failures, tolerance, designs.count, designs.table,
     )  # fmt: skip
 
 
@@ -126,38 +126,35 @@ def _nominal(
 def _check_steps(designs: Designs, base: Base) -> None:
     """Raise `InputError` for a key that may be neither larger nor smaller, such as a count, before any run."""
     for k, key in enumerate(base.keys):
-        problems = [designs.problem(base.moved(k, offset)) for offset in (base.steps[k], -base.steps[k])]
-        if all(problems):
+        if not base.point[k].is_integer():
+            continue
+        offsets, problem = (base.steps[k], -base.steps[k]), ""
+        for offset in offsets:
+            if not (problem := designs.problem(base.moved(k, offset))):
+                break
+        if problem:
             name = ".".join(key)
-            raise InputError(
-                f"--to: expected keys that may be a little larger or smaller, found {name}:\n{problems[0]}"
-            )
+            raise InputError(f"--to: expected keys that may be a little larger or smaller, found {name}:\n{problem}")
 
 
-def _samples(designs: Designs, base: Base, exact: Exact) -> list[Sample]:
-    """All that derivatives need which are not `exact`, with other steps where the first ones are not good enough."""
+def _all_known(designs: Designs, base: Base, exact: Exact) -> Known:
+    """All that derivatives need, with other steps where the first ones are not good enough."""
+    known = Known(exact)
     wanted = [k for k in range(len(base.keys)) if any((g, k) not in exact for g in range(len(base.goals)))]
-    samples: list[Sample] = []
-    if base.repeats:
-        for parts in (REPEATED, *FINER_REPEATED):
-            samples += _beside(designs, base, wanted, parts)
-            wanted = wants_smaller_steps(base, samples, exact)
-        if not (wanted := wants_larger_steps(base, samples, exact)):
-            return samples
-    samples += _beside(designs, base, wanted, _both_sides(SIZES))
-    for sizes in FINER:
-        if not (rough := wants_smaller_steps(base, samples, exact)):
-            break
-        samples += _beside(designs, base, rough, _both_sides(sizes))
-    return samples
+    if base.repeats and wanted:
+        take_pairs(designs, base, known, wanted)
+        for parts in OTHERS:
+            wanted = wants_larger_steps(base, known)
+            known.samples += _beside(designs, base, known, wanted, parts)
+        wanted = wants_larger_steps(base, known)
+    known.samples += _beside(designs, base, known, wanted, SIZES)
+    for sizes in () if base.repeats else FINER:
+        known.samples += _beside(designs, base, known, wants_smaller_steps(base, known), sizes)
+    return known
 
 
-def _both_sides(sizes: Sequence[float]) -> list[float]:
-    return [sign * size for size in sizes for sign in (1.0, -1.0)]
-
-
-def _beside(designs: Designs, base: Base, which: Sequence[int], parts: Sequence[float]) -> list[Sample]:
-    """Runs with one key changed by these parts of its largest step."""
-    places = [(k, part * base.steps[k]) for k in which for part in parts]
-    found = designs.run([base.moved(k, offset) for k, offset in places], base.again)
-    return [sample(base, k, offset, design) for (k, offset), design in zip(places, found, strict=True)]
+def _beside(designs: Designs, base: Base, known: Known, which: Sequence[int], parts: Sequence[float]) -> list[Sample]:
+    """Runs with one key changed by these parts of its largest step, to both sides, where there are none of them yet."""
+    taken = {(one.k, one.offset) for one in known.samples}
+    places = [(k, sign * part * base.steps[k]) for k in which for part in parts for sign in (1.0, -1.0)]
+    return samples_at(designs, base, [place for place in places if place not in taken])

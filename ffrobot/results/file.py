@@ -84,6 +84,7 @@ class Results:
 
     def _open(self, path: Path, content: PathLike[str] | str | h5py.h5f.FileID) -> None:
         self.path, self._in_memory = path, isinstance(content, h5py.h5f.FileID)
+        self._histories: dict[str, tuple[str, ...]] = {}  # by analysis: a walk through a file takes milliseconds
         try:
             self._file = h5py.File(content, "r") if isinstance(content, h5py.h5f.FileID) else open_checked(path)
         except OSError as error:
@@ -340,6 +341,11 @@ class Results:
 
     def histories(self, analysis: str) -> list[str]:
         """Names, inside an analysis, of its datasets with a row for each output."""
+        if analysis not in self._histories:
+            self._histories[analysis] = tuple(self._names_of_histories(analysis))
+        return list(self._histories[analysis])
+
+    def _names_of_histories(self, analysis: str) -> list[str]:
         found: list[str] = []
         outputs = len(self.time(analysis))
 

@@ -104,10 +104,12 @@ def _feasibility(solution: Solution, result: AnalysisResult) -> Feasibility | No
     for body, array in solution.patches.items():
         loaded = solution.bodies[body]
         assert loaded.modal is not None
-        trial = partial(with_patch_count, solution.scene.path, array.layout, loaded.modal, loaded.planar)
+        counts = partial(with_patch_count, solution.scene.path, array.layout, loaded.modal, loaded.planar)
         p = outcome.q[:, outcome.coordinates(body)][:, 3:]
         motion = ModalMotion(outcome.time, p, outcome.F_p[:, outcome.modal_columns(body)])
-        patches[body] = judge_patches(array, result.voltages[body], motion, trial)
+        patches[body] = judge_patches(
+            array, result.voltages[body], motion, None if outcome.analysis.is_repeated else counts
+        )
     return Feasibility(_judge_motors(solution, outcome), patches)
 
 

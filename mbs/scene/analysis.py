@@ -66,6 +66,11 @@ class Analysis(Record):
     applicable: ClassVar[tuple[str, ...]] = ()  # values of `apply` by which forward runs can replay what it finds
     findings: ClassVar[tuple[str, ...]] = ()  # ends before the last time that are results, not failures
 
+    @property
+    def is_repeated(self) -> bool:
+        """Whether it takes the steps of another run again, which has been checked and judged."""
+        return False
+
     @classmethod
     def kind_name(cls) -> str:
         """The value of `kind` of all analyses of this record."""
@@ -167,6 +172,11 @@ class IntegratedAnalysis(TimedAnalysis):
     """Results file of this analysis, with `keep_steps`: its steps are taken again, whatever they err."""
 
     is_integrated = True
+
+    @property
+    def is_repeated(self) -> bool:
+        """With `repeat_steps`."""
+        return self.repeat_steps is not None
 
     @model_validator(mode="after")
     def _integrator_fits(self) -> Self:

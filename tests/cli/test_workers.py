@@ -116,7 +116,7 @@ def sweep(ffrobot, scene):
     def run(*functions, options=()):
         listed = ",".join(f'"{scene.parent}/mine.py:{name}"' for name in functions)
         vary = f"analysis.loop.controller.0.python={listed}"
-        done = ffrobot("sweep", scene, "--vary", vary, "--collect", "loop/joints/O/coordinate:last", *options)
+        done = ffrobot("sweep", scene, "--vary", vary, "--collect", "loop/joints/O/coordinate:last", "-j", 1, *options)
         assert done.returncode == 0, done.stderr
         with (scene.with_suffix(".sweep") / "table.csv").open(encoding="utf-8") as file:
             return list(csv.DictReader(file))
