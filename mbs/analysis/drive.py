@@ -1,9 +1,14 @@
-"""Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here."""
+"""Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here.
+
+Joint coordinates are integrated where the mechanism can be told in them (`model.planar_tree`), else those of the
+system. Outputs are evaluated by the system either way.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +16,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_list
 from .. import _core
+from ..model.planar_tree import NotInTreeError, PlanarTree
 from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause
@@ -18,7 +24,7 @@ from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls, unmet, with_steps_of
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
-from .earlier_check import check_earlier
+from .earlier_check import check_earlier, kept_of
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 
 Progress = Callable[[float], bool]
@@ -53,6 +59,15 @@ class SampledControl:
     times: Array
     delay: float
     controller: Callable[[int, float, Array], Array]
+
+
+@dataclass(frozen=True)
+class TreeStart:
+    """A tree that is integrated in place of its system, and where: q and v (n,)."""
+
+    tree: PlanarTree
+    q: Array
+    v: Array
 
 
 def drive(
@@ -91,13 +106,20 @@ def drive(
     integrator = with_steps_of(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
-    continuation = Continuation(_core.Checkpoint(), recording)
+    tree = _tree(assembly, start, control, earlier)
+    in_tree = isinstance(tree, TreeStart)
+    continuation = Continuation(_core.TreeCheckpoint() if in_tree else _core.Checkpoint(), recording)
     if earlier is not None:  # with the same candidates, and what they have become since
         known, continuation = earlier.statistics.integrator, earlier.continuation
         integrator = replace(integrator, name=known.name, reason=known.reason)
-    run = _integrated(assembly, analysis, start, times, integrator, steering, control, resolver, continuation, progress)
+    with nullcontext() if earlier is None else _gone_on_with(earlier, times, tree):
+        run = _integrated(
+            assembly, analysis, tree if isinstance(tree, TreeStart) else start, times, integrator, steering, control,
+            resolver, continuation, progress,
+        )  # fmt: skip
     seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)
+    statistics = replace(statistics, coordinates="joint" if in_tree else f"absolute: {tree}")
     if statistics.status == "step underflow" and not statistics.cause:
         statistics = replace(statistics, cause=beyond_order(integrator, analysis) or unmet(integrator, run))
     outcome = Outcome(
@@ -115,7 +137,7 @@ def drive(
 def _integrated(
     assembly: MechanismSystem,
     analysis: IntegratedAnalysis,
-    start: State,
+    start: State | TreeStart,
     times: Array,
     integrator: Choice,
     steering: _core.ExternalLoads | None,
@@ -125,19 +147,51 @@ def _integrated(
     progress: Progress,
 ) -> _core.Run:
     common: dict[str, Any] = {
-        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments,
-        "joints": assembly.joint_measures, "times": as_list(times),
-        "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
+        "system": assembly.system, "times": as_list(times), "q": start.q, "v": start.v,
+        "controls": integration_controls(analysis, integrator), "carry_on": progress,
     }  # fmt: skip
+    kept: dict[str, Any] = {
+        "external_loads": steering, "actuator_forces": resolver, "recording": continuation.recording,
+        "checkpoint": continuation.checkpoint,
+    }  # fmt: skip
+    if isinstance(start, TreeStart):
+        tree = start.tree
+        of_tree: dict[str, Any] = {"tree": tree.core, "scene": tree.scene, "bodies": tree.bodies, "drives": tree.drives}
+        return _core.run_tree(**of_tree, **common, **kept)
+    judged: dict[str, Any] = {"groups": assembly.groups, "moments": assembly.moments, "joints": assembly.joint_measures}
     if control is None:
-        return _core.run(
-            **common, external_loads=steering, actuator_forces=resolver, recording=continuation.recording,
-            checkpoint=continuation.checkpoint,
-        )  # fmt: skip
+        return _core.run(**common, **judged, **kept)
     return _core.run_sampled(
-        **common, motors=control.motors, patches=control.voltages, first_command=control.first,
+        **common, **judged, motors=control.motors, patches=control.voltages, first_command=control.first,
         sensing=control.sensing, samples=as_list(control.times), delay=control.delay, controller=control.controller,
     )  # fmt: skip
+
+
+def _tree(
+    assembly: MechanismSystem, start: State, control: SampledControl | None, earlier: EarlierRun | None
+) -> TreeStart | str:
+    """What is integrated in joint coordinates; or why nothing is."""
+    if control is not None:
+        return "under a sampled controller"
+    if earlier is not None and isinstance(earlier.continuation.checkpoint, _core.Checkpoint):
+        return "as the run that it goes on with"
+    try:
+        tree = PlanarTree(assembly)
+        return TreeStart(tree, *tree.state(start.q, start.v))
+    except NotInTreeError as why:
+        return str(why)
+
+
+@contextmanager
+def _gone_on_with(earlier: EarlierRun, times: Array, tree: TreeStart | str) -> Iterator[None]:
+    """For the run that goes on with `earlier`. Raises `InputError` where that stopped in another tree."""
+    kept, point = kept_of(earlier, times), earlier.continuation.checkpoint
+    if isinstance(point, _core.TreeCheckpoint):
+        n = len(tree.q) if isinstance(tree, TreeStart) else 0
+        kept.expect(n > 0, "checkpoint", "what a run of this scene remembers")
+        kept.tree_checkpoint(point, n, n)
+    with kept.gone_on_with():
+        yield
 
 
 def motion_of(assembly: MechanismSystem, run: _core.Run | _core.FcidOutputs, times: Array) -> Motion:

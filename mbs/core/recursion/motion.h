@@ -72,6 +72,14 @@ struct Target {
   }
 };
 
+// Forces from outside that depend on time alone.
+class Steering {
+public:
+  virtual ~Steering() = default;
+  // Adds those at time t along v (n_v), and on the wrenches of the mechanism (wrenches, dim).
+  virtual void add(double t, double *force, double *wrench) = 0;
+};
+
 struct Scene {
   std::vector<Target> targets; // of rows
   std::vector<Load> loads;
@@ -81,6 +89,8 @@ struct Scene {
   std::vector<GearSpring> gears;
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;
+  bool limits_steps = false;     // where its functions of time bend: OdeSystem::prescribe
+  std::vector<double> most_bent; // of each node, kg m^2: p^T p beyond it makes no sense; empty: nothing is
 };
 
 // What a motion remembers of its steps: with it another one of the same mechanism goes on as if it had taken them.
@@ -96,9 +106,10 @@ template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
   // The mechanism and the scene must outlive this. Rows that depend on others
   // at time t and (q, v) are left out of the equations from there on; they are
-  // to be consistent. `held` may be null: what acts beside the scene's loads, and may change between steps.
+  // to be consistent. What acts beside the scene's loads may be null, and must outlive this: `held`, which may change
+  // between steps, and `steering`.
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
-                  const HeldForces *held = nullptr);
+                  const HeldForces *held = nullptr, Steering *steering = nullptr);
 
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
@@ -106,6 +117,8 @@ public:
   double change_size(const double *z, const double *change, double rate) const override;
   void accepted(double t, const double *z, const double *z_dot) override;
   bool is_sensible(const double *z) const override;
+  Eigen::Index prescribed() const override; // of the scene's loads and targets, where these limit steps
+  void prescribe(double t, double *f) override;
   double initial_step() const override { return 0.1 / fastest_; }
   unsigned long evaluations() const override { return workspace_.evaluations; }
 
@@ -149,9 +162,11 @@ private:
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
   const HeldForces *held_;
+  Steering *steering_;
   // of accelerations; of rows and of Newton's method, which must not disturb
   // these
   Workspace<Space, double> workspace_, measured_, newton_;
+  bool has_given_; // generalized forces: force_
   Eigen::VectorXd force_, wrench_, target_, value_, rate_, correction_, state_;
   std::vector<Jet> jets_;
   double target_time_;
