@@ -7,8 +7,7 @@ system. Outputs are evaluated by the system either way.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +15,6 @@ import numpy as np
 
 from ...common.arrays import Array, as_list
 from .. import _core
-from ..model.planar_tree import NotInTreeError, PlanarTree
 from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause
@@ -24,8 +22,9 @@ from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls, unmet, with_steps_of
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
-from .earlier_check import check_earlier, kept_of
+from .earlier_check import check_earlier
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
+from .tree_start import TreeStart, tree_start
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -61,15 +60,6 @@ class SampledControl:
     controller: Callable[[int, float, Array], Array]
 
 
-@dataclass(frozen=True)
-class TreeStart:
-    """A tree that is integrated in place of its system, and where: q and v (n,)."""
-
-    tree: PlanarTree
-    q: Array
-    v: Array
-
-
 def drive(
     assembly: MechanismSystem,
     analysis: IntegratedAnalysis,
@@ -93,10 +83,9 @@ def drive(
     integration that ends early is kept with its cause.
     """
     times = analysis.times if times is None else times
-    if earlier is not None:
-        motors = len(assembly.motor_measures) if resolver is not None else None
-        check_earlier(earlier, assembly, times, motors, recorded=recording is not None)
+    motors = len(assembly.motor_measures) if resolver is not None else None
     if earlier is not None and earlier.statistics.status == "completed":
+        check_earlier(earlier, assembly, times, motors, recorded=recording is not None)
         integrated = None if reported is None else assembly
         return Outcome(
             analysis, reported or assembly, earlier.motion, earlier.forces, earlier.statistics,
@@ -106,20 +95,23 @@ def drive(
     integrator = with_steps_of(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
-    tree = _tree(assembly, start, control, earlier)
-    in_tree = isinstance(tree, TreeStart)
-    continuation = Continuation(_core.TreeCheckpoint() if in_tree else _core.Checkpoint(), recording)
+    sampled = "under a sampled controller"
+    tree = tree_start(assembly, start, integrator, earlier) if control is None else sampled
+    integrated_from = start if isinstance(tree, str) else tree
+    if isinstance(tree, TreeStart) and steering is None:
+        integrator = integrator.in_tree()
+    continuation = Continuation(_core.Checkpoint(), recording)
     if earlier is not None:  # with the same candidates, and what they have become since
+        size = len(integrated_from.q) + len(integrated_from.v)
+        check_earlier(earlier, assembly, times, motors, recorded=recording is not None, state_size=size)
         known, continuation = earlier.statistics.integrator, earlier.continuation
         integrator = replace(integrator, name=known.name, reason=known.reason)
-    with nullcontext() if earlier is None else _gone_on_with(earlier, times, tree):
-        run = _integrated(
-            assembly, analysis, tree if isinstance(tree, TreeStart) else start, times, integrator, steering, control,
-            resolver, continuation, progress,
-        )  # fmt: skip
+    run = _integrated(
+        assembly, analysis, integrated_from, times, integrator, steering, control, resolver, continuation, progress
+    )
     seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)
-    statistics = replace(statistics, coordinates="joint" if in_tree else f"absolute: {tree}")
+    statistics = replace(statistics, coordinates=f"absolute: {tree}" if isinstance(tree, str) else "joint")
     if statistics.status == "step underflow" and not statistics.cause:
         statistics = replace(statistics, cause=beyond_order(integrator, analysis) or unmet(integrator, run))
     outcome = Outcome(
@@ -147,51 +139,22 @@ def _integrated(
     progress: Progress,
 ) -> _core.Run:
     common: dict[str, Any] = {
-        "system": assembly.system, "times": as_list(times), "q": start.q, "v": start.v,
-        "controls": integration_controls(analysis, integrator), "carry_on": progress,
+        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments,
+        "joints": assembly.joint_measures, "times": as_list(times),
+        "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
     }  # fmt: skip
-    kept: dict[str, Any] = {
-        "external_loads": steering, "actuator_forces": resolver, "recording": continuation.recording,
-        "checkpoint": continuation.checkpoint,
-    }  # fmt: skip
-    if isinstance(start, TreeStart):
-        tree = start.tree
-        of_tree: dict[str, Any] = {"tree": tree.core, "scene": tree.scene, "bodies": tree.bodies, "drives": tree.drives}
-        return _core.run_tree(**of_tree, **common, **kept)
-    judged: dict[str, Any] = {"groups": assembly.groups, "moments": assembly.moments, "joints": assembly.joint_measures}
     if control is None:
-        return _core.run(**common, **judged, **kept)
+        kept: dict[str, Any] = {
+            "external_loads": steering, "actuator_forces": resolver, "recording": continuation.recording,
+            "checkpoint": continuation.checkpoint,
+        }  # fmt: skip
+        if isinstance(start, TreeStart):
+            return _core.run_tree(**start.core_arguments, **common, **kept)
+        return _core.run(**common, **kept)
     return _core.run_sampled(
-        **common, **judged, motors=control.motors, patches=control.voltages, first_command=control.first,
+        **common, motors=control.motors, patches=control.voltages, first_command=control.first,
         sensing=control.sensing, samples=as_list(control.times), delay=control.delay, controller=control.controller,
     )  # fmt: skip
-
-
-def _tree(
-    assembly: MechanismSystem, start: State, control: SampledControl | None, earlier: EarlierRun | None
-) -> TreeStart | str:
-    """What is integrated in joint coordinates; or why nothing is."""
-    if control is not None:
-        return "under a sampled controller"
-    if earlier is not None and isinstance(earlier.continuation.checkpoint, _core.Checkpoint):
-        return "as the run that it goes on with"
-    try:
-        tree = PlanarTree(assembly)
-        return TreeStart(tree, *tree.state(start.q, start.v))
-    except NotInTreeError as why:
-        return str(why)
-
-
-@contextmanager
-def _gone_on_with(earlier: EarlierRun, times: Array, tree: TreeStart | str) -> Iterator[None]:
-    """For the run that goes on with `earlier`. Raises `InputError` where that stopped in another tree."""
-    kept, point = kept_of(earlier, times), earlier.continuation.checkpoint
-    if isinstance(point, _core.TreeCheckpoint):
-        n = len(tree.q) if isinstance(tree, TreeStart) else 0
-        kept.expect(n > 0, "checkpoint", "what a run of this scene remembers")
-        kept.tree_checkpoint(point, n, n)
-    with kept.gone_on_with():
-        yield
 
 
 def motion_of(assembly: MechanismSystem, run: _core.Run | _core.FcidOutputs, times: Array) -> Motion:

@@ -16,15 +16,11 @@ from .. import _core
 from ..joints.measure import Marker, Measure
 from .model import ZERO, Constraint
 from .system import MechanismSystem
-from .tree_layout import FREE, JOINTS, Coordinate, Layout, Node
+from .tree_layout import FREE, JOINTS, Coordinate, Layout, Node, NotInTreeError
 
 MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
 COMPONENTS = {_core.MeasureKind.x: 0, _core.MeasureKind.y: 1, _core.MeasureKind.angle: 2, _core.MeasureKind.gear: 2}
 """Of a planar wrench, of the force along a measure whose direction is that of the ground."""
-
-
-class NotInTreeError(Exception):
-    """Says what of a mechanism cannot be integrated in joint coordinates."""
 
 
 class Share(NamedTuple):
@@ -63,8 +59,6 @@ class PlanarTree:
             raise NotInTreeError(f"{len(rows)} components of trajectories and loops, more than {MOST_ROWS}")
         self._add_loads()
         self._add_what_joints_have()
-        self.scene.limits_steps = True
-        self.scene.most_bent = [node.body.inertia for node in self._layout.nodes]
         wrenches = [self._layout.place(marker) for marker in self._wrenches]
         bodies = [self._body(number, node) for number, node in enumerate(self._layout.nodes)]
         self.core = _core.PlanarModel(

@@ -29,6 +29,10 @@ FREE = (_core.JointKind.free, 3)
 """Of a body that nothing carries: (R, θ) of its frame."""
 
 
+class NotInTreeError(Exception):
+    """Says what of a mechanism cannot be integrated in joint coordinates."""
+
+
 class Coordinate(NamedTuple):
     """Of a joint of the tree: its number in q and v, and the sign with which the tree counts it."""
 
@@ -50,6 +54,8 @@ class Node(NamedTuple):
 
 class Layout:
     """The tree of a model, and the markers on its bodies, which are made where they are asked for.
+
+    Raises `NotInTreeError` for a type of joint that the core does not know.
 
     Attributes:
         nodes: each after the one that carries it.
@@ -100,6 +106,8 @@ class Layout:
 
     def _node(self, body: PlanarBody, joint: JointRecord | None, carrier: Carrier | None) -> Node:
         first = self.size
+        if joint is not None and joint.type not in JOINTS:
+            raise NotInTreeError(f"{joint.label}, {joint.type}")
         _, count = FREE if joint is None else JOINTS[joint.type]
         backwards = joint is not None and carrier is not None and joint.between[0] == carrier.own
         sides = [self.place(at, turn) for at, turn in self._sides(body, joint)]

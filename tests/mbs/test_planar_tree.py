@@ -6,7 +6,8 @@ import zoo
 from mechanisms import always, assemble, core_run, make_model, relative, revolute
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.planar_tree import NotInTreeError, PlanarTree
+from ffrobot.mbs.model.planar_tree import PlanarTree
+from ffrobot.mbs.model.tree_layout import NotInTreeError
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 T = 0.0
@@ -94,7 +95,8 @@ def test_states_there_and_back():
         )
         run = _core.run_tree(
             system=assembly.system, tree=tree.core, scene=tree.scene, bodies=tree.bodies, drives=tree.drives,
-            times=[T], q=start_q, v=start_v, controls=controls, carry_on=always,
+            groups=assembly.groups, moments=assembly.moments, joints=[], times=[T], q=start_q, v=start_v,
+            controls=controls, carry_on=always,
         )  # fmt: skip
         np.testing.assert_allclose(run.q[0], q, rtol=0, atol=1e-12)
         np.testing.assert_allclose(run.v[0], v, rtol=0, atol=1e-11)

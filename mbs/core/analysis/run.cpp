@@ -63,18 +63,13 @@ Outputs OutputEvaluator::take(std::size_t reached) {
   return std::move(outputs_);
 }
 
-namespace {
-
-// Throws std::invalid_argument where the checkpoint is not one of this motion.
-void restore(ConstrainedMotion &motion, const Checkpoint &checkpoint) {
-  const Peaks &now = motion.norm().peaks(), &then = checkpoint.peaks;
-  if (checkpoint.integration.state.size() != motion.local().state_size() || then.bodies.size() != now.bodies.size() ||
+void restore(ErrorNorm &norm, Index state_size, const Checkpoint &checkpoint) {
+  const Peaks &now = norm.peaks(), &then = checkpoint.peaks;
+  if (checkpoint.integration.state.size() != state_size || then.bodies.size() != now.bodies.size() ||
       then.groups.size() != now.groups.size())
     throw std::invalid_argument("checkpoint: expected one of the same system, found one of other sizes");
-  motion.norm().set_peaks(then);
+  norm.set_peaks(then);
 }
-
-} // namespace
 
 Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
         const IntegrationControls &controls, OutputEvaluator evaluate, const std::function<bool(double)> &carry_on,
@@ -84,7 +79,7 @@ Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen
   result.last << q, v;
   motion.norm().plan(times.back() - times.front());
   if (checkpoint && checkpoint->integration.has_begun())
-    restore(motion, *checkpoint);
+    restore(motion.norm(), motion.local().state_size(), *checkpoint);
   result.report = integrate(
       motion, times, result.last, controls,
       [&](std::size_t i, double t, const double *state) { evaluate(i, t, state); }, carry_on, recording, nullptr,

@@ -1,5 +1,6 @@
 #include "core/analysis/tree_run.h"
 
+#include <limits>
 #include <stdexcept>
 
 namespace ffrobot {
@@ -19,14 +20,15 @@ AbsoluteState::AbsoluteState(const System &system, const PlanarTree &tree, std::
 
 const VectorXd &AbsoluteState::operator()(const double *state) {
   const double *q = state, *v = state + tree_.n_q;
-  const auto frames = recursion::frame_motions(tree_, q, v, workspace_);
+  const auto &frames = recursion::frame_poses(tree_, q, v, workspace_);
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const auto &node = tree_.nodes[i];
-    const recursion::FrameMotion &frame = frames[i];
-    const Eigen::Vector3d d = frame.R * node.origin, r = frame.r + d, r_dot = frame.v + frame.omega.cross(d);
+    const auto &[r, r_dot, omega, R, angle] = frames[i];
+    const double x = node.origin[0], y = node.origin[1]; // of the body's frame, in axes of the tree's
+    const double d_x = R[0][0] * x + R[0][1] * y, d_y = R[1][0] * x + R[1][1] * y;
     const Index at = system_.first_coordinate[bodies_[i]], at_rate = system_.n_q() + at;
-    state_.segment<3>(at) << r[0], r[1], frame.angle - node.turn;
-    state_.segment<3>(at_rate) << r_dot[0], r_dot[1], frame.omega[2];
+    state_.segment<3>(at) << r[0] + d_x, r[1] + d_y, angle - node.turn;
+    state_.segment<3>(at_rate) << r_dot[0] - omega[2] * d_y, r_dot[1] + omega[2] * d_x, omega[2];
     state_.segment(at + 3, node.n()) = Eigen::Map<const VectorXd>(q + node.p_q(), node.n());
     state_.segment(at_rate + 3, node.n()) = Eigen::Map<const VectorXd>(v + node.p_v(), node.n());
   }
@@ -65,22 +67,61 @@ void append(const Recording &steps, AbsoluteState &absolute, Recording &recordin
 
 } // namespace
 
-Run run(recursion::RecursiveMotion<recursion::Planar> &motion, AbsoluteState absolute, const std::vector<double> &times,
-        const VectorXd &q, const VectorXd &v, const IntegrationControls &controls, OutputEvaluator evaluate,
-        const std::function<bool(double)> &carry_on, Recording *recording, IntegrationCheckpoint *checkpoint) {
+TreeMotion::TreeMotion(Tree &tree, ConstrainedMotion &observed, AbsoluteState &absolute)
+    : ImplicitSystem(tree.local().space()), tree_(tree), observed_(observed), absolute_(absolute),
+      time_(std::numeric_limits<double>::quiet_NaN()), z_(size()), shifted_(size()), y_dot_(observed.size()) {}
+
+void TreeMotion::observe(double t, const double *z) {
+  const Eigen::Map<const VectorXd> at(z, size());
+  if (t == time_ && at == z_)
+    return;
+  y_ = absolute_(z);
+  observed_.slope(t, y_.data(), y_dot_.data());
+  time_ = t, z_ = at;
+}
+
+double TreeMotion::error_size(double t, const double *z, const double *e) {
+  observe(t, z);
+  shifted_ = z_ + Eigen::Map<const VectorXd>(e, size());
+  error_ = absolute_(shifted_.data()) - y_;
+  return observed_.error_size(t, y_.data(), error_.data());
+}
+
+double TreeMotion::change_size(const double *z, const double *change, double rate) const {
+  const VectorXd y = absolute_(z);
+  const VectorXd shifted = Eigen::Map<const VectorXd>(z, size()) + Eigen::Map<const VectorXd>(change, size());
+  const VectorXd difference = absolute_(shifted.data()) - y;
+  return observed_.change_size(y.data(), difference.data(), rate);
+}
+
+void TreeMotion::accepted(double t, const double *z, const double *) {
+  observe(t, z);
+  observed_.accepted(t, y_.data(), y_dot_.data());
+}
+
+Run run(TreeMotion &motion, AbsoluteState &absolute, const std::vector<double> &times, const VectorXd &q,
+        const VectorXd &v, const IntegrationControls &controls, OutputEvaluator evaluate,
+        const std::function<bool(double)> &carry_on, Recording *recording, Checkpoint *checkpoint) {
   Run result;
   VectorXd last(q.size() + v.size());
   last << q, v;
+  motion.norm().plan(times.back() - times.front());
   Recording steps;
-  if (recording && !recording->times.empty() && checkpoint && checkpoint->has_begun()) {
-    steps.times = {checkpoint->time};
-    steps.states = {checkpoint->state.begin(), checkpoint->state.end()};
-    steps.methods = {{0, recording->methods.back().second}};
+  if (checkpoint && checkpoint->integration.has_begun()) {
+    restore(motion.norm(), motion.local().state_size(), *checkpoint);
+    const IntegrationCheckpoint &begun = checkpoint->integration;
+    if (recording && !recording->times.empty()) {
+      steps.times = {begun.time};
+      steps.states = {begun.state.begin(), begun.state.end()};
+      steps.methods = {{0, recording->methods.back().second}};
+    }
   }
   result.report = integrate(
       motion, times, last, controls,
       [&](std::size_t i, double t, const double *state) { evaluate(i, t, absolute(state).data()); }, carry_on,
-      recording ? &steps : nullptr, nullptr, checkpoint);
+      recording ? &steps : nullptr, nullptr, checkpoint ? &checkpoint->integration : nullptr);
+  if (checkpoint)
+    checkpoint->peaks = motion.norm().peaks();
   if (recording)
     append(steps, absolute, *recording);
   result.last = absolute(last.data());
