@@ -163,7 +163,7 @@ def stopped(stopped_once, tmp_path):
     return stopped_once, shutil.copy(stopped_once.with_name("r.h5"), tmp_path / "r.h5")
 
 
-PEAKS = [f"checkpoint/peaks/{name}" for name in ("velocity", "modal", "groups")]
+PEAKS = ["checkpoint/state_peaks", "checkpoint/force_peaks"]
 RESUMED = ["checkpoint/state", *PEAKS, "q", "v", "a", "lambda_", "tau", "F_p"]
 CHANGES = {
     "empty": lambda values: values[:0],

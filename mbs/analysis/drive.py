@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,7 +23,7 @@ from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls, unmet, with_steps_of
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
-from .earlier_check import check_earlier
+from .earlier_check import check_earlier, kept_of
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from .tree_start import TreeStart, tree_start
 
@@ -97,18 +98,20 @@ def drive(
     )
     sampled = "under a sampled controller"
     tree = tree_start(assembly, start, integrator, earlier) if control is None else sampled
-    integrated_from = start if isinstance(tree, str) else tree
     if isinstance(tree, TreeStart) and steering is None:
         integrator = integrator.in_tree()
-    continuation = Continuation(_core.Checkpoint(), recording)
+    point = _core.TreeCheckpoint() if isinstance(tree, TreeStart) else _core.Checkpoint()
+    continuation = Continuation(point, recording)
     if earlier is not None:  # with the same candidates, and what they have become since
-        size = len(integrated_from.q) + len(integrated_from.v)
-        check_earlier(earlier, assembly, times, motors, recorded=recording is not None, state_size=size)
+        size = None if isinstance(tree, str) else len(tree.q)
+        check_earlier(earlier, assembly, times, motors, recorded=recording is not None, tree_size=size)
         known, continuation = earlier.statistics.integrator, earlier.continuation
         integrator = replace(integrator, name=known.name, reason=known.reason)
-    run = _integrated(
-        assembly, analysis, integrated_from, times, integrator, steering, control, resolver, continuation, progress
-    )
+    with nullcontext() if earlier is None else kept_of(earlier, times).gone_on_with():
+        run = _integrated(
+            assembly, analysis, start if isinstance(tree, str) else tree, times, integrator, steering, control,
+            resolver, continuation, progress,
+        )  # fmt: skip
     seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)
     statistics = replace(statistics, coordinates=f"absolute: {tree}" if isinstance(tree, str) else "joint")
@@ -139,17 +142,17 @@ def _integrated(
     progress: Progress,
 ) -> _core.Run:
     common: dict[str, Any] = {
-        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments,
-        "joints": assembly.joint_measures, "times": as_list(times),
-        "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
+        "system": assembly.system, "times": as_list(times), "q": start.q, "v": start.v,
+        "controls": integration_controls(analysis, integrator), "carry_on": progress,
     }  # fmt: skip
+    kept: dict[str, Any] = {
+        "external_loads": steering, "actuator_forces": resolver, "recording": continuation.recording,
+        "checkpoint": continuation.checkpoint,
+    }  # fmt: skip
+    if isinstance(start, TreeStart):
+        return _core.run_tree(**start.core_arguments, **common, **kept)
+    common |= {"groups": assembly.groups, "moments": assembly.moments, "joints": assembly.joint_measures}
     if control is None:
-        kept: dict[str, Any] = {
-            "external_loads": steering, "actuator_forces": resolver, "recording": continuation.recording,
-            "checkpoint": continuation.checkpoint,
-        }  # fmt: skip
-        if isinstance(start, TreeStart):
-            return _core.run_tree(**start.core_arguments, **common, **kept)
         return _core.run(**common, **kept)
     return _core.run_sampled(
         **common, motors=control.motors, patches=control.voltages, first_command=control.first,

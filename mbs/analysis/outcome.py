@@ -97,6 +97,12 @@ STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error"
 METHOD_HISTORY = ("second", "pace_of_other", "since", "measured", "tries", "window", "trial")
 """Of the core's `MethodHistory`, all."""
 
+TREE_MEMORY = ("inertial_peak", "accepted", "least_ratio", "singular_at", "watched_at", "determinant")
+"""Numbers of the core's `TreeCheckpoint` beside those of its steps and methods."""
+
+TREE_VECTORS = ("state", "state_peaks", "force_peaks", "singular_posture")
+"""Arrays of the core's `TreeCheckpoint`."""
+
 BODY_PEAKS = (
     "velocity", "angular_velocity", "modal_velocity", "modal", "acceleration", "angular_acceleration",
     "modal_acceleration",
@@ -109,11 +115,11 @@ class Continuation:
     """Where an integration can be gone on with, and its steps where a later analysis replays them.
 
     Both are in the coordinates of `assembly`, what was integrated, where that is not the outcome's: see `raised_mass`.
-    The state of the checkpoint is that of the tree where joint coordinates were integrated: the steps after it are then
-    those that the run would have made.
+    The checkpoint is one of a tree where joint coordinates were integrated: the steps after it are then those that the
+    run would have made.
     """
 
-    checkpoint: _core.Checkpoint
+    checkpoint: _core.Checkpoint | _core.TreeCheckpoint
     recording: _core.Recording | None = None
     assembly: MechanismSystem | None = None
 

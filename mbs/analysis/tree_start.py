@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...common.arrays import Array
+from .. import _core
 from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
 from ..model.tree_layout import NotInTreeError
@@ -36,13 +37,12 @@ def tree_start(
 
     A run that goes on with an `earlier` one stays in the coordinates in which that was stopped.
     """
+    if earlier is not None and isinstance(earlier.continuation.checkpoint, _core.Checkpoint):
+        return "as the run that it goes on with"
     if integrator.begins_implicit:  # its steps take 1.9 times as long in joint coordinates: docs/recursion.md
         return "Newton's matrices are sparse there"
     try:
         tree = PlanarTree(assembly)
-        found = TreeStart(tree, *tree.state(start.q, start.v))
+        return TreeStart(tree, *tree.state(start.q, start.v))
     except NotInTreeError as why:
         return str(why)
-    if earlier is not None and len(earlier.continuation.checkpoint.state) != len(found.q) + len(found.v):
-        return "as the run that it goes on with"
-    return found

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
+from ..fields.field_types import GROUND
 from ..joints.measure import Marker, Measure
 from .model import ZERO, Constraint
 from .system import MechanismSystem
@@ -59,6 +60,8 @@ class PlanarTree:
             raise NotInTreeError(f"{len(rows)} components of trajectories and loops, more than {MOST_ROWS}")
         self._add_loads()
         self._add_what_joints_have()
+        self.scene.is_strict = True
+        self.scene.most_bent = [node.body.inertia for node in self._layout.nodes]
         wrenches = [self._layout.place(marker) for marker in self._wrenches]
         bodies = [self._body(number, node) for number, node in enumerate(self._layout.nodes)]
         self.core = _core.PlanarModel(
@@ -175,7 +178,10 @@ class PlanarTree:
 def _check(assembly: MechanismSystem) -> None:
     """Raise `NotInTreeError` for what the recursion in the plane does not have."""
     model = assembly.model
+    joined = {body for joint in model.scene.joint if GROUND not in joint.bodies for body in joint.bodies}
     missing = {
+        # Errors of forces are judged between bodies: those on the ground are not known to the core.
+        "a body that is joined to no other": any(body.name not in joined for body in model.links),
         "geometric stiffening": any(body.stiffening is not None for body in model.bodies),
         "gears that give": bool(model.gears),
         "forces that depend on the motion of points": bool(model.state_forces),

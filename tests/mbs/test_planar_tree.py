@@ -12,6 +12,7 @@ from ffrobot.mbs.solve.initial_state import undeformed_state
 
 T = 0.0
 NOT_IN_TREE = {
+    "chain of 1": "a body that is joined to no other",
     "stiffened": "geometric stiffening",
     "stiffened, driven": "geometric stiffening",
     "stiffened, as built": "geometric stiffening",
@@ -95,16 +96,15 @@ def test_states_there_and_back():
         )
         run = _core.run_tree(
             system=assembly.system, tree=tree.core, scene=tree.scene, bodies=tree.bodies, drives=tree.drives,
-            groups=assembly.groups, moments=assembly.moments, joints=[], times=[T], q=start_q, v=start_v,
-            controls=controls, carry_on=always,
+            times=[T], q=start_q, v=start_v, controls=controls, carry_on=always,
         )  # fmt: skip
         np.testing.assert_allclose(run.q[0], q, rtol=0, atol=1e-12)
         np.testing.assert_allclose(run.v[0], v, rtol=0, atol=1e-11)
 
 
 def test_more_rows_than_the_core_has():
-    joints = [revolute("j1", "ground", "b1.root")]
-    joints += [revolute(f"g{k}", "b1.tip", "ground", at=(0.1 * k, 0.0)) for k in range(8)]
-    model = make_model(zoo.clouds(np.random.default_rng(0), 1), joint=joints)
+    joints = [revolute("j1", "ground", "b1.root"), revolute("j2", "b1.tip", "b2.root")]
+    joints += [revolute(f"g{k}", "b2.tip", "ground", at=(0.1 * k, 0.0)) for k in range(8)]
+    model = make_model(zoo.clouds(np.random.default_rng(0), 2), joint=joints)
     with pytest.raises(NotInTreeError, match="16 components of trajectories and loops, more than 15"):
         PlanarTree(assemble(model))

@@ -39,31 +39,33 @@ void check_drives(const System &system, const PlanarModel &tree, const DrivesOnT
 }
 
 Run run_tree(const System &system, const PlanarModel &tree, const recursion::Scene &scene,
-             std::vector<std::size_t> bodies, const DrivesOnTree &drives, std::vector<int> groups,
-             std::vector<bool> moments, std::vector<Measure> joints, const std::vector<double> &times,
+             std::vector<std::size_t> bodies, const DrivesOnTree &drives, const std::vector<double> &times,
              const VectorXd &q, const VectorXd &v, const IntegrationControls &controls,
              const std::function<bool(double)> &carry_on, ExternalLoads *external_loads,
-             ActuatorForces *actuator_forces, Recording *recording, Checkpoint *checkpoint) {
+             ActuatorForces *actuator_forces, Recording *recording, recursion::TreeCheckpoint *checkpoint) {
   tree.check_state(q, v);
   recursion::check_scene(tree, scene);
   check_drives(system, tree, drives);
-  check_size("moments", static_cast<Index>(moments.size()), static_cast<Index>(groups.size()));
   const nb::gil_scoped_release unlocked;
   std::optional<SteeredTree> steering;
   if (external_loads)
     steering.emplace(system, *external_loads, drives);
-  TreeMotion::Tree of_tree(tree.mechanism, scene, times.front(), q.data(), v.data(), nullptr,
-                           steering ? &*steering : nullptr);
-  ConstrainedMotion observed(
-      system, {system, {std::move(groups), std::move(moments), std::move(joints), actuator_forces}}, external_loads);
-  AbsoluteState absolute(system, tree.mechanism, std::move(bodies));
-  TreeMotion motion(of_tree, observed, absolute);
+  recursion::RecursiveMotion<Planar> motion(tree.mechanism, scene, times.front(), q.data(), v.data(), nullptr,
+                                            steering ? &*steering : nullptr);
+  if (checkpoint && checkpoint->integration.has_begun()) {
+    check_size("state of the checkpoint", checkpoint->integration.state.size(), q.size() + v.size());
+    motion.go_on(checkpoint->history);
+  }
   const auto ask = [&](double t) {
     const nb::gil_scoped_acquire locked;
     return carry_on(t);
   };
-  return run(motion, absolute, times, q, v, controls, {system, times.size(), external_loads, actuator_forces}, ask,
-             recording, checkpoint);
+  Run found = run(motion, {system, tree.mechanism, std::move(bodies)}, times, q, v, controls,
+                  {system, times.size(), external_loads, actuator_forces}, ask, recording,
+                  checkpoint ? &checkpoint->integration : nullptr);
+  if (checkpoint)
+    checkpoint->history = motion.history();
+  return found;
 }
 
 } // namespace
@@ -87,9 +89,9 @@ void bind_system_run(nb::module_ &m) {
           },
           "drive"_a, "wrench"_a, "component"_a, "share"_a,
           "`share` times the drive is a component of (force, moment), global axes, on a wrench of the tree.");
-  m.def("run_tree", &run_tree, nb::kw_only(), "system"_a, "tree"_a, "scene"_a, "bodies"_a, "drives"_a, "groups"_a,
-        "moments"_a, "joints"_a, "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a, "external_loads"_a = nb::none(),
-        "actuator_forces"_a = nb::none(), "recording"_a = nb::none(), "checkpoint"_a = nb::none(),
+  m.def("run_tree", &run_tree, nb::kw_only(), "system"_a, "tree"_a, "scene"_a, "bodies"_a, "drives"_a, "times"_a, "q"_a,
+        "v"_a, "controls"_a, "carry_on"_a, "external_loads"_a = nb::none(), "actuator_forces"_a = nb::none(),
+        "recording"_a = nb::none(), "checkpoint"_a = nb::none(),
         "As `run`, but integrates a tree of the same bodies from (q, v) of its own; bodies: number in the system of\n"
         "each of the tree's.");
 }

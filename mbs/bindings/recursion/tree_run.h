@@ -44,6 +44,9 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
   for (const GearSpring &gear : scene.gears)
     for (const GearSpring::Side &side : {gear.a, gear.b})
       check_index("q of a gear", side.q, n_q), check_index("v of a gear", side.v, n_v);
+  if (!scene.most_bent.empty())
+    check_size("most_bent", static_cast<Eigen::Index>(scene.most_bent.size()),
+               static_cast<Eigen::Index>(model.mechanism.nodes.size()));
   if (scene.watch)
     check_size("is_path", static_cast<Eigen::Index>(scene.watch->is_path.size()), model.rows());
   for (const DrivenMarker &driven : scene.driven)

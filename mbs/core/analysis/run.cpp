@@ -63,13 +63,18 @@ Outputs OutputEvaluator::take(std::size_t reached) {
   return std::move(outputs_);
 }
 
-void restore(ErrorNorm &norm, Index state_size, const Checkpoint &checkpoint) {
-  const Peaks &now = norm.peaks(), &then = checkpoint.peaks;
-  if (checkpoint.integration.state.size() != state_size || then.bodies.size() != now.bodies.size() ||
+namespace {
+
+// Throws std::invalid_argument where the checkpoint is not one of this motion.
+void restore(ConstrainedMotion &motion, const Checkpoint &checkpoint) {
+  const Peaks &now = motion.norm().peaks(), &then = checkpoint.peaks;
+  if (checkpoint.integration.state.size() != motion.local().state_size() || then.bodies.size() != now.bodies.size() ||
       then.groups.size() != now.groups.size())
     throw std::invalid_argument("checkpoint: expected one of the same system, found one of other sizes");
-  norm.set_peaks(then);
+  motion.norm().set_peaks(then);
 }
+
+} // namespace
 
 Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
         const IntegrationControls &controls, OutputEvaluator evaluate, const std::function<bool(double)> &carry_on,
@@ -79,7 +84,7 @@ Run run(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen
   result.last << q, v;
   motion.norm().plan(times.back() - times.front());
   if (checkpoint && checkpoint->integration.has_begun())
-    restore(motion.norm(), motion.local().state_size(), *checkpoint);
+    restore(motion, *checkpoint);
   result.report = integrate(
       motion, times, result.last, controls,
       [&](std::size_t i, double t, const double *state) { evaluate(i, t, state); }, carry_on, recording, nullptr,

@@ -51,10 +51,6 @@ private:
   Outputs outputs_;
 };
 
-// What a norm remembers at a checkpoint. Throws std::invalid_argument where that is not one of such a norm, and of
-// states (q, v) of that size.
-void restore(ErrorNorm &norm, Eigen::Index state_size, const Checkpoint &checkpoint);
-
 // Integrates `motion` from (q, v) over `times`. `recording` and `checkpoint` may be null. Where the run goes on from a
 // `checkpoint`, rows of outputs that were delivered before are left as they are: undefined.
 // Throws std::invalid_argument where the checkpoint is not one of this system.

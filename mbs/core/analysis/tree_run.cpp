@@ -1,6 +1,5 @@
 #include "core/analysis/tree_run.h"
 
-#include <limits>
 #include <stdexcept>
 
 namespace ffrobot {
@@ -67,61 +66,22 @@ void append(const Recording &steps, AbsoluteState &absolute, Recording &recordin
 
 } // namespace
 
-TreeMotion::TreeMotion(Tree &tree, ConstrainedMotion &observed, AbsoluteState &absolute)
-    : ImplicitSystem(tree.local().space()), tree_(tree), observed_(observed), absolute_(absolute),
-      time_(std::numeric_limits<double>::quiet_NaN()), z_(size()), shifted_(size()), y_dot_(observed.size()) {}
-
-void TreeMotion::observe(double t, const double *z) {
-  const Eigen::Map<const VectorXd> at(z, size());
-  if (t == time_ && at == z_)
-    return;
-  y_ = absolute_(z);
-  observed_.slope(t, y_.data(), y_dot_.data());
-  time_ = t, z_ = at;
-}
-
-double TreeMotion::error_size(double t, const double *z, const double *e) {
-  observe(t, z);
-  shifted_ = z_ + Eigen::Map<const VectorXd>(e, size());
-  error_ = absolute_(shifted_.data()) - y_;
-  return observed_.error_size(t, y_.data(), error_.data());
-}
-
-double TreeMotion::change_size(const double *z, const double *change, double rate) const {
-  const VectorXd y = absolute_(z);
-  const VectorXd shifted = Eigen::Map<const VectorXd>(z, size()) + Eigen::Map<const VectorXd>(change, size());
-  const VectorXd difference = absolute_(shifted.data()) - y;
-  return observed_.change_size(y.data(), difference.data(), rate);
-}
-
-void TreeMotion::accepted(double t, const double *z, const double *) {
-  observe(t, z);
-  observed_.accepted(t, y_.data(), y_dot_.data());
-}
-
-Run run(TreeMotion &motion, AbsoluteState &absolute, const std::vector<double> &times, const VectorXd &q,
-        const VectorXd &v, const IntegrationControls &controls, OutputEvaluator evaluate,
-        const std::function<bool(double)> &carry_on, Recording *recording, Checkpoint *checkpoint) {
+Run run(recursion::RecursiveMotion<recursion::Planar> &motion, AbsoluteState absolute, const std::vector<double> &times,
+        const VectorXd &q, const VectorXd &v, const IntegrationControls &controls, OutputEvaluator evaluate,
+        const std::function<bool(double)> &carry_on, Recording *recording, IntegrationCheckpoint *checkpoint) {
   Run result;
   VectorXd last(q.size() + v.size());
   last << q, v;
-  motion.norm().plan(times.back() - times.front());
   Recording steps;
-  if (checkpoint && checkpoint->integration.has_begun()) {
-    restore(motion.norm(), motion.local().state_size(), *checkpoint);
-    const IntegrationCheckpoint &begun = checkpoint->integration;
-    if (recording && !recording->times.empty()) {
-      steps.times = {begun.time};
-      steps.states = {begun.state.begin(), begun.state.end()};
-      steps.methods = {{0, recording->methods.back().second}};
-    }
+  if (recording && !recording->times.empty() && checkpoint && checkpoint->has_begun()) {
+    steps.times = {checkpoint->time};
+    steps.states = {checkpoint->state.begin(), checkpoint->state.end()};
+    steps.methods = {{0, recording->methods.back().second}};
   }
   result.report = integrate(
       motion, times, last, controls,
       [&](std::size_t i, double t, const double *state) { evaluate(i, t, absolute(state).data()); }, carry_on,
-      recording ? &steps : nullptr, nullptr, checkpoint ? &checkpoint->integration : nullptr);
-  if (checkpoint)
-    checkpoint->peaks = motion.norm().peaks();
+      recording ? &steps : nullptr, nullptr, checkpoint);
   if (recording)
     append(steps, absolute, *recording);
   result.last = absolute(last.data());

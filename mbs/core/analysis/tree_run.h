@@ -1,5 +1,5 @@
 // A whole analysis of a planar system that is integrated in joint coordinates (core/recursion) and observed in the
-// system's own: what errors are measured by, outputs and recordings of steps are those of run().
+// system's own: outputs, and all that is found of them, are those of run(), and so are recordings of steps.
 #pragma once
 
 #include "core/analysis/run.h"
@@ -61,59 +61,11 @@ private:
   Workspace workspace_;
 };
 
-// The motion of a tree as a system that methods step, its errors judged as those of its system: `observed`, which is
-// evaluated where a step ends.
-class TreeMotion final : public ImplicitSystem {
-public:
-  using Tree = recursion::RecursiveMotion<recursion::Planar>;
-
-  // All must outlive this.
-  TreeMotion(Tree &tree, ConstrainedMotion &observed, AbsoluteState &absolute);
-
-  double error_size(double t, const double *z, const double *e) override;
-  double change_size(const double *z, const double *change, double rate) const override;
-  void accepted(double t, const double *z, const double *z_dot) override;
-  bool is_sensible(const double *z) const override { return observed_.is_sensible(absolute_(z).data()); }
-  Eigen::Index prescribed() const override { return observed_.prescribed(); }
-  void prescribe(double t, double *f) override { observed_.prescribe(t, f); }
-  double initial_step() const override { return observed_.initial_step(); }
-  unsigned long evaluations() const override { return tree_.evaluations() + observed_.evaluations(); }
-
-  void slope(double t, const double *z, double *z_dot) override { tree_.slope(t, z, z_dot); }
-  bool correct(double t, double *z) override { return tree_.correct(t, z); }
-  Eigen::Index constraints() const override { return tree_.constraints(); }
-  const Eigen::VectorXd &stiffness() const override { return tree_.stiffness(); }
-  const Eigen::VectorXd &damping() const override { return tree_.damping(); }
-  void factorise(double damping_factor, double stiffness_factor) override {
-    tree_.factorise(damping_factor, stiffness_factor);
-  }
-  void factorise(Complex damping_factor, Complex stiffness_factor) override {
-    tree_.factorise(damping_factor, stiffness_factor);
-  }
-  void solve(const double *r, const double *c, double *x) override { tree_.solve(r, c, x); }
-  void solve(const Complex *r, Complex *x) override { tree_.solve(r, x); }
-  void constrain(const double *x, double *c) override { tree_.constrain(x, c); }
-  void constraint_values(double t, const double *z, double *value, double *rate) override {
-    tree_.constraint_values(t, z, value, rate);
-  }
-
-  ErrorNorm &norm() { return observed_.norm(); }
-
-private:
-  void observe(double t, const double *z); // into y_ and y_dot_, unless they are there
-
-  Tree &tree_;
-  ConstrainedMotion &observed_;
-  AbsoluteState &absolute_;
-  double time_; // of y_
-  Eigen::VectorXd z_, shifted_, y_, y_dot_, error_;
-};
-
-// Integrates the tree from its (q, v). Outputs, `recording`, the last state and the peaks of the checkpoint are those
-// of the system, the checkpoint's state is that of the tree: the steps after it are those that the run would have made.
-// Otherwise as the run() of a system.
-Run run(TreeMotion &motion, AbsoluteState &absolute, const std::vector<double> &times, const Eigen::VectorXd &q,
-        const Eigen::VectorXd &v, const IntegrationControls &controls, OutputEvaluator evaluate,
-        const std::function<bool(double)> &carry_on, Recording *recording, Checkpoint *checkpoint);
+// Integrates `motion` from (q, v) of the tree, outputs, `recording` and the last state being those of the system;
+// otherwise as the run() of a system. The checkpoint is one of the tree, and so is all that `motion` remembers.
+Run run(recursion::RecursiveMotion<recursion::Planar> &motion, AbsoluteState absolute, const std::vector<double> &times,
+        const Eigen::VectorXd &q, const Eigen::VectorXd &v, const IntegrationControls &controls,
+        OutputEvaluator evaluate, const std::function<bool(double)> &carry_on, Recording *recording,
+        IntegrationCheckpoint *checkpoint);
 
 } // namespace ffrobot

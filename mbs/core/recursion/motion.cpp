@@ -35,6 +35,8 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
       target_time_(std::numeric_limits<double>::quiet_NaN()), norm_(mechanism),
       shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(VectorXd::Zero(mechanism.n_v)) {
+  has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
+               !scene_.frame_motors.empty() || !scene_.gears.empty();
   update_targets(t);
   keep_independent_rows(mechanism, q, v, workspace_);
   newton_.keep(workspace_.active);
@@ -59,8 +61,7 @@ template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
 template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
   update_targets(t);
   Forces<double> forces;
-  if (held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.frame_motors.empty() ||
-      !scene_.gears.empty()) {
+  if (has_given_) {
     force_.setZero();
     for (const Load &load : scene_.loads) {
       const double magnitude = load.magnitude(t).value;
@@ -168,7 +169,7 @@ template <class Space> double RecursiveMotion<Space>::change_size(const double *
 template <class Space> void RecursiveMotion<Space>::accepted(double t, const double *z, const double *z_dot) {
   if (accepted_ == 0)
     norm_.observe(workspace_);
-  norm_.take(z, z_dot, workspace_);
+  norm_.take(z, z_dot, scene_.is_strict && has_given_ ? force_.data() : nullptr, workspace_);
   if (accepted_ % steps_between_postures_ == 0)
     watch_posture(t, local().state(z));
   ++accepted_;
@@ -191,7 +192,26 @@ template <class Space> void RecursiveMotion<Space>::watch_posture(double t, cons
   }
 }
 
+template <class Space> Index RecursiveMotion<Space>::prescribed() const {
+  const std::size_t count = scene_.targets.size() + scene_.loads.size() + scene_.point_loads.size();
+  return scene_.is_strict ? static_cast<Index>(count) : 0;
+}
+
+template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *f) {
+  for (const Target &target : scene_.targets)
+    *f++ = target(t).acceleration;
+  for (const Load &load : scene_.loads)
+    *f++ = load.magnitude(t).value;
+  for (const PointLoad &load : scene_.point_loads)
+    *f++ = load.magnitude(t).value;
+}
+
 template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z) const {
+  for (std::size_t i = 0; i < scene_.most_bent.size(); ++i) {
+    const Node<Space> &node = mechanism_.nodes[i];
+    if (!(Eigen::Map<const VectorXd>(z + node.p_v(), node.n()).squaredNorm() <= scene_.most_bent[i]))
+      return false;
+  }
   return least_ratio_ >= singular_ratio && Eigen::Map<const VectorXd>(z, 2 * n_v()).allFinite();
 }
 

@@ -89,6 +89,10 @@ struct Scene {
   std::vector<GearSpring> gears;
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;
+  // As scenes in the plane have it: steps are limited where functions of time bend (OdeSystem::prescribe), and errors of
+  // links that given forces hold straight are compared with what these would bend them.
+  bool is_strict = false;
+  std::vector<double> most_bent; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
 
 // What a motion remembers of its steps: with it another one of the same mechanism goes on as if it had taken them.
@@ -115,6 +119,8 @@ public:
   double change_size(const double *z, const double *change, double rate) const override;
   void accepted(double t, const double *z, const double *z_dot) override;
   bool is_sensible(const double *z) const override;
+  Eigen::Index prescribed() const override; // of the scene's loads and targets, where these limit steps
+  void prescribe(double t, double *f) override;
   double initial_step() const override { return 0.1 / fastest_; }
   unsigned long evaluations() const override { return workspace_.evaluations; }
 
@@ -162,6 +168,7 @@ private:
   // of accelerations; of rows and of Newton's method, which must not disturb
   // these
   Workspace<Space, double> workspace_, measured_, newton_;
+  bool has_given_; // generalized forces: force_
   Eigen::VectorXd force_, wrench_, target_, value_, rate_, correction_, state_;
   std::vector<Jet> jets_;
   double target_time_;

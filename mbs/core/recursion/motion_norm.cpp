@@ -132,9 +132,11 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
 }
 
 template <class Space>
-void MotionNorm<Space>::take(const double *z, const double *z_dot, const Workspace<Space, double> &w) {
+void MotionNorm<Space>::take(const double *z, const double *z_dot, const double *applied,
+                             const Workspace<Space, double> &w) {
   const std::size_t n = frequency_.size();
-  std::vector<double> of_forces(size_.size(), 0.0); // what the forces on modes will do to them
+  // what the forces on modes will do to them, and what given ones would do alone, which may hold a link straight
+  std::vector<double> of_forces(size_.size(), 0.0), of_given(size_.size(), 0.0);
   std::fill(size_.begin(), size_.end(), 0.0);
   for (std::size_t i = 0; i < group_.size(); ++i)
     size_[static_cast<std::size_t>(group_[i])] += z[i] * z[i];
@@ -143,9 +145,12 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const Workspa
       const double rate = z_dot[n + i] / frequency_[i], way = rate / frequency_[i];
       of_forces[static_cast<std::size_t>(group_[i])] += way * way;
       of_forces[static_cast<std::size_t>(group_[n + i])] += rate * rate;
+      const double bend = applied ? applied[i] / std::pow(frequency_[i], 2) : 0;
+      of_given[static_cast<std::size_t>(group_[i])] += bend * bend;
+      of_given[static_cast<std::size_t>(group_[n + i])] += std::pow(bend * frequency_[i], 2);
     }
   for (std::size_t g = 0; g < size_.size(); ++g)
-    peak_[g] = std::max({peak_[g], std::sqrt(size_[g]), std::sqrt(of_forces[g])});
+    peak_[g] = std::max({peak_[g], std::sqrt(size_[g]), std::sqrt(of_forces[g]), std::sqrt(of_given[g])});
   take_accelerations(w);
   // Rotation vectors start at zero in every step: an angle is compared with one radian at least, a way with a length.
   peak_[0] = std::max(peak_[0], length_), peak_[1] = std::max(peak_[1], 1.0);

@@ -26,8 +26,9 @@ public:
   double of_observed(const Workspace<Space, double> &w);
   bool observes() const { return !force_group_.empty(); }
 
-  // Peaks grow by the state z, its rate and the forces observed there; w: as at the last evaluation.
-  void take(const double *z, const double *z_dot, const Workspace<Space, double> &w);
+  // Peaks grow by the state z, its rate and the forces observed there; w: as at the last evaluation. `applied` (n_v):
+  // given generalized forces there; null: none.
+  void take(const double *z, const double *z_dot, const double *applied, const Workspace<Space, double> &w);
 
   NormPeaks peaks() const { return {peak_, force_peak_, inertial_}; }
   void set_peaks(const NormPeaks &peaks); // throws std::invalid_argument where they are those of another mechanism

@@ -15,7 +15,7 @@ struct FrameMotion {
   Eigen::Vector3d a_origin;
 };
 
-// Where all frames are and how they move, third axis or not, accelerations aside: w.frames.
+// Where all frames are and how they move, accelerations aside: w.frames.
 template <class Space>
 const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const double *q, const double *v,
                                              Workspace<Space, double> &w);
