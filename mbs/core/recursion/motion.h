@@ -89,8 +89,9 @@ struct Scene {
   std::vector<GearSpring> gears;
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;
-  // As scenes in the plane have it: steps are limited where functions of time bend (OdeSystem::prescribe), and errors of
-  // links that given forces hold straight are compared with what these would bend them.
+  // As scenes in the plane have it: steps are limited where functions of time bend (OdeSystem::prescribe), errors of
+  // forces between bodies count twice, and those of links that given forces hold straight are compared with what these
+  // would bend them.
   bool is_strict = false;
   std::vector<double> most_bent; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
