@@ -2,6 +2,7 @@
 
 #include "core/integrate/delivery.h"
 #include "core/integrate/jump.h"
+#include "core/integrate/rounding.h"
 #include "core/integrate/step_control.h"
 #include "core/integrate/step_limit.h"
 #include "core/integrate/watch.h"
@@ -21,6 +22,10 @@ namespace {
 // estimates hardly see it, and most harm is done between their ends. Only where it may be a notable part of the
 // tolerance.
 constexpr double radians_too_long = 5, notable = 0.1;
+
+// Steps below a radian of the fastest vibration, in first steps, are looked at for rounding: vibrations do not ask for
+// steps that are much shorter. Methods that damp what they do not resolve need no such look.
+constexpr double radian = 10;
 
 // Steps that are rejected until they are this part of the usual ones may have met a jump, which is looked for. Steps
 // end before it and begin behind it, and are as long as usual.
@@ -206,9 +211,21 @@ private:
       return NAN;
     system_.slope(attempt.end, method_->end(), method_->last_slope());
     method_->estimate(attempt.step, error_);
-    const double size = system_.error_size(attempt.end, method_->end(), error_.data()) / allowance.error;
+    double size = system_.error_size(attempt.end, method_->end(), error_.data()) / allowance.error;
+    if (size > StepControl::target && attempt.step < radian * system_.initial_step() && !method_->damps())
+      size = beyond_rounding(attempt, allowance, size);
     const bool is_dense = size <= 1 && delivery_.next_time() < attempt.end;
     return is_dense ? std::max(dense_size(attempt), size) : size; // keeps NaN
+  }
+
+  // What of that size is more than rounding
+  double beyond_rounding(const Attempt &attempt, const Allowance &allowance, double size) {
+    const Eigen::VectorXd left = rounding_error(system_, t_, z_.data(), method_->first_slope(), attempt.step, error_);
+    if (left.isZero(0))
+      return size;
+    system_.slope(attempt.end, method_->end(), method_->last_slope());
+    const double by_rounding = system_.error_size(attempt.end, method_->end(), left.data());
+    return std::max(size - by_rounding / allowance.error, 0.0);
   }
 
   // That of outputs between its ends, which no later step depends on: relative to the whole tolerance.

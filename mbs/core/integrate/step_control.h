@@ -11,6 +11,8 @@ constexpr double no_time = 1e-13; // of the time, or of the run: no step is made
 
 class StepControl {
 public:
+  static constexpr double target = 0.25; // of the largest error allowed: leaves room for its scatter
+
   // order: the error shrinks as step^order
   explicit StepControl(double order) : order_(order) {}
 
@@ -44,8 +46,6 @@ public:
   }
 
 private:
-  static constexpr double target = 0.25; // of the largest error allowed: leaves room for its scatter
-
   double order_;
   double previous_step_ = 0, previous_error_ = 1;
 };

@@ -33,7 +33,8 @@ inline void hand_over(const Mechanism<Space> &m, const Node<Space> &node, Worksp
     if (node.rotor_inertia > 0)
       H[3].add(0, hinge.gyro[0]), H[4].add(0, hinge.gyro[1]);
   Cols P[d];
-  Space::template Turn<T>::add_moment(hinge.r, H);
+  if (!node.shape.is_centred)
+    Space::template Turn<T>::add_moment(hinge.r, H);
   hinge.turn.apply(H, P);
   if (node.parent < 0) {
     T A[d];
@@ -55,7 +56,8 @@ inline void inward(const Mechanism<Space> &m, const Node<Space> &node, const T *
                    Workspace<Space, T> &w, Pack<T, W> (&S)[W], Pack<T, W> &gamma) {
   constexpr int d = Space::dim;
   using Cols = Pack<T, W>;
-  Pack<T, d> M[d];
+  // M becomes Lambda, where that is in axes of the section
+  Pack<T, d> own[d], *M = node.shape.free_are_axes ? w.hinges[&node - m.nodes.data()].Lambda : own;
   T b[d];
   auto &state = w.bodies[&node - m.nodes.data()];
   evaluate_inertia(node, q + node.p_q(), v + node.p_v(), state, M, b);

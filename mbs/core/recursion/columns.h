@@ -20,6 +20,18 @@ template <class Cols, int W> FFROBOT_INLINE void lose(Cols (&S)[W], const Cols &
     S[r] -= a[r] * b;
 }
 
+// Of `count` pairs, one row of S after the other: that stays in a register
+template <int count, class Cols, int W>
+FFROBOT_INLINE void gain_all(Cols (&S)[W], const Cols (&a)[count], const Cols (&b)[count]) {
+#pragma GCC unroll 8
+  for (int r = 1; r < W; ++r) {
+    Cols row = S[r];
+    for (int i = 0; i < count; ++i)
+      row += a[i][r] * b[i];
+    S[r] = row;
+  }
+}
+
 // y (Cols) = M x
 template <int d, class T, class Cols> FFROBOT_INLINE void apply(const Pack<T, d> *M, const Cols *x, Cols *y) {
   for (int i = 0; i < d; ++i) {

@@ -114,8 +114,9 @@ inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, 
   }
   for (int k = node.shape.freedoms.count - 1; k >= 0; --k)
     eliminate_freedom<Space, T, W>(node, k, force ? applied : nullptr, hinge, m, w, M, H, S);
-  for (int i = 0; i < d; ++i)
-    hinge.Lambda[i] = M[i]; // in axes of the cross, or without the last row: `factors` knows
+  if (M != hinge.Lambda)
+    for (int i = 0; i < d; ++i)
+      hinge.Lambda[i] = M[i]; // in axes of the cross, or without the last row: `factors` knows
   if constexpr (d == 6) {
     if (universal) {
       const auto change = [&](auto *x) { from_cross(hinge, x); };

@@ -52,7 +52,9 @@ Inertia inertia_of(const planar::Body &b, const double *p, const double *v, plan
 
 Inertia inertia_of(const spatial::Body &b, const double *, const double *v, spatial::State<double> &s) {
   Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
-  spatial::FrameTerms<double> frame;
+  Pack<double, 6> M[6];
+  double bias[6];
+  spatial::FrameTerms<double> frame(M, bias);
   inertia(b, s, frame);
   to.s = vector(s.s);
   for (int i = 0; i < 3; ++i)

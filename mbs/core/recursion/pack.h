@@ -106,6 +106,26 @@ struct Pack<double, n> {
   FFROBOT_INLINE double sum() const { return v.sum(); }
 };
 
+// Six of eight numbers: zeros behind them
+template <class T> FFROBOT_INLINE Pack<T, 6> read_six(const T *from) {
+  auto x = Pack<T, 6>::read(from);
+  if constexpr (std::is_same_v<T, double>)
+    x.v.keep(6);
+  return x;
+}
+
+// to_i = sum of x_i
+template <int count, class T, int n> FFROBOT_INLINE void sums(const Pack<T, n> (&x)[count], T *to) {
+  if constexpr (std::is_same_v<T, double> && n > 1) {
+    Register<Pack<T, n>::lanes> registers[count];
+    for (int i = 0; i < count; ++i)
+      registers[i] = x[i].v;
+    sums<count>(registers, to);
+  } else
+    for (int i = 0; i < count; ++i)
+      to[i] = x[i].sum();
+}
+
 // How many numbers a Pack of n takes in memory
 template <class T, int n>
 constexpr int packed = std::is_same_v<T, double> ? static_cast<int>(std::bit_ceil(unsigned(n))) : n;

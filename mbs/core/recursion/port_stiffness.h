@@ -126,7 +126,8 @@ template <int rank, int d, class T, class H>
 FFROBOT_INLINE void series_stiffness(const H &hinge, const Pack<T, d> *G, Pack<T, d> *Y) {
   using Row = Pack<T, d>;
   Row M[rank], C[rank];
-  T N[rank][rank], D_inverse[rank];
+  Row products[rank * (rank + 1) / 2]; // of N's lower half, row after row
+  T N[rank][rank], lower[rank * (rank + 1) / 2], D_inverse[rank];
 #pragma GCC unroll 6
   for (int i = 0; i < rank; ++i)
     M[i] = hinge.Lambda[i];
@@ -150,7 +151,14 @@ FFROBOT_INLINE void series_stiffness(const H &hinge, const Pack<T, d> *G, Pack<T
       GC += C[i][k] * G[k];
 #pragma GCC unroll 6
     for (int j = 0; j <= i; ++j)
-      N[i][j] = (GC * C[j]).sum();
+      products[i * (i + 1) / 2 + j] = GC * C[j];
+  }
+  sums(products, lower);
+#pragma GCC unroll 6
+  for (int i = 0; i < rank; ++i) {
+#pragma GCC unroll 6
+    for (int j = 0; j <= i; ++j)
+      N[i][j] = lower[i * (i + 1) / 2 + j];
     N[i][i] += D_inverse[i];
   }
 #pragma GCC unroll 6

@@ -59,6 +59,21 @@ inline void spread_to_later_ports(const Node<Space> &node, int k, bool loaded, c
   }
 }
 
+// H += X^T F, M += X^T YX, row by row
+template <int d, class T, int W>
+FFROBOT_INLINE void gain_by_transpose(const Pack<T, d> *X, const Pack<T, W> *F, const Pack<T, d> *YX, Pack<T, W> *H,
+                                      Pack<T, d> *M) {
+  for (int r = 0; r < d; ++r) {
+    Pack<T, W> h = H[r];
+    Pack<T, d> m = M[r];
+    for (int i = 0; i < d; ++i) {
+      const T x = X[i][r];
+      h += x * F[i], m += x * YX[i];
+    }
+    H[r] = h, M[r] = m;
+  }
+}
+
 // Ports of the body, one after the other: M, H, S and gamma gain what hangs there.
 template <class Space, class T, int W>
 inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
@@ -93,6 +108,9 @@ inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, 
     Cols P[d], E[d], F[d];
     for (int i = 0; i < d; ++i)
       E[i] = P[i] = Cols::read(w.force.data() + (index * d + i) * stride);
+    Pack<T, d> YX[d];
+    if (loaded)
+      apply<d, T>(port.Y, port.X, YX);
     if (is_soft) {
       Cols GP[d];
       apply<d, T>(port.G, P, GP);
@@ -101,8 +119,7 @@ inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, 
           for (int j = 0; j < d; ++j)
             E[i] -= port.Y[i][j] * GP[j];
       if (W > 1) // P^T G E
-        for (int i = 0; i < d; ++i)
-          gain(S, GP[i], E[i]);
+        gain_all(S, GP, E);
     }
     for (int i = 0; i < d; ++i)
       F[i] = E[i];
@@ -128,19 +145,14 @@ inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, 
           F[i].add(0, Y_beta[i]);
       }
     }
-    for (int i = 0; i < d; ++i) {
+    for (int i = 0; i < d; ++i)
       F[i].write(w.answer.data() + (node.port_slot(k) + i) * stride);
-      for (int j = 0; j < d; ++j)
-        H[j] += port.X[i][j] * F[i];
-    }
     if (loaded)
-      for (int i = 0; i < d; ++i) {
-        Pack<T, d> YX = port.Y[i][0] * port.X[0];
-        for (int j = 1; j < d; ++j)
-          YX += port.Y[i][j] * port.X[j];
+      gain_by_transpose<d, T, W>(port.X, F, YX, H, M);
+    else
+      for (int i = 0; i < d; ++i)
         for (int r = 0; r < d; ++r)
-          M[r] += port.X[i][r] * YX;
-      }
+          H[r] += port.X[i][r] * F[i];
     if (several)
       spread_to_later_ports<Space, T, W>(node, k, loaded, F, w);
   }

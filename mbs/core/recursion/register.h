@@ -65,6 +65,13 @@ struct Register<n> {
   FFROBOT_INLINE double operator[](int i) const { return v[i]; }
   FFROBOT_INLINE void set(int i, double x) { v = only(i) ? V{} + x : v; }
   FFROBOT_INLINE void add(int i, double x) { v += only(i) ? V{} + x : V{}; }
+  // Zeros behind the first `count`
+  FFROBOT_INLINE void keep(int count) {
+    I lane;
+    for (int k = 0; k < n; ++k)
+      lane[k] = k;
+    v = lane < I{} + count ? v : V{};
+  }
   FFROBOT_INLINE double sum() const {
     if constexpr (n == 2)
       return v[0] + v[1];
@@ -96,6 +103,12 @@ struct Register<n> {
   FFROBOT_INLINE double operator[](int i) const { return i < half ? low[i] : high[i - half]; }
   FFROBOT_INLINE void set(int i, double x) { i < half ? low.set(i, x) : high.set(i - half, x); }
   FFROBOT_INLINE void add(int i, double x) { i < half ? low.add(i, x) : high.add(i - half, x); }
+  FFROBOT_INLINE void keep(int count) {
+    if (count < half)
+      low.keep(count), high = Half::zero();
+    else
+      high.keep(count - half);
+  }
   FFROBOT_INLINE double sum() const { return (low + high).sum(); }
   FFROBOT_INLINE Register &operator+=(const Register &o) { return low += o.low, high += o.high, *this; }
   FFROBOT_INLINE Register &operator-=(const Register &o) { return low -= o.low, high -= o.high, *this; }
@@ -113,6 +126,44 @@ struct Register<n> {
 };
 
 using Eight = Register<8>;
+
+// to_i = the sum of x_i's lanes: four by four where lanes can be added crosswise
+template <int count, int n> FFROBOT_INLINE void sums(const Register<n> *x, double *to) {
+#if defined(__AVX__)
+  if constexpr (n >= 4) {
+    const auto folded = [&](int i) {
+      if constexpr (n == 4)
+        return (__m256d)x[i].v;
+      else if constexpr (n == 8 && native_lanes == 4)
+        return (__m256d)(x[i].low + x[i].high).v;
+#if defined(__AVX512F__)
+      else if constexpr (n == 8)
+        return _mm256_add_pd(_mm512_castpd512_pd256((__m512d)x[i].v), _mm512_extractf64x4_pd((__m512d)x[i].v, 1));
+#endif
+      else
+        return _mm256_set_pd(0, 0, 0, x[i].sum());
+    };
+    const auto four = [&](int i, int left) {
+      const __m256d zero = _mm256_setzero_pd();
+      const __m256d ab = _mm256_hadd_pd(folded(i), left > 1 ? folded(i + 1) : zero);
+      const __m256d cd = left > 2 ? _mm256_hadd_pd(folded(i + 2), left > 3 ? folded(i + 3) : zero) : zero;
+      return _mm256_add_pd(_mm256_permute2f128_pd(ab, cd, 0x20), _mm256_permute2f128_pd(ab, cd, 0x31));
+    };
+    constexpr int rest = count % 4, first = count - rest;
+#pragma GCC unroll 8
+    for (int i = 0; i < first; i += 4)
+      _mm256_storeu_pd(to + i, four(i, 4));
+    if constexpr (rest > 0) {
+      const Register<4> last{(Register<4>::V)four(first, rest)};
+      for (int k = 0; k < rest; ++k)
+        to[first + k] = last[k];
+    }
+    return;
+  }
+#endif
+  for (int i = 0; i < count; ++i)
+    to[i] = x[i].sum();
+}
 
 // The first `count` (1 to 8) of eight numbers, zeros behind them; and back. What stands behind them is not touched.
 #if defined(__AVX512F__)

@@ -14,6 +14,15 @@ FFROBOT_INLINE T answer(const Workspace<Space, T> &w, int slot, const Pack<T, W>
   return (Pack<T, W>::read(w.answer.data() + slot * stride_of(W)) * y).sum();
 }
 
+// … of `count` slots from there on
+template <int count, class Space, class T, int W>
+FFROBOT_INLINE void answers_of(const Workspace<Space, T> &w, int slot, const Pack<T, W> &y, T *to) {
+  Pack<T, W> products[count];
+  for (int i = 0; i < count; ++i)
+    products[i] = Pack<T, W>::read(w.answer.data() + (slot + i) * stride_of(W)) * y;
+  sums(products, to);
+}
+
 // Acceleration A of the section (in: as if the joint were stiff) and a of the joint
 template <class Space, class T, int W>
 inline void release_joint(const Node<Space> &node, const T *q, const Hinge<Space, T> &hinge,
@@ -82,9 +91,12 @@ inline void release_ports(const Mechanism<Space> &m, const Node<Space> &node, bo
     const bool is_soft = node.body.ports[k].is_soft, loaded = m.children[node.first_port + k] >= 0;
     if (loaded)
       held = symmetric_product<d, T>(port.Y, X_A);
-    if (is_soft || loaded)
+    if (is_soft || loaded) {
+      T answers[d];
+      answers_of<d>(w, node.port_slot(k), y, answers);
       for (int i = 0; i < d; ++i)
-        port.f[i] = -(answer<Space, T, W>(w, node.port_slot(k) + i, y) + held[i]);
+        port.f[i] = -(answers[i] + held[i]);
+    }
     if (is_soft)
       moved = symmetric_product<d, T>(port.G, port.f);
     for (int i = 0; i < d; ++i) {
@@ -113,12 +125,13 @@ inline void release(const Mechanism<Space> &m, const Node<Space> &node, const T 
     hinge.turn.back(ground, A);
   } else
     hinge.turn.back(w.ports[node.parent_port].A, A);
-  Space::template Turn<T>::shift(hinge.r, A);
+  if (!node.shape.is_centred)
+    Space::template Turn<T>::shift(hinge.r, A);
   if (!by_multipliers)
     for (int i = 0; i < d; ++i)
       A[i] += hinge.c[i];
   release_joint<Space, T, W>(node, q + node.q, hinge, w, y, A, a + node.v);
-  T frame[d], *A_frame = A;
+  T frame[packed<T, d>] = {}, *A_frame = A;
   T *z = w.z.data();
   if (node.body.n)
     for (int r = 0; r < node.body_width(); ++r)
@@ -126,7 +139,7 @@ inline void release(const Mechanism<Space> &m, const Node<Space> &node, const T 
   if (node.inboard >= 0) {
     PortWork<Space, T> &port = w.ports[node.first_port + node.inboard];
     const auto *R = w.soft.data() + w.first_soft[i_node];
-    T A_section[d];
+    T A_section[packed<T, d>] = {};
     inboard_tilt(node, state).apply(A, A_section);
     multiply<d, T>(R + d, A_section, port.f);
     for (int i = 0; i < d; ++i)

@@ -49,14 +49,13 @@ template <class M, class X> FFROBOT_INLINE void logarithm(const M &R, X *x) {
     x[i] = factor * x[i];
 }
 
-// y = M x of rows
+// y = M x of rows; x has room for a Pack, with zeros behind its numbers
 template <int d, class T> FFROBOT_INLINE void multiply(const Pack<T, d> *M, const T *x, T *y) {
-  for (int i = 0; i < d; ++i) {
-    T sum = M[i][0] * x[0];
-    for (int j = 1; j < d; ++j)
-      sum += M[i][j] * x[j];
-    y[i] = sum;
-  }
+  const auto all = Pack<T, d>::read(x);
+  Pack<T, d> products[d];
+  for (int i = 0; i < d; ++i)
+    products[i] = M[i] * all;
+  sums(products, y);
 }
 
 // y = M x, M symmetric, as a row

@@ -26,9 +26,9 @@ template <class Space, class T> struct Hinge {
   T column[d][packed<T, d>];                // force of 1 along each axis of the section, in axes of the port
   Pack<T, d> U[d];                          // by freedoms, the last eliminated first
   T D_inverse[d];
-  T A[d];    // of the section
-  T pin[2];  // U/D of a pin, in place of all that
-  T spin;    // rad/s of its rotor about z
+  T A[packed<T, d>] = {}; // of the section
+  T pin[2];               // U/D of a pin, in place of all that
+  T spin;                 // rad/s of its rotor about z
   T gyro[2]; // moment on the inner section about x, y by which the rotor resists turning with it, opposite sign
 };
 
@@ -36,8 +36,8 @@ template <class Space, class T> struct PortWork {
   static constexpr int d = Space::dim;
   Pack<T, d> X[d], G[d], Y[d]; // A_port = X A + beta + G f; f = -Y (X A + …) - …
   T beta[d];
-  T A[d]; // axes of the undeformed section
-  T f[d]; // on the body, by what hangs there and by rows; where modes move the port
+  T A[d];                 // axes of the undeformed section
+  T f[packed<T, d>] = {}; // on the body, by what hangs there and by rows; where modes move the port
   // of a port in the plane that passes forces only
   T Lambda_xx, Lambda_xy, Lambda_yy, Y_xx, Y_xy, Y_yy, X_xa, X_ya, beta_x, beta_y;
 };

@@ -31,6 +31,7 @@ struct JointShape {
   Freedoms freedoms;
   bool in_inner_axes = false; // translations are along axes of the inner section, not of the outer one
   bool free_are_axes = true;  // what is free is an axis of the outer section
+  bool is_centred = false;    // origins of the sections stay together
 };
 
 // Of the outer section: turned by R (cosine, sine of it in the plane), its origin at r from the inner one's; relative

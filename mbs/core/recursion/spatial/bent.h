@@ -54,7 +54,7 @@ template <class T> FFROBOT_APART void bend(const Body &b, State<T> &s) {
     T *row = bent.rows.data() + r * padded(b.n);
     for (int j = 0; j < b.n; ++j)
       row[j] = T(b.rows[r * padded(b.n) + j]);
-    if (r < lanes)
+    if (r < lanes || r >= lanes + static_cast<int>(k.at_ports.size()))
       continue;
     const auto second = curve(k.at_ports[r - lanes], b.n, s, row);
     s.u[r] -= second.half, s.u_dot[r] -= second.rate;
@@ -220,7 +220,7 @@ FFROBOT_APART void bent_inertia(const Body &b, State<T> &s, const Pack<T, 6> &Fw
 
 // X = X_rigid - P m_ff^-1 m^T of a port but for the turn of its section, and Phi_r m_ff^-1 m^T
 template <class T>
-FFROBOT_INLINE void bent_port(const Body &b, const State<T> &s, int row, Pack<T, 6> (&X)[6], Pack<T, 6> (&P)[3]) {
+FFROBOT_INLINE void bent_port(const Body &b, const State<T> &s, int row, Pack<T, 6> *X, Pack<T, 6> (&P)[3]) {
   const T *gram = s.bent.gram.data() + row * b.width;
   for (int r = 0; r < 6; ++r)
     X[r] -= Pack<T, 6>::read(gram + r * b.width);

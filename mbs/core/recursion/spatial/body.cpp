@@ -31,6 +31,28 @@ MatrixXd complete_I_bar(const SpatialData &data) {
   return I_bar;
 }
 
+// g_ab, a <= b, of data along the axes of T_s; zero where it is nothing but rounding
+MatrixXd symmetric_I_bar(const SpatialData &data) {
+  const double reach = std::sqrt(std::max(data.J2.trace(), 1e-300) / std::max(data.mass, 1e-300));
+  const MatrixXd I = complete_I_bar(data);
+  MatrixXd g = MatrixXd::Zero(6, data.modes());
+  Index s = 0;
+  for (int a = 0; a < 3; ++a)
+    for (int b = a; b < 3; ++b, ++s) {
+      const Eigen::RowVectorXd row = 0.5 * (I.row(3 * a + b) + I.row(3 * b + a));
+      if (row.cwiseAbs().maxCoeff() > negligible * reach)
+        g.row(s) = row;
+    }
+  return g;
+}
+
+int rows_that_are_not_zero(const MatrixXd &M) {
+  int count = 0;
+  for (Index r = 0; r < M.rows(); ++r)
+    count += (M.row(r).array() != 0).any();
+  return count;
+}
+
 // x_k = R_kl y_l of matrices
 std::vector<MatrixXd> turned(const Matrix3d &R, const MatrixXd *y) {
   std::vector<MatrixXd> x;
@@ -115,14 +137,16 @@ Body::Body(const SpatialData &data, const std::vector<int> &used) : n(static_cas
   mass = data.mass;
   for (int i = 0; i < 3; ++i)
     s0[i] = data.first_moment[i];
-  width = lanes * (1 + static_cast<int>(used.size()));
+  const SpatialData along_axes = moved(data, Vector3d::Zero(), data.axes);
+  const MatrixXd g = n ? symmetric_I_bar(along_axes) : MatrixXd();
+  width = lanes * std::max(1 + static_cast<int>(used.size()), (rows_that_are_not_zero(g) + 1) / 2);
   if (n && is_stiffened(data))
     stiffening = std::make_shared<const Stiffening>(data, used);
   fill_rows(data, used, complete_I_bar(data));
   fill_residuals(data, used);
   fill_damping(data);
   if (n)
-    fill_tensors(moved(data, Vector3d::Zero(), data.axes), data.axes);
+    fill_tensors(along_axes, data.axes, g);
 }
 
 // Whether rows from this one on, of a port, have terms of second order
@@ -157,7 +181,7 @@ void Body::fill_rows(const SpatialData &data, const std::vector<int> &used, cons
     }
     ports.push_back(port);
   }
-  W.assign(static_cast<std::size_t>(n * width), 0.0);
+  W.assign(static_cast<std::size_t>(even(n) * width), 0.0);
   rows.assign(static_cast<std::size_t>(width * padded(n)), 0.0);
   for (int r = 0; r < width; ++r)
     for (int k = 0; k < n; ++k)
@@ -213,10 +237,17 @@ void Body::fill_damping(const SpatialData &data) {
       D[static_cast<std::size_t>(k)] = data.damping.cols() == 1 ? data.damping(k, 0) : data.damping(k, k);
 }
 
+// The row of W that is g from now on
+int Body::add_to_W(const Eigen::VectorXd &g) {
+  const auto count = std::count_if(stretches.begin(), stretches.end(), [](const Stretch &s) { return s.g_row >= 0; });
+  const int row = lanes * static_cast<int>(count / 2) + 6 + static_cast<int>(count % 2);
+  for (int k = 0; k < n; ++k)
+    W[static_cast<std::size_t>(k * width + row)] = g[k];
+  return row;
+}
+
 // T_s, g_s, G_s and z_c, A_c, from data along the axes z, which are the columns of `axes`
-void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes) {
-  const double reach = std::sqrt(std::max(data.J2.trace(), 1e-300) / std::max(mass, 1e-300));
-  const MatrixXd I = complete_I_bar(data);
+void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes, const MatrixXd &g) {
   const auto without_spin = [&](int slot) { // transposed: column i multiplies p_i
     const auto &given = data.S_bar_kl[static_cast<std::size_t>(slot)];
     MatrixXd block = given.size() ? MatrixXd(given.transpose()) : MatrixXd::Zero(n, n);
@@ -225,17 +256,20 @@ void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes) {
     return block;
   };
   const auto cleaned = [](const MatrixXd &M) { return MatrixXd((M.array().abs() > negligible).select(M, 0.0)); };
+  Index ab = 0;
   for (int a = 0; a < 3; ++a)
-    for (int b = a; b < 3; ++b) {
-      const Eigen::VectorXd g = 0.5 * (I.row(3 * a + b) + I.row(3 * b + a));
+    for (int b = a; b < 3; ++b, ++ab) {
+      const Eigen::VectorXd g_ab = g.row(ab);
       Stretch of;
-      of.has_g = g.cwiseAbs().maxCoeff() > negligible * reach;
+      const bool has_g = !g_ab.isZero(0);
       of.G = ModeMatrix(cleaned(0.5 * (without_spin(3 * a + b) + without_spin(3 * b + a))));
-      if (!of.has_g && of.G.kind == ModeMatrix::Kind::zero)
+      if (!has_g && of.G.kind == ModeMatrix::Kind::zero)
         continue;
       of.g.assign(static_cast<std::size_t>(padded(n)), 0.0);
-      for (int k = 0; of.has_g && k < n; ++k)
-        of.g[static_cast<std::size_t>(k)] = g[k];
+      if (has_g) {
+        of.g_row = add_to_W(g_ab);
+        std::copy_n(g_ab.data(), n, of.g.data());
+      }
       Matrix3d T = axes.col(a) * axes.col(b).transpose();
       if (a != b)
         T += T.transpose().eval();

@@ -8,8 +8,9 @@
 // with constant tensors T_s = z_a z_b^T + z_b z_a^T of the axes z in which the modes are given. What vanishes there is
 // left out: of a straight beam, which moves across itself, three of six G_s and two of three A_c.
 //
-// Rows of W lie side by side, eight and eight: S_bar, h and two zeros; then Phi of each port and two zeros. Phi is
-// along the axes of the undeformed section.
+// Rows of W lie side by side, eight and eight: S_bar, h and two more; then Phi of each port and two more. Phi is along
+// the axes of the undeformed section. What is left of each eight holds the g_s, two and two (more eights where they
+// need them); these are in W alone, not in `rows` and G, which the other products are made of.
 #pragma once
 
 #include "core/recursion/model.h"
@@ -35,7 +36,7 @@ struct Port {
 // T_s and b_s
 struct Stretch {
   double inertia[3][lanes] = {}; // (tr T) I - T, in the place of alpha
-  bool has_g = false;
+  int g_row = -1;                // of W, -1: g is zero
   Aligned<double> g;
   ModeMatrix G;
 };
@@ -55,7 +56,7 @@ struct Body {
   double mass = 0, s0[3] = {};
   double J0[3][lanes] = {};       // inertia with that of spin, in the place of alpha
   double residual[6][lanes] = {}; // M_rr - m m^T of the undeformed body
-  Aligned<double> W;              // (n, width) transposed
+  Aligned<double> W;              // (even n, width) transposed, with all g_s
   Aligned<double> rows;           // (width, padded n)
   Aligned<double> G;              // (width, width) W W^T
   Aligned<double> K, D;           // (padded n) stiffness; damping where it is diagonal
@@ -75,7 +76,8 @@ private:
   void fill_rows(const SpatialData &data, const std::vector<int> &used, const Eigen::MatrixXd &I_bar);
   void fill_residuals(const SpatialData &data, const std::vector<int> &used);
   void fill_damping(const SpatialData &data);
-  void fill_tensors(const SpatialData &data, const Eigen::Matrix3d &axes);
+  void fill_tensors(const SpatialData &data, const Eigen::Matrix3d &axes, const Eigen::MatrixXd &g);
+  int add_to_W(const Eigen::VectorXd &g);
 };
 
 // The same body with its frame at `position`, its axes the columns of `triad`.

@@ -31,8 +31,7 @@ template <class T> FFROBOT_INLINE void modal_forces(const Body &b, const T *forc
 template <class T> inline void project(const Body &b, const T *p, const T *v, const T *force, State<T> &s) {
   if (b.n == 0)
     return;
-  for (int k = 0; k < b.n; ++k)
-    s.p[k] = p[k], s.v[k] = v[k];
+  read_modes(p, b.n, s.p.data()), read_modes(v, b.n, s.v.data());
   apply_W<2, T>(b, {s.p.data(), s.v.data()}, {s.u.data(), s.u_dot.data()});
   modal_forces(b, force, s);
   if (b.stiffening)
@@ -48,7 +47,7 @@ template <class T> inline void project(const Body &b, const T *p, const T *v, co
 }
 
 // J and M are sums over stretches of T_s' = (tr T) I - T: J grows by T_s' (2 g_s + G_s p).p, at twice the rate of
-// F = sum of T_s' b_s.p_dot; centrifugal forces on modes are (w.T_s' w) b_s.
+// F = sum of T_s' b_s.p_dot; centrifugal forces on modes are (w.T_s' w) b_s. Products with g_s are rows of W.
 template <class T> FFROBOT_INLINE void stretch(const Body &b, State<T> &s, T *E, T *F) {
   const T *w = s.omega;
   const T ww[6] = {w[0] * w[0], w[1] * w[1], w[2] * w[2], w[0] * w[1], w[1] * w[2], w[2] * w[0]};
@@ -61,19 +60,23 @@ template <class T> FFROBOT_INLINE void stretch(const Body &b, State<T> &s, T *E,
   const T *p = s.p.data(), *v = s.v.data();
   int i = 0;
   for (const Stretch &of : b.stretches) {
-    multiply<1, T>(of.G, b.n, {p}, {x});
+    const bool grows = of.G.kind != ModeMatrix::Kind::zero;
+    if (grows)
+      multiply<1, T>(of.G, b.n, {p}, {x});
     auto growth = Modes<T>::zero(), rate = growth;
     for (int k = 0; k < b.n; k += step<T>) {
-      auto b_s = Modes<T>::read(x + k);
-      const auto p_k = Modes<T>::read(p + k);
-      if (of.has_g) {
-        const auto g = constants<T>(of.g.data() + k);
-        b_s += g, growth += g * p_k;
+      auto b_s = constants<T>(of.g.data() + k);
+      if (grows) {
+        const auto x_k = Modes<T>::read(x + k);
+        b_s += x_k, growth += x_k * Modes<T>::read(p + k), rate += x_k * Modes<T>::read(v + k);
       }
-      growth += b_s * p_k, rate += b_s * Modes<T>::read(v + k);
       (Modes<T>::read(Q_f + k) + tension[i] * b_s).write(Q_f + k);
     }
-    E[i] = growth.sum(), F[i] = rate.sum();
+    E[i] = F[i] = T(0.);
+    if (grows)
+      E[i] = growth.sum(), F[i] = rate.sum();
+    if (of.g_row >= 0)
+      E[i] += 2. * s.u[of.g_row], F[i] += s.u_dot[of.g_row];
     ++i;
   }
 }
@@ -115,7 +118,7 @@ template <class T> FFROBOT_INLINE void eliminate_twists(const Body &b, State<T> 
     T *Wh = s.Wh[c].data();
     apply_W<1, T>(b, {h_c}, {Wh});
     const T along = modal_dot(b.n, h_c, static_cast<const T *>(s.Q_f.data()));
-    const auto rows = Pack<T, 6>::read(Wh);
+    const auto rows = read_six(Wh);
     for (int i = 0; i < 6; ++i)
       add_scaled(T(-1.) * rows[i], z, to.M[i]);
     for (int i = 0; i < 3; ++i) {

@@ -101,7 +101,7 @@ template <class T> FFROBOT_INLINE void force_columns(const Node<Spatial> &node, 
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k)
       hinge.column[i][k] = hinge.column[3 + i][3 + k] = R[k][i];
-  if (node.joint == JointKind::revolute) // its axis goes through the port
+  if (node.shape.is_centred)
     return;
   const T *r = hinge.r;
   for (int i = 0; i < 3; ++i) { // r x e_i = r_k e_j - r_j e_k
@@ -168,10 +168,8 @@ template <class T> FFROBOT_INLINE SpatialTurn<T> inboard_tilt(const Node<Spatial
 template <class T>
 FFROBOT_APART void evaluate_inertia(const Node<Spatial> &node, const T *, const T *, spatial::State<T> &s,
                                     Pack<T, 6> *M, T *b) {
-  spatial::FrameTerms<T> found;
+  spatial::FrameTerms<T> found(M, b);
   inertia(node.body, s, found);
-  for (int i = 0; i < 6; ++i)
-    M[i] = found.M[i], b[i] = found.bias[i];
 }
 
 template <bool by_multipliers, class T>

@@ -17,7 +17,7 @@ ModeMatrix::ModeMatrix(const Eigen::MatrixXd &M) {
   }
   kind = 5 * (filled + n) < 3 * n * padded(n) / modes_at_once ? Kind::sparse : Kind::full;
   if (kind == Kind::full) {
-    values.assign(static_cast<std::size_t>(n * padded(n)), 0.0);
+    values.assign(static_cast<std::size_t>(even(n) * padded(n)), 0.0);
     for (int j = 0; j < n; ++j)
       for (int i = 0; i < n; ++i)
         values[static_cast<std::size_t>(j * padded(n) + i)] = M(i, j);

@@ -16,6 +16,7 @@ namespace ffrobot::recursion::spatial {
 constexpr int lanes = 8; // that rows of six take in memory
 constexpr int modes_at_once = 8;
 constexpr int padded(int n) { return (n + modes_at_once - 1) / modes_at_once * modes_at_once; }
+constexpr int even(int n) { return n + n % 2; } // columns of full matrices: products take two at once
 
 template <class T> constexpr int step = std::is_same_v<T, double> ? modes_at_once : 1;
 template <class T> using Modes = Pack<T, step<T>>; // of a vector over modes
@@ -50,6 +51,15 @@ template <int n, class T> FFROBOT_INLINE void write_modes(const Pack<T, n> &x, i
     to[0] = x[0];
 }
 
+// n of them from where nothing is padded
+template <class T> FFROBOT_INLINE void read_modes(const T *from, int n, T *to) {
+  if constexpr (std::is_same_v<T, double>)
+    for (int k = 0; k < n; k += modes_at_once)
+      load_part(from + k, std::min(n - k, modes_at_once)).store(to + k);
+  else
+    std::copy_n(from, n, to);
+}
+
 struct ModeMatrix {
   enum class Kind { zero, diagonal, sparse, full };
   ModeMatrix() = default;
@@ -61,7 +71,7 @@ struct ModeMatrix {
   std::vector<int> column;
 };
 
-// Rows `first` … of y_c = M x_c, M full by columns `stride` apart, for `count` vectors at once
+// Rows `first` … of y_c = M x_c, M full by columns `stride` apart, `even(n)` of them, for `count` vectors at once
 template <int blocks, int count, class T>
 FFROBOT_INLINE void full_rows(const double *column, int stride, int n, const T *const (&x)[count], T *const (&y)[count],
                               int first) {
@@ -70,10 +80,12 @@ FFROBOT_INLINE void full_rows(const double *column, int stride, int n, const T *
     for (auto &block : of)
       block = Modes<T>::zero();
   column += first;
-  for (int k = 0; k < n; ++k, column += stride)
+  for (int k = 0; k < n; k += 2, column += 2 * stride)
     for (int c = 0; c < count; ++c)
-      for (int i = 0; i < blocks; ++i)
+      for (int i = 0; i < blocks; ++i) {
         add_scaled(x[c][k], column + i * step<T>, sum[c][i]);
+        add_scaled(x[c][k + 1], column + stride + i * step<T>, sum[c][i]);
+      }
   for (int c = 0; c < count; ++c)
     for (int i = 0; i < blocks; ++i)
       sum[c][i].write(y[c] + first + i * step<T>);

@@ -41,15 +41,12 @@ template <class T> FFROBOT_INLINE void port_bias(const Body &b, int i, const Sta
 }
 
 // X = X_rigid - P m^T at p: P = H Phi, H = diag(1, J_l)
-template <class T> FFROBOT_INLINE void port_by_frame(const Body &b, int i, const State<T> &s, Pack<T, 6> *to) {
+template <class T> FFROBOT_INLINE void port_by_frame(const Body &b, int i, const State<T> &s, Pack<T, 6> *X) {
   const Port &port = b.ports[i];
-  Pack<T, 6> X[6];
   for (int r = 0; r < 6; ++r)
     X[r] = constant_row<6, T>(port.T[r]);
-  if (!port.is_soft) {
-    std::copy_n(X, 6, to);
+  if (!port.is_soft)
     return;
-  }
   const T *du = s.u.data() + port.row;
   for (int i1 = 0; i1 < 3; ++i1) { // e_k . (alpha x R du) = alpha . R (du x e_k)
     const int i2 = (i1 + 1) % 3, i3 = (i1 + 2) % 3;
@@ -72,7 +69,6 @@ template <class T> FFROBOT_INLINE void port_by_frame(const Body &b, int i, const
   const auto &excess = s.ports[i].excess;
   for (int r = 0; r < 3; ++r)
     X[3 + r] -= excess[r][0] * P[0] + excess[r][1] * P[1] + excess[r][2] * P[2];
-  std::copy_n(X, 6, to);
 }
 
 // G of forces on port j by accelerations of port i: H_i Phi_i Phi_j^T H_j^T

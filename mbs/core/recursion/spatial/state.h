@@ -45,10 +45,12 @@ template <class T> struct State {
   Bent<T> bent; // empty without geometric stiffening
 };
 
-// What becomes of a body in its frame's six equations: J (in the place of alpha), M_rr - m m^T, -(Q_r - m Q_f)
+// What becomes of a body in its frame's six equations: J (in the place of alpha); where the caller wants them,
+// M_rr - m m^T (6 rows) and -(Q_r - m Q_f) (6)
 template <class T> struct FrameTerms {
-  Pack<T, 6> J[3], M[6];
-  T bias[6];
+  FrameTerms(Pack<T, 6> *to_M, T *to_bias) : M(to_M), bias(to_bias) {}
+  Pack<T, 6> J[3], *M;
+  T *bias;
 };
 
 } // namespace ffrobot::recursion::spatial
