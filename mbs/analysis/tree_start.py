@@ -14,6 +14,10 @@ from ..solve.integrators import Choice
 from ..solve.state import State
 from .outcome import EarlierRun
 
+SPARSE = "Newton's matrices are sparse there"
+OTHERS = {"radau": SPARSE, "generalized-alpha": SPARSE, "dopri5": "multipliers keep its tolerance there"}
+"""Integrators that a run does not begin with in joint coordinates, and why: docs/recursion.md."""
+
 
 @dataclass(frozen=True)
 class TreeStart:
@@ -39,8 +43,8 @@ def tree_start(
     """
     if earlier is not None and isinstance(earlier.continuation.checkpoint, _core.Checkpoint):
         return "as the run that it goes on with"
-    if integrator.begins_implicit:  # its steps take 1.9 times as long in joint coordinates: docs/recursion.md
-        return "Newton's matrices are sparse there"
+    if integrator.name in OTHERS:
+        return OTHERS[integrator.name]
     try:
         tree = PlanarTree(assembly)
         return TreeStart(tree, *tree.state(start.q, start.v))

@@ -74,11 +74,6 @@ class Choice:
         """Whether the program made it, not the scene."""
         return self.reason != ASKED_FOR
 
-    @property
-    def begins_implicit(self) -> bool:
-        """Whether a run begins with steps that solve equations."""
-        return self.name in IMPLICIT
-
     def in_tree(self) -> Choice:
         """With what steps cost in joint coordinates."""
         return replace(self, candidates=tuple(_in_tree(one) for one in self.candidates))

@@ -77,9 +77,13 @@ def test_replay(apply, in_absolute):
         assert relative(found.q, source.q) < 1e-6
 
 
-def test_implicit_methods_stay_in_absolute_coordinates():
-    outcome = run_pcid(arm(), pcid(integrator="radau"), False, always)
-    assert outcome.statistics.coordinates == "absolute: Newton's matrices are sparse there"
+@pytest.mark.parametrize(
+    ("integrator", "why"),
+    [("radau", "Newton's matrices are sparse there"), ("dopri5", "multipliers keep its tolerance there")],
+)
+def test_other_methods_stay_in_absolute_coordinates(integrator, why):
+    outcome = run_pcid(arm(), pcid(end=0.01, integrator=integrator), False, always)
+    assert outcome.statistics.coordinates == f"absolute: {why}"
 
 
 def test_what_a_tree_has_not_stays_in_absolute_coordinates():
