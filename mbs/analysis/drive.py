@@ -98,8 +98,6 @@ def drive(
     )
     sampled = "under a sampled controller"
     tree = tree_start(assembly, start, integrator, earlier) if control is None else sampled
-    if isinstance(tree, TreeStart) and steering is None:
-        integrator = integrator.in_tree()
     point = _core.TreeCheckpoint() if isinstance(tree, TreeStart) else _core.Checkpoint()
     continuation = Continuation(point, recording)
     if earlier is not None:  # with the same candidates, and what they have become since

@@ -33,7 +33,6 @@ STABLE = 4.8
 RESOLVED_DOP853, RESOLVED_RADAU = 1.25, 0.30
 STEPS_TO_START = 100
 COST_OF_RADAU, COST_OF_RADAU_STEERED = 2.4, 0.75
-RADAU_IN_TREE = 1.75  # times that in joint coordinates, where Newton's matrix is dense (docs/recursion.md)
 NEGLIGIBLE_DOP853, NEGLIGIBLE_RADAU = 0.1, 1.0
 
 MOST_COORDINATES = 600  # beyond them the eigenproblem takes longer than many a run
@@ -41,7 +40,6 @@ MANY_PERIODS = 1e5
 ASKED_FOR = "asked for"
 REPEATED = "steps taken again"
 EXPLICIT = ("dopri5", "dop853")
-IMPLICIT = ("radau", "generalized-alpha")
 
 
 AFTER = " after "  # in names of integrators that were changed during a run
@@ -74,10 +72,6 @@ class Choice:
         """Whether the program made it, not the scene."""
         return self.reason != ASKED_FOR
 
-    def in_tree(self) -> Choice:
-        """With what steps cost in joint coordinates."""
-        return replace(self, candidates=tuple(_in_tree(one) for one in self.candidates))
-
     def changed_in(self, run: _core.Run | _core.TreeRun) -> Choice:
         """What it has become during `run`, which says when and why."""
         if not run.changes:
@@ -92,11 +86,6 @@ class Choice:
         if len(run.changes) > MOST_TOLD:
             told.append(f"changed {len(run.changes)} times in all")
         return replace(self, name=f"{last}{AFTER}{' and '.join(before)}", reason="; ".join([self.reason, *told]))
-
-
-def _in_tree(candidate: Candidate) -> Candidate:
-    factor = RADAU_IN_TREE if candidate.name in IMPLICIT else 1.0
-    return replace(candidate, cost=factor * candidate.cost, pace=candidate.pace / factor)
 
 
 NOT_INTEGRATED = Choice("none", "nothing to integrate")
