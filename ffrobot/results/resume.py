@@ -37,6 +37,7 @@ from ..scene.scene import Scene
 from .file import Results
 from .same_input import check_same_input, input_files
 from .stopped import GROUP, STOPPED, analyses, goes_on, is_kept, row_of_numbers
+from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
 
 ROWS = ("q", "v", "a", "lambda_", "tau", "F_p")  # what results files do not hold anyway
 COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
@@ -79,6 +80,18 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
             group[name] = rows
     assert outcome.continuation is not None
     checkpoint, recording = outcome.continuation.checkpoint, outcome.continuation.recording
+    if isinstance(checkpoint, _core.TreeCheckpoint):
+        write_tree_checkpoint(group, checkpoint)
+    else:
+        _write_checkpoint(group, checkpoint)
+    if recording is not None:
+        group["recording/times"] = recording.times
+        group["recording/states"] = recording.states
+        names = {kind: name for name, kind in METHODS.items()}
+        group["recording"].attrs["methods"] = json.dumps([(first, names[kind]) for first, kind in recording.methods])
+
+
+def _write_checkpoint(group: h5py.Group, checkpoint: _core.Checkpoint) -> None:
     group["checkpoint/state"] = checkpoint.state
     for name in (*BODY_PEAKS, "groups"):
         group[f"checkpoint/peaks/{name}"] = getattr(checkpoint.peaks, name)
@@ -86,11 +99,6 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
     about |= {name: getattr(checkpoint.steps, name) for name in STEPS}
     about |= {name: getattr(checkpoint.methods, name) for name in METHOD_HISTORY}
     group["checkpoint"].attrs.update(about)
-    if recording is not None:
-        group["recording/times"] = recording.times
-        group["recording/states"] = recording.states
-        names = {kind: name for name, kind in METHODS.items()}
-        group["recording"].attrs["methods"] = json.dumps([(first, names[kind]) for first, kind in recording.methods])
 
 
 def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
@@ -113,7 +121,9 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
 
 def _continuation(solution: Solution, file: Results, name: str) -> Continuation:
     about, group = file.attributes(name), f"{name}/{GROUP}"
-    checkpoint, expected = _checkpoint(file, f"{group}/checkpoint"), len(file.time(name))
+    where, expected = f"{group}/checkpoint", len(file.time(name))
+    in_system = file.has(f"{where}/peaks")  # else joint coordinates were integrated
+    checkpoint = _checkpoint(file, where) if in_system else read_tree_checkpoint(file, where)
     if checkpoint.outputs != expected or about["status"] not in (*STOPPED, "completed"):
         raise InputError(
             f"{file.path}: {group}: expected as many outputs as times, {expected}, found {checkpoint.outputs}"

@@ -12,8 +12,7 @@ import h5py
 from ..common.errors import InputError
 from ..common.hdf5 import blaming
 from ..mbs import _core
-from ..mbs.analysis.outcome import METHOD_HISTORY, STEPS
-from ..mbs.analysis.spatial_earlier import MEMORY, ROWS, VECTORS, EarlierSpatialRun
+from ..mbs.analysis.spatial_earlier import ROWS, EarlierSpatialRun
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.solve.integrators import Choice
 from ..run.spatial import Keep, prepare_spatial, run_spatial
@@ -23,7 +22,8 @@ from ..run.watcher import Watcher
 from ..scene.spatial import SpatialScene
 from .file import Results
 from .same_input import check_same_input, input_files
-from .stopped import GROUP, STOPPED, analyses, goes_on, is_kept, row_of_numbers
+from .stopped import GROUP, STOPPED, analyses, goes_on, is_kept
+from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
 
 COUNTS = ("steps", "evaluations", "wall_seconds")
 
@@ -62,19 +62,14 @@ def write_state_in_space(file: h5py.File, solution: SpatialSolution) -> None:
 def _write_run(group: h5py.Group, run: SpatialRun, checkpoint: _core.TreeCheckpoint) -> None:
     for name in ROWS:
         group[name] = getattr(run, name)
-    for name in VECTORS:
-        group[f"checkpoint/{name}"] = getattr(checkpoint, name)
-    about = {name: getattr(checkpoint, name) for name in ("time", "outputs", *MEMORY)}
-    about |= {name: getattr(checkpoint.steps, name) for name in STEPS}
-    about |= {name: getattr(checkpoint.methods, name) for name in METHOD_HISTORY}
-    group["checkpoint"].attrs.update(about)
+    write_tree_checkpoint(group, checkpoint)
 
 
 def _earlier_run(file: Results, name: str) -> EarlierSpatialRun:
     about, group = file.attributes(name), f"{name}/{GROUP}"
     if missing := [row for row in ROWS if not file.has(f"{group}/{row}")]:
         raise InputError(f"{file.path}: {group}/{missing[0]}: expected a dataset, found none")
-    checkpoint, expected = _checkpoint(file, f"{group}/checkpoint"), len(file.time(name))
+    checkpoint, expected = read_tree_checkpoint(file, f"{group}/checkpoint"), len(file.time(name))
     if checkpoint.outputs != expected or about["status"] not in (*STOPPED, "completed"):
         raise InputError(
             f"{file.path}: {group}: expected as many outputs as times, {expected}, found {checkpoint.outputs}"
@@ -89,20 +84,3 @@ def _earlier_run(file: Results, name: str) -> EarlierSpatialRun:
         checkpoint=checkpoint,
         where=f"{file.path}: {group}",
     )
-
-
-def _checkpoint(file: Results, group: str) -> _core.TreeCheckpoint:
-    about = file.attributes(group)
-    try:
-        memory: dict[str, Any] = {name: about[name].item() for name in MEMORY}
-        memory |= {name: row_of_numbers(file, f"{group}/{name}") for name in VECTORS}
-        found: _core.TreeCheckpoint = _core.TreeCheckpoint(
-            time=float(about["time"]),
-            outputs=int(about["outputs"]),
-            steps=_core.StepHistory(**{name: about[name].item() for name in STEPS}),
-            methods=_core.MethodHistory(**{name: about[name].item() for name in METHOD_HISTORY}),
-            **memory,
-        )
-        return found
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
-        raise InputError(f"{file.path}: {group}: expected where the run has stopped, found {error}") from None

@@ -1,9 +1,14 @@
-"""Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here."""
+"""Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here.
+
+Joint coordinates are integrated where the mechanism can be told in them (`model.planar_tree`), else those of the
+system. Outputs are evaluated by the system either way.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,8 +23,9 @@ from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls, unmet, with_steps_of
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
-from .earlier_check import check_earlier
+from .earlier_check import check_earlier, kept_of
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
+from .tree_start import TreeStart, tree_start
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -78,10 +84,9 @@ def drive(
     integration that ends early is kept with its cause.
     """
     times = analysis.times if times is None else times
-    if earlier is not None:
-        motors = len(assembly.motor_measures) if resolver is not None else None
-        check_earlier(earlier, assembly, times, motors, recorded=recording is not None)
+    motors = len(assembly.motor_measures) if resolver is not None else None
     if earlier is not None and earlier.statistics.status == "completed":
+        check_earlier(earlier, assembly, times, motors, recorded=recording is not None)
         integrated = None if reported is None else assembly
         return Outcome(
             analysis, reported or assembly, earlier.motion, earlier.forces, earlier.statistics,
@@ -91,13 +96,23 @@ def drive(
     integrator = with_steps_of(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
-    continuation = Continuation(_core.Checkpoint(), recording)
+    sampled = "under a sampled controller"
+    tree = tree_start(assembly, start, integrator, earlier) if control is None else sampled
+    point = _core.TreeCheckpoint() if isinstance(tree, TreeStart) else _core.Checkpoint()
+    continuation = Continuation(point, recording)
     if earlier is not None:  # with the same candidates, and what they have become since
+        size = None if isinstance(tree, str) else len(tree.q)
+        check_earlier(earlier, assembly, times, motors, recorded=recording is not None, tree_size=size)
         known, continuation = earlier.statistics.integrator, earlier.continuation
         integrator = replace(integrator, name=known.name, reason=known.reason)
-    run = _integrated(assembly, analysis, start, times, integrator, steering, control, resolver, continuation, progress)
+    with nullcontext() if earlier is None else kept_of(earlier, times).gone_on_with():
+        run = _integrated(
+            assembly, analysis, start if isinstance(tree, str) else tree, times, integrator, steering, control,
+            resolver, continuation, progress,
+        )  # fmt: skip
     seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)
+    statistics = replace(statistics, coordinates=f"absolute: {tree}" if isinstance(tree, str) else "joint")
     if statistics.status == "step underflow" and not statistics.cause:
         statistics = replace(statistics, cause=beyond_order(integrator, analysis) or unmet(integrator, run))
     outcome = Outcome(
@@ -115,7 +130,7 @@ def drive(
 def _integrated(
     assembly: MechanismSystem,
     analysis: IntegratedAnalysis,
-    start: State,
+    start: State | TreeStart,
     times: Array,
     integrator: Choice,
     steering: _core.ExternalLoads | None,
@@ -125,15 +140,18 @@ def _integrated(
     progress: Progress,
 ) -> _core.Run:
     common: dict[str, Any] = {
-        "system": assembly.system, "groups": assembly.groups, "moments": assembly.moments,
-        "joints": assembly.joint_measures, "times": as_list(times),
-        "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator), "carry_on": progress,
+        "system": assembly.system, "times": as_list(times), "q": start.q, "v": start.v,
+        "controls": integration_controls(analysis, integrator), "carry_on": progress,
     }  # fmt: skip
+    kept: dict[str, Any] = {
+        "external_loads": steering, "actuator_forces": resolver, "recording": continuation.recording,
+        "checkpoint": continuation.checkpoint,
+    }  # fmt: skip
+    if isinstance(start, TreeStart):
+        return _core.run_tree(**start.core_arguments, **common, **kept)
+    common |= {"groups": assembly.groups, "moments": assembly.moments, "joints": assembly.joint_measures}
     if control is None:
-        return _core.run(
-            **common, external_loads=steering, actuator_forces=resolver, recording=continuation.recording,
-            checkpoint=continuation.checkpoint,
-        )  # fmt: skip
+        return _core.run(**common, **kept)
     return _core.run_sampled(
         **common, motors=control.motors, patches=control.voltages, first_command=control.first,
         sensing=control.sensing, samples=as_list(control.times), delay=control.delay, controller=control.controller,

@@ -71,6 +71,7 @@ class Statistics:
     """How a run went. `cause` is what was found wrong at `time_reached` (s, the last step's) where it ended early.
 
     `step_ends` (N,), in s, with which the run can be repeated, if it was asked for them; see `fields.steps`.
+    `coordinates`: "joint", or "absolute: …" and why, of what was integrated; "" where nothing was, or it is not known.
     """
 
     status: str = "completed"
@@ -82,6 +83,7 @@ class Statistics:
     time_reached: float | None = None
     cause: str = ""
     step_ends: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
+    coordinates: str = ""
 
     def added_to(self, earlier: Statistics) -> Statistics:
         """With the work of the run that this one went on from."""
@@ -95,6 +97,12 @@ STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error"
 METHOD_HISTORY = ("second", "pace_of_other", "since", "measured", "tries", "window", "trial")
 """Of the core's `MethodHistory`, all."""
 
+TREE_MEMORY = ("inertial_peak", "accepted", "least_ratio", "singular_at", "watched_at", "determinant")
+"""Numbers of the core's `TreeCheckpoint` beside those of its steps and methods."""
+
+TREE_VECTORS = ("state", "state_peaks", "force_peaks", "singular_posture")
+"""Arrays of the core's `TreeCheckpoint`."""
+
 BODY_PEAKS = (
     "velocity", "angular_velocity", "modal_velocity", "modal", "acceleration", "angular_acceleration",
     "modal_acceleration",
@@ -107,9 +115,11 @@ class Continuation:
     """Where an integration can be gone on with, and its steps where a later analysis replays them.
 
     Both are in the coordinates of `assembly`, what was integrated, where that is not the outcome's: see `raised_mass`.
+    The checkpoint is one of a tree where joint coordinates were integrated: the steps after it are then those that the
+    run would have made.
     """
 
-    checkpoint: _core.Checkpoint
+    checkpoint: _core.Checkpoint | _core.TreeCheckpoint
     recording: _core.Recording | None = None
     assembly: MechanismSystem | None = None
 

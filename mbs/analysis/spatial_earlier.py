@@ -9,22 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError
 from .. import _core
 from ..model.spatial_model import SpatialModel
 from ..solve.integrators import Choice
-from .outcome import METHOD_HISTORY, STEPS
+from .kept_check import Kept
 
 ROWS = ("q", "v", "a", "multipliers")
 """Arrays of a run with one row per output."""
-
-MEMORY = (
-    "inertial_peak", "accepted", "least_ratio", "singular_at", "watched_at", "determinant",
-)  # fmt: skip
-"""Numbers of the core's `TreeCheckpoint` beside those of its steps and methods."""
-
-VECTORS = ("state", "state_peaks", "force_peaks", "singular_posture")
-"""Arrays of the core's `TreeCheckpoint`."""
 
 
 @dataclass(frozen=True)
@@ -63,40 +54,21 @@ class EarlierSpatialRun:
         Raises `InputError` where sizes, times and numbers are not those of such a run.
         """
         self._check(model, times)
-        try:
+        with self._kept(times).gone_on_with():
             yield
-        except ValueError:  # by the core: what it remembers is that of another mechanism
-            self._expect(False, "checkpoint", "what a run of this scene remembers")
 
     def _check(self, model: SpatialModel, times: Array) -> None:
         outputs, n_q, n_v = len(self.time), model.tree.n_q, model.tree.n_v
+        kept = self._kept(times)
         fits = 0 < outputs <= len(times) and np.array_equal(self.time, times[:outputs])
-        self._expect(fits, "time", "the times of the scene")
-        self._expect(self.status != "completed" or outputs == len(times), "status", "a run up to its end")
+        kept.expect(fits, "time", "the times of the scene")
+        completed = self.status == "completed"
+        kept.expect(not completed or outputs == len(times), "status", "a run up to its end")
         columns = dict(zip(ROWS, (n_q, n_v, n_v, len(model.rows)), strict=True))
         for name, count in columns.items():
-            self._numbers(name, getattr(self, name), (outputs, count))
-        self._checkpoint(times, n_q + n_v)
+            kept.numbers(name, getattr(self, name), (outputs, count))
+        kept.tree_checkpoint(self.checkpoint, n_q, n_v)
+        kept.expect(completed or self.checkpoint.steps.next_step > 0.0, "checkpoint", "a positive step")
 
-    def _checkpoint(self, times: Array, state_size: int) -> None:
-        point, outputs = self.checkpoint, len(self.time)
-        self._numbers("checkpoint/state", point.state, (state_size,))
-        for name in VECTORS[1:]:
-            self._numbers(f"checkpoint/{name}", getattr(point, name), getattr(point, name).shape)
-        watched = len(point.singular_posture)
-        self._expect(watched in (0, state_size - self.v.shape[1]), "checkpoint/singular_posture", "a posture or none")
-        for record, names in ((point.steps, STEPS), (point.methods, METHOD_HISTORY), (point, MEMORY)):
-            values = np.array([float(getattr(record, name)) for name in names])
-            self._numbers("checkpoint", values, (len(names),))
-        slack = 1e-9 * (times[-1] - times[0])  # for rounding, s
-        until = times[min(outputs, len(times) - 1)]
-        in_time = times[outputs - 1] - slack <= point.time <= until + slack
-        self._expect(bool(in_time) and point.outputs == outputs, "checkpoint", f"a time after {outputs} outputs")
-        self._expect(self.status == "completed" or point.steps.next_step > 0.0, "checkpoint", "a positive step")
-
-    def _numbers(self, name: str, values: Array, shape: tuple[int, ...]) -> None:
-        self._expect(values.shape == shape and bool(np.isfinite(values).all()), name, f"finite numbers {shape}")
-
-    def _expect(self, holds: bool, name: str, expected: str) -> None:
-        if not holds:
-            raise InputError(f"{self.where}/{name}: expected {expected}, found otherwise: damaged or changed")
+    def _kept(self, times: Array) -> Kept:
+        return Kept(self.where, times, len(self.time))

@@ -180,4 +180,5 @@ void bind_recursion(nb::module_ &m) {
   bind_tree_motion(m);
   bind_tree_sampled(m);
   bind_held_motion(m);
+  bind_system_run(m);
 }

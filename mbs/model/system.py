@@ -33,6 +33,7 @@ class MechanismSystem:
         self.index = {body.name: i for i, body in enumerate(model.bodies)}
         self._markers: list[list[str]] = [[] for _ in model.bodies]
         self.constraints = tuple(constraints[i] for i in envelope_order([c.measure for c in constraints]))
+        self.drives = tuple(drives)
         core = self._core_measure
         self.constraint_measures = [core(c.measure) for c in self.constraints]
         driven = [(core(measure), magnitude) for measure, magnitude in drives]

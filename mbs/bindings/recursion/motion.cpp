@@ -234,6 +234,8 @@ void bind_tree_motion(nb::module_ &m) {
           },
           "is_path"_a, "length"_a,
           "Watch how well the joints can follow the rows of the path; the run diverges where they cannot at all.")
+      .def_rw("is_strict", &Scene::is_strict, "Whether steps are limited and errors judged as in planar scenes.")
+      .def_rw("most_bent", &Scene::most_bent, "(bodies) kg m^2: largest p^T p of each that makes sense; empty: any.")
       .def(
           "turn_marker", [](Scene &s, int marker, const OrientationLaw &law) { s.driven.push_back({marker, law}); },
           "marker"_a, "law"_a, "How a marker of the ground turns, which the model says it does.");

@@ -49,6 +49,9 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
       check_index("wrench of a cut joint", wrench, model.mechanism.wrenches.size());
   for (const CutLoad &load : scene.cut_loads)
     check_index("joint of a load", load.joint, scene.cut_joints.size());
+  if (!scene.most_bent.empty())
+    check_size("most_bent", static_cast<Eigen::Index>(scene.most_bent.size()),
+               static_cast<Eigen::Index>(model.mechanism.nodes.size()));
   if (scene.watch)
     check_size("is_path", static_cast<Eigen::Index>(scene.watch->is_path.size()), model.rows());
   for (const DrivenMarker &driven : scene.driven)

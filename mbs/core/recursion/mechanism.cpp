@@ -47,6 +47,10 @@ Eigen::Vector3d origin_from(const PlanarMarker &m) {
 }
 Eigen::Vector3d origin_from(const SpatialMarker &m) { return -(m.triad.transpose() * m.position); }
 
+// Of its axes in those of the body, in the plane
+double turn_of(const PlanarMarker &m) { return m.angle; }
+double turn_of(const SpatialMarker &) { return 0; }
+
 // Whether a frame fixed at the inboard marker is where the joint holds the section: modes move the section at most in
 // ways that the joint leaves free, and nothing asks for the joint's coordinate.
 template <class Space>
@@ -219,7 +223,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
       tilts = node.is_pin && !sits;
     }
     if (sits || tilts)
-      model.data = at_marker(model.data, inboard), node.origin = origin_from(inboard);
+      model.data = at_marker(model.data, inboard), node.origin = origin_from(inboard), node.turn = turn_of(inboard);
     else
       node.inboard = node.outboard, used[i].push_back(model.inboard_marker);
     node.is_weightless = is_weightless(model.data) && node.outboard == 0;

@@ -32,6 +32,7 @@ template <class Space> struct Node {
   bool has_rows = false;      // constraint rows that are coordinates of the joint
   bool is_weightless = false; // nothing but a rotor's inertia, nothing hangs on it: what carries it feels no inertia
   Eigen::Vector3d origin = Eigen::Vector3d::Zero(); // of the body's data, in axes of the frame
+  double turn = 0;                                  // in the plane: of the frame's axes in those of the body's data
 
   int n() const { return body.n; }
   int body_width() const { return body.row_count(); } // rows of W

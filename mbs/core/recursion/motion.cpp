@@ -26,16 +26,18 @@ Load::Load(const VectorXd &direction, TimeFunction magnitude_) : magnitude(std::
 
 template <class Space>
 RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
-                                        const double *q, const double *v, const HeldForces *held)
+                                        const double *q, const double *v, const HeldForces *held, Steering *steering)
     : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
-      held_(held), workspace_(mechanism), measured_(mechanism), newton_(mechanism),
+      held_(held), steering_(steering), workspace_(mechanism), measured_(mechanism), newton_(mechanism),
       force_(VectorXd::Zero(mechanism.n_v)),
       wrench_(VectorXd::Zero(Space::dim * static_cast<Index>(mechanism.wrenches.size()))),
       along_cuts_(VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()))),
       target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
       correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
-      target_time_(std::numeric_limits<double>::quiet_NaN()), norm_(mechanism),
+      target_time_(std::numeric_limits<double>::quiet_NaN()), norm_(mechanism, scene.is_strict),
       shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(VectorXd::Zero(mechanism.n_v)) {
+  has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
+               !scene_.frame_motors.empty() || !scene_.gears.empty();
   update_targets(t);
   keep_independent_rows(mechanism, q, v, workspace_);
   newton_.keep(workspace_.active);
@@ -60,8 +62,7 @@ template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
 template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
   update_targets(t);
   Forces<double> forces;
-  if (held_ || !scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.frame_motors.empty() ||
-      !scene_.gears.empty()) {
+  if (has_given_) {
     force_.setZero();
     for (const Load &load : scene_.loads) {
       const double magnitude = load.magnitude(t).value;
@@ -80,7 +81,7 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
       held_->add(q, force_.data());
     forces.generalized = force_.data();
   }
-  if (!scene_.point_loads.empty() || !scene_.cut_joints.empty()) {
+  if (steering_ || !scene_.point_loads.empty() || !scene_.cut_joints.empty()) {
     wrench_.setZero();
     for (const PointLoad &load : scene_.point_loads)
       wrench_[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
@@ -88,6 +89,8 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
       act_along_cuts(t, q, v);
     forces.wrench = wrench_.data();
   }
+  if (steering_)
+    steering_->add(t, force_.data(), wrench_.data());
   accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
 }
 
@@ -180,7 +183,7 @@ template <class Space> double RecursiveMotion<Space>::change_size(const double *
 template <class Space> void RecursiveMotion<Space>::accepted(double t, const double *z, const double *z_dot) {
   if (accepted_ == 0)
     norm_.observe(workspace_);
-  norm_.take(z, z_dot, workspace_);
+  norm_.take(z, z_dot, scene_.is_strict && has_given_ ? force_.data() : nullptr, workspace_);
   if (accepted_ % steps_between_postures_ == 0)
     watch_posture(t, local().state(z));
   ++accepted_;
@@ -203,7 +206,26 @@ template <class Space> void RecursiveMotion<Space>::watch_posture(double t, cons
   }
 }
 
+template <class Space> Index RecursiveMotion<Space>::prescribed() const {
+  const std::size_t count = scene_.targets.size() + scene_.loads.size() + scene_.point_loads.size();
+  return scene_.is_strict ? static_cast<Index>(count) : 0;
+}
+
+template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *f) {
+  for (const Target &target : scene_.targets)
+    *f++ = target(t).acceleration;
+  for (const Load &load : scene_.loads)
+    *f++ = load.magnitude(t).value;
+  for (const PointLoad &load : scene_.point_loads)
+    *f++ = load.magnitude(t).value;
+}
+
 template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z) const {
+  for (std::size_t i = 0; i < scene_.most_bent.size(); ++i) {
+    const Node<Space> &node = mechanism_.nodes[i];
+    if (!(Eigen::Map<const VectorXd>(z + node.p_v(), node.n()).squaredNorm() <= scene_.most_bent[i]))
+      return false;
+  }
   return least_ratio_ >= singular_ratio && Eigen::Map<const VectorXd>(z, 2 * n_v()).allFinite();
 }
 

@@ -80,6 +80,14 @@ struct Target {
   }
 };
 
+// Forces from outside that depend on time alone.
+class Steering {
+public:
+  virtual ~Steering() = default;
+  // Adds those at time t along v (n_v), and on the wrenches of the mechanism (wrenches, dim).
+  virtual void add(double t, double *force, double *wrench) = 0;
+};
+
 struct Scene {
   std::vector<Target> targets; // of rows
   std::vector<Load> loads;
@@ -91,6 +99,11 @@ struct Scene {
   std::vector<CutLoad> cut_loads;
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;
+  // As scenes in the plane have it: steps are limited where functions of time bend (OdeSystem::prescribe), errors of
+  // forces between bodies count twice, and those of links that given forces hold straight are compared with what these
+  // would bend them.
+  bool is_strict = false;
+  std::vector<double> most_bent; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
 
 // What a motion remembers of its steps: with it another one of the same mechanism goes on as if it had taken them.
@@ -106,9 +119,10 @@ template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
   // The mechanism and the scene must outlive this. Rows that depend on others
   // at time t and (q, v) are left out of the equations from there on; they are
-  // to be consistent. `held` may be null: what acts beside the scene's loads, and may change between steps.
+  // to be consistent. What acts beside the scene's loads may be null, and must outlive this: `held`, which may change
+  // between steps, and `steering`.
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
-                  const HeldForces *held = nullptr);
+                  const HeldForces *held = nullptr, Steering *steering = nullptr);
 
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
@@ -116,6 +130,8 @@ public:
   double change_size(const double *z, const double *change, double rate) const override;
   void accepted(double t, const double *z, const double *z_dot) override;
   bool is_sensible(const double *z) const override;
+  Eigen::Index prescribed() const override; // of the scene's loads and targets, where these limit steps
+  void prescribe(double t, double *f) override;
   double initial_step() const override { return 0.1 / fastest_; }
   unsigned long evaluations() const override { return workspace_.evaluations; }
 
@@ -163,9 +179,11 @@ private:
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
   const HeldForces *held_;
+  Steering *steering_;
   // of accelerations; of rows and of Newton's method, which must not disturb
   // these
   Workspace<Space, double> workspace_, measured_, newton_;
+  bool has_given_; // generalized forces: force_
   Eigen::VectorXd force_, wrench_, along_cuts_, target_, value_, rate_, correction_, state_;
   std::vector<Jet> jets_;
   double target_time_;

@@ -42,7 +42,8 @@ double farthest(const spatial::Body &b) {
 } // namespace
 
 template <class Space>
-MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism) : mechanism_(mechanism), pace_{slow, slow} {
+MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
+    : mechanism_(mechanism), pace_{slow, slow} {
   const auto n = static_cast<std::size_t>(mechanism.n_v);
   group_.assign(2 * n, 0), frequency_.assign(n, 0);
   for (const Node<Space> &node : mechanism.nodes) {
@@ -71,7 +72,7 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism) : mechanism_(me
       is_moment_.push_back(key.second);
     force_group_.push_back(at->second);
   }
-  of_rows_ = is_moment_.size();
+  levers_ = is_moment_.size();
   for (std::size_t port = 0; port < mechanism.children.size(); ++port)
     if (mechanism.children[port] >= 0) {
       const int force = static_cast<int>(is_moment_.size());
@@ -80,6 +81,8 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism) : mechanism_(me
       for (int i = 0; i < Space::dim; ++i)
         force_group_.push_back(i < Space::linear ? force : force + 1);
     }
+  if (is_strict)
+    levers_ = is_moment_.size();
   force_now_ = force_error_ = force_peak_ = std::vector<double>(is_moment_.size(), 0.0);
   observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
 }
@@ -124,7 +127,7 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
   for (std::size_t g = 0; g < is_moment_.size(); ++g) {
     const double least = small_force * (is_moment_[g] ? moment : force);
     const double scale = std::max({force_peak_[g], force_now_[g], least, nothing});
-    const double size = (g < of_rows_ ? leverage : 1) * force_error_[g] / scale;
+    const double size = (g < levers_ ? leverage : 1) * force_error_[g] / scale;
     if (!(size <= worst))
       worst = size; // keeps NaN
   }
@@ -132,9 +135,11 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
 }
 
 template <class Space>
-void MotionNorm<Space>::take(const double *z, const double *z_dot, const Workspace<Space, double> &w) {
+void MotionNorm<Space>::take(const double *z, const double *z_dot, const double *applied,
+                             const Workspace<Space, double> &w) {
   const std::size_t n = frequency_.size();
-  std::vector<double> of_forces(size_.size(), 0.0); // what the forces on modes will do to them
+  // what the forces on modes will do to them, and what given ones would do alone, which may hold a link straight
+  std::vector<double> of_forces(size_.size(), 0.0), of_given(size_.size(), 0.0);
   std::fill(size_.begin(), size_.end(), 0.0);
   for (std::size_t i = 0; i < group_.size(); ++i)
     size_[static_cast<std::size_t>(group_[i])] += z[i] * z[i];
@@ -143,9 +148,12 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const Workspa
       const double rate = z_dot[n + i] / frequency_[i], way = rate / frequency_[i];
       of_forces[static_cast<std::size_t>(group_[i])] += way * way;
       of_forces[static_cast<std::size_t>(group_[n + i])] += rate * rate;
+      const double bend = applied ? applied[i] / std::pow(frequency_[i], 2) : 0;
+      of_given[static_cast<std::size_t>(group_[i])] += bend * bend;
+      of_given[static_cast<std::size_t>(group_[n + i])] += std::pow(bend * frequency_[i], 2);
     }
   for (std::size_t g = 0; g < size_.size(); ++g)
-    peak_[g] = std::max({peak_[g], std::sqrt(size_[g]), std::sqrt(of_forces[g])});
+    peak_[g] = std::max({peak_[g], std::sqrt(size_[g]), std::sqrt(of_forces[g]), std::sqrt(of_given[g])});
   take_accelerations(w);
   // Rotation vectors start at zero in every step: an angle is compared with one radian at least, a way with a length.
   peak_[0] = std::max(peak_[0], length_), peak_[1] = std::max(peak_[1], 1.0);

@@ -16,7 +16,8 @@ struct NormPeaks {
 // Errors e and states z are local coordinates (space/local_coordinates.h).
 template <class Space> class MotionNorm {
 public:
-  explicit MotionNorm(const Mechanism<Space> &mechanism);
+  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed.
+  explicit MotionNorm(const Mechanism<Space> &mechanism, bool is_strict = false);
 
   double of_state(const double *e) const;
 
@@ -26,8 +27,9 @@ public:
   double of_observed(const Workspace<Space, double> &w);
   bool observes() const { return !force_group_.empty(); }
 
-  // Peaks grow by the state z, its rate and the forces observed there; w: as at the last evaluation.
-  void take(const double *z, const double *z_dot, const Workspace<Space, double> &w);
+  // Peaks grow by the state z, its rate and the forces observed there; w: as at the last evaluation. `applied` (n_v):
+  // given generalized forces there; null: none.
+  void take(const double *z, const double *z_dot, const double *applied, const Workspace<Space, double> &w);
 
   NormPeaks peaks() const { return {peak_, force_peak_, inertial_}; }
   void set_peaks(const NormPeaks &peaks); // throws std::invalid_argument where they are those of another mechanism
@@ -47,7 +49,7 @@ private:
   std::vector<std::size_t> carriers_; // of all ports: on which a joint of the tree hangs
   std::vector<int> force_group_;      // of each row, then of each component at these ports
   std::vector<bool> is_moment_;       // of each group of these
-  std::size_t of_rows_ = 0;           // how many groups are of rows
+  std::size_t levers_ = 0;            // how many groups other forces follow from: those of rows, or all
   std::vector<double> force_peak_, force_now_, force_error_;
   Eigen::VectorXd observed_, change_;
   double inertial_ = 0; // N, largest sum of mass times acceleration

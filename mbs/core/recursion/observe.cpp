@@ -82,10 +82,17 @@ Vector3d joint_axis(const Mechanism<Space> &m, std::size_t i, const Workspace<Sp
 } // namespace
 
 template <class Space>
-std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
-                                       Workspace<Space, double> &w) {
+const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const double *q, const double *v,
+                                             Workspace<Space, double> &w) {
   kinematics(m, q, v, Forces<double>(), w);
   locate(m, q, w);
+  return w.frames;
+}
+
+template <class Space>
+std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
+                                       Workspace<Space, double> &w) {
+  frame_poses(m, q, v, w);
   Vector3d g = Vector3d::Zero();
   g.head(m.gravity.size()) = m.gravity;
   std::vector<FrameMotion> all;
@@ -133,6 +140,8 @@ Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Works
   return sum;
 }
 
+template const std::vector<Pose<double>> &frame_poses(const Mechanism<Planar> &, const double *, const double *,
+                                                      Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Planar> &, const double *, const double *,
                                                 Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, const double *, const double *,

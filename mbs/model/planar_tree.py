@@ -1,0 +1,205 @@
+"""A planar mechanism in joint coordinates, as the core's recursion integrates it (docs/recursion.md).
+
+It is made of what a `MechanismSystem` is made of: bodies hang on the joints of the spanning forest, the joints that
+close loops and the trajectories are rows, loads act along coordinates of joints or on points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from .. import _core
+from ..fields.field_types import GROUND
+from ..joints.measure import Marker, Measure
+from .model import ZERO, Constraint
+from .system import MechanismSystem
+from .tree_layout import FREE, JOINTS, Coordinate, Layout, Node, NotInTreeError
+
+MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
+COMPONENTS = {_core.MeasureKind.x: 0, _core.MeasureKind.y: 1, _core.MeasureKind.angle: 2, _core.MeasureKind.gear: 2}
+"""Of a planar wrench, of the force along a measure whose direction is that of the ground."""
+
+
+class Share(NamedTuple):
+    """Of a force along a measure, which acts `size` times on a component of the wrench on a marker."""
+
+    marker: Marker
+    component: int
+    size: float
+
+
+class PlanarTree:
+    """A core model of a planar system in joint coordinates, and what acts on it.
+
+    Attributes:
+        core: bodies, joints, rows.
+        scene: what rows follow, loads, friction.
+        drives: where those drives of the system act whose forces are set from outside.
+        bodies: number in the system of each body of the tree.
+        constraints: of the system that are rows of `core`: trajectories, and joints that close loops.
+    """
+
+    def __init__(self, assembly: MechanismSystem) -> None:
+        """Raises `NotInTreeError`."""
+        _check(assembly)
+        model, self._assembly, self._layout = assembly.model, assembly, Layout(assembly.model)
+        self.bodies = [assembly.index[node.body.name] for node in self._layout.nodes]
+        modes = {number: node.modes for number, node in zip(self.bodies, self._layout.nodes, strict=True)}
+        self.scene, self.drives = _core.TreeScene(), _core.DrivesOnTree([modes[k] for k in range(len(modes))])
+        self._wrenches: dict[Marker, int] = {}
+        self._driven: set[int] = set()
+        self._rotors: dict[int, tuple[float, float]] = {}
+        loops = self._layout.loops
+        self.constraints = tuple(c for c in assembly.constraints if c.is_trajectory or c.owner in loops)
+        rows = [self._row(constraint) for constraint in self.constraints]
+        if len(rows) > MOST_ROWS:
+            raise NotInTreeError(f"{len(rows)} components of trajectories and loops, more than {MOST_ROWS}")
+        self._add_loads()
+        self._add_what_joints_have()
+        self.scene.is_strict = True
+        self.scene.most_bent = [node.body.inertia for node in self._layout.nodes]
+        wrenches = [self._layout.place(marker) for marker in self._wrenches]
+        bodies = [self._body(number, node) for number, node in enumerate(self._layout.nodes)]
+        self.core = _core.PlanarModel(
+            bodies, self._layout.ground_markers(), rows, wrenches, np.array(model.scene.gravity)
+        )
+
+    def state(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """(q, v) of the tree for those of the system, (coordinates,) each.
+
+        Raises `NotInTreeError` where trajectories and loops depend on each other there.
+        """
+        found = np.zeros((2, self._layout.size))
+        for number, node in zip(self.bodies, self._layout.nodes, strict=True):
+            first, n = int(self._assembly.first[number]), node.body.n_modes
+            for of_tree, of_system in zip(found, (q, v), strict=True):
+                of_tree[node.modes : node.modes + n] = of_system[first + 3 : first + 3 + n]
+                if node.joint is None:
+                    of_tree[node.first : node.modes] = of_system[first : first + 3]
+        measures, coordinates = self._joints()
+        along = [(measure, order) for order in (0, 1) for measure in measures]
+        readings = _core.Sensing(self._assembly.system, along, []).read(q[None], v[None], np.zeros_like(v)[None])
+        indices, signs = [c.number for c in coordinates], np.array([c.sign for c in coordinates])
+        found[:, indices] = signs * readings[0].reshape(2, -1)
+        if len(self.core.keep_independent_rows(*found)) < len(self.constraints):
+            raise NotInTreeError("trajectories and loops that depend on each other")
+        return found[0], found[1]
+
+    def _joints(self) -> tuple[list[_core.Measure], list[Coordinate]]:
+        """Measures of all joints of the tree that move, and their coordinates."""
+        joints = [joint.coordinate("section") for joint in self._assembly.model.scene.joint]
+        moving = zip(self._assembly.joint_measures, (m for m in joints if m is not None), strict=True)
+        found = [(core, self._layout.coordinate(measure)) for core, measure in moving]
+        in_tree = [(core, coordinate) for core, coordinate in found if coordinate is not None]
+        return [core for core, _ in in_tree], [coordinate for _, coordinate in in_tree]
+
+    @property
+    def row_signs(self) -> Array:
+        """(rows,) −1 where the row, its target and its multiplier count the tree's coordinate, not the joint's."""
+        found = [self._layout.coordinate(constraint.measure) for constraint in self.constraints]
+        return np.array([1.0 if coordinate is None else coordinate.sign for coordinate in found])
+
+    def _row(self, constraint: Constraint) -> _core.RowModel:
+        measure, found = constraint.measure, _core.RowModel()
+        found.name = measure.label.partition(",")[0]
+        coordinate = self._layout.coordinate(measure)
+        self.scene.add_target(constraint.target, 1.0 if coordinate is None else coordinate.sign)
+        if coordinate is not None:
+            found.kind, found.coordinate = _core.RowKind.coordinate, coordinate.number
+            return found
+        if measure.kind == _core.MeasureKind.slide:
+            found.kind, found.f = _core.RowKind.slide, np.array([*measure.direction, 0.0])
+        else:
+            component = COMPONENTS[measure.kind]
+            found.kind = _core.RowKind.rotation if component == 2 else _core.RowKind.point
+            found.f = np.eye(3)[component]
+        found.a, found.b = self._layout.place(measure.a), self._layout.place(measure.b, -measure.offset)
+        return found
+
+    def _add_loads(self) -> None:
+        """The drives of the system: `drives` has where they act, `scene` their magnitudes over time."""
+        for number, (measure, magnitude) in enumerate(self._assembly.drives):
+            if (coordinate := self._layout.coordinate(measure)) is not None:
+                self._driven.add(coordinate.number)
+                self.drives.add_along(number, coordinate.number, coordinate.sign)
+                if magnitude is not ZERO:
+                    self.scene.add_load(coordinate.sign * np.eye(self._layout.size)[coordinate.number], magnitude)
+                continue
+            for marker, component, size in _shares(measure):
+                wrench = self._wrenches.setdefault(marker, len(self._wrenches))
+                self.drives.add_at_point(number, wrench, component, size)
+                if magnitude is not ZERO:
+                    self.scene.add_point_load(wrench, component, magnitude, size)
+        for load in self._assembly.model.modal_loads:
+            node = next(node for node in self._layout.nodes if node.body.name == load.body)
+            direction = np.zeros(self._layout.size)
+            direction[node.modes : node.modes + node.body.n_modes] = load.vector
+            self.scene.add_load(direction, load.magnitude)
+
+    def _add_what_joints_have(self) -> None:
+        """Friction and rotors."""
+        model = self._assembly.model
+        for measure, friction in model.frictions:
+            index, _ = self._in_tree(measure, "friction")
+            self._driven.add(index)
+            self.scene.add_joint_force(index, index, 0.0, 0.0, friction.viscous, friction.coulomb, friction.speed)
+        for measure, inertia in model.rotors:
+            is_gear = measure.kind == _core.MeasureKind.gear
+            turned = measure if not is_gear else _angle_between(measure)
+            index, sign = self._in_tree(turned, "a rotor")
+            # it sits on the first side and spins with N Ω_second − (N − 1) Ω_first
+            N = measure.gear_ratios[0] if is_gear else 1.0
+            self._rotors[index] = inertia, 1.0 - N if is_gear and sign < 0 else N
+
+    def _in_tree(self, measure: Measure, what: str) -> Coordinate:
+        coordinate = self._layout.coordinate(measure)
+        if coordinate is None:
+            raise NotInTreeError(f"{what} along a coordinate that is none of the tree ({measure.label})")
+        return coordinate
+
+    def _body(self, number: int, node: Node) -> _core.PlanarBody:
+        body = _core.PlanarBody()
+        body.name, body.data = node.body.name, self._layout.data(number)
+        body.parent, body.parent_marker, body.inboard_marker = node.inner.body, node.inner.marker, node.outer.marker
+        body.joint, _ = FREE if node.joint is None else JOINTS[node.joint.type]
+        coordinates = range(node.first, node.modes)
+        body.driven = not self._driven.isdisjoint(coordinates)
+        # Else the core may take the frame's coordinates where modes turn the section: same motion, other numbers.
+        body.of_section = bool(np.any(body.data.markers[node.outer.marker].Phi))
+        for index in self._rotors.keys() & coordinates:
+            body.rotor_inertia, body.gear_ratio = self._rotors[index]
+        return body
+
+
+def _check(assembly: MechanismSystem) -> None:
+    """Raise `NotInTreeError` for what the recursion in the plane does not have."""
+    model = assembly.model
+    joined = {body for joint in model.scene.joint if GROUND not in joint.bodies for body in joint.bodies}
+    missing = {
+        # Errors of forces are judged between bodies: those on the ground are not known to the core.
+        "a body that is joined to no other": any(body.name not in joined for body in model.links),
+        "geometric stiffening": any(body.stiffening is not None for body in model.bodies),
+        "gears that give": bool(model.gears),
+        "forces that depend on the motion of points": bool(model.state_forces),
+    }
+    if found := [what for what, is_there in missing.items() if is_there]:
+        raise NotInTreeError(", ".join(found))
+
+
+def _shares(measure: Measure) -> Iterator[Share]:
+    """Of a force along a measure that is no coordinate of the tree. Raises `NotInTreeError` where it turns."""
+    if measure.kind not in COMPONENTS:
+        raise NotInTreeError(f"a load along a direction that turns with its body ({measure.label})")
+    of_b, of_a = measure.gear_ratios if measure.kind == _core.MeasureKind.gear else (1.0, 1.0)
+    for marker, size in ((measure.b, of_b), (measure.a, -of_a)):
+        if marker.body is not None:
+            yield Share(marker, COMPONENTS[measure.kind], size)
+
+
+def _angle_between(measure: Measure) -> Measure:
+    """The angle of the second side of a gear on its first."""
+    return Measure(measure.label, _core.MeasureKind.angle, measure.a, measure.b)

@@ -1,0 +1,166 @@
+"""The bodies of a planar mechanism on the joints of its spanning forest, as the core's recursion takes them.
+
+q and v of a tree have the same layout: of each body the coordinates of the joint that carries it, then those of its
+modes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from .. import _core
+from ..joints.joint import JointRecord
+from ..joints.measure import FRAME, GROUND_FRAME, Marker, Measure
+from ..scene.topology import Carrier
+from .model import Model
+from .planar_body import PlanarBody, core_arguments
+
+JOINTS = {
+    "revolute": (_core.JointKind.revolute, 1),
+    "prismatic": (_core.JointKind.prismatic, 1),
+    "weld": (_core.JointKind.weld, 0),
+}
+"""By type of joint: what it is to the core, and its number of coordinates."""
+
+FREE = (_core.JointKind.free, 3)
+"""Of a body that nothing carries: (R, θ) of its frame."""
+
+
+class NotInTreeError(Exception):
+    """Says what of a mechanism cannot be integrated in joint coordinates."""
+
+
+class Coordinate(NamedTuple):
+    """Of a joint of the tree: its number in q and v, and the sign with which the tree counts it."""
+
+    number: int
+    sign: float
+
+
+class Node(NamedTuple):
+    """A body, the joint that carries it from section `inner` to `outer` (None: free), first indices of both in v."""
+
+    body: PlanarBody
+    joint: JointRecord | None
+    backwards: bool
+    inner: _core.MarkerAt
+    outer: _core.MarkerAt
+    first: int
+    modes: int
+
+
+class Layout:
+    """The tree of a model, and the markers on its bodies, which are made where they are asked for.
+
+    Raises `NotInTreeError` for a type of joint that the core does not know.
+
+    Attributes:
+        nodes: each after the one that carries it.
+        loops: names of the joints that close loops.
+        size: of q and of v.
+    """
+
+    def __init__(self, model: Model) -> None:
+        topology = model.scene.topology
+        self._index = {name: number for number, name in enumerate(topology.carriers)}
+        self._bodies = [model.body(name) for name in topology.carriers]
+        self._markers: list[dict[tuple[Marker, float], int]] = [{} for _ in (None, *self._bodies)]  # the ground's first
+        self._coordinates: dict[tuple[object, ...], Coordinate] = {}
+        self._kept = {c.owner: c.measure.offset for c in model.joints if c.measure.kind == _core.MeasureKind.angle}
+        self.loops = {model.scene.joint[number].name for number in topology.loop_joints}
+        self.nodes: list[Node] = []
+        self.size = 0
+        for body, carrier in zip(self._bodies, topology.carriers.values(), strict=True):
+            joint = None if carrier is None else model.scene.joint[carrier.joint]
+            self.nodes.append(self._node(body, joint, carrier))
+
+    def place(self, marker: Marker, turn: float = 0.0) -> _core.MarkerAt:
+        """A marker, its axes turned by `turn` (rad) against its section or the ground."""
+        number = -1 if marker.body is None else self._index[marker.body]
+        known = self._markers[number + 1]
+        return _core.MarkerAt(number, known.setdefault((marker, turn), len(known)))
+
+    def coordinate(self, measure: Measure) -> Coordinate | None:
+        """The coordinate of the tree that a measure is; None of others."""
+        return self._coordinates.get(_key(measure))
+
+    def ground_markers(self) -> list[_core.PlanarMarker]:
+        """All that were placed."""
+        return [_marker(np.array(at.position), np.zeros((3, 0)), turn) for at, turn in self._markers[0]]
+
+    def data(self, number: int) -> _core.PlanarData:
+        """Constants of a body with all markers that were placed on it; terms that vanish are left empty."""
+        body, found = self._bodies[number], _core.PlanarData()
+        of_core = core_arguments(body, [], [])
+        for key in ("mass", "inertia", "first_moment"):
+            setattr(found, key, of_core[key])
+        if body.n_modes:
+            for key in ("stiffness", "damping", "j", "S_tilde", "m_xy"):
+                setattr(found, key, of_core[key])
+            found.S_bar, found.h = body.S_bar, body.h
+        found.markers = [_marker(*_section(body, at.point), turn) for at, turn in self._markers[number + 1]]
+        return found
+
+    def _node(self, body: PlanarBody, joint: JointRecord | None, carrier: Carrier | None) -> Node:
+        first = self.size
+        if joint is not None and joint.type not in JOINTS:
+            raise NotInTreeError(f"{joint.label}, {joint.type}")
+        _, count = FREE if joint is None else JOINTS[joint.type]
+        backwards = joint is not None and carrier is not None and joint.between[0] == carrier.own
+        sides = [self.place(at, turn) for at, turn in self._sides(body, joint)]
+        inner, outer = sides[::-1] if backwards else sides
+        if joint is not None and count:
+            self._add_coordinate(joint, Coordinate(first, -1.0 if backwards else 1.0))
+        self.size = first + count + body.n_modes
+        return Node(body, joint, backwards, inner, outer, first, first + count)
+
+    def _sides(self, body: PlanarBody, joint: JointRecord | None) -> list[tuple[Marker, float]]:
+        """Markers of a joint on its first and second side, and how their axes are turned: alike where it keeps these.
+
+        Prismatic joints slide along the axis x of both.
+        """
+        if joint is None:
+            return [(GROUND_FRAME, 0.0), (Marker(body.name), 0.0)]
+        (a, b), coordinate = joint.markers, joint.coordinate("section")
+        if joint.type == "revolute" or coordinate is None:
+            turn = 0.0
+        else:
+            x, y = coordinate.direction
+            turn = float(np.arctan2(y, x))
+        return [(a, turn), (b, turn - self._kept.get(joint.name, 0.0))]
+
+    def _add_coordinate(self, joint: JointRecord, coordinate: Coordinate) -> None:
+        """Of sections; and of frames where modes turn neither section against its frame."""
+        of_sections, of_frames = joint.coordinate("section"), joint.coordinate("frame")
+        assert of_sections is not None
+        assert of_frames is not None
+        self._coordinates[_key(of_sections)] = coordinate
+        if not any(np.any(self._turning(marker)) for marker in joint.markers):
+            self._coordinates[_key(of_frames)] = coordinate
+
+    def _turning(self, marker: Marker) -> Array:
+        """Φ_r (n,) of a section; () of the ground."""
+        if marker.body is None:
+            return np.zeros(0)
+        return self._bodies[self._index[marker.body]].points[marker.point].rotation
+
+
+def _key(measure: Measure) -> tuple[object, ...]:
+    return measure.kind, measure.a, measure.b, measure.direction
+
+
+def _section(body: PlanarBody, point: str) -> tuple[Array, Array]:
+    """Position (2,) and Φ over Φ_r (3, n) of a point, or of the frame."""
+    if point == FRAME:
+        return np.zeros(2), np.zeros((3, body.n_modes))
+    at = body.points[point]
+    return at.position, np.vstack([at.translation, at.rotation])
+
+
+def _marker(position: Array, Phi: Array, turn: float) -> _core.PlanarMarker:
+    marker = _core.PlanarMarker()
+    marker.position, marker.Phi, marker.angle = np.array(position), Phi, turn
+    return marker
