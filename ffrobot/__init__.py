@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         optimise,
         plot_results,
         read_modal_body,
+        screening,
         sensitivity,
         solve,
         trade_off,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
         view_file,
         write_movie,
         write_report,
+        write_study,
     )
     from .common.errors import FfrobotError, FfrobotWarning, InputError, SolveError
     from .fe_models.modal_body import ModalBody
@@ -51,6 +53,7 @@ _HOME = {
     "optimise": ".api",
     "plot_results": ".api",
     "read_modal_body": ".api",
+    "screening": ".api",
     "sensitivity": ".api",
     "solve": ".api",
     "trade_off": ".api",
@@ -58,6 +61,7 @@ _HOME = {
     "view_file": ".api",
     "write_movie": ".api",
     "write_report": ".api",
+    "write_study": ".api",
     "FfrobotError": ".common.errors",
     "FfrobotWarning": ".common.errors",
     "InputError": ".common.errors",
@@ -87,6 +91,7 @@ __all__ = [
     "optimise",
     "plot_results",
     "read_modal_body",
+    "screening",
     "sensitivity",
     "solve",
     "trade_off",
@@ -94,6 +99,7 @@ __all__ = [
     "view_file",
     "write_movie",
     "write_report",
+    "write_study",
 ]
 
 

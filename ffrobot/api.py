@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from .design.optimise import Method
     from .design.optimum import Optimum
     from .design.record import Sensitivity
+    from .design.screening import Screening
+    from .design.studies import Found
     from .design.uncertainty import Uncertainty
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
@@ -276,22 +278,44 @@ def uncertainty(
 
     Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.uncertainty`.
     """
-    from contextlib import nullcontext
-    from tempfile import TemporaryDirectory
-
-    from .common.outputs import protected
-    from .common.python_files import python_allowed
     from .design.uncertainty import uncertainty
-    from .run.inputs import files_of
 
-    path = Path(scene)
-    where = TemporaryDirectory() if output is None else nullcontext(str(output))
-    with where as folder, protected(files_of(path)), python_allowed(Path(place) for place in allow_python):
+    with _designs(Path(scene), output, allow_python) as folder:
         found = uncertainty(
-            path, of, spread, Path(folder),
-            samples=samples, seed=seed, by=by, indices=indices, processes=processes,
-        )  # fmt: skip
+            Path(scene), of, spread, folder, samples=samples, seed=seed, by=by, indices=indices, processes=processes
+        )
     return found if output is not None else replace(found, table=None)
+
+
+def screening(
+    scene: AnyPath,
+    of: Sequence[str],
+    spread: Sequence[str],
+    output: AnyPath | None = None,
+    *,
+    trajectories: int = 10,
+    seed: int = 0,
+    processes: int = 1,
+    allow_python: Sequence[AnyPath] = (),
+) -> Screening:
+    """Elementary effects on goals `of` a scene file of keys that are `spread`: `ffrobot uncertainty --by screening`.
+
+    Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.screening`.
+    """
+    from .design.screening import screening
+
+    with _designs(Path(scene), output, allow_python) as folder:
+        found = screening(Path(scene), of, spread, folder, trajectories=trajectories, seed=seed, processes=processes)
+    return found if output is not None else replace(found, table=None)
+
+
+def write_study(found: Found, folder: AnyPath, *, figures: bool = True) -> list[Path]:
+    """Write what the design functions return as files for `write_report`, and as figures; the files written."""
+    from .common.extras import extras
+    from .design.studies import keep_study
+
+    with extras():
+        return list(keep_study(found, Path(folder), figures=figures))
 
 
 def read_modal_body(path: AnyPath) -> ModalBody:
@@ -317,15 +341,22 @@ def plot_results(
 
 
 def write_report(results: AnyPath | Results | Sequence[AnyPath | Results], path: AnyPath) -> None:
-    """Write one HTML page about results, or several side by side: `ffrobot report`."""
+    """Write one HTML page about results, or several side by side: `ffrobot report`.
+
+    Folders of `sensitivity`, `optimise`, `trade_off`, `uncertainty` and `screening` may be among them, or alone.
+    """
     from .common.extras import extras
+    from .common.outputs import protected
+    from .pictures.studies.study import study_files
     from .results.file import Results
 
     several = [results] if isinstance(results, str | PathLike | Results) else results
-    with extras(), _files(*several) as paths:
+    studies = [file for r in several if not isinstance(r, Results) for file in study_files(Path(r))]
+    solved = [r for r in several if isinstance(r, Results) or not study_files(Path(r))]
+    with extras(), protected(studies), _files(*solved) as paths:
         from .pictures.report import write_report
 
-        write_report(paths, Path(path))
+        write_report([*paths, *studies], Path(path))
 
 
 def view_file(

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
-from .checks import check
+from .interpolation import interpolate
 from .parts import Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint, freeze
+from .unit_loads import unit_load_names
+
+# m_ff = I and the identities between invariants must hold to this.
+IDENTITY_TOLERANCE = 1e-8
+POSITIVE_TOLERANCE = 1e-6  # of matrices that rounding, or a mesh, may leave indefinite
+INTERFACE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +103,7 @@ class ModalBody:
         if not np.size(self.residual):
             object.__setattr__(self, "residual", np.zeros(len(self.family), dtype=np.int64))
         freeze(self)
-        check(self)
+        _check(self)
 
     def __repr__(self) -> str:
         modes = f"{self.modes_in_words} of {self.frequency[0]:.5g} … {self.frequency[self.eigenmode_count - 1]:.5g} Hz"
@@ -138,40 +145,188 @@ class ModalBody:
                 f"modal body {self.name}: x: expected {positions[0]:g} … {positions[-1]:g} m, the body's, found {x:g} m"
             )
         x = float(np.clip(x, positions[0], positions[-1]))
-        element = self.stations.element
-        if element is None:
-            return _hermite(self.stations, x)
-        index = np.clip(np.searchsorted(positions[element[:, 0]], x, side="right") - 1, 0, len(element) - 1)
-        return _through(self.stations, element[index], x)
+        return interpolate(self.stations, x)
 
 
-def _through(stations: Stations, members: Integers, x: float) -> Interface:
-    """The polynomial through the stations `members`, at x (Lagrange)."""
-    nodes = stations.position[members, 0]
-    others = ~np.eye(len(nodes), dtype=bool)
-    weights = np.prod((x - nodes) / (nodes[:, None] - nodes + ~others), axis=1, where=others)
-    return Interface(
-        weights @ stations.position[members],
-        np.einsum("i,ikn->kn", weights, stations.translation[members]),
-        np.einsum("i,ikn->kn", weights, stations.rotation[members]),
+def _check(body: ModalBody) -> None:
+    """All that must hold of a modal body, in one place."""
+    n, k, p = body.mode_count, body.stations.position.shape[0], body.mesh.points.shape[0]
+    for name, array, shape in [*_expected_shapes(body, n, k, p), *_expected_stresses(body, n, p)]:
+        if np.shape(array) != shape:
+            _fail(body, f"{name}: expected shape {shape}, found {np.shape(array)}")
+        if not np.all(np.isfinite(array)):
+            _fail(body, f"{name}: expected finite numbers, found NaN or infinity")
+    for name in ("root", "tip"):
+        if name not in body.interfaces:
+            _fail(body, f"interfaces: expected one named {name}, found {', '.join(body.interfaces) or 'none'}")
+    for name, value in (("length", body.length), ("mass", body.mass)):
+        if not value > 0:
+            _fail(body, f"{name}: expected a positive number, found {value}")
+    if k < 2 or np.any(np.diff(body.stations.position[:, 0]) <= 0):
+        _fail(body, "stations.position: expected at least two, ascending in x")
+    element = body.stations.element
+    if element is not None and not _is_chain(element, k):
+        _fail(body, "stations.element: expected four ascending stations for each element, from the first to the last")
+    if np.any((body.residual != 0) & (body.residual != 1)) or np.any(np.diff(body.residual) < 0):
+        _fail(body, "residual: expected 0 of each eigenmode, then 1 of each residual attachment mode")
+    unknown = [load for load in body.stress_loads if load not in unit_load_names(body.interfaces)]
+    if unknown:
+        _fail(body, f"stress/loads: expected unit loads of the link and its interfaces, found {', '.join(unknown)}")
+    if np.any(body.frequency <= 0):
+        _fail(body, "frequency: expected positive numbers")
+    if np.any(body.damping_ratio < 0):
+        _fail(body, "damping_ratio: expected numbers not below 0")
+    _check_identities(body, np.eye(n))
+    _check_inertia(body)
+    _check_spin(body)
+    _check_interfaces(body)
+
+
+def _check_inertia(body: ModalBody) -> None:
+    """Kinetic energy is positive in every motion: about the center of mass, and with what the modes carry along."""
+    second = body.second_moment - np.outer(body.first_moment, body.first_moment) / body.mass
+    about_center = np.trace(second) * np.eye(3) - second  # inertia of a mass on an interface may be about z alone
+    relative = body.modal_mass - body.S_bar.T @ body.S_bar / body.mass
+    matrices = {"second_moment, as inertia about the center of mass": about_center, "modal_mass, less S_bar": relative}
+    for name, matrix in matrices.items():
+        lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
+        if lowest < -POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0):
+            _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
+
+
+def _check_spin(body: ModalBody) -> None:
+    """Spin inertia is known whole or not at all; its energy is positive, and S_bar_33 holds that of the modes."""
+    parts = {name: getattr(body, name) for name in ("J_spin", "h_spin", "S_spin")}
+    missing = [name for name, value in parts.items() if value is None]
+    if missing:
+        if len(missing) < len(parts):
+            known = ", ".join(name for name in parts if name not in missing)
+            _fail(body, f"{missing[0]}: expected beside {known}, found none")
+        return
+    J, h, S = parts.values()
+    if not J >= 0:
+        _fail(body, f"J_spin: expected a number not below 0, found {J}")
+    matrices = {
+        "S_spin, less h_spinᵀ h_spin / J_spin": S - (np.outer(h, h) / J if J else np.abs(S) + np.outer(h, h)),
+        "S_bar_kl[2, 2], less S_spin": body.S_bar_kl[2, 2] - S,
+    }
+    for name, matrix in matrices.items():
+        lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
+        if lowest < -IDENTITY_TOLERANCE * np.abs(body.S_bar_kl[2, 2]).max(initial=0.0):
+            _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
+
+
+def _check_interfaces(body: ModalBody) -> None:
+    """Interfaces of a beam are points of its axis: they move as its stations do."""
+    if body.kind != "beam" or body.stations.element is None:
+        return
+    for name, interface in body.interfaces.items():
+        axis = body.interpolate(float(interface.position[0]))
+        for key, of_all in (("translation", body.stations.translation), ("rotation", body.stations.rotation)):
+            error = np.max(np.abs(getattr(interface, key) - getattr(axis, key)), initial=0.0)
+            if error > INTERFACE_TOLERANCE * np.max(np.abs(of_all), initial=0.0):
+                _fail(
+                    body,
+                    f"interfaces/{name}/{key}: expected what stations say there, found a difference of {error:.2g}",
+                )
+
+
+def _check_identities(body: ModalBody, unit: Array) -> None:
+    squares = (2 * np.pi * body.frequency) ** 2
+    total = body.S_bar_kl[0, 0] + body.S_bar_kl[1, 1] + body.S_bar_kl[2, 2]
+    identities = [
+        ("second_moment", "symmetric", body.second_moment, body.second_moment.T),
+        ("stiffness", "diag((2π frequency)²)", body.stiffness, np.diag(squares)),
+        ("modal_mass", "the identity", body.modal_mass, unit),
+        ("S_bar_kl", "S_bar_kl[l, k] = S_bar_kl[k, l]ᵀ", body.S_bar_kl, body.S_bar_kl.transpose(1, 0, 3, 2)),
+        ("S_bar_kl", "a sum S_bar_11 + S_bar_22 + S_bar_33 equal to modal_mass", total, body.modal_mass),
+        *((f"geometric_stiffness/{k}", "symmetric", v, v.T) for k, v in body.geometric_stiffness.items()),
+    ]
+    if body.S_spin is not None:
+        identities.append(("S_spin", "symmetric", body.S_spin, body.S_spin.T))
+    for name, expected, left, right in identities:
+        error = np.max(np.abs(left - right), initial=0.0)
+        if error > IDENTITY_TOLERANCE * np.max(np.abs(right), initial=0.0):
+            _fail(body, f"{name}: expected {expected} to {IDENTITY_TOLERANCE:g}, found a difference of {error:.2g}")
+
+
+def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str, Any, tuple[int, ...]]]:
+    shapes: list[tuple[str, Any, tuple[int, ...]]] = [
+        ("length", body.length, ()),
+        ("mass", body.mass, ()),
+        ("first_moment", body.first_moment, (3,)),
+        ("second_moment", body.second_moment, (3, 3)),
+        ("frequency", body.frequency, (n,)),
+        ("stiffness", body.stiffness, (n, n)),
+        ("modal_mass", body.modal_mass, (n, n)),
+        ("damping_ratio", body.damping_ratio, (n,)),
+        ("residual", body.residual, (n,)),
+        ("S_bar", body.S_bar, (3, n)),
+        ("I_bar", body.I_bar, (3, 3, n)),
+        ("S_bar_kl", body.S_bar_kl, (3, 3, n, n)),
+        ("stations.position", body.stations.position, (k, 3)),
+        ("stations.translation", body.stations.translation, (k, 3, n)),
+        ("stations.rotation", body.stations.rotation, (k, 3, n)),
+        ("stations.height", body.stations.height, (k,)),
+        ("mesh.points", body.mesh.points, (p, 3)),
+        ("mesh.mode_shapes", body.mesh.mode_shapes, (p, 3, n)),
+    ]
+    shapes += [(f"geometric_stiffness/{load}", matrix, (n, n)) for load, matrix in body.geometric_stiffness.items()]
+    for name, interface in body.interfaces.items():
+        shapes.append((f"interfaces/{name}/position", interface.position, (3,)))
+        shapes.append((f"interfaces/{name}/translation", interface.translation, (3, n)))
+        shapes.append((f"interfaces/{name}/rotation", interface.rotation, (3, n)))
+    if body.J_spin is not None:
+        shapes.append(("J_spin", body.J_spin, ()))
+    if body.h_spin is not None:
+        shapes.append(("h_spin", body.h_spin, (n,)))
+    if body.S_spin is not None:
+        shapes.append(("S_spin", body.S_spin, (n, n)))
+    if body.measured is not None:
+        shapes += [(f"measured.{name}", value, (n,)) for name, value in vars(body.measured).items()]
+    if body.stations.rigidity is not None:
+        shapes.append(("stations.rigidity", body.stations.rigidity, (k, 2)))
+    for name in ("width", "out_of_plane_rigidity", "torsional_rigidity"):
+        if (values := getattr(body.stations, name)) is not None:
+            shapes.append((f"stations.{name}", values, (k,)))
+    if body.mesh.edges is not None:
+        shapes.append(("mesh.edges", body.mesh.edges, (len(body.mesh.edges), 2)))
+    if (outline := body.stations.outline) is not None:
+        shapes.append(("stations.outline", outline, (k, *outline.shape[1:2], 2)))
+    if body.surface_patches is not None:
+        patches = np.shape(body.surface_patches.edges)[0]
+        shapes.append(("surface_patches/edges", body.surface_patches.edges, (patches, 2)))
+        for face in ("top", "bottom"):
+            if (values := getattr(body.surface_patches, face)) is not None:
+                shapes.append((f"surface_patches/{face}", values, (patches, n)))
+    return shapes
+
+
+def _expected_stresses(body: ModalBody, n: int, p: int) -> Iterator[tuple[str, Any, tuple[int, ...]]]:
+    loads = len(body.stress_loads)
+    for name, point in body.stress.items():
+        yield f"stress/points/{name}/position", point.position, (3,)
+        yield f"stress/points/{name}/stress", point.stress, (6, n)
+        yield f"stress/points/{name}/strain", point.strain, (6, n)
+        if point.static is not None or loads:
+            yield f"stress/points/{name}/static", point.static, (6, loads)
+    if body.surface_stress is not None:
+        yield "stress/surface", body.surface_stress, (p, 6, n)
+        if body.surface_static is not None or loads:
+            yield "stress/surface_static", body.surface_static, (p, 6, loads)
+
+
+def _is_chain(element: Integers, stations: int) -> bool:
+    """Whether the elements (e, 4) cover all intervals between stations, one after the other."""
+    return (
+        element.ndim == 2
+        and element.shape[0] > 0
+        and element.shape[1] == 4
+        and bool(np.all(np.diff(element, axis=1) > 0))
+        and bool(np.all(element[1:, 0] == element[:-1, 3]))
+        and bool(element[0, 0] == 0 and element[-1, 3] == stations - 1)
     )
 
 
-def _hermite(stations: Stations, x: float) -> Interface:
-    """Cubic Hermite on v with v' = rotation_z and on w with w' = −rotation_y; the rest through four stations."""
-    positions = stations.position[:, 0]
-    k = positions.size
-    i = int(np.clip(np.searchsorted(positions, x, side="right") - 1, 0, k - 2))
-    first = min(max(i - 1, 0), max(k - 4, 0))
-    near = _through(stations, np.arange(first, min(first + 4, k)), x)
-    h = positions[i + 1] - positions[i]
-    s = (x - positions[i]) / h
-    translation, rotation = near.translation.copy(), near.rotation.copy()
-    for axis, turn, sign in ((1, 2, 1.0), (2, 1, -1.0)):
-        values = stations.translation[i : i + 2, axis]
-        slopes = sign * h * stations.rotation[i : i + 2, turn]
-        rise = values[1] - values[0]
-        translation[axis] = values[0] + rise * s**2 * (3 - 2 * s) + s * (1 - s) * ((1 - s) * slopes[0] - s * slopes[1])
-        derivative = 6 * s * (1 - s) * rise + (1 - s) * (1 - 3 * s) * slopes[0] + s * (3 * s - 2) * slopes[1]
-        rotation[turn] = sign * derivative / h
-    return Interface(near.position, translation, rotation)
+def _fail(body: ModalBody, message: str) -> None:
+    raise InputError(f"modal body {body.name}: {message}")

@@ -60,6 +60,7 @@ def sensitivity(
     """  # noqa: D301 (click wants the backspace itself)
     from ..design.record import print_sensitivity, write_sensitivity
     from ..design.sensitivity import sensitivity as find
+    from ..design.studies import keep_study
     from ..present.progress import Display
     from ..present.summary import summary_console
     from ..run.inputs import files_of
@@ -75,11 +76,8 @@ def sensitivity(
     print_sensitivity(found, summary_console())
     write_sensitivity(found, folder / "sensitivity.csv")
     click.echo(f"written    {folder / 'sensitivity.csv'}")
-    if figures:
-        from ..design.tornado import write_tornados
-
-        for path in write_tornados(found, folder):
-            click.echo(f"written    {path}")
+    for path in keep_study(found, folder, figures=figures):
+        click.echo(f"written    {path}")
 
 
 METHODS = ("auto", "slsqp", "trust-constr", "differential-evolution", "all")
@@ -104,10 +102,11 @@ METHODS = ("auto", "slsqp", "trust-constr", "differential-evolution", "all")
     show_default=True,
     help="Of the runs, where the scene has a larger one.",
 )
+@click.option("--figures/--no-figures", default=True, show_default=True, help="Whether the designs are drawn.")
 @runs_options("SCENE.optimum")
 @python_option
 @logging_options
-def optimise(scene_file: Path, output: Path | None, **options: Any) -> None:  # noqa: ANN401 (of `optimise.optimise`)
+def optimise(scene_file: Path, output: Path | None, figures: bool, **options: Any) -> None:  # noqa: ANN401 (of `optimise.optimise`)
     """Find the best design: the numbers and rows of catalogues with which a goal is least, within limits.
 
     \b
@@ -122,11 +121,13 @@ def optimise(scene_file: Path, output: Path | None, **options: Any) -> None:  # 
 
     Numbers are sought along gradients from the scene's own values (and --starts - 1 others), catalogues by trying all
     rows or by differential evolution. The same command takes up what was stopped. The best design's scene is in
-    DIR/best, all designs with their goals in DIR/designs.csv. Exit code 1 where no design keeps the limits.
+    DIR/best, all designs with their goals in DIR/designs.csv and, as parallel coordinates, DIR/designs.png. Exit code 1
+    where no design keeps the limits.
     """  # noqa: D301 (click wants the backspace itself)
     from ..common.errors import SolveError
     from ..design.optimise import optimise as find
     from ..design.optimum import print_optimum, write_optimum
+    from ..design.studies import keep_study
     from ..present.progress import Display
     from ..present.summary import summary_console
     from ..run.inputs import files_of
@@ -135,7 +136,7 @@ def optimise(scene_file: Path, output: Path | None, **options: Any) -> None:  # 
     protect(files_of(scene_file))
     points = options.pop("points")
     if options["against"] is not None:
-        _trade_off(scene_file, folder, points, options)
+        _trade_off(scene_file, folder, points, options, figures=figures)
         return
     del options["against"]
     with Display() as display:
@@ -144,15 +145,18 @@ def optimise(scene_file: Path, output: Path | None, **options: Any) -> None:  # 
     write_optimum(found, folder / "optimum.csv")
     for path in (found.best_scene, found.designs, folder / "optimum.csv"):
         click.echo(f"written    {path}")
+    for path in keep_study(found, folder, figures=figures):
+        click.echo(f"written    {path}")
     if not found.feasible:
         raise SolveError(f"{scene_file}: no design found that keeps all limits: see the table of limits")
 
 
-def _trade_off(scene_file: Path, folder: Path, points: int, options: dict[str, Any]) -> None:
+def _trade_off(scene_file: Path, folder: Path, points: int, options: dict[str, Any], *, figures: bool) -> None:
     """Of two goals: searches along gradients from one design to the next."""
     from ..common.errors import InputError, SolveError
     from ..design.front import trade_off
-    from ..design.front_record import draw_front, print_front, write_front
+    from ..design.front_record import print_front, write_front
+    from ..design.studies import keep_study
     from ..present.progress import Display
     from ..present.summary import summary_console
 
@@ -167,7 +171,8 @@ def _trade_off(scene_file: Path, folder: Path, points: int, options: dict[str, A
         found = trade_off(scene_file, options.pop("vary"), folder, points=points, watcher=display, **options)
     print_front(found, summary_console())
     write_front(found, folder / "front.csv")
-    for path in (folder / "front.csv", *draw_front(found, folder)):
+    click.echo(f"written    {folder / 'front.csv'}")
+    for path in keep_study(found, folder, figures=figures):
         click.echo(f"written    {path}")
     if not all(one.feasible for one in found.points):
         raise SolveError(f"{scene_file}: not all designs of the curve keep the limits: see the table")

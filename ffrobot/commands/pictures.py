@@ -99,17 +99,26 @@ def _tell(paths: Iterable[Path], notes: Iterable[str] = ()) -> None:
 
 
 @click.command()
-@click.argument("results_files", metavar="RESULTS.h5 …", nargs=-1, required=True, type=FILE)
-@click.option("-o", "--output", metavar="FILE.html", type=FILE, help="Where to write [RESULTS.html, of the first].")
+@click.argument("results_files", metavar="RESULTS.h5|FOLDER …", nargs=-1, required=True, type=FILE)
+@click.option(
+    "-o", "--output", metavar="FILE.html", type=FILE, help="Where to write [RESULTS.html or FOLDER.html, of the first]."
+)
 def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     """Write one self-contained HTML page: motion, histories, modes, tables.
 
-    Several results files come side by side, for comparison. The page needs no network and no other file.
+    Several results files come side by side, for comparison. Folders of sensitivity, optimise and uncertainty, beside
+    results or alone, add what these have found: tornado diagrams, all designs of a search, bands, rankings. The page
+    needs no network and no other file.
     """
     from ..common.hdf5 import reading
+    from ..common.outputs import protected
     from ..pictures.report import write_report
+    from ..pictures.studies.study import study_files
 
-    path = output or results_files[0].with_suffix(".html")
-    with reading(*results_files):
+    studies = {file: study_files(file) for file in results_files}
+    first = results_files[0]
+    path = output or (first.parent / f"{first.resolve().name}.html" if first.is_dir() else first.with_suffix(".html"))
+    solved = [file for file, found in studies.items() if not found]
+    with protected(file for found in studies.values() for file in found), reading(*solved):
         write_report(results_files, path)
     click.echo(path)

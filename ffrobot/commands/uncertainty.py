@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import click
 
@@ -19,11 +19,15 @@ from .protect import protect
 @click.option("--samples", metavar="N", type=int, default=200, show_default=True, help="Of a Latin hypercube.")
 @click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Of the samples.")
 @click.option(
-    "--by", type=click.Choice(["samples", "gradients"]), default="samples", show_default=True,
-    help="Samples, or two runs for each key.",
+    "--by", type=click.Choice(["samples", "gradients", "screening"]), default="samples", show_default=True,
+    help="Samples, two runs for each key, or elementary effects of many keys (Morris).",
 )  # fmt: skip
 @click.option("--indices", is_flag=True, help="Sobol indices, by N/2 more runs for each key.")
-@click.option("--figures/--no-figures", default=True, show_default=True, help="Whether bands are drawn.")
+@click.option(
+    "--trajectories", metavar="R", type=int, default=10, show_default=True,
+    help="Of --by screening, with a run for each key and one more.",
+)  # fmt: skip
+@click.option("--figures/--no-figures", default=True, show_default=True, help="Whether bands and rankings are drawn.")
 @runs_options("SCENE.uncertainty")
 @python_option
 @logging_options
@@ -33,8 +37,9 @@ def uncertainty(
     spread: tuple[str, ...],
     samples: int,
     seed: int,
-    by: Literal["samples", "gradients"],
+    by: Literal["samples", "gradients", "screening"],
     indices: bool,
+    trajectories: int,
     processes: int,
     retry: bool,
     figures: bool,
@@ -50,26 +55,38 @@ def uncertainty(
     --spread links.arm.material.youngs_modulus=normal:3%     a normal distribution, its deviation
     --spread gravity.1=uniform:-9.83:-9.78     between two values
 
+    --by screening says which of many keys matter at all, in R runs for each and R more: then spread these alone.
     Every number has its own error. The same command takes up what was stopped; failed runs are told and left out.
     """  # noqa: D301 (click wants the backspace itself)
+    from ..common.errors import InputError
+    from ..design.screening import Screening, screening
+    from ..design.screening_record import print_screening, write_screening
+    from ..design.studies import keep_study
+    from ..design.uncertainty import Uncertainty
     from ..design.uncertainty import uncertainty as find
     from ..design.uncertainty_record import print_uncertainty, write_uncertainty
     from ..present.progress import Display
     from ..present.summary import summary_console
     from ..run.inputs import files_of
 
+    if by == "screening" and indices:
+        raise InputError("uncertainty: --indices: expected --by samples beside it, found --by screening")
     folder = output or scene_file.with_suffix(".uncertainty")
     protect(files_of(scene_file))
+    runs: dict[str, Any] = {"seed": seed, "processes": processes, "retry": retry}
+    found: Screening | Uncertainty
     with Display() as display:
-        found = find(
-            scene_file, of, spread, folder, samples=samples, seed=seed, by=by, indices=indices, processes=processes,
-            retry=retry, watcher=display,
-        )  # fmt: skip
-    print_uncertainty(found, summary_console())
-    for path in write_uncertainty(found, folder):
+        if by == "screening":
+            found = screening(scene_file, of, spread, folder, trajectories=trajectories, watcher=display, **runs)
+        else:
+            found = find(
+                scene_file, of, spread, folder, samples=samples, by=by, indices=indices, watcher=display, **runs
+            )
+    if isinstance(found, Screening):
+        print_screening(found, summary_console())
+        tables = [write_screening(found, folder)]
+    else:
+        print_uncertainty(found, summary_console())
+        tables = write_uncertainty(found, folder)
+    for path in (*tables, *keep_study(found, folder, figures=figures)):
         click.echo(f"written    {path}")
-    if figures and found.bands:
-        from ..design.band_figures import write_bands
-
-        for path in write_bands(found, folder):
-            click.echo(f"written    {path}")

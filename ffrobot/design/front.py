@@ -43,6 +43,7 @@ class FrontPoint:
         price: ∂goal/∂against along the front; NaN at its ends.
         converged: whether gradients say that nothing better is near. `feasible`: whether it keeps all limits.
         message: why the search ended where it is not.
+        design: itself.
     """
 
     point: tuple[object, ...]
@@ -52,11 +53,16 @@ class FrontPoint:
     converged: bool
     feasible: bool
     message: str
+    design: Evaluated
 
 
 @dataclass(frozen=True)
 class Front:
-    """What a trade-off has found: `points` from the least `goals[0]` to the least `goals[1]`; `runs` in all."""
+    """What a trade-off has found: `points` from the least `goals[0]` to the least `goals[1]`; `runs` in all.
+
+    `tried` are the designs of all searches, each once, with readings of the goals of `problem`, its limits along the
+    whole curve among them, and then of the second goal.
+    """
 
     scene: Path
     goals: tuple[str, str]
@@ -65,6 +71,9 @@ class Front:
     points: tuple[FrontPoint, ...]
     runs: int
     tolerance: float
+    space: Space
+    problem: Problem
+    tried: tuple[Evaluated, ...]
 
     @property
     def values(self) -> Array:
@@ -123,6 +132,7 @@ class _Searches:
     tolerance: float
     watcher: Watcher
     ran: set[Path] = field(default_factory=set)
+    tried: dict[Path, Evaluated] = field(default_factory=dict)
 
     def front(self, count: int) -> Front:
         """The ends, then from the first one on to the second."""
@@ -145,6 +155,7 @@ class _Searches:
             self.path, (self.problem.objective.text, self.against.text), (units[0], units[1]),
             tuple(map(".".join, self.space.keys)),
             (self._point(first, np.nan), *middle, self._point(last, np.nan)), len(self.ran), self.tolerance,
+            self.space, self.problem, tuple(map(self._with_both, self.tried.values())),
         )  # fmt: skip
 
     def _least(self, problem: Problem, start: Place, title: str) -> Search:
@@ -158,6 +169,7 @@ class _Searches:
         if spent:
             raise SolveError(f"{self.path}: ended before {title} points after {self.most} runs, as many as allowed")
         self.ran |= evaluations.folders
+        self.tried |= {one.design.folder: one for one in evaluations.searched}
         if not found.best.completed:
             raise SolveError(f"{self.path}: no design could be run to its end: {found.message}")
         return Search(found.best, found.optimality, found.message, evaluations.problem)
@@ -175,8 +187,15 @@ class _Searches:
         stands = one.optimality
         return FrontPoint(
             self.space.point(one.best.place), goal, against, price, stands is not None and stands.reached(AIM),
-            one.problem.violation(one.best.readings) <= KEPT, one.message,
+            one.problem.violation(one.best.readings) <= KEPT, one.message, one.best,
         )  # fmt: skip
+
+    def _with_both(self, one: Evaluated) -> Evaluated:
+        """With readings of all goals, those of the limits, and the second one."""
+        if not one.completed:
+            return one
+        with one.design.results() as results:
+            return replace(one, readings=tuple(goal.read(results) for goal in (*self.problem.goals, self.against)))
 
     @staticmethod
     def _read(goal: Goal, design: Evaluated) -> Reading:

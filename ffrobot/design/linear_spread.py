@@ -40,7 +40,10 @@ class LinearModel:
         return as_floats(np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0).T)
 
     def statistics(self) -> Statistics:
-        """Of the linear part; errors are the differences that the curvatures make."""
+        """Of the linear part; errors are the differences that the curvatures make.
+
+        The worst case has every key at the end of its spread that makes it worst, a normal one two deviations off.
+        """
         from scipy.stats.qmc import LatinHypercube
 
         u = LatinHypercube(len(self.spreads), seed=0).random(DRAWS)
@@ -51,8 +54,11 @@ class LinearModel:
         bent = linear + 0.5 * np.tensordot(delta**2, self.curvatures, 1)
         quantiles = np.quantile(linear, LEVELS, axis=0)
         deviation = np.sqrt((self.slopes**2).sum(axis=0))
+        ends = np.array([(one.ends[1] - one.mean) / one.deviation for one in self.spreads])
+        reach = np.tensordot(ends, np.abs(self.slopes), 1)
         return Statistics(
             self.middle, as_floats(np.abs(bent.mean(axis=0) - linear.mean(axis=0))),
             as_floats(deviation), as_floats(np.abs(bent.std(axis=0) - linear.std(axis=0))),
             as_floats(quantiles), as_floats(np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles)),
+            as_floats(self.middle - reach), as_floats(self.middle + reach),
         )  # fmt: skip

@@ -40,6 +40,7 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
     beyond limits, the largest excess is made less until they are kept, or no design near exceeds them less.
     """
     evaluations = differentiation.evaluations
+    begun = len(evaluations.searched)
     (first,) = evaluations.at([start])
     if not first.completed:
         return Local(first, first, None, first.failure)
@@ -56,7 +57,8 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
         message = KINK if found is not None and found.kinks else message
     except SpentError:
         message = f"ended after {evaluations.runs} runs, as many as were allowed"
-        return Local(first, best, found, message, spent=True)
+        last = best_of(evaluations, [best, *evaluations.searched[begun:]])
+        return Local(first, last, found if last is best else None, message, spent=True)
     except StuckError as error:
         message = str(error)
     except ConflictError as error:

@@ -191,5 +191,5 @@ def _optimum(
     return Optimum(
         path, problem, space, method, best.start, best.best, best.optimality, best.conflict, best.message,
         tuple(searches), evaluations.runs, tuple(evaluations.failures), tolerance, verdict, scene,
-        designs=folder / "designs.csv",
+        designs=folder / "designs.csv", tried=tuple(evaluations.searched),
     )  # fmt: skip

@@ -41,6 +41,7 @@ class Optimum:
         verdict: of the best design.
         best_scene: the scene file of the best design, whole; None where it was not kept.
         designs: the table of all designs with their goals; None likewise.
+        tried: these designs, in the order of the search.
     """
 
     scene: Path
@@ -59,6 +60,7 @@ class Optimum:
     verdict: Verdict
     best_scene: Path | None
     designs: Path | None
+    tried: tuple[Evaluated, ...]
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -125,15 +127,15 @@ def print_optimum(found: Optimum, console: Console) -> None:
     def say(text: str) -> None:
         console.print(text, soft_wrap=True, markup=False, highlight=False)
 
-    say(_headline(found))
+    say(headline(found))
     keys = plain_table("key", "start", "best", "bounds")
-    for name, start, best, bounds in _keys(found):
-        keys.add_row(name, _number(start), _number(best), bounds)
+    for row in key_rows(found):
+        keys.add_row(*row)
     console.print(keys, highlight=False)
     if found.problem.limits:
         limits = plain_table("limit", "start", "best", "")
-        for k, limit in enumerate(found.problem.limits):
-            limits.add_row(limit.text, _at(found.start, k + 1), _at(found.best, k + 1), _state(found, k))
+        for limit in limit_rows(found):
+            limits.add_row(*limit[:4])
         console.print(limits, highlight=False)
     console.print()
     for line in remarks(found):
@@ -197,7 +199,8 @@ def _reached(price: float) -> tuple[str, object]:
     return ("yes", price) if np.isfinite(price) else ("no", "")
 
 
-def _headline(found: Optimum) -> str:
+def headline(found: Optimum) -> str:
+    """The best value and what it saves, or that no design keeps all limits."""
     word = "least" if found.problem.sense > 0 else "largest"
     text = f"{word} {found.problem.objective.text}: {_value(found.best.readings[0])}"
     if found.start.completed and (own := found.start.values[0]):
@@ -205,13 +208,21 @@ def _headline(found: Optimum) -> str:
     return text if found.feasible else f"no design found that keeps all limits; nearest is one with {text}"
 
 
-def _keys(found: Optimum) -> Iterator[tuple[str, object, object, str]]:
+def key_rows(found: Optimum) -> Iterator[tuple[str, str, str, str]]:
+    """Of each key its name, where the search began, its best value, and its bounds."""
     start, best = found.space.point(found.start.place), found.values
     for variable in found.space.variables:
         for key in variable.keys:
             k = found.space.keys.index(key)
             bounds = f"{len(variable.rows)} rows" if variable.is_catalogue else f"{variable.low:g} to {variable.high:g}"
-            yield found.keys[k], start[k], best[k], bounds
+            yield found.keys[k], _number(start[k]), _number(best[k]), bounds
+
+
+def limit_rows(found: Optimum) -> Iterator[tuple[str, str, str, str, str]]:
+    """Of each limit its text, the goal at first and in the best design, whether it is reached, its price."""
+    for k, (limit, price) in enumerate(zip(found.problem.limits, found.prices, strict=True)):
+        cost = f"{price:.4g}" if np.isfinite(price) else ""
+        yield limit.text, _at(found.start, k + 1), _at(found.best, k + 1), _state(found, k), cost
 
 
 def _state(found: Optimum, k: int) -> str:

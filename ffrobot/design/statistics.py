@@ -20,7 +20,8 @@ RESAMPLES = 200  # of a bootstrap
 class Statistics:
     """Of quantities of any shape (…): `mean` (…), `deviation` (…), `quantiles` (3, …) at `LEVELS`.
 
-    Beside each its standard error: `mean_error`, `deviation_error`, `quantile_errors`.
+    Beside each its standard error: `mean_error`, `deviation_error`, `quantile_errors`. `lowest` and `highest` (…) are
+    the worst case: of samples the least and the largest one.
     """
 
     mean: Array
@@ -29,6 +30,8 @@ class Statistics:
     deviation_error: Array
     quantiles: Array
     quantile_errors: Array
+    lowest: Array
+    highest: Array
 
 
 def statistics(values: Array) -> Statistics:
@@ -46,7 +49,9 @@ def statistics(values: Array) -> Statistics:
     step = np.sqrt(p * (1.0 - p) / n)
     low, high = (np.quantile(values, np.clip(p + sign * step, 0.0, 1.0), axis=0) for sign in (-1.0, 1.0))
     quantiles = np.quantile(values, p, axis=0)
-    return Statistics(mean, s / np.sqrt(n), s, deviation_error, quantiles, as_floats(0.5 * (high - low)))
+    errors = as_floats(0.5 * (high - low))
+    least, largest = values.min(axis=0), values.max(axis=0)
+    return Statistics(mean, s / np.sqrt(n), s, deviation_error, quantiles, errors, least, largest)
 
 
 def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:

@@ -16,15 +16,14 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
-from ..common.parallel import processes as of_mpi
 from ..run.watcher import Watcher
-from .designs import Design, Designs, Point
+from .designs import Design, Point
 from .goals import parse_goal
 from .histories import History, read_history
 from .linear_spread import LinearModel
 from .readings import Goal, Reading
-from .scenes import changes_for
-from .spreads import Spread, parse_spread, spread_points
+from .spread_designs import Runs, SpreadDesigns, read_spreads
+from .spreads import Spread, spread_points
 from .statistics import Indices, Statistics, regression_shares, sobol_indices, statistics
 
 TOLERANCE = 1e-8  # of runs for gradients, at most: differences of one standard deviation
@@ -118,73 +117,36 @@ def uncertainty(
         InputError: goals, keys or spreads that mean nothing, or that make scenes impossible.
         SolveError: the scene with all keys in the middle, or all others, cannot be solved.
     """
-    if of_mpi() > 1:
-        raise InputError("uncertainty: expected one process, found several under mpirun: -j runs samples side by side")
     if by == "samples" and samples < FEWEST:
         raise InputError(f"uncertainty: expected at least {FEWEST} samples, found {samples}")
     if by == "gradients" and indices:
         raise InputError("uncertainty: expected Sobol indices of samples, found them asked for by gradients")
     names = list(dict.fromkeys(of))
-    goals = tuple(parse_goal(text) for text in names if not _is_history(text))
-    curves = tuple(Curve(text) for text in names if _is_history(text))
-    spreads = _spreads(path, spread)
+    goals = tuple(parse_goal(text) for text in names if not is_history(text))
+    curves = tuple(Curve(text) for text in names if is_history(text))
+    spreads = read_spreads(path, spread)
     if not names or not spreads:
         raise InputError("uncertainty: expected at least one goal or history (--of) and one key (--spread)")
-    fixed = changes_for(path, (*goals, *curves), TOLERANCE if by == "gradients" else None)
-    keys, own = [one.key for one in spreads], tuple(one.own for one in spreads)
-    designs = Designs(path, keys, own, folder, fixed, processes=processes, watcher=watcher or Watcher(), retry=retry)
-    middle = _middle(path, designs, spreads)
-    study = _Study(path, spreads, goals, curves, designs, middle)
+    designs = SpreadDesigns(
+        path, spreads, goals, Runs(folder, processes, retry, watcher),
+        others=curves, tolerance=TOLERANCE if by == "gradients" else None,
+    )  # fmt: skip
+    study = _Study(designs, curves)
     return study.by_gradients() if by == "gradients" else study.by_samples(samples, seed, indices=indices)
 
 
-def _is_history(text: str) -> bool:
+def is_history(text: str) -> bool:
+    """Whether a history as a whole is meant, no goal: one word."""
     return len(text.split()) == 1 and text.strip() != "mass"
-
-
-def _spreads(path: Path, texts: Sequence[str]) -> tuple[Spread, ...]:
-    spreads = tuple(parse_spread(text, path) for text in texts)
-    keys = [one.key for one in spreads]
-    for key in keys:
-        if keys.count(key) > 1:
-            raise InputError(f"--spread: expected every key once, found {'.'.join(key)} {keys.count(key)} times")
-    return spreads
-
-
-def _middle(path: Path, designs: Designs, spreads: Sequence[Spread]) -> Design:
-    """The design with all keys in the middle, which has to be there, and to make sense at their ends."""
-    centre = tuple(one.mean for one in spreads)
-    for k, one in enumerate(spreads):
-        for end in one.ends:
-            if problem := designs.problem((*centre[:k], end, *centre[k + 1 :])):
-                raise InputError(
-                    f"--spread: expected spreads with which the scene makes sense, found {one.text}:\n{problem}"
-                )
-    (design,) = designs.run([centre])
-    if not design.completed:
-        error = InputError if design.row.status == "wrong input" else SolveError
-        raise error(f"{path}: {design.row.status}: {design.row.message}")
-    return design
 
 
 class _Study:
     """Runs, and what they say."""
 
-    def __init__(
-        self,
-        path: Path,
-        spreads: tuple[Spread, ...],
-        goals: tuple[Goal, ...],
-        curves: tuple[Curve, ...],
-        designs: Designs,
-        middle: Design,
-    ) -> None:
-        self._path, self._spreads, self._goals, self._curves = path, spreads, goals, curves
-        self._designs, self._middle = designs, middle
-        with middle.results() as results:
-            self._readings = tuple(goal.read(results) for goal in goals)
-        self._nominal = tuple(curve.history(middle) for curve in curves)
-        self._failures: list[str] = []
+    def __init__(self, designs: SpreadDesigns, curves: tuple[Curve, ...]) -> None:
+        self._designs, self._curves = designs, curves
+        self._spreads, self._goals, self._readings = designs.spreads, designs.goals, designs.readings
+        self._nominal = tuple(curve.history(designs.middle) for curve in curves)
         self._notes: dict[str, str] = {}
 
     def by_samples(self, count: int, seed: int, *, indices: bool) -> Uncertainty:
@@ -201,11 +163,13 @@ class _Study:
             u = LatinHypercube(k, optimization="random-cd", seed=seed).random(count)
         points = spread_points(self._spreads, u)
         designs = self._designs.run(points)
-        values = np.array([self._read(design) for design in designs])
+        values = np.array([self._designs.read(design) for design in designs])
         n = 2 * (count // 2) if indices else count  # those of the mixed points are no Latin hypercube
         whole = np.isfinite(values[:n]).all(axis=1) & [design.completed for design in designs[:n]]
         if whole.sum() < FEWEST:
-            raise SolveError(f"{self._path}: {n - whole.sum()} of {n} samples failed: {self._failures[0]}")
+            raise SolveError(
+                f"{self._designs.path}: {n - whole.sum()} of {n} samples failed: {self._designs.failures[0]}"
+            )
         x = np.array(points[:n])[whole]
         shares, explained = regression_shares(x, values[:n][whole])
         bands = tuple(self._sampled(m, [d for d, w in zip(designs[:n], whole, strict=True) if w]) for m in self._all())
@@ -239,27 +203,14 @@ class _Study:
         return range(len(self._curves))
 
     def _beside(self, k: int, sign: float) -> Point:
-        middle = self._middle.point
+        middle = self._designs.middle.point
         return (*middle[:k], middle[k] + sign * self._spreads[k].deviation, *middle[k + 1 :])
 
     def _check_sides(self, designs: Sequence[Design]) -> None:
         if failed := next((one for one in designs if not one.completed), None):
-            raise SolveError(
-                f"{self._path}: {self._where(failed)}: {failed.row.status}: {failed.row.message}; gradients need all"
-                " runs, samples do without some"
-            )
-
-    def _read(self, design: Design) -> list[float]:
-        """The goals of a sample, NaN where it failed or does not have them."""
-        if design.completed:
-            try:
-                with design.results() as results:
-                    return [goal.read(results).value for goal in self._goals]
-            except InputError as error:
-                self._failures.append(f"{self._where(design)}: {error}")
-        else:
-            self._failures.append(f"{self._where(design)}: {design.row.status}: {design.row.message}")
-        return [float("nan")] * len(self._goals)
+            where = f"{self._designs.path}: {self._designs.where(failed)}"
+            why = f"{failed.row.status}: {failed.row.message}"
+            raise SolveError(f"{where}: {why}; gradients need all runs, samples do without some")
 
     def _follow(self, design: Design) -> list[float]:
         """The goals beside the middle, peaks at their own times."""
@@ -269,7 +220,7 @@ class _Study:
             found = [g.follow(results, r) for g, r in zip(self._goals, self._readings, strict=True)]
         for goal, one in zip(self._goals, found, strict=True):
             if one.elsewhere:
-                kink = f"{goal.text}: a kink: with {self._where(design)} the largest value is {one.elsewhere}"
+                kink = f"{goal.text}: a kink: with {self._designs.where(design)} the largest value is {one.elsewhere}"
                 self._notes.setdefault(goal.text, f"{kink}; samples take it into account")
         return [one.value for one in found]
 
@@ -278,9 +229,8 @@ class _Study:
         found = self._curves[m].history(design)
         time = self._nominal[m].time
         if found.time.shape != time.shape or not np.allclose(found.time, time, rtol=1e-9, atol=1e-12):
-            raise InputError(
-                f'--of: expected the same times of "{found.name}" in all runs, found others: {self._where(design)}'
-            )
+            where = self._designs.where(design)
+            raise InputError(f'--of: expected the same times of "{found.name}" in all runs, found others: {where}')
         return found.values[:, 0]
 
     def _sampled(self, m: int, designs: Sequence[Design]) -> Band:
@@ -289,11 +239,6 @@ class _Study:
     def _band(self, m: int, found: Statistics) -> Band:
         nominal = self._nominal[m]
         return Band(nominal.name, nominal.unit, nominal.time, nominal.values[:, 0], found)
-
-    def _where(self, design: Design) -> str:
-        return ", ".join(
-            f"{'.'.join(one.key)} = {value:.6g}" for one, value in zip(self._spreads, design.point, strict=True)
-        )
 
     def _found(
         self,
@@ -307,7 +252,7 @@ class _Study:
         runs: int,
     ) -> Uncertainty:
         return Uncertainty(
-            self._path, self._spreads, method, tuple(goal.text for goal in self._goals), self._readings, found, bands,
-            shares, explained, indices, samples, tuple(self._failures),
+            self._designs.path, self._spreads, method, tuple(goal.text for goal in self._goals), self._readings, found,
+            bands, shares, explained, indices, samples, tuple(self._designs.failures),
             tuple(self._notes.values()), runs, self._designs.table,
         )  # fmt: skip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -14,16 +13,15 @@ from rich.console import Console
 from ..common.arrays import Array
 from ..common.files import write_atomically
 from ..present.tables import plain_table
+from .readings import Reading
 from .statistics import LEVELS, Statistics
+from .study_parts import file_name
 from .uncertainty import Band, Uncertainty
 
 NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
+ROUNDING = 1e-13  # of a goal: smaller deviations are none
+UNCHANGED = "none of the keys changes it"
 LINEAR = 0.9  # of a variance: below, shares by regression are told to be few
-
-
-def file_name(text: str) -> str:
-    """Of a goal or a history, without what file names do not take."""
-    return re.sub(r"\W+", "_", text).strip("_")
 
 
 def write_uncertainty(found: Uncertainty, folder: Path) -> list[Path]:
@@ -39,54 +37,83 @@ def write_uncertainty(found: Uncertainty, folder: Path) -> list[Path]:
 
 
 def print_uncertainty(found: Uncertainty, console: Console) -> None:
-    """The goals, each key's part in them, and what there is to mind."""
-    if found.goals:
-        table = plain_table("goal", "unit", "middle", "mean", "deviation", *NAMES)
-        for g, (goal, reading) in enumerate(zip(found.goals, found.readings, strict=True)):
-            s = found.statistics
-            pairs = [(s.mean[g], s.mean_error[g]), (s.deviation[g], s.deviation_error[g])]
-            pairs += list(zip(s.quantiles[:, g], s.quantile_errors[:, g], strict=True))
-            table.add_row(goal, reading.unit, f"{reading.value:.6g}", *(_with_error(*pair) for pair in pairs))
-        console.print(table, highlight=False)
-        console.print()
-        _print_parts(found, console)
+    """Each goal with what the keys do to it, the bands, and what there is to mind."""
+    for g in range(len(found.goals)):
+        console.print(goal_line(found.goals[g], found.readings[g]), soft_wrap=True, markup=False, highlight=False)
+        for headings, rows in ((statistics_headings(), [statistics_row(found, g)]), parts(found, g)):
+            table = plain_table(*headings)
+            for row in rows:
+                table.add_row(*row)
+            console.print(table, highlight=False)
+            console.print()
     if found.bands:
-        table = plain_table("history", "unit", "deviation, at most", "at t = (s)", "widest 5 % to 95 %", "at t = (s)")
-        for band in found.bands:
-            width = band.statistics.quantiles[-1] - band.statistics.quantiles[0]
-            cells: list[str] = []
-            for values in (band.statistics.deviation, width):
-                k = int(np.argmax(values))
-                cells += [f"{values[k]:.4g}", f"{band.time[k]:g}"]
-            table.add_row(band.name, band.unit, *cells)
+        table = plain_table(*BAND_HEADINGS)
+        for row in band_rows(found):
+            table.add_row(*row)
         console.print(table, highlight=False)
         console.print()
-    for line in _remarks(found):
+    for line in remarks(found):
         console.print(line, soft_wrap=True, markup=False, highlight=False)
 
 
-def _print_parts(found: Uncertainty, console: Console) -> None:
-    """Shares of the variance, the largest first; Sobol indices where there are some."""
-    for g, goal in enumerate(found.goals):
-        console.print(f"{goal}:", soft_wrap=True, markup=False, highlight=False)
-        headers = ("alone", "with others") if found.indices else ("share of the variance",)
-        table = plain_table("key", "spread", *headers)
-        by = found.indices.total[g] if found.indices else found.shares[g]
-        for k in np.argsort(-np.nan_to_num(by)):
-            one = found.spreads[k]
-            cells = [f"{100.0 * found.shares[g, k]:.1f} %"]
-            if i := found.indices:
-                cells = [
-                    _with_error(i.first[g, k], i.first_error[g, k]),
-                    _with_error(i.total[g, k], i.total_error[g, k]),
-                ]
-            table.add_row(".".join(one.key), one.text.partition("=")[2], *cells)
-        console.print(table, highlight=False)
-        console.print()
+def goal_line(goal: str, reading: Reading) -> str:
+    """With all keys in the middle."""
+    return f"{goal}: {reading.value:.6g} {reading.unit}".rstrip() + " with all keys in the middle"
 
 
-def _remarks(found: Uncertainty) -> Iterator[str]:
-    for goal, explained in zip(found.goals, found.explained, strict=True):
+def statistics_headings() -> tuple[str, ...]:
+    """Of the columns of `statistics_row`."""
+    return ("mean", "deviation", *NAMES, "worst case")
+
+
+def statistics_row(found: Uncertainty, g: int) -> tuple[str, ...]:
+    """Of goal g, each with its error."""
+    s = found.statistics
+    pairs = [(s.mean[g], s.mean_error[g]), (s.deviation[g], s.deviation_error[g])]
+    pairs += list(zip(s.quantiles[:, g], s.quantile_errors[:, g], strict=True))
+    return (*(with_error(*pair) for pair in pairs), f"{s.lowest[g]:.5g} to {s.highest[g]:.5g}")
+
+
+def parts(found: Uncertainty, g: int) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Headings and rows of the keys' shares of the variance of goal g, the largest first; Sobol indices where known."""
+    rows = []
+    for k in ranked(found, g):
+        one = found.spreads[k]
+        cells = [f"{100.0 * found.shares[g, k]:.1f} %"]
+        if i := found.indices:
+            cells = [with_error(i.first[g, k], i.first_error[g, k]), with_error(i.total[g, k], i.total_error[g, k])]
+        rows.append((".".join(one.key), one.text.partition("=")[2], *cells))
+    return ("key", "spread", *(("alone", "with others") if found.indices else ("share of the variance",))), rows
+
+
+def ranked(found: Uncertainty, g: int) -> list[int]:
+    """Keys by number, the one that matters most for goal g first."""
+    by = found.indices.total[g] if found.indices else found.shares[g]
+    return [int(k) for k in np.argsort(-np.nan_to_num(by), kind="stable")]
+
+
+BAND_HEADINGS = ("history", "unit", "deviation, at most", "at t = (s)", "widest 5 % to 95 %", "at t = (s)")
+
+
+def band_rows(found: Uncertainty) -> Iterator[tuple[str, ...]]:
+    """Where each history is least sure."""
+    for band in found.bands:
+        width = band.statistics.quantiles[-1] - band.statistics.quantiles[0]
+        cells: list[str] = []
+        for values in (band.statistics.deviation, width):
+            k = int(np.argmax(values))
+            cells += [f"{values[k]:.4g}", f"{band.time[k]:g}"]
+        yield (band.name, band.unit, *cells)
+
+
+def remarks(found: Uncertainty) -> Iterator[str]:
+    """What there is to mind, and how it was found."""
+    deviations = found.statistics.deviation
+    for goal, reading, explained, deviation in zip(
+        found.goals, found.readings, found.explained, deviations, strict=True
+    ):
+        if deviation <= ROUNDING * abs(reading.value):
+            yield f"note       {goal}: {UNCHANGED}"
         if explained < LINEAR and found.indices is None:
             yield (
                 f"note       {goal}: a linear function of the keys makes {100.0 * explained:.0f} % of the variance:"
@@ -95,9 +122,15 @@ def _remarks(found: Uncertainty) -> Iterator[str]:
     yield from (f"note       {text}" for text in found.notes)
     if failed := len(found.failures):
         yield f"failed     {failed} of {found.runs} runs, left out: {found.failures[0]}"
-    how = "± the standard error of as many independent samples: the mean of a Latin hypercube is better"
+    how = (
+        "± the standard error of as many independent samples: the mean of a Latin hypercube is better; worst case:"
+        " the lowest and the highest sample"
+    )
     if found.method == "gradients":
-        how = "linear between runs one standard deviation to both sides; ± the difference that curvature makes"
+        how = (
+            "linear between runs one standard deviation to both sides; ± the difference that curvature makes; worst"
+            " case: all keys at the worse ends of their spreads, normal ones two deviations off"
+        )
     yield f"how        {found.runs} runs; {how}"
 
 
@@ -129,13 +162,15 @@ def _columns() -> list[str]:
         "deviation",
         "deviation_error",
         *(f"{name}{e}" for name in NAMES for e in ("", "_error")),
+        "lowest",
+        "highest",
     ]
 
 
 def _numbers(s: Statistics, k: int) -> list[float]:
     pairs: list[Array] = [s.mean, s.mean_error, s.deviation, s.deviation_error]
     quantiles = zip(s.quantiles, s.quantile_errors, strict=True)
-    return [float(one[k]) for one in (*pairs, *(value for pair in quantiles for value in pair))]
+    return [float(one[k]) for one in (*pairs, *(value for pair in quantiles for value in pair), s.lowest, s.highest)]
 
 
 def _write(path: Path, columns: Sequence[str], rows: Iterator[list[object]]) -> None:
@@ -146,5 +181,6 @@ def _write(path: Path, columns: Sequence[str], rows: Iterator[list[object]]) -> 
     write_atomically(path, text.getvalue().encode(), "table of uncertainties", ours=True)
 
 
-def _with_error(value: float, error: float) -> str:
+def with_error(value: float, error: float) -> str:
+    """`0.17 ± 0.01`; nothing where there is no value."""
     return "" if np.isnan(value) else f"{value:.5g} ± {error:.1g}"

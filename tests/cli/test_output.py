@@ -17,7 +17,7 @@ FORBIDDEN = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "matplotlib")
         (["solve", "--help"], ["SCENE.toml", "-o, --output RESULTS.h5", "SCENE.results.h5", "stage 1"]),
         (["info", "-h"], ["FILE.h5", "modal body", "results"]),
         (["plot", "-h"], ["RESULTS.h5", "-o, --output DIR", "--format png,pdf,svg"]),
-        (["report", "-h"], ["RESULTS.h5 …", "-o, --output FILE.html", "self-contained"]),
+        (["report", "-h"], ["RESULTS.h5|FOLDER …", "-o, --output FILE.html", "self-contained"]),
     ],
 )
 def test_help(ffrobot, arguments, told):

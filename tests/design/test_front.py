@@ -8,6 +8,7 @@ import tomli_w
 from small_robots import BEAM, CANTILEVER, FORCE, RHO, E, L
 
 import ffrobot
+from ffrobot.design.studies import study_of
 
 WIDTH = BEAM["geometry"]["section"]["width"]
 HEIGHT = "links.beam.geometry.section.height=0.01:0.04:log"
@@ -35,6 +36,13 @@ def test_mass_against_deflection_is_a_power_law(scene):
         assert one.price == pytest.approx(-one.goal / (3.0 * one.against), rel=1e-4)
     assert all(one.converged and one.feasible for one in found.points)
     assert found.units == ("kg", "m")
+    curve, designs = study_of(found).diagrams
+    np.testing.assert_allclose([curve.x, curve.y], [tip, mass], rtol=1e-14)
+    axes = {axis.label: axis.values for axis in designs.axes}
+    assert list(axes) == [HEIGHT.partition("=")[0], "mass (kg)", f"{TIP} (m)"]
+    np.testing.assert_allclose(axes[f"{TIP} (m)"], [deflection(h) for h in axes[HEIGHT.partition("=")[0]]], rtol=1e-6)
+    best = [value for value, state in zip(axes["mass (kg)"], designs.states, strict=True) if state == "best"]
+    np.testing.assert_allclose(sorted(best), sorted(mass), rtol=1e-14)
 
 
 def test_going_on(ffrobot, scene):
@@ -53,7 +61,8 @@ def test_going_on(ffrobot, scene):
         designs = list(csv.DictReader(file))
     assert [row["converged"] for row in designs] == ["yes"] * 3
     assert float(designs[1][TIP]) == pytest.approx(np.sqrt(deflection(0.01) * deflection(0.04)), rel=1e-6)
-    assert (folder / "front.png").stat().st_size > 1000
+    for name in ("front.png", "designs.png", "front.json"):
+        assert (folder / name).stat().st_size > 1000
 
 
 def test_goals_that_go_together(scene):

@@ -245,3 +245,17 @@ def test_no_design_keeps_the_limits(ffrobot, write):
     assert (
         'no design near this one keeps "peak points.beam.tip.deflection <= 1e-05", within the bounds of' in done.stdout
     )
+
+
+def test_evolution_keeps_limits_and_tells_the_best_of_all_designs_when_runs_end(write):
+    """The lightest rotor whose gear keeps the moment below the limit; the search that follows is cut short."""
+    vary = ["joint.shoulder.rotor_inertia in {5e-5, 1e-5, 3e-5}", f"{RATIO}=20:500:log"]
+    bound = 1.2 * 4.0 * np.sqrt(J * 1e-5)
+    found = ffrobot.optimise(
+        write(ARM), vary, minimise="value joint.shoulder.gear_ratio", subject_to=[f"{MOTOR} <= {bound}"], processes=2,
+        method="differential-evolution", runs=40, seed=3,
+    )  # fmt: skip
+    assert found.runs <= 40
+    kept = [one for one in found.tried if one.completed and found.problem.violation(one.readings) <= 1e-6]
+    assert 0 < len(kept) < len(found.tried)
+    assert found.value == min(one.values[0] for one in kept)

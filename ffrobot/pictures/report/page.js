@@ -78,17 +78,22 @@ const ROW = 14; // of a legend, in pixels
 const SIZES = {
   paper: {
     mechanism: { width: 690, height: 400, "legend.y": -0.2 },
+    broad: { width: 690, height: 400, "legend.y": -0.1, "title.font.size": 11 },
+    long: { width: 690, "title.font.size": 11 },
     chart: { width: 340, height: 265, "legend.y": -0.4, "legend.font.size": 8, "title.font.size": 11 },
   },
   screen: {
     mechanism: { width: null, height: null, "legend.y": -0.13 },
+    broad: { width: null, height: null, "legend.y": -0.06, "title.font.size": NARROW ? 13 : 14 },
+    long: { width: null, "title.font.size": NARROW ? 13 : 14 },
     chart: { width: null, height: null, "legend.y": -0.27, "legend.font.size": 11, "title.font.size": NARROW ? 13 : 14 },
   },
 };
 function resize(place) {
   for (const chart of drawn()) {
     if (chart.id === "modes-3d") continue;
-    const size = { ...(SIZES[place][chart.id] ?? SIZES[place].chart) };
+    const shape = ["broad", "long"].find((name) => chart.classList.contains(name)) ?? chart.id;
+    const size = { ...(SIZES[place][shape] ?? SIZES[place].chart) };
     if (size.height) size.height += ROW * Math.max(0, Math.ceil(chart.data.length / 3) - 2);
     Plotly.relayout(chart, size);
   }

@@ -13,35 +13,42 @@ from ...common.files import write_atomically
 from ...common.outputs import check_not_an_input
 from ...common.version import program_version
 from ...results.file import Results
+from ..studies.study import Study, read_study, study_files
+from .charts import Chart
+from .diagrams import DrawnDiagram
 from .histories import folded, history_charts
 from .mechanism import mechanism
 from .mechanism_3d import spatial_mechanism
 from .modes import link_modes
 from .modes_3d import modes_3d
 from .runs import runs, sources
+from .studies import StudyPart, study_parts
 from .tables import analyses_table, bending_table, origins_table, peaks_table, voltages_table, warnings_table
 from .verdicts import loops_table, verdicts, zeros_table
 
 HERE = Path(__file__).parent
 
 
-def write_report(results_paths: Sequence[Path], path: Path) -> None:
+def write_report(paths: Sequence[Path], path: Path) -> None:
     """Write a page about one results file, or several side by side, to `path`; an earlier report is replaced.
 
-    Raises `InputError` where a file is no results file or `path` would cost a file of another kind, `SolveError` where
-    the page cannot be written or Plotly is not installed.
+    `paths` may have studies, too: their files, or folders of design commands. Raises `InputError` where a file is no
+    results file and no study, or `path` would cost a file of another kind, `SolveError` where the page cannot be
+    written or Plotly is not installed.
     """
     check_not_an_input(path)
     if path.is_dir():
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f'{path}: output: expected a name that ends in ".html", found "{path.name}"')
+    found = [(p, study_files(p)) for p in paths]
+    studies = [(file, read_study(file)) for _, files in found for file in files]
     with ExitStack() as stack:
-        files = [stack.enter_context(Results(p)) for p in results_paths]
-        write_atomically(path, report(files).encode(), "report")
+        results = [stack.enter_context(Results(p)) for p, files in found if not files]
+        write_atomically(path, report(results, studies).encode(), "report")
 
 
-def report(files: Sequence[Results]) -> str:
+def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ()) -> str:
     """The page as text."""
     try:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -52,7 +59,7 @@ def report(files: Sequence[Results]) -> str:
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     return environment.get_template("page.html").render(
-        _content(files),
+        _content(files, study_parts(studies)),
         plotly_js=get_plotlyjs(),
         plotly_version=get_plotlyjs_version(),
         page_js=(HERE / "page.js").read_text(encoding="utf-8"),
@@ -64,19 +71,32 @@ def report(files: Sequence[Results]) -> str:
     )
 
 
-def _content(files: Sequence[Results]) -> dict[str, Any]:
+def _content(files: Sequence[Results], studies: Sequence[StudyPart]) -> dict[str, Any]:
     """What the template fills in."""
+    solved, charts = _of_results(files) if files else ({}, [])
+    drawn: list[Chart | DrawnDiagram] = [*charts, *(chart for part in studies for chart in part.charts)]
+    names = [*(results.name for results in files), *(part.study.scene_name for part in studies)]
+    return {
+        "title": ", ".join(dict.fromkeys(names)),
+        "solved": bool(files),
+        "studies": studies,
+        "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in drawn}),
+        "origins": origins_table(files, studies),
+        "scenes": [(source or r.name, r.scene_text) for r, source in zip(files, sources(files), strict=True)],
+        **solved,
+    }
+
+
+def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
+    """The parts of the page that need solved scenes, and their charts."""
     all_runs = runs(files)
     spatial = _all_spatial(files)
     moving = spatial_mechanism(all_runs) if spatial else mechanism(all_runs)
     modes, histories = link_modes(all_runs), history_charts(files)
     shapes = modes_3d(modes)
-    charts = [*histories, *(chart for link in modes for chart in link.charts)]
-    return {
-        "title": ", ".join(dict.fromkeys(results.name for results in files)),
+    content = {
         "mechanism": _script_data(moving.data),
         "spatial": spatial,
-        "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
         "shapes": shapes["links"],
         "modes_3d": _script_data(shapes),
         "histories": folded(histories),
@@ -89,11 +109,10 @@ def _content(files: Sequence[Results]) -> dict[str, Any]:
         "bending": bending_table(all_runs),
         "peaks": peaks_table(all_runs),
         "voltages": voltages_table(all_runs),
-        "origins": origins_table(files),
         "notes": moving.notes,
         "skipped": [(source, line) for r, source in zip(files, sources(files), strict=True) for line in r.skipped],
-        "scenes": [(source or r.name, r.scene_text) for r, source in zip(files, sources(files), strict=True)],
     }
+    return content, [*histories, *(chart for link in modes for chart in link.charts)]
 
 
 def _all_spatial(files: Sequence[Results]) -> bool:

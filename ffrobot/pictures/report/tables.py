@@ -15,6 +15,7 @@ from ..figures.shared import bending_points
 from ..path_targets import targets
 from .histories import path_error
 from .runs import Run, sources
+from .studies import StudyPart
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ def voltages_table(runs: Sequence[Run]) -> Table:
     return Table(heading, rows)
 
 
-def origins_table(files: Sequence[Results]) -> Table:
+def origins_table(files: Sequence[Results], studies: Sequence[StudyPart]) -> Table:
     """Files, hashes and versions that the page rests on."""
     rows = []
     for results, source in zip(files, sources(files), strict=True):
@@ -113,6 +114,10 @@ def origins_table(files: Sequence[Results]) -> Table:
         for name, file in results.modal_files.items():
             rows.append(("", f"modal body of {name}", str(file.path), file.sha256))
             rows.append(("", f"link content of {name}", "", file.input_hash))
+    for part in studies:
+        rows.append((part.title, "study", str(part.file), _sha256(part.file.read_bytes())))
+        rows.append(("", "written by", f"ffrobot {part.study.ffrobot_version}", ""))
+        rows.append(("", "scene file", part.study.scene, ""))
     return Table(("results", "what", "where", "SHA-256"), rows)
 
 

@@ -1,0 +1,231 @@
+"""Diagrams of studies in Plotly's terms: tornados and rankings, parallel coordinates, convergence, bands, points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from ...common.arrays import Array
+from ..figures.palette import COLORS
+from ..studies.diagrams import Axis, Band, Bars, Diagram, Numbers, Parallel, Points, Progress, wrapped
+from ..studies.looks import LOOKS, Look
+from .charts import encoded, plain
+
+AXIS = "#8b95a3"  # of parallel coordinates, on light and on dark pages
+LETTERS, LINE = 15, 15  # of a label, in a line; pixels that a line takes
+BAR, REST = 34, 120  # pixels: of a bar, of what is round them
+Trace = dict[str, Any]
+
+
+@dataclass
+class DrawnDiagram:
+    """One chart of the page; `height` in pixels where it has one of its own.
+
+    `shape`: "broad" over the whole width, "long" on paper alone, where names leave no room for bars.
+    """
+
+    name: str
+    traces: list[Trace]
+    layout: dict[str, Any]
+    shape: Literal["", "broad", "long"] = ""
+    height: int | None = None
+
+
+def drawn(diagram: Diagram, name: str) -> DrawnDiagram:
+    """Under a `name` that is unique on the page."""
+    match diagram:
+        case Bars():
+            return _bars(diagram, name)
+        case Parallel():
+            return _parallel(diagram, name)
+        case Progress():
+            return DrawnDiagram(name, list(_progress(diagram)), _layout(
+                diagram.title, "design, in the order of the search", diagram.y_label, logarithmic=diagram.logarithmic
+            ))  # fmt: skip
+        case Band():
+            return DrawnDiagram(name, list(_band(diagram)), _layout(diagram.title, "time (s)", diagram.y_label))
+        case Points():
+            return DrawnDiagram(
+                name, [_points(diagram)], _layout(diagram.title, diagram.x_label, diagram.y_label, legend=False)
+            )
+
+
+def _layout(title: str, x: str, y: str, *, legend: bool = True, logarithmic: bool = False) -> dict[str, Any]:
+    y_axis = {"title": {"text": plain(y)}, "automargin": True, "exponentformat": "power"}
+    return {
+        "title": {"text": plain(title)},
+        "xaxis": {"title": {"text": plain(x), "standoff": 5}},
+        "yaxis": y_axis | ({"type": "log"} if logarithmic else {}),
+        "showlegend": legend,
+    }
+
+
+def _bars(diagram: Bars, name: str) -> DrawnDiagram:
+    """The first label on top, a colour for each series, of a signed one for each sign."""
+    traces = []
+    form = "+.3g" if diagram.signed else ".3g"
+    for k, series in enumerate(diagram.series):
+        values = [value or 0.0 for value in series.values]
+        traces.append({
+            "type": "bar", "orientation": "h", "name": plain(series.label), "x": values,
+            "y": [plain(label) for label in diagram.labels], "text": [f"{value:{form}}" for value in values],
+            "marker": {"color": [COLORS[1] if diagram.signed and value < 0.0 else COLORS[k] for value in values]},
+            "hovertemplate": "%{y}: %{x:.5g}<extra></extra>",
+        })  # fmt: skip
+        if series.errors:
+            traces[-1]["error_x"] = {"type": "data", "array": list(series.errors), "thickness": 1, "color": AXIS}
+    layout = _layout(diagram.title, diagram.x_label, "", legend=len(traces) > 1)
+    layout["yaxis"] |= {"autorange": "reversed", "type": "category"}
+    layout |= {"bargap": 0.25, "barmode": "group"}
+    return DrawnDiagram(name, traces, layout, "long", REST + BAR * len(diagram.labels) * len(traces))
+
+
+def _parallel(diagram: Parallel, name: str) -> DrawnDiagram:
+    """A trace for each state, so that the legend shows and hides it; axes are shapes and their texts annotations."""
+    places = np.column_stack([axis.places for axis in diagram.axes])
+    traces = []
+    for state, look in LOOKS.items():
+        rows = [k for k, one in enumerate(diagram.states) if one == state]
+        if rows:
+            label = diagram.best_label if state == "best" else look.label
+            traces.append(_lines(diagram, places, rows, look, label))
+    limits = [(k, axis) for k, axis in enumerate(diagram.axes) if axis.limit is not None]
+    if limits:
+        traces.append(_limits(limits))
+    axes = [
+        {"type": "line", "x0": k, "x1": k, "y0": 0, "y1": 1, "layer": "below", "line": {"color": AXIS, "width": 1.5}}
+        for k in range(len(diagram.axes))
+    ]
+    lines = max(len(wrapped(axis.label, LETTERS)) for axis in diagram.axes)
+    hidden = {"visible": False, "fixedrange": True}
+    layout = {
+        "title": {"text": plain(diagram.title)}, "shapes": axes,
+        "annotations": [text for k, axis in enumerate(diagram.axes) for text in _texts(k, axis)],
+        "xaxis": hidden | {"range": [-0.4, len(diagram.axes) - 0.6]}, "yaxis": hidden | {"range": [-0.04, 1.04]},
+        "margin": {"l": 40, "r": 40, "t": 50 + LINE * lines, "b": 30}, "showlegend": True,
+        "legend": {"orientation": "h", "y": -0.06},
+    }  # fmt: skip
+    return DrawnDiagram(name, traces, layout, "broad")
+
+
+def _lines(diagram: Parallel, places: Array, rows: list[int], look: Look, label: str) -> Trace:
+    """Designs one after the other with gaps between them; what a design has is told where it meets an axis."""
+    x: list[float | None] = []
+    y: list[float | None] = []
+    texts: list[str] = []
+    for row in rows:
+        known = np.flatnonzero(np.isfinite(places[row]))
+        x += [*map(float, known), None]
+        y += [*map(float, places[row, known]), None]
+        texts += [f"{diagram.designs[row]}: {_told(diagram.axes[k], row)}" for k in known] + [""]
+    dash, marker = look.plotly
+    return {
+        "type": "scatter", "mode": "lines+markers", "name": plain(label), "x": x, "y": y, "text": texts,
+        "hovertemplate": "%{text}<extra></extra>",
+        "line": {"color": look.color, "width": 1.2 * look.width, "dash": dash},
+        "marker": {"size": 4 if look.width < 2 else 7, "symbol": marker, "color": look.color},
+        "opacity": 0.55 if look.width < 2 and len(rows) > 30 else 1.0,
+    }  # fmt: skip
+
+
+def _told(axis: Axis, row: int) -> str:
+    value = axis.values[row]
+    text = "" if value is None else axis.names[round(value)] if axis.names else f"{value:.6g}"
+    return plain(f"{axis.label} = {text}")
+
+
+def _limits(limits: list[tuple[int, Axis]]) -> Trace:
+    """A mark for each that points to the side that is forbidden."""
+    return {
+        "type": "scatter", "mode": "markers", "name": "limit, pointing beyond it",
+        "x": [k for k, _ in limits], "y": [float(axis.place(np.array(axis.limit))) for _, axis in limits],
+        "text": [plain(f"limit of {axis.label}: {axis.limit:.6g}") for _, axis in limits],
+        "hovertemplate": "%{text}<extra></extra>",
+        "marker": {
+            "symbol": ["triangle-up" if axis.sense > 0 else "triangle-down" for _, axis in limits], "size": 13,
+            "color": COLORS[3], "line": {"color": AXIS, "width": 1},
+        },
+    }  # fmt: skip
+
+
+def _texts(k: int, axis: Axis) -> Iterator[dict[str, Any]]:
+    """The name above an axis and its ticks at the left."""
+    name = "<br>".join(plain(line) for line in wrapped(axis.label, LETTERS))
+    yield {"x": k, "y": 1.03, "text": name, "showarrow": False, "yanchor": "bottom", "font": {"size": 11}}
+    for place, text in axis.ticks:
+        yield {
+            "x": k,
+            "y": place,
+            "text": f"{plain(text)} –",
+            "showarrow": False,
+            "xanchor": "right",
+            "font": {"size": 10},
+        }
+
+
+def _progress(diagram: Progress) -> Iterator[Trace]:
+    numbers = list(range(len(diagram.values)))
+    yield {
+        "type": "scatter", "mode": "lines", "name": "best so far", "x": numbers, "y": list(diagram.best),
+        "line": {"color": COLORS[0], "shape": "hv"},
+    }  # fmt: skip
+    lowest = min((value for value in diagram.values if value is not None), default=1.0)
+    for state, look in LOOKS.items():
+        mine = [k for k in numbers if diagram.states[k] == state]
+        if mine:
+            values: Numbers = tuple(diagram.values[k] if state != "failed" else lowest for k in mine)
+            yield {
+                "type": "scatter", "mode": "markers", "name": plain(look.label), "x": mine, "y": list(values),
+                "marker": {"color": look.color, "symbol": look.plotly[1], "size": 8},
+                "hovertemplate": "design %{x}: " + ("failed" if state == "failed" else "%{y:.6g}") + "<extra></extra>",
+            }  # fmt: skip
+
+
+def _band(band: Band) -> Iterator[Trace]:
+    """Bands as pairs of lines without width, the second filled to the first."""
+    time = np.array(band.time)
+    for low, high, label, color in (
+        (band.lowest, band.highest, band.worst_label, "rgba(230, 159, 0, 0.3)"),
+        (band.low, band.high, band.band_label, "rgba(86, 180, 233, 0.6)"),
+    ):
+        edge = {
+            "type": "scatter",
+            "mode": "lines",
+            "line": {"width": 0},
+            "x": encoded(time, "f8"),
+            "legendgroup": label,
+        }
+        yield edge | {"y": encoded(np.array(low)), "showlegend": False, "name": f"{plain(label)}: lower end"}
+        yield edge | {"y": encoded(np.array(high)), "fill": "tonexty", "fillcolor": color, "name": plain(label)}
+    for values, label, line in (
+        (band.median, "median", {"color": COLORS[0]}),
+        (band.nominal, "keys in the middle", {"color": AXIS, "dash": "dot"}),
+    ):
+        yield {
+            "type": "scatter", "mode": "lines", "name": label, "x": encoded(time, "f8"),
+            "y": encoded(np.array(values)), "line": line | {"simplify": False},
+        }  # fmt: skip
+
+
+def _points(diagram: Points) -> Trace:
+    sure = diagram.sure or (True,) * len(diagram.x)
+    mode = "+".join(["lines"] * diagram.joined + ["markers"] + ["text"] * diagram.named)
+    trace: Trace = {
+        "type": "scatter", "mode": mode, "x": list(diagram.x), "y": list(diagram.y),
+        "text": [plain(label) for label in diagram.labels], "textposition": _sides(diagram),
+        "hovertemplate": "%{text}<br>%{x:.6g}, %{y:.6g}<extra></extra>", "cliponaxis": False,
+        "line": {"color": COLORS[0]},
+        "marker": {"size": 8, "color": COLORS[0], "symbol": ["circle" if one else "circle-open" for one in sure]},
+    }  # fmt: skip
+    if diagram.x_errors:
+        trace["error_x"] = {"type": "data", "array": list(diagram.x_errors), "thickness": 1}
+    return trace
+
+
+def _sides(diagram: Points) -> list[str]:
+    """Names stay within the chart: to the left of points in its right half."""
+    middle = 0.5 * max(diagram.x, default=0.0)
+    return [f"top {'left' if x > middle else 'right'}" for x in diagram.x]

@@ -1,0 +1,1 @@
+"""What sensitivities, searches and uncertainties have found, as pictures: their data, figures, and files."""

@@ -1,0 +1,171 @@
+"""What design commands leave for the report: axes of parallel coordinates, states of designs, bands, files."""
+
+import csv
+
+import numpy as np
+import pytest
+import tomli_w
+from small_robots import SWING
+
+import ffrobot
+from ffrobot.design.studies import study_of
+from ffrobot.pictures.studies.diagrams import Axis, Band, Bars, Parallel, Points, Progress, axis_of_goal, wrapped
+from ffrobot.pictures.studies.study import read_study, study_files
+
+OUTER, INNER = "links.arm.geometry.section.outer", "links.arm.geometry.section.inner"
+DENSITY = "links.arm.material.density"
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    path = tmp_path_factory.mktemp("studies") / "scene.toml"
+    path.write_text(tomli_w.dumps(SWING), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def searched(scene):
+    """Every tube of two catalogues: wide holes in narrow tubes fail, thin walls are beyond the limit."""
+    vary = [f"{OUTER} in {{0.015, 0.02, 0.025}}", f"{INNER},{DENSITY} in {{0.010:2700.0, 0.016:2700.0, 0.0195:7800.0}}"]
+    limits = ["frequency 1 arm >= 40"]
+    return ffrobot.optimise(scene, vary, minimise="mass", subject_to=limits, processes=2)
+
+
+def diagrams(study):
+    return {one.name: one for one in study.diagrams}
+
+
+def test_axes():
+    """Places and round numbers, linear and by logarithms; goals that span decades are drawn by logarithms."""
+    linear = Axis(label="a", values=(1.0, None), low=0.0, high=4.0)
+    np.testing.assert_allclose(linear.places, [0.25, np.nan])
+    assert linear.ticks == [(0.0, "0"), (0.25, "1"), (0.5, "2"), (0.75, "3"), (1.0, "4")]
+    by_logarithm = Axis(label="a", values=(10.0,), low=1.0, high=1e4, logarithmic=True)
+    np.testing.assert_allclose(by_logarithm.places, [0.25])
+    assert [text for _, text in by_logarithm.ticks] == ["1", "10", "100", "1000", "10000"]
+    narrow = Axis(label="a", values=(), low=0.011, high=0.019, logarithmic=True)
+    assert len(narrow.ticks) > 2  # no power of ten is in there
+    assert axis_of_goal("a", (1e-3, 1.0, None)).logarithmic
+    assert not axis_of_goal("a", (-1e-3, 1.0)).logarithmic
+    goal = axis_of_goal("a", (2.0, 3.0, None), limit=5.0)
+    assert goal.low < 2.0
+    assert 5.0 < goal.high < 6.0
+    alone = axis_of_goal("a", (2.0,))
+    np.testing.assert_allclose(alone.places, [0.5])
+    assert axis_of_goal("a", (None, None)).ticks
+
+
+def test_labels_break_at_dots_and_blanks():
+    label = "rms points.upper_arm.tip.deflection[0] (m)"
+    lines = wrapped(label, 16)
+    assert "".join(lines).replace(" ", "") == label.replace(" ", "")
+    assert max(map(len, lines)) <= 16
+    assert wrapped("peak joints.shoulder.moment (N m)", 20)[-1] == "(N m)"
+
+
+def test_all_designs_of_a_search(searched):
+    """Each as what it is; the line of a failed one ends where its goals would begin."""
+    study = study_of(searched)
+    assert study.good
+    parallel, progress = diagrams(study)["designs"], diagrams(study)["convergence"]
+    assert isinstance(parallel, Parallel)
+    assert isinstance(progress, Progress)
+    labels = [OUTER, INNER, DENSITY, "mass (kg)", "frequency 1 arm (Hz)"]
+    assert [axis.label for axis in parallel.axes] == labels
+    assert (parallel.axes[4].limit, parallel.axes[4].sense) == (40.0, -1)
+    for outer, inner, mass, frequency, state, far in zip(
+        *(parallel.axes[k].values for k in (0, 1, 3, 4)), parallel.states, progress.best, strict=True
+    ):
+        if inner >= outer:
+            assert (state, mass, frequency) == ("failed", None, None)
+        else:
+            assert state in (("kept", "best") if frequency >= 40.0 else ("exceeded",))
+            assert mass == pytest.approx(
+                np.pi / 4 * (outer**2 - inner**2) * 0.6 * (7800.0 if inner > 0.019 else 2700.0)
+            )
+        assert far is None or far >= searched.value
+    assert progress.best[-1] == searched.value
+    assert parallel.states.count("best") == 1
+    assert {"failed", "exceeded", "kept"} <= set(parallel.states)
+    assert parallel.axes[3].values[parallel.states.index("best")] == searched.value
+
+
+def test_files_of_a_command(ffrobot, scene, tmp_path):
+    """Figures and study; a number that is varied in its logarithm has such an axis; the page is made of the folder."""
+    folder = tmp_path / "found"
+    done = ffrobot(
+        "optimise", scene, "--minimise", "mass", "--subject-to", "frequency 1 arm >= 60",
+        "--vary", f"{OUTER}=0.017:0.03:log", "-o", folder, "-j", 2,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    for name in ("designs.png", "designs.pdf", "convergence.png"):
+        assert (folder / name).stat().st_size > 1000
+    (file,) = study_files(folder)
+    study = read_study(file)
+    axes = diagrams(study)["designs"].axes
+    assert (axes[0].logarithmic, axes[0].low, axes[0].high) == (True, 0.017, 0.03)
+    assert any("frequency 1 arm: 59.4 Hz in place of 60 saves" in fact for fact in study.facts)
+    with (folder / "designs.csv").open(encoding="utf-8") as table:
+        masses = [float(row["mass"]) for row in csv.DictReader(table)]
+    np.testing.assert_allclose(axes[1].values, masses, rtol=1e-12)
+    page = ffrobot("report", folder)
+    assert page.returncode == 0, page.stderr
+    assert (tmp_path / "found.html").stat().st_size > 1_000_000
+
+
+def test_tornado_bands_and_screening(scene, tmp_path):
+    """From Python: `write_study` writes what the commands do."""
+    matters = ffrobot.sensitivity(scene, ["mass"], [OUTER, INNER], processes=2)
+    (tornado,) = study_of(matters).diagrams
+    assert isinstance(tornado, Bars)
+    assert tornado.labels == (OUTER, INNER)
+    np.testing.assert_allclose(tornado.series[0].values, [2.0 / 0.36, -2.0 * 0.64 / 0.36], rtol=1e-6)
+    sure = ffrobot.uncertainty(
+        scene, ["mass", "joints.shoulder.moment"], ["payload.0.mass=±5%", f"{DENSITY}=normal:1%"], by="gradients",
+        processes=2,
+    )  # fmt: skip
+    study = study_of(sure)
+    band = diagrams(study)["band_joints_shoulder_moment"]
+    assert isinstance(band, Band)
+    for low, inner_low, middle, inner_high, high in zip(
+        band.lowest, band.low, band.nominal, band.high, band.highest, strict=True
+    ):
+        assert low < inner_low < middle < inner_high < high
+    deviations = np.array(sure.bands[0].statistics.deviation)
+    assert np.all(np.array(band.highest) - band.nominal <= 2.0 * np.sqrt(2.0) * deviations)
+    screened = ffrobot.screening(scene, ["mass"], [f"{OUTER}=±1%", f"{INNER}=±1%"], trajectories=2, processes=2)
+    (points,) = study_of(screened).diagrams
+    assert isinstance(points, Points)
+    assert points.labels[0] == OUTER
+    written = [path.name for found in (matters, sure, screened) for path in ffrobot.write_study(found, tmp_path)]
+    for name in ("sensitivity.json", "tornado_mass.png", "uncertainty.json", "ranking_mass.pdf", "screening.json"):
+        assert name in written
+        assert (tmp_path / name).stat().st_size > 500
+    assert [file.name for file in study_files(tmp_path)] == ["sensitivity.json", "uncertainty.json", "screening.json"]
+    assert read_study(tmp_path / "uncertainty.json") == study
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{", "expected a study of ffrobot as JSON"),
+        ("[1]", 'expected a study of ffrobot (format "ffrobot-study"), found another file'),
+        (
+            '{"format": "ffrobot-study", "format_version": 7}',
+            "expected format_version 1, found 7: run the command again",
+        ),
+        ('{"format": "ffrobot-study", "format_version": 1, "name": "sensitivity"}', "study.json: ffrobot_version"),
+    ],
+)
+def test_files_that_are_no_studies(ffrobot, tmp_path, content, message):
+    (tmp_path / "study.json").write_text(content, encoding="utf-8")
+    done = ffrobot("report", tmp_path / "study.json")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (tmp_path / "study.html").exists()
+
+
+def test_a_folder_without_a_study(ffrobot, tmp_path):
+    done = ffrobot("report", tmp_path)
+    assert done.returncode == 2
+    assert "expected a folder of ffrobot sensitivity, optimise or uncertainty" in done.stderr
