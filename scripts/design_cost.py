@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -137,57 +138,112 @@ def segment(name: str, length: float) -> dict[str, object]:
     }
 
 
-CANTILEVER = {
+JOINTS = [
+    {"name": f"j{k}", "type": "weld", "between": [f"s{k - 1}.tip" if k else "ground", f"s{k}.root"]} for k in range(8)
+]
+CANTILEVER: dict[str, object] = {
     "name": "stepped",
     "gravity": [0.0, 0.0],
     "body": [{"name": f"s{k}", "link": segment(f"s{k}", 0.1)} for k in range(8)],
-    "joint": [
-        {"name": f"j{k}", "type": "weld", "between": [f"s{k - 1}.tip" if k else "ground", f"s{k}.root"]}
-        for k in range(8)
-    ],
+    "joint": JOINTS,
     "load": [{"point": "s7.tip", "y": "1.0"}],
     "initial": {"state": "static"},
     "analysis": [{"name": "still", "kind": "static"}],
 }
 
 
-LONG = (
-    *(f"links.{link}.geometry.section.{side}=0.01:0.03" for link in ("link1", "link2") for side in ("height", "width")),
-    *(f"links.{link}.material.density=4000:9000" for link in ("link1", "link2")),
-    *(f"links.{link}.damping.ratio=0.001:0.05" for link in ("link1", "link2")),
-)
+SHAKEN = CANTILEVER | {
+    "name": "shaken",
+    "joint": [JOINTS[0] | {"type": "revolute"}, *JOINTS[1:]],
+    "trajectory": [{"name": "held", "joint": "j0", "value": "0"}],
+    "load": [{"point": "s7.tip", "y": "sin(10*pi*t)"}],
+    "analysis": [
+        {
+            "name": "inverse",
+            "kind": "pcid",
+            "end": 0.3,
+            "output_step": 0.001,
+            "integrator": "dop853",
+            "tolerance": 1e-8,
+        }
+    ],
+}
+"""The same cantilever, held by a motor and shaken at 5 Hz: a second of integration."""
 
 
 def optima(folder: Path) -> None:
-    """Of the stepped cantilever, whose runs are short, and of two_link."""
-    short = folder / "scene.toml"
-    short.write_text(tomli_w.dumps(CANTILEVER), encoding="utf-8")
-    heights = [HEIGHTS.format(f"s{k}") for k in range(8)]
-    optimum("stepped cantilever", short, heights, ["peak points.s7.tip.position[1] <= 2e-4"])
-    optimum("two_link", pcid_of("two_link", folder, {"initial": STILL}), LONG, LONG_LIMITS)
+    """Of the stepped cantilever: runs are short where it is at rest, and long where it is shaken."""
+    for keys, limit in (
+        (CANTILEVER, "peak points.s7.tip.position[1] <= 2e-4"),
+        (SHAKEN, "rms points.s7.tip.position[1] <= 2e-4"),
+    ):
+        scene = folder / f"{keys['name']}.toml"
+        scene.write_text(tomli_w.dumps(keys), encoding="utf-8")
+        search = partial(
+            ffrobot.optimise, scene, [HEIGHTS.format(f"s{k}") for k in range(8)], folder / scene.stem, minimise="mass",
+            subject_to=[limit], processes=processors(),
+        )  # fmt: skip
+        found, cost = against_solves(scene, search)
+        ending = "" if found.converged else ", not converged"
+        print(f"{keys['name']} cantilever: the lightest of eight heights, {found.runs} runs{ending}: {cost}")
 
 
-def optimum(name: str, scene: Path, vary: Sequence[str], limits: Sequence[str]) -> None:
-    """The least mass within limits: a line."""
-    search = partial(
-        ffrobot.optimise, scene, vary, scene.with_suffix(".runs"), minimise="mass", subject_to=limits,
-        processes=processors(),
-    )  # fmt: skip
-    found, cost = against_solves(scene, search)
-    ending = "" if found.converged else ", NOT CONVERGED"
-    print(f"{name}: {found.runs} runs{ending}: {cost}")
+# --- spreads ---
+
+SPREADS = tuple(
+    f"links.{link}.{key}=±2%"
+    for link in ("link1", "link2")
+    for key in ("geometry.section.height", "material.density", "material.youngs_modulus")
+)
+HISTORIES = ("joints.O.moment", "joints.A.moment")
+FROM_REST = {"state": "static", "angles": {"link1": 0.0, "link2": np.pi / 3}}
+ROWS = 3  # that are solved again by themselves
+
+
+def uncertainties(folder: Path, count: int = 1000) -> None:
+    """Samples of two_link from rest, 20 ms of them, and of its motion from rest to rest: see `spread`."""
+    begun = run_files(CASES / "two_link" / "scene.toml", {}, folder).scene["analysis"][0] | {"end": 0.02}
+    spread("two_link", pcid_of("two_link", folder, {"initial": FROM_REST, "analysis": [begun]}), count)
+    spread("two_link_rest_to_rest", pcid_of("two_link_rest_to_rest", folder), count // 10)
+
+
+def spread(name: str, scene: Path, count: int) -> None:
+    """Samples against single runs, and bands by gradients against theirs."""
+    folder = scene.with_suffix(".uncertainty")
+    study = partial(ffrobot.uncertainty, scene, HISTORIES, SPREADS, processes=processors())
+    sampled, cost = against_solves(scene, partial(study, folder / "samples", samples=count))
+    print(f"{name}: {sampled.runs} runs of samples: {cost}")
+    linear, cost = against_solves(scene, partial(study, folder / "gradients", by="gradients"))
+    print(f"{name}: {linear.runs} runs of gradients: {cost}")
+    for one, other in zip(linear.bands, sampled.bands, strict=True):
+        off = np.abs(one.statistics.deviation - other.statistics.deviation).max() / other.statistics.deviation.max()
+        print(f"{name}: {one.name}: deviations by gradients are off by {100 * off:.2g} % of the largest")
+    print(f"{name}: {ROWS} samples solved by themselves: off by {rows_alone(folder / 'samples'):.1e} of the peaks")
+
+
+def rows_alone(folder: Path) -> float:
+    """How far moments of a few samples are off those of `ffrobot.solve` of the same scene, of their peaks."""
+    off = 0.0
+    warnings.simplefilter("ignore", ffrobot.FfrobotWarning)
+    for run in sorted((folder / "runs").iterdir())[:ROWS]:
+        with ffrobot.solve(run / "scene.toml") as alone, ffrobot.Results(run / "results.h5") as sample:
+            for name in HISTORIES:
+                dataset = f"inverse/{name.replace('.', '/')}"
+                off = max(off, float(np.abs(alone[dataset] - sample[dataset]).max() / np.abs(alone[dataset]).max()))
+    return off
 
 
 def main() -> None:
     """What is asked for."""
-    parts: dict[str, Callable[..., None]] = {"sensitivity": sensitivities}
-    parser = argparse.ArgumentParser(description="What designs cost.")
+    parts = {"sensitivity": sensitivities, "optimise": optima, "uncertainty": uncertainties}
+    parser = argparse.ArgumentParser(description="What designs cost, in times of one solve.")
     parser.add_argument("part", nargs="?", choices=parts)
-    chosen = parser.parse_args().part
+    parser.add_argument("samples", nargs="?", type=int, default=1000)
+    chosen = parser.parse_args()
     for name, part in parts.items():
-        if chosen in (None, name):
+        if chosen.part in (None, name):
             with tempfile.TemporaryDirectory() as folder:
-                part(Path(folder))
+                part(Path(folder), *([chosen.samples] if part is uncertainties else []))
 
 
 if __name__ == "__main__":

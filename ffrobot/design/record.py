@@ -29,8 +29,6 @@ HOW = {
     "exact": "exact: by modes, without runs",
 }
 ERRORS = "errors: by differences of lower order or of all keys at once, noise, and the tolerance of repeated steps"
-    "errors: by differences of lower order, or of all keys at once, by noise, and by the tolerance of repeated steps"
-)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 // One evaluation of the recursion in space, of chains of revolute joints: 3 or 6 links with 10 modes and rows at the
-// tip, or 6 rigid ones. `CHAIN ROWS REPETITIONS` prints the microseconds of the fastest of 20 rounds.
+// tip, or 6 rigid ones. `CHAIN ROWS REPETITIONS` prints the microseconds of the fastest of 20 rounds,
+// with `d` behind them those of an evaluation in duals, with derivatives in eight directions.
+#include "core/recursion/dual.h"
 #include "core/recursion/workspace.h"
 
 #include <Eigen/Geometry>
@@ -7,6 +9,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <random>
 
 using namespace ffrobot::recursion;
@@ -99,9 +102,37 @@ SpatialData link(int modes) {
   return data;
 }
 
+Eight unit(std::size_t i) {
+  double x[8] = {};
+  x[i] = 1;
+  Eight found;
+  std::memcpy(&found, x, sizeof x);
+  return found;
+}
+
+// Of one evaluation, the fastest of 20 rounds; of duals one of eight directions for each coordinate in turn.
+template <class T>
+double microseconds(const Mechanism<Spatial> &mechanism, const VectorXd &q, const VectorXd &v, int repetitions) {
+  Workspace<Spatial, T> w(mechanism);
+  std::vector<T> at(q.begin(), q.end()), rate(v.begin(), v.end()), a(v.size());
+  const std::vector<T> target(16, T(0.));
+  if constexpr (!std::is_same_v<T, double>)
+    for (std::size_t i = 0; i < at.size(); ++i)
+      at[i].rate = unit(i % 8);
+  double fastest = 1e9;
+  for (int round = 0; round < 20; ++round) {
+    const auto start = std::chrono::steady_clock::now();
+    for (int i = 0; i < repetitions; ++i)
+      accelerations(mechanism, at.data(), rate.data(), Forces<T>(), target.data(), w, a.data());
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    fastest = std::min(fastest, 1e6 * seconds / repetitions);
+  }
+  return fastest;
+}
+
 } // namespace
 
-int main(int, char **given) {
+int main(int count, char **given) {
   const int modes = given[1][1] == 'r' ? 0 : 10, links = given[1][0] - '0', rows = std::atoi(given[2]);
   const int repetitions = std::atoi(given[3]);
   std::vector<BodyModel<SpatialData>> bodies;
@@ -118,20 +149,12 @@ int main(int, char **given) {
     held.push_back(row);
   }
   const Mechanism<Spatial> mechanism(bodies, {SpatialMarker()}, held, {}, Vector3d(0, 0, -9.81));
-  Workspace<Spatial, double> w(mechanism);
-  VectorXd q(mechanism.n_q), v(mechanism.n_v), a(mechanism.n_v);
-  const VectorXd target = VectorXd::Zero(rows);
+  VectorXd q(mechanism.n_q), v(mechanism.n_v);
   for (int i = 0; i < mechanism.n_q; ++i)
     q[i] = 0.01 * number(), v[i] = number();
   for (const auto &node : mechanism.nodes)
     q[node.q] = number();
-  double fastest = 1e9;
-  for (int round = 0; round < 20; ++round) {
-    const auto start = std::chrono::steady_clock::now();
-    for (int i = 0; i < repetitions; ++i)
-      accelerations(mechanism, q.data(), v.data(), Forces<double>(), target.data(), w, a.data());
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    fastest = std::min(fastest, 1e6 * seconds / repetitions);
-  }
-  std::printf("%.4f\n", fastest);
+  const bool duals = count > 4 && given[4][0] == 'd';
+  std::printf("%.4f\n", duals ? microseconds<Dual>(mechanism, q, v, repetitions)
+                              : microseconds<double>(mechanism, q, v, repetitions));
 }
