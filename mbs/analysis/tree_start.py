@@ -18,6 +18,8 @@ SPARSE = "Newton's matrices are sparse there"
 OTHERS = {"radau": SPARSE, "generalized-alpha": SPARSE, "dopri5": "multipliers keep its tolerance there"}
 """Integrators that a run does not begin with in joint coordinates, and why: docs/recursion.md."""
 
+LOOPS = "closed loops keep small tolerances there, and stop where they are singular"
+
 
 @dataclass(frozen=True)
 class TreeStart:
@@ -45,6 +47,8 @@ def tree_start(
         return "as the run that it goes on with"
     if integrator.name in OTHERS:
         return OTHERS[integrator.name]
+    if assembly.model.scene.topology.loop_joints:
+        return LOOPS
     try:
         tree = PlanarTree(assembly)
         return TreeStart(tree, *tree.state(start.q, start.v))

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ffrobot.bench.evaluation import evaluation_seconds
+from ffrobot.bench.evaluation import tree_evaluation_seconds
 from ffrobot.bench.hand_written import STEPS, TIME, HandWritten, general_state
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.pcid import Pcid, run_pcid
@@ -69,7 +69,7 @@ def test_right_hand_side_ratio(benchmark, two_link, program):
     count = 20_000 if benchmark.enabled else 4_000
 
     def both():
-        return evaluation_seconds(state, TIME, count), program.evaluation_seconds(count)
+        return tree_evaluation_seconds(state, TIME, count), program.evaluation_seconds(count)
 
     rounds = 15 if benchmark.enabled else 9
     times = np.array([both() for _ in range(rounds)]).min(axis=0)

@@ -11,6 +11,7 @@ from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.analysis.outcome import EarlierRun
 from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet
+from ffrobot.mbs.analysis.tree_start import LOOPS
 
 KEYS = {"end": 0.05, "output_step": 0.005, "tolerance": 1e-10, "integrator": "dop853"}
 DRIVEN = (
@@ -18,8 +19,6 @@ DRIVEN = (
     "backwards",
     "mixed",
     "mixed backwards",
-    "slider-crank",
-    "four-bar",
     "tree",
     "loaded",
     "mixed, as built",
@@ -86,9 +85,10 @@ def test_other_methods_stay_in_absolute_coordinates(integrator, why):
     assert outcome.statistics.coordinates == f"absolute: {why}"
 
 
-def test_what_a_tree_has_not_stays_in_absolute_coordinates():
-    outcome = run_forward(zoo.build("stiffened"), forward(**KEYS), None, ActuatorSet(), always)
-    assert outcome.statistics.coordinates == "absolute: geometric stiffening"
+@pytest.mark.parametrize(("name", "why"), [("stiffened", "geometric stiffening"), ("four-bar", LOOPS)])
+def test_other_mechanisms_stay_in_absolute_coordinates(name, why):
+    outcome = run_forward(zoo.build(name), forward(**KEYS), None, ActuatorSet(), always)
+    assert outcome.statistics.coordinates == f"absolute: {why}"
 
 
 @pytest.mark.parametrize("stopped_in", ["joint", "absolute"])
