@@ -4,7 +4,7 @@
 
 prints, as minima of interleaved repetitions: time per evaluation of both and their ratio; time of PCID from the
 undeformed start against the hand-written one in equal steps of DOP853, both with λ to 1e-4 of its peak. The aim is 1.5
-of both; 3.1 and 4.1 are measured (README.md). In the ordinary test run repetitions are few, and the alarms half as much
+of both; 2.0 and 3.7 are measured (README.md). In the ordinary test run repetitions are few, and the alarms half as much
 again and twice that: minima of interleaved milliseconds hardly feel what else the machine does.
 """
 
