@@ -11,18 +11,14 @@ import numpy as np
 from rich.console import Console
 
 from ..common.files import write_atomically
-from ..present.tables import plain_table
+from ..present.tables import print_table
 from .front import Front, FrontPoint
 from .study_parts import with_unit
 
 
 def print_front(found: Front, console: Console) -> None:
     """A line for each design: both goals, what the second one costs, the keys; how it was found."""
-    table = plain_table(*front_headings(found))
-    for row in front_rows(found):
-        table.add_row(*row)
-    console.print(table, highlight=False)
-    console.print()
+    print_table(console, front_headings(found), front_rows(found))
     for line in front_remarks(found):
         console.print(line, soft_wrap=True, markup=False, highlight=False)
 

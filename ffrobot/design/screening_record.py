@@ -13,7 +13,7 @@ from rich.console import Console
 from ..common.files import write_atomically
 from ..pictures.studies.diagrams import Points
 from ..pictures.studies.study import Study
-from ..present.tables import plain_table
+from ..present.tables import print_table
 from .screening import Screening
 from .study_parts import file_name, floats, make_study, table, with_unit
 from .uncertainty_record import UNCHANGED, goal_line, with_error
@@ -26,11 +26,7 @@ def print_screening(found: Screening, console: Console) -> None:
     """A table for each goal, the key that matters most first; what there is to mind."""
     for g, (goal, reading) in enumerate(zip(found.goals, found.readings, strict=True)):
         console.print(goal_line(goal, reading), soft_wrap=True, markup=False, highlight=False)
-        rows = plain_table(*HEADINGS)
-        for row in _rows(found, g):
-            rows.add_row(*row)
-        console.print(rows, highlight=False)
-        console.print()
+        print_table(console, HEADINGS, _rows(found, g))
     for line in remarks(found):
         console.print(line, soft_wrap=True, markup=False, highlight=False)
 

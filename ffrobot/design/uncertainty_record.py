@@ -12,7 +12,7 @@ from rich.console import Console
 
 from ..common.arrays import Array
 from ..common.files import write_atomically
-from ..present.tables import plain_table
+from ..present.tables import print_table
 from .readings import Reading
 from .statistics import LEVELS, Statistics
 from .study_parts import file_name
@@ -41,17 +41,9 @@ def print_uncertainty(found: Uncertainty, console: Console) -> None:
     for g in range(len(found.goals)):
         console.print(goal_line(found.goals[g], found.readings[g]), soft_wrap=True, markup=False, highlight=False)
         for headings, rows in ((statistics_headings(), [statistics_row(found, g)]), parts(found, g)):
-            table = plain_table(*headings)
-            for row in rows:
-                table.add_row(*row)
-            console.print(table, highlight=False)
-            console.print()
+            print_table(console, headings, rows)
     if found.bands:
-        table = plain_table(*BAND_HEADINGS)
-        for row in band_rows(found):
-            table.add_row(*row)
-        console.print(table, highlight=False)
-        console.print()
+        print_table(console, BAND_HEADINGS, band_rows(found))
     for line in remarks(found):
         console.print(line, soft_wrap=True, markup=False, highlight=False)
 

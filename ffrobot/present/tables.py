@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from rich.console import Console
 from rich.table import Table
 
 
@@ -14,3 +17,12 @@ def plain_table(*headers: str) -> Table:
         else:
             table.add_column(header, justify="right", no_wrap=True)
     return table
+
+
+def print_table(console: Console, headers: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    """Print `rows` below their headers, and an empty line."""
+    table = plain_table(*headers)
+    for row in rows:
+        table.add_row(*row)
+    console.print(table, highlight=False)
+    console.print()

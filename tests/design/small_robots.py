@@ -1,4 +1,4 @@
-"""What designs are sought for in these tests: a tube that swings, and a cantilever under a force at its tip."""
+"""What designs are sought for in these tests: a tube that swings, a cantilever under a force, a rigid arm."""
 
 TUBE = {
     "name": "arm",
@@ -39,3 +39,24 @@ CANTILEVER = {
     "initial": {"state": "static"},
     "analysis": [{"name": "still", "kind": "static"}],
 }
+
+ARM = {
+    "name": "arm",
+    "gravity": [0.0, -9.81],
+    "payload": [{"point": "arm.tip", "mass": 0.5}],
+    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.05}],
+    "body": [
+        {
+            "name": "arm",
+            "rigid": {
+                "mass": 2.0,
+                "center": [0.3, 0.0],
+                "inertia": 0.05,
+                "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]},
+            },
+        }
+    ],
+}
+MASS, PAYLOAD = "body.arm.rigid.mass", "payload.0.mass"

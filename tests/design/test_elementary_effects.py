@@ -5,31 +5,10 @@ import csv
 import numpy as np
 import pytest
 import tomli_w
-from small_robots import SWING
+from small_robots import ARM, MASS, PAYLOAD, SWING
 
 import ffrobot
 from ffrobot.design.elementary_effects import draw_trajectories, elementary_effects
-
-ARM = {
-    "name": "arm",
-    "gravity": [0.0, -9.81],
-    "payload": [{"point": "arm.tip", "mass": 0.5}],
-    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
-    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.05}],
-    "body": [
-        {
-            "name": "arm",
-            "rigid": {
-                "mass": 2.0,
-                "center": [0.3, 0.0],
-                "inertia": 0.05,
-                "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]},
-            },
-        }
-    ],
-}
-MASS, PAYLOAD = "body.arm.rigid.mass", "payload.0.mass"
 
 
 def test_a_trajectory_changes_every_key_once_on_the_levels_of_the_grid():

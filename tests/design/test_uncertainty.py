@@ -8,32 +8,14 @@ import numpy as np
 import pytest
 import tomli_w
 from scipy.stats import norm, qmc
+from small_robots import ARM, MASS, PAYLOAD
 
 import ffrobot
 from ffrobot.design.linear_spread import LinearModel
 from ffrobot.design.spreads import Spread, parse_spread, spread_points
 from ffrobot.design.statistics import LEVELS, regression_shares, sobol_indices, statistics
 
-ARM = {
-    "name": "arm",
-    "gravity": [0.0, -9.81],
-    "payload": [{"point": "arm.tip", "mass": 0.5}],
-    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
-    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.05}],
-    "body": [
-        {
-            "name": "arm",
-            "rigid": {
-                "mass": 2.0,
-                "center": [0.3, 0.0],
-                "inertia": 0.05,
-                "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]},
-            },
-        }
-    ],
-}
-MASS, PAYLOAD, MOMENT = "body.arm.rigid.mass", "payload.0.mass", "joints.shoulder.moment"
+MOMENT = "joints.shoulder.moment"
 SLOPES = np.array([9.81 * 0.3 + 2.0 * 0.3**2, 9.81 * 0.6 + 2.0 * 0.6**2])
 """Of the moment at the start, level and with 2 rad/s², by both masses."""
 
