@@ -24,7 +24,7 @@ class JointInTree(NamedTuple):
     """What a joint is to the core, and its number of coordinates."""
 
     kind: _core.JointKind
-    count: int
+    coordinates: int
 
 
 JOINTS = {

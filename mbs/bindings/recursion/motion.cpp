@@ -3,6 +3,7 @@
 #include "core/integrate/integrate.h"
 #include "core/recursion/observe.h"
 
+#include <nanobind/stl/complex.h>
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
@@ -66,7 +67,40 @@ std::tuple<VectorXd, VectorXd, double> projected(const Model<Space> &model, cons
   return {q, v, left};
 }
 
+// x (n_v) of N x + C_q^T nu = r, C_q x = c at (q, v); complex factors know no c
+template <class Space, class Scalar>
+Eigen::Matrix<Scalar, Eigen::Dynamic, 1>
+newton_step(const Model<Space> &model, const Scene &scene, double t, const VectorXd &q, const VectorXd &v,
+            Scalar damping_factor, Scalar stiffness_factor, const Eigen::Matrix<Scalar, Eigen::Dynamic, 1> &r,
+            const VectorXd &c) {
+  model.check_state(q, v);
+  check_scene(model, scene);
+  RecursiveMotion<Space> motion(model.mechanism, scene, t, q.data(), v.data());
+  check_size("r", r.size(), motion.n_stiff());
+  check_size("c", c.size(), motion.constraints());
+  VectorXd state(q.size() + v.size()), z(motion.size()), slope(motion.size());
+  state << q, v;
+  motion.local().set_centre(state.data());
+  motion.local().from_state(state.data(), z.data());
+  motion.slope(t, z.data(), slope.data());
+  motion.factorise(damping_factor, stiffness_factor);
+  Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x(v.size());
+  if constexpr (std::is_same_v<Scalar, double>)
+    motion.solve(r.data(), c.data(), x.data());
+  else
+    motion.solve(r.data(), x.data());
+  return x;
+}
+
 template <class Space> void bind_motion(nb::module_ &m) {
+  const auto bind_newton_step = [&](auto step) {
+    m.def("tree_newton_step", step, "model"_a, "scene"_a, "t"_a, "q"_a, "v"_a, "damping_factor"_a, "stiffness_factor"_a,
+          "r"_a, "c"_a,
+          "For tests: x of (M + damping_factor D + stiffness_factor K) x + C_q^T nu = r, C_q x = c, zero where factors "
+          "are complex.");
+  };
+  bind_newton_step(&newton_step<Space, double>);
+  bind_newton_step(&newton_step<Space, std::complex<double>>);
   m.def("tree_motion", &motion_of<Space>, "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
         "checkpoint"_a = nb::none(),
         "Integrates the motion from (q, v) at the first of `times`, or on from a checkpoint, which it moves, and "

@@ -41,10 +41,10 @@ template <class Space> void RecursiveMotion<Space>::find_stiff_terms() {
   stiff_terms(mechanism_, scene_, stiffness_, damping_);
   coupling_.setZero(n_v(), stiffness_.size() - n_v());
   take_friction(scene_, VectorXd::Zero(n_stiff()), damping_); // at rest, where none that acts has a slope of zero
-  for (Index i = 0; i < n_stiff(); ++i)
-    if (stiffness_[i] != 0 || damping_[i] != 0)
-      stiff_.push_back(i);
-  compliance_.resize(n_v(), static_cast<Index>(stiff_.size()));
+  std::size_t node = 0;
+  for (const Node<Space> &joint : mechanism_.nodes)
+    if (posture_.body(node++).turn.size() > 0 && (stiffness_[joint.v] != 0 || damping_[joint.v] != 0))
+      turned_.push_back(joint.v);
 }
 
 template <class Space> void RecursiveMotion<Space>::find_coupling() {
@@ -57,32 +57,19 @@ template <class Space> void RecursiveMotion<Space>::find_coupling() {
   }
 }
 
-// Columns of P: what a unit of force at each stiff coordinate changes. At rest, where the least is subtracted.
-template <class Space> void RecursiveMotion<Space>::find_compliance() {
-  if (!compliance_is_old_)
+template <class Space> void RecursiveMotion<Space>::take_posture() {
+  if (!posture_is_old_)
     return;
+  posture_.take(evaluated_.data(), newton_);
   if (coupling_.size() > 0)
     find_coupling();
-  const VectorXd rest = VectorXd::Zero(n_v()), held = VectorXd::Zero(target_.size());
-  VectorXd unit = rest, base(n_v()), a(n_v());
-  Forces<double> forces;
-  forces.generalized = unit.data();
-  const auto respond = [&](VectorXd &to) {
-    accelerations(mechanism_, evaluated_.data(), rest.data(), forces, held.data(), newton_, to.data());
-  };
-  for (std::size_t k = 0; k < stiff_.size(); ++k) {
-    if (const Index i = stiff_[k]; i < n_v())
-      unit[i] = 1;
-    else
-      unit = coupling_.col(i - n_v());
-    respond(a);
-    compliance_.col(static_cast<Index>(k)) = a;
-    unit.setZero();
-  }
-  respond(base);
-  compliance_.colwise() -= base;
-  base_ = evaluated_;
-  compliance_is_old_ = false;
+  const auto kept = static_cast<Index>(newton_.active.size()), turned = static_cast<Index>(turned_.size());
+  newton_rows_.setZero(kept + coupling_.cols() + turned, n_v());
+  newton_rows_.topRows(kept) = posture_.gradients()(newton_.active, Eigen::all);
+  newton_rows_.middleRows(kept, coupling_.cols()) = coupling_.transpose();
+  for (Index k = 0; k < turned; ++k)
+    newton_rows_(kept + coupling_.cols() + k, turned_[static_cast<std::size_t>(k)]) = 1;
+  posture_is_old_ = false;
 }
 
 // B v of the last slope()
@@ -92,42 +79,54 @@ template <class Space> VectorXd RecursiveMotion<Space>::stiff_rates() const {
   return found;
 }
 
-template <class Space> void RecursiveMotion<Space>::factorise(double damping_factor, double stiffness_factor) {
-  find_compliance();
+template <class Space>
+template <class Scalar>
+void RecursiveMotion<Space>::factorise(NewtonMatrix<Space, Scalar> &matrix, Scalar damping_factor,
+                                       Scalar stiffness_factor) {
+  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
+  take_posture();
   take_friction(scene_, stiff_rates(), damping_);
-  real_.factorise(compliance_, coupling_, stiff_, (damping_factor * damping_ + stiffness_factor * stiffness_)(stiff_));
+  const Vector E = damping_factor * damping_ + stiffness_factor * stiffness_;
+  Vector of_tree = E.head(n_v()), extra(coupling_.cols() + static_cast<Index>(turned_.size()));
+  extra << E.tail(coupling_.cols()), of_tree(turned_);
+  of_tree(turned_).setZero();
+  matrix.factorise(posture_, newton_rows_, of_tree, extra);
+}
+
+template <class Space> void RecursiveMotion<Space>::factorise(double damping_factor, double stiffness_factor) {
+  factorise(real_, damping_factor, stiffness_factor);
 }
 
 template <class Space> void RecursiveMotion<Space>::factorise(Complex damping_factor, Complex stiffness_factor) {
-  find_compliance();
-  take_friction(scene_, stiff_rates(), damping_);
-  complex_.factorise(compliance_, coupling_, stiff_,
-                     (damping_factor * damping_ + stiffness_factor * stiffness_)(stiff_));
+  factorise(complex_, damping_factor, stiffness_factor);
+}
+
+// x = B^T r
+template <class Space> template <class Scalar> void RecursiveMotion<Space>::spread(const Scalar *r, Scalar *x) const {
+  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
+  Eigen::Map<Vector> x_(x, n_v());
+  x_ = Eigen::Map<const Vector>(r, n_v());
+  if (coupling_.cols() > 0)
+    x_ += coupling_ * Eigen::Map<const Vector>(r + n_v(), coupling_.cols());
 }
 
 template <class Space> void RecursiveMotion<Space>::solve(const double *r, const double *c, double *x) {
-  Eigen::Map<VectorXd> x_(x, n_v());
-  if (c) {
-    response(mechanism_, base_.data(), c, newton_, x);
-    x_ = -x_;
-  } else
-    x_.setZero();
-  real_.solve(r, x);
+  spread(r, x);
+  if (!c) {
+    real_.solve(nullptr, x);
+    return;
+  }
+  const VectorXd kept = Eigen::Map<const VectorXd>(c, constraints())(newton_.active);
+  real_.solve(kept.data(), x);
 }
 
 template <class Space> void RecursiveMotion<Space>::solve(const Complex *r, Complex *x) {
-  Eigen::Map<Eigen::VectorXcd>(x, n_v()).setZero();
-  complex_.solve(r, x);
+  spread(r, x);
+  complex_.solve(nullptr, x);
 }
 
-// Rates of rows are linear in velocities, but for those of markers that turn.
 template <class Space> void RecursiveMotion<Space>::constrain(const double *x, double *c) {
-  measure(mechanism_, base_.data(), x, measured_, value_.data(), c);
-  if (scene_.driven.empty())
-    return;
-  const VectorXd rest = VectorXd::Zero(n_v());
-  measure(mechanism_, base_.data(), rest.data(), measured_, value_.data(), rate_.data());
-  Eigen::Map<VectorXd>(c, rate_.size()) -= rate_;
+  Eigen::Map<VectorXd>(c, constraints()) = posture_.gradients() * Eigen::Map<const VectorXd>(x, n_v());
 }
 
 template <class Space>
@@ -141,7 +140,7 @@ void RecursiveMotion<Space>::constraint_values(double t, const double *z, double
   template void RecursiveMotion<Space>::find_stiff_terms();                                                            \
   template void RecursiveMotion<Space>::find_coupling();                                                               \
   template VectorXd RecursiveMotion<Space>::stiff_rates() const;                                                       \
-  template void RecursiveMotion<Space>::find_compliance();                                                             \
+  template void RecursiveMotion<Space>::take_posture();                                                                \
   template void RecursiveMotion<Space>::factorise(double, double);                                                     \
   template void RecursiveMotion<Space>::factorise(Complex, Complex);                                                   \
   template void RecursiveMotion<Space>::solve(const double *, const double *, double *);                               \

@@ -172,9 +172,12 @@ private:
   void residuals(double t, const double *q, const double *v);
   void act_along_cuts(double t, const double *q, const double *v); // adds to wrench_
   void find_stiff_terms();
-  void find_compliance();
+  void take_posture();
   void find_coupling();
   Eigen::VectorXd stiff_rates() const;
+  template <class Scalar>
+  void factorise(NewtonMatrix<Space, Scalar> &matrix, Scalar damping_factor, Scalar stiffness_factor);
+  template <class Scalar> void spread(const Scalar *r, Scalar *x) const;
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
@@ -197,14 +200,14 @@ private:
   double watched_at_ = 0, determinant_ = 0;                 // of the posture before
 
   Eigen::VectorXd stiffness_, damping_; // diagonals (n_v, then cut joints); of friction as at the last factorisation
-  std::vector<Eigen::Index> stiff_;     // where they are not zero
+  std::vector<Eigen::Index> turned_;    // stiff coordinates along pins whose section modes turn
   Eigen::MatrixXd coupling_;            // (n_v, cut joints) their rates are coupling^T v
-  Eigen::MatrixXd compliance_;          // (n_v, stiff) what unit forces there do under the rows
-  Eigen::VectorXd evaluated_, base_;    // q of the last slope(), of the compliance
-  Eigen::VectorXd rates_;               // v of the last slope()
-  bool compliance_is_old_ = true;       // there was a slope since
-  NewtonMatrix<double> real_;
-  NewtonMatrix<Complex> complex_;
+  Eigen::VectorXd evaluated_, rates_;   // q and v of the last slope()
+  NewtonPosture<Space> posture_;        // there, unless that is old: there was a slope since
+  bool posture_is_old_ = true;
+  Eigen::MatrixXd newton_rows_; // (kept rows, cut joints, turned_; n_v)
+  NewtonMatrix<Space, double> real_;
+  NewtonMatrix<Space, Complex> complex_;
 };
 
 } // namespace ffrobot::recursion

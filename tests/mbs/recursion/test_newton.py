@@ -1,0 +1,202 @@
+"""The matrix of Newton's method in implicit integrators, eliminated body by body, against dense matrices.
+
+N x + C_qᵀν = r, C_q x = c with N = M + E has x = P (r − E x) + R c: what evaluations at rest say of P and R, column by
+column, is compared with a solution of one factorisation.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import zoo
+from closed_chains import COUNT, FRICTION, closed_chain
+from mechanisms import assemble
+from points_in_space import Body, J, Mechanism, r
+from random_bodies import GRAVITY, JOINTS, ground, random_body, random_state, row, three_links
+from recursion_trees import tree_of
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+
+FACTORS = [(0.02, 3e-4), (3.0, 20.0), (0.7 + 0.4j, 5.0 - 8.0j)]
+STILL = _core.TimeFunction.constant(0.0)
+
+
+def scene_of(rows, springs=()):
+    """Rows that hold still; springs and viscous friction (q, v, stiffness, damping) along joints."""
+    scene = _core.TreeScene()
+    for _ in range(rows):
+        scene.add_target(STILL)
+    for q, v, stiffness, damping in springs:
+        scene.add_joint_force(q, v, stiffness, 0.0, damping, 0.0, 1.0)
+    return scene
+
+
+def responses(model, q, rows):
+    """P (n_v, n_v) and R (n_v, rows): what forces do under rows that hold, and accelerations of rows."""
+    rest, large = np.zeros(model.n_v), 1e4  # beside what acts at q without them, which is subtracted
+
+    def a(force, target):
+        return model.evaluate(q, rest, target, force, None)[0]
+
+    start = a(rest, np.zeros(rows))
+    P = [(a(large * unit, np.zeros(rows)) - start) / large for unit in np.eye(model.n_v)]
+    R = [(a(rest, large * unit) - start) / large for unit in np.eye(rows)]
+    return np.array(P).T, np.array(R).reshape(rows, model.n_v).T
+
+
+def solved(N, r):
+    """N⁻¹ r, and what it may be off: n ε cond(N), beside the rounding of what N is made of."""
+    x = np.linalg.solve(N, r)
+    return x, (1e-12 + len(x) * np.finfo(float).eps * np.linalg.cond(N)) * np.abs(x).max()
+
+
+def check(model, q, scene, stiffness, damping, rows, seed=1):
+    """`stiffness` and `damping` (n_v) of modes and joints; forces act where these are."""
+    rng = np.random.default_rng(seed)
+    n = model.n_v
+    P, R = responses(model, q, rows)
+    stiff = (stiffness != 0) | (damping != 0)
+    for of_damping, of_stiffness in FACTORS:
+        E = np.diag(of_damping * damping + of_stiffness * stiffness)
+        force, c = stiff * rng.standard_normal(n), rng.standard_normal(rows)
+        if isinstance(of_damping, complex):
+            force, c = force + 1j * stiff * rng.standard_normal(n), np.zeros(rows)
+        expected, error = solved(np.eye(n) + P @ E, P @ force + R @ c)
+        found = _core.tree_newton_step(model, scene, 0.0, q, np.zeros(n), of_damping, of_stiffness, force, c)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=error)
+
+
+def check_mechanism(mechanism, rng, with_springs=True):
+    model = mechanism.model()
+    q, _ = random_state(rng, mechanism, model)
+    stiffness, damping, springs = np.zeros(model.n_v), np.zeros(model.n_v), []
+    for body, (joint_q, p_q, joint_v, p_v) in zip(mechanism.bodies, model.first, strict=True):
+        stiffness[p_v : p_v + body.n], damping[p_v : p_v + body.n] = body.stiffness, np.diag(body.damping)
+        if with_springs and p_q - joint_q == p_v - joint_v:
+            springs += [(joint_q + k, joint_v + k, *rng.uniform(1, 9, 2)) for k in range(p_v - joint_v)]
+    for _, v, k, d in springs:
+        stiffness[v], damping[v] = k, d
+    check(model, q, scene_of(len(mechanism.rows), springs), stiffness, damping, len(mechanism.rows))
+
+
+@pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
+@pytest.mark.parametrize("seed", range(6))
+def test_trees_in_space(seed, curved):
+    """Random joints, rigid bodies and bodies of up to five modes, clamped or not."""
+    rng = np.random.default_rng(seed)
+    bodies = []
+    for i in range(6):
+        parent = int(rng.integers(-1, i)) if i else -1
+        keys = {"parent": parent, "parent_marker": 0 if parent < 0 else int(rng.integers(1, 3)), "curved": curved}
+        joint = JOINTS[int(rng.integers(len(JOINTS)))]
+        bodies.append(random_body(rng, int(rng.integers(0, 6)), joint, bool(rng.integers(2)), **keys))
+    check_mechanism(Mechanism(bodies, ground(rng), GRAVITY), rng)
+
+
+@pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
+def test_rows_of_every_kind_in_space(curved):
+    rng = np.random.default_rng(4)
+    K = r.RowKind
+    rows = [
+        *(row(K.point, (-1, 1), (2, 1), axis) for axis in np.eye(3)),
+        *(row(K.rotation, (-1, 1), (2, 2), axis) for axis in np.eye(3)[:2]),
+        row(K.slide, (0, 2), (1, 2), (0.6, 0.8, 0)),
+        row(K.dot, (0, 1), (2, 1), (0, 0, 1), (0.6, 0, 0.8)),
+    ]
+    bodies = three_links(rng, 4, curved=curved)
+    check_mechanism(Mechanism(bodies, ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows]), rng)
+
+
+class Geared(Body):
+    """With a rotor in its joint."""
+
+    def core(self, name):
+        body = super().core(name)
+        body.rotor_inertia, body.gear_ratio = 0.2, 7.0
+        return body
+
+
+@pytest.mark.parametrize("clamped", [False, True], ids=["free modes", "clamped"])
+def test_rotors(clamped):
+    rng = np.random.default_rng(5)
+    bodies = [
+        random_body(rng, 3, J.revolute, clamped),
+        random_body(rng, 3, J.prismatic, clamped, parent=0, parent_marker=1),
+        random_body(rng, 3, J.revolute, clamped, parent=1, parent_marker=2),
+    ]
+    check_mechanism(Mechanism([Geared(**vars(body)) for body in bodies], ground(rng), GRAVITY), rng)
+
+
+@pytest.mark.parametrize(
+    ("types", "kinds"),
+    [(("revolute", "universal", "cylindrical", "universal"), ("rigid",)), (("revolute", "cylindrical"), ("beam",))],
+)
+def test_friction_where_a_loop_is_cut(types, kinds):
+    """What it takes at unit rates is found from accelerations with it and without; forces on modes alone."""
+    rng = np.random.default_rng(1)
+    chain = closed_chain(rng, types, kinds)
+    rough, smooth = (with_friction(chain, viscous) for viscous in (0.4, 0.0))
+    q, n = chain.position(rough.model), rough.model.tree.n_v
+    rough.core.keep_independent_rows(q, np.zeros(n))
+    rows = len(rough.row_signs)
+    P, R = responses(rough.core, q, rows)
+
+    def a(system, v):
+        return _core.tree_outputs(system.core, system.scene, [0.0], np.concatenate([q, v])[None]).accelerations[0]
+
+    P_friction = np.array([a(smooth, unit) - a(rough, unit) for unit in np.eye(n)]).T
+    stiffness, damping = np.zeros(n), np.zeros(n)
+    for node in rough.model.tree.nodes:
+        stiffness[node.p_v], damping[node.p_v] = node.body.stiffness, np.diag(node.body.damping)
+    force, c = (stiffness > 0) * rng.standard_normal(n), rng.standard_normal(rows)
+    force[0] = 1.0  # along a joint of the tree
+    for of_damping, of_stiffness in FACTORS[:2]:
+        N = np.eye(n) + of_damping * (P * damping + P_friction) + of_stiffness * P * stiffness
+        expected, error = solved(N, P @ force + R @ c)
+        r = np.append(force, np.zeros(COUNT[types[-1]]))
+        found = _core.tree_newton_step(rough.core, rough.scene, 0.0, q, np.zeros(n), of_damping, of_stiffness, r, c)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=error)
+
+
+def with_friction(chain, viscous):
+    """Cut at its last joint, with viscous friction alone, the same in all joints."""
+    tables = {
+        name: {key: value for key, value in table.items() if key not in FRICTION} | {"viscous_friction": viscous}
+        for name, table in chain.tables.items()
+    }
+    return SpatialSystem(replace(chain, tables=tables).model(list(tables)[-1]))
+
+
+def test_driven_coordinate_in_space():
+    rng = np.random.default_rng(6)
+    bodies = [random_body(rng, 3, J.revolute), random_body(rng, 3, J.revolute, parent=0, parent_marker=1)]
+    mechanism = Mechanism(bodies, ground(rng), GRAVITY)
+    driven, at = row(r.RowKind.coordinate, (0, 0), (0, 0), (1, 0, 0))
+    driven.coordinate = mechanism.model().first[1][2]
+    mechanism.rows, mechanism.row_sides = [driven], [at]
+    check_mechanism(mechanism, rng)
+
+
+NAMES = [name for name in zoo.ALL if "stiffened" not in name and "as built" not in name and "loaded" not in name]
+
+
+@pytest.mark.parametrize("free", [False, True], ids=["tree", "rows"])
+@pytest.mark.parametrize("name", NAMES)
+def test_mechanisms_of_the_plane(name, free):
+    """Joints of the tree, or (`free`) free bodies under rows; springs and friction along all coordinates of joints."""
+    assembly = assemble(zoo.build(name))
+    if free and len(assembly.constraints) > 15:
+        pytest.skip("more rows than the recursion takes")
+    tree = tree_of(assembly, free=free)
+    model, rng = tree.model, np.random.default_rng(1)
+    q = 0.1 * rng.standard_normal(model.n_q) + 0.5
+    stiffness, damping, springs = np.zeros(model.n_v), np.zeros(model.n_v), []
+    for i, (joint_q, _, joint_v, p_v) in zip(tree.bodies, model.first, strict=True):
+        body = assembly.model.bodies[i]
+        here = slice(p_v, p_v + body.n_modes)
+        stiffness[here], damping[here] = body.stiffness, np.diag(body.damping)
+        springs += [(joint_q + k, joint_v + k, *rng.uniform(1, 9, 2)) for k in range(p_v - joint_v)]
+    for _, v, k, d in springs:
+        stiffness[v], damping[v] = k, d
+    check(model, q, scene_of(len(tree.rows), springs), stiffness, damping, len(tree.rows))
