@@ -17,7 +17,7 @@ from ..fields.field_types import GROUND
 from ..joints.measure import Marker, Measure
 from .model import ZERO, Constraint
 from .system import MechanismSystem
-from .tree_layout import FREE, JOINTS, Coordinate, Layout, Node, NotInTreeError
+from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError
 
 MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
 COMPONENTS = {_core.MeasureKind.x: 0, _core.MeasureKind.y: 1, _core.MeasureKind.angle: 2, _core.MeasureKind.gear: 2}
@@ -78,7 +78,7 @@ class PlanarTree:
             first, n = int(self._assembly.first[number]), node.body.n_modes
             for of_tree, of_system in zip(found, (q, v), strict=True):
                 of_tree[node.modes : node.modes + n] = of_system[first + 3 : first + 3 + n]
-                if node.joint is None:
+                if node.joint == FREE.kind:
                     of_tree[node.first : node.modes] = of_system[first : first + 3]
         measures, coordinates = self._joints()
         along = [(measure, order) for order in (0, 1) for measure in measures]
@@ -90,10 +90,11 @@ class PlanarTree:
         return found[0], found[1]
 
     def _joints(self) -> tuple[list[_core.Measure], list[Coordinate]]:
-        """Measures of all joints of the tree that move, and their coordinates."""
+        """Measures of all joints of the tree that move, and their coordinates; those of motors behind gears, too."""
         joints = [joint.coordinate("section") for joint in self._assembly.model.scene.joint]
-        moving = zip(self._assembly.joint_measures, (m for m in joints if m is not None), strict=True)
-        found = [(core, self._layout.coordinate(measure)) for core, measure in moving]
+        moving = [m for m in joints if m is not None] + [gear.motor for gear in self._assembly.model.gears]
+        measures = [*self._assembly.joint_measures, *self._assembly.gear_measures]
+        found = [(core, self._layout.coordinate(m)) for core, m in zip(measures, moving, strict=True)]
         in_tree = [(core, coordinate) for core, coordinate in found if coordinate is not None]
         return [core for core, _ in in_tree], [coordinate for _, coordinate in in_tree]
 
@@ -141,7 +142,7 @@ class PlanarTree:
             self.scene.add_load(direction, load.magnitude)
 
     def _add_what_joints_have(self) -> None:
-        """Friction and rotors."""
+        """Friction, rotors, gears that give."""
         model = self._assembly.model
         for measure, friction in model.frictions:
             index, _ = self._in_tree(measure, "friction")
@@ -154,6 +155,12 @@ class PlanarTree:
             # it sits on the first side and spins with N Ω_second − (N − 1) Ω_first
             N = measure.gear_ratios[0] if is_gear else 1.0
             self._rotors[index] = inertia, 1.0 - N if is_gear and sign < 0 else N
+        for gear in model.gears:
+            motor, _ = self._in_tree(gear.motor, "a motor")
+            joint, sign = self._in_tree(gear.coordinate, "a gear")
+            self._driven |= {motor, joint}
+            self._rotors[motor] = gear.inertia, gear.ratio
+            self.scene.add_gear((motor, motor), (joint, joint), sign, gear.stiffness, gear.damping)
 
     def _in_tree(self, measure: Measure, what: str) -> Coordinate:
         coordinate = self._layout.coordinate(measure)
@@ -165,7 +172,7 @@ class PlanarTree:
         body = _core.PlanarBody()
         body.name, body.data = node.body.name, self._layout.data(number)
         body.parent, body.parent_marker, body.inboard_marker = node.inner.body, node.inner.marker, node.outer.marker
-        body.joint, _ = FREE if node.joint is None else JOINTS[node.joint.type]
+        body.joint = node.joint
         coordinates = range(node.first, node.modes)
         body.driven = not self._driven.isdisjoint(coordinates)
         # Else the core may take the frame's coordinates where modes turn the section: same motion, other numbers.
@@ -183,7 +190,6 @@ def _check(assembly: MechanismSystem) -> None:
         # Errors of forces are judged between bodies: those on the ground are not known to the core.
         "a body that is joined to no other": any(body.name not in joined for body in model.links),
         "geometric stiffening": any(body.stiffening is not None for body in model.bodies),
-        "gears that give": bool(model.gears),
         "forces that depend on the motion of points": bool(model.state_forces),
     }
     if found := [what for what, is_there in missing.items() if is_there]:

@@ -43,7 +43,8 @@ class MechanismSystem:
         self.motor_measures = [core(measure) for measure in motors]
         coordinates = [joint.coordinate("section") for joint in model.scene.joint]
         self.joint_measures = [core(measure) for measure in coordinates if measure is not None]
-        springs = [(core(gear.motor), core(gear.coordinate)) for gear in model.gears]
+        self.gear_measures = [core(gear.motor) for gear in model.gears]
+        springs = [(motor, core(gear.coordinate)) for motor, gear in zip(self.gear_measures, model.gears, strict=True)]
         self.system = _core.System(np.array(model.scene.gravity))
         for body, markers in zip(model.bodies, self._markers, strict=True):
             self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))

@@ -14,18 +14,27 @@ from ...common.arrays import Array
 from .. import _core
 from ..joints.joint import JointRecord
 from ..joints.measure import FRAME, GROUND_FRAME, Marker, Measure
+from ..joints.transmission import ElasticGear
 from ..scene.topology import Carrier
 from .model import Model
 from .planar_body import PlanarBody, core_arguments
 
-JOINTS = {
-    "revolute": (_core.JointKind.revolute, 1),
-    "prismatic": (_core.JointKind.prismatic, 1),
-    "weld": (_core.JointKind.weld, 0),
-}
-"""By type of joint: what it is to the core, and its number of coordinates."""
 
-FREE = (_core.JointKind.free, 3)
+class JointInTree(NamedTuple):
+    """What a joint is to the core, and its number of coordinates."""
+
+    kind: _core.JointKind
+    coordinates: int
+
+
+JOINTS = {
+    "revolute": JointInTree(_core.JointKind.revolute, 1),
+    "prismatic": JointInTree(_core.JointKind.prismatic, 1),
+    "weld": JointInTree(_core.JointKind.weld, 0),
+}
+"""By type of joint."""
+
+FREE = JointInTree(_core.JointKind.free, 3)
 """Of a body that nothing carries: (R, θ) of its frame."""
 
 
@@ -41,15 +50,18 @@ class Coordinate(NamedTuple):
 
 
 class Node(NamedTuple):
-    """A body, the joint that carries it from section `inner` to `outer` (None: free), first indices of both in v."""
+    """A body, the joint that carries it from section `inner` to `outer`, first indices of both in v.
+
+    `gear`: of the output of one that gives, which is a body of no inertia; its `body` is the rotor of the system.
+    """
 
     body: PlanarBody
-    joint: JointRecord | None
-    backwards: bool
+    joint: _core.JointKind
     inner: _core.MarkerAt
     outer: _core.MarkerAt
     first: int
     modes: int
+    gear: ElasticGear | None = None
 
 
 class Layout:
@@ -58,24 +70,26 @@ class Layout:
     Raises `NotInTreeError` for a type of joint that the core does not know.
 
     Attributes:
-        nodes: each after the one that carries it.
+        nodes: each after the one that carries it; outputs of gears that give come last.
         loops: names of the joints that close loops.
         size: of q and of v.
     """
 
     def __init__(self, model: Model) -> None:
         topology = model.scene.topology
-        self._index = {name: number for number, name in enumerate(topology.carriers)}
-        self._bodies = [model.body(name) for name in topology.carriers]
+        names = [*topology.carriers, *(gear.rotor for gear in model.gears)]
+        self._index = {name: number for number, name in enumerate(names)}
+        self._bodies = [model.body(name) for name in names]
         self._markers: list[dict[tuple[Marker, float], int]] = [{} for _ in (None, *self._bodies)]  # the ground's first
         self._coordinates: dict[tuple[object, ...], Coordinate] = {}
         self._kept = {c.owner: c.measure.offset for c in model.joints if c.measure.kind == _core.MeasureKind.angle}
         self.loops = {model.scene.joint[number].name for number in topology.loop_joints}
         self.nodes: list[Node] = []
         self.size = 0
-        for body, carrier in zip(self._bodies, topology.carriers.values(), strict=True):
+        for body, carrier in zip(self._bodies, topology.carriers.values(), strict=False):
             joint = None if carrier is None else model.scene.joint[carrier.joint]
             self.nodes.append(self._node(body, joint, carrier))
+        self.nodes += [self._output(gear) for gear in model.gears]
 
     def place(self, marker: Marker, turn: float = 0.0) -> _core.MarkerAt:
         """A marker, its axes turned by `turn` (rad) against its section or the ground."""
@@ -95,8 +109,9 @@ class Layout:
         """Constants of a body with all markers that were placed on it; terms that vanish are left empty."""
         body, found = self._bodies[number], _core.PlanarData()
         of_core = core_arguments(body, [], [])
-        for key in ("mass", "inertia", "first_moment"):
-            setattr(found, key, of_core[key])
+        if self.nodes[number].gear is None:
+            for key in ("mass", "inertia", "first_moment"):
+                setattr(found, key, of_core[key])
         if body.n_modes:
             for key in ("stiffness", "damping", "j", "S_tilde", "m_xy"):
                 setattr(found, key, of_core[key])
@@ -108,14 +123,24 @@ class Layout:
         first = self.size
         if joint is not None and joint.type not in JOINTS:
             raise NotInTreeError(f"{joint.label}, {joint.type}")
-        _, count = FREE if joint is None else JOINTS[joint.type]
+        kind, count = FREE if joint is None else JOINTS[joint.type]
         backwards = joint is not None and carrier is not None and joint.between[0] == carrier.own
         sides = [self.place(at, turn) for at, turn in self._sides(body, joint)]
         inner, outer = sides[::-1] if backwards else sides
         if joint is not None and count:
             self._add_coordinate(joint, Coordinate(first, -1.0 if backwards else 1.0))
         self.size = first + count + body.n_modes
-        return Node(body, joint, backwards, inner, outer, first, first + count)
+        return Node(body, kind, inner, outer, first, first + count)
+
+    def _output(self, gear: ElasticGear) -> Node:
+        """It turns on the first side of the gear's joint by θ_m, the rotor N times as fast."""
+        first, (a, b) = self.size, (gear.motor.a, gear.motor.b)
+        self._coordinates[_key(gear.motor)] = Coordinate(first, 1.0)
+        kind, count = JOINTS["revolute"]
+        self.size += count
+        return Node(
+            self._bodies[self._index[gear.rotor]], kind, self.place(a), self.place(b), first, first + count, gear
+        )
 
     def _sides(self, body: PlanarBody, joint: JointRecord | None) -> list[tuple[Marker, float]]:
         """Markers of a joint on its first and second side, and how their axes are turned: alike where it keeps these.

@@ -6,6 +6,7 @@ import zoo
 from mechanisms import always, assemble, core_run, make_model, relative, revolute
 
 from ffrobot.mbs import _core
+from ffrobot.mbs.analysis.elastic_joints import with_compliance
 from ffrobot.mbs.model.planar_tree import PlanarTree
 from ffrobot.mbs.model.tree_layout import NotInTreeError
 from ffrobot.mbs.solve.initial_state import undeformed_state
@@ -22,10 +23,11 @@ NOT_IN_TREE = {
 
 
 def bent_state(assembly, seed=1):
-    """q and v at T on all constraints, with modes of any size and rate; a and multipliers there."""
+    """q and v at T on all constraints, with modes and twists of gears of any size and rate; a and multipliers there."""
     start, rng = undeformed_state(assembly), np.random.default_rng(seed)
     modal = np.ones(assembly.system.coordinates, dtype=bool)
     modal[assembly.frame_coordinates] = False
+    modal[[assembly.first[assembly.index[gear.rotor]] + 2 for gear in assembly.model.gears]] = True
     q, v = start.q + 0.05 * rng.standard_normal(len(start.q)) * modal, start.v + rng.standard_normal(len(start.v))
     return core_run(assembly, q, v, [T])
 
@@ -41,8 +43,14 @@ def compare(assembly):
     a, scale = expected.a[0], np.abs(expected.a).max()
     frames = found.frames.reshape(-1, 6)
     modes = {number: first for number, (_, _, _, first) in zip(tree.bodies, tree.core.first, strict=True)}
+    ratios = {assembly.index[gear.rotor]: gear.ratio for gear in assembly.model.gears}
     for k, number in enumerate(tree.bodies):
         first, n = assembly.first[number], assembly.model.bodies[number].n_modes
+        if number in ratios:  # the angle of a rotor over its ratio: of the output, and a share of what carries it
+            of_output = found.accelerations[0, modes[number] - 1]
+            turned = of_output + (frames[k, 5] - of_output) / ratios[number]
+            assert relative(turned, a[first + 2], scale) < 1e-11
+            continue
         assert relative(frames[k, [0, 1, 5]], a[first : first + 3], scale) < 1e-11
         if n:
             p = found.accelerations[0, modes[number] : modes[number] + n]
@@ -57,6 +65,13 @@ def compare(assembly):
 @pytest.mark.parametrize("name", [name for name in zoo.ALL if name not in NOT_IN_TREE])
 def test_zoo(name):
     compare(assemble(zoo.build(name)))
+
+
+@pytest.mark.parametrize("name", ["chain of 3", "backwards", "mixed", "mixed backwards", "tree", "loaded"])
+def test_gears_that_give(name):
+    model = with_compliance(zoo.geared(name))
+    assert model.gears
+    compare(assemble(model))
 
 
 @pytest.mark.parametrize("name", NOT_IN_TREE)
@@ -83,8 +98,11 @@ def test_coordinates_of_frames_and_sections_are_followed(motors):
 
 def test_states_there_and_back():
     """Angles count full turns."""
-    for name in ("mixed", "mixed backwards", "four-bar", "free-flying", "backwards"):
-        assembly = assemble(zoo.build(name))
+    models = {name: zoo.build(name) for name in ("mixed", "mixed backwards", "four-bar", "free-flying", "backwards")}
+    for name in ("chain of 3", "mixed backwards"):
+        models[f"{name}, geared"] = with_compliance(zoo.geared(name))
+    for name, model in models.items():
+        assembly = assemble(model)
         expected, tree = bent_state(assembly), PlanarTree(assembly)
         q, v = expected.q[0].copy(), expected.v[0]
         q[assembly.first + 2] += 6 * np.pi

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 import zoo
 from links import arm
-from mechanisms import always, forward, pcid, relative
+from mechanisms import always, forward, make_model, pcid, relative, revolute
+from rods import rod
 
 from ffrobot.mbs.analysis import drive
+from ffrobot.mbs.analysis.elastic_joints import add_transmission
 from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.analysis.outcome import EarlierRun
 from ffrobot.mbs.analysis.pcid import run_pcid
@@ -59,6 +61,44 @@ def test_free_motion(name, in_absolute):
     found = run_forward(model, forward(**KEYS), None, ActuatorSet(), always)
     in_absolute()
     compare(found, run_forward(model, forward(**KEYS), None, ActuatorSet(), always), 1e-7)
+
+
+@pytest.mark.parametrize("name", ["chain of 3", "mixed backwards"])
+def test_free_motion_with_gears_that_give(name, in_absolute):
+    model = zoo.geared(name)
+    found = run_forward(model, forward(**KEYS), None, ActuatorSet(), always)
+    in_absolute()
+    expected = run_forward(model, forward(**KEYS), None, ActuatorSet(), always)
+    assert len(found.assembly.model.bodies) > len(model.bodies)
+    compare(found, expected, 1e-7)
+
+
+def test_gears_that_set_out_from_nothing(in_absolute):
+    """In no gravity, without damping: rounding of stiff springs is not what steps follow."""
+    gear = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 4e4}
+    joints = [revolute("O", "ground", "link1.root", **gear), revolute("A", "link1.tip", "link2.root", **gear)]
+    load = [{"joint": "O", "moment": "4*sin(2*t)**4"}, {"joint": "A", "moment": "sin(2*t)**4"}]
+    bodies = [rod("link1", 1.0, 1.0), rod("link2", 1.0, 1.0)]
+    initial = {"angles": {"link1": 0.4, "link2": 1.3}}
+    model = make_model(bodies, joint=joints, load=load, initial=initial, gravity=(0.0, 0.0))
+    keys = KEYS | {"end": 0.5}
+    found = run_forward(model, forward(**keys), None, ActuatorSet(), always)
+    in_absolute()
+    expected = run_forward(model, forward(**keys), None, ActuatorSet(), always)
+    compare(found, expected, 1e-7)
+    assert found.statistics.steps < 1.5 * expected.statistics.steps  # 0.9 times; it ended at the start before
+
+
+def test_replay_with_gears_that_give(in_absolute):
+    """Motors turn outputs, from twists that carry the moments of the inverse analysis on."""
+    gear = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0}
+    joints = [revolute("O", "ground", "link1.root", **gear), revolute("A", "link1.tip", "link2.root", **gear)]
+    model = arm(joint=joints)
+    source = add_transmission(run_pcid(model, pcid(**KEYS), True, always))
+    replay = forward(**KEYS, actuation="inverse", apply="joints")
+    found = run_forward(model, replay, source, ActuatorSet(), always)
+    in_absolute()
+    compare(found, run_forward(model, replay, source, ActuatorSet(), always), 1e-7)
 
 
 @pytest.mark.parametrize("apply", ["joints", "trajectory"])

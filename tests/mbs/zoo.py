@@ -122,7 +122,7 @@ def loaded(rng, **keys):
     bodies[1] = with_payload(bodies[1], "tip", mass=0.6, inertia=0.02)
     patches = [ModalLoad("b1", rng.standard_normal(bodies[0].n_modes), parse_expression(f"2-{k}*t")) for k in range(2)]
     tables = {"trajectory": [tip_path("b2")], "load": LOADS, "initial": {"angles": {"b1": 1.2, "b2": -0.7}}}
-    return make_model(bodies, patches, joint=serial_joints(2), **(tables | keys))
+    return make_model(bodies, patches, **({"joint": serial_joints(2)} | tables | keys))
 
 
 def stiffened(rng, **keys):
@@ -161,6 +161,13 @@ def as_built(mechanism):
         return mechanism(rng, **({"joint": built(joints)} | keys))
 
     return build
+
+
+def geared(name, **keys):
+    """A mechanism of `ALL` whose revolute joints have motors behind gears that give; rotors come with the analysis."""
+    gear = {"gear_ratio": 7.0, "rotor_inertia": 0.02, "stiffness": 90.0, "damping": 0.3, "viscous_friction": 0.2}
+    joints = [joint.model_dump(exclude_unset=True) for joint in build(name).scene.joint]
+    return build(name, joint=[joint | gear if joint["type"] == "revolute" else joint for joint in joints], **keys)
 
 
 def random_stiffening(rng, body, size=0.05):

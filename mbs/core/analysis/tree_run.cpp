@@ -26,6 +26,12 @@ const VectorXd &AbsoluteState::operator()(const double *state) {
     const double x = node.origin[0], y = node.origin[1]; // of the body's frame, in axes of the tree's
     const double d_x = R[0][0] * x + R[0][1] * y, d_y = R[1][0] * x + R[1][1] * y;
     const Index at = system_.first_coordinate[bodies_[i]], at_rate = system_.n_q() + at;
+    if (node.is_weightless) { // the rotor before a gear, whose frame stays at the origin
+      const double N = node.gear_ratio, theta = q[node.q], theta_dot = v[node.v];
+      state_.segment<3>(at) << 0, 0, theta + (angle - theta) / N;
+      state_.segment<3>(at_rate) << 0, 0, theta_dot + (omega[2] - theta_dot) / N;
+      continue;
+    }
     state_.segment<3>(at) << r[0] + d_x, r[1] + d_y, angle - node.turn;
     state_.segment<3>(at_rate) << r_dot[0] - omega[2] * d_y, r_dot[1] + omega[2] * d_x, omega[2];
     state_.segment(at + 3, node.n()) = Eigen::Map<const VectorXd>(q + node.p_q(), node.n());

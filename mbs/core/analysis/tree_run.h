@@ -10,7 +10,8 @@ namespace ffrobot {
 
 using PlanarTree = recursion::Mechanism<recursion::Planar>;
 
-// States of a system, (R, theta, p) of each body and their rates, by those of a tree of the same bodies.
+// States of a system, (R, theta, p) of each body and their rates, by those of a tree of the same bodies. The output of
+// a gear that gives stands for the rotor before it: theta is the rotor's angle over the gear's ratio.
 class AbsoluteState {
 public:
   // bodies[i]: number in the system of node i. Both must outlive this; throws std::invalid_argument where the tree has

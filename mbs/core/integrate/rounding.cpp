@@ -32,6 +32,7 @@ VectorXd rounding_error(OdeSystem &system, double t, const double *z, const doub
   VectorXd left(n);
   system.slope(t, shifted(z, n).data(), left.data());
   left = step / reach * (left - Eigen::Map<const VectorXd>(z_dot, n));
+  left.head(n / 2) += step * left.tail(n / 2); // a coordinate, by its rate
   const double rate = 1 / step;
   if (!(system.change_size(z, left.data(), rate) > notable * system.change_size(z, error.data(), rate)))
     left.setZero();

@@ -18,6 +18,7 @@ constexpr double leverage = 2;       // of multipliers: motors' moments follow f
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
 constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
 constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
+constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
 constexpr double nothing = 1e-12;
 
 template <class Space> bool is_moment(const Mechanism<Space> &m, const Row &row) {
@@ -87,6 +88,11 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
   observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
 }
 
+template <class Space> void MotionNorm<Space>::add_spring(double stiffness, double inertia) {
+  of_springs_ = std::max(of_springs_, small_twist * stiffness);
+  pace_[1] = std::max(pace_[1], small_twist * std::sqrt(stiffness / inertia));
+}
+
 template <class Space> double MotionNorm<Space>::of_state(const double *e) const {
   std::fill(size_.begin(), size_.end(), 0.0);
   for (std::size_t i = 0; i < group_.size(); ++i)
@@ -126,7 +132,8 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
   force = std::max(force, moment / length_), moment = std::max(moment, small_arm * length_ * force);
   for (std::size_t g = 0; g < is_moment_.size(); ++g) {
     const double least = small_force * (is_moment_[g] ? moment : force);
-    const double scale = std::max({force_peak_[g], force_now_[g], least, nothing});
+    const double of_springs = is_moment_[g] ? of_springs_ : of_springs_ / length_;
+    const double scale = std::max({force_peak_[g], force_now_[g], least, of_springs, nothing});
     const double size = (g < levers_ ? leverage : 1) * force_error_[g] / scale;
     if (!(size <= worst))
       worst = size; // keeps NaN

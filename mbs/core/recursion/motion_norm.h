@@ -19,6 +19,10 @@ public:
   // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed.
   explicit MotionNorm(const Mechanism<Space> &mechanism, bool is_strict = false);
 
+  // Of a spring in front of which an inertia swings (N m/rad, kg m^2): moments and rates of a small twist are small,
+  // too. At rest, where nothing else acts, they are rounding.
+  void add_spring(double stiffness, double inertia);
+
   double of_state(const double *e) const;
 
   // Keeps the forces of the last evaluation: multipliers, then those at ports; then, of another at a state that an
@@ -52,7 +56,8 @@ private:
   std::size_t levers_ = 0;            // how many groups other forces follow from: those of rows, or all
   std::vector<double> force_peak_, force_now_, force_error_;
   Eigen::VectorXd observed_, change_;
-  double inertial_ = 0; // N, largest sum of mass times acceleration
+  double of_springs_ = 0; // N m, moments below count like this one
+  double inertial_ = 0;   // N, largest sum of mass times acceleration
 };
 
 } // namespace ffrobot::recursion
