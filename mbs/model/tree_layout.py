@@ -87,6 +87,27 @@ class Layout:
         """The coordinate of the tree that a measure is; None of others."""
         return self._coordinates.get(_key(measure))
 
+    def motor(self, measure: Measure) -> tuple[int, float, Array] | None:
+        """Number and sign of the coordinate along which a motor acts, and (n_v,) what modes add to its measure.
+
+        None of those at joints where loops are cut. Frames turn as sections do, less what modes turn these.
+        """
+        if (coordinate := self.coordinate(measure)) is not None:
+            return *coordinate, np.zeros(0)
+        for node in self.nodes:
+            if node.joint is None or node.joint.coordinate("frame") != measure:
+                continue
+            of_sections = node.joint.coordinate("section")
+            assert of_sections is not None
+            on_modes = np.zeros(self.size)
+            for marker, sign in ((of_sections.a, 1.0), (of_sections.b, -1.0)):
+                if marker.body is not None:
+                    turning = self._turning(marker)
+                    first = self.nodes[self._index[marker.body]].modes
+                    on_modes[first : first + len(turning)] += sign * turning
+            return *self._coordinates[_key(of_sections)], on_modes
+        return None
+
     def ground_markers(self) -> list[_core.PlanarMarker]:
         """All that were placed."""
         return [_marker(np.array(at.position), np.zeros((3, 0)), turn) for at, turn in self._markers[0]]
