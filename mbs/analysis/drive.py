@@ -97,9 +97,8 @@ def drive(
     integrator = with_steps_of(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
-    sampled = "under a sampled controller"
     wanted = list(assembly.model.motors.values()) if resolver is not None else []
-    tree = tree_start(assembly, start, integrator, earlier, wanted) if control is None else sampled
+    tree = tree_start(assembly, start, integrator, earlier, wanted)
     point = _core.TreeCheckpoint() if isinstance(tree, TreeStart) else _core.Checkpoint()
     continuation = Continuation(point, recording)
     if earlier is not None:  # with the same candidates, and what they have become since
@@ -145,19 +144,24 @@ def _integrated(
         "times": as_list(times), "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator),
         "carry_on": progress,
     }  # fmt: skip
-    kept: dict[str, Any] = {
-        "external_loads": steering, "recording": continuation.recording, "checkpoint": continuation.checkpoint,
-    }  # fmt: skip
+    if control is None:
+        more: dict[str, Any] = {
+            "external_loads": steering, "recording": continuation.recording, "checkpoint": continuation.checkpoint,
+        }  # fmt: skip
+    else:
+        more = {
+            "motors": control.motors, "patches": control.voltages, "first_command": control.first,
+            "sensing": control.sensing, "samples": as_list(control.times), "delay": control.delay,
+            "controller": control.controller,
+        }  # fmt: skip
     if isinstance(start, TreeStart):
-        return _core.run_tree(start.tree.both, **common, **kept)
+        run = _core.run_tree if control is None else _core.run_tree_sampled
+        return run(start.tree.both, **common, **more)
     common |= {"system": assembly.system, "groups": assembly.groups, "moments": assembly.moments}
     common["joints"] = assembly.joint_measures
     if control is None:
-        return _core.run(**common, **kept, actuator_forces=resolver)
-    return _core.run_sampled(
-        **common, motors=control.motors, patches=control.voltages, first_command=control.first,
-        sensing=control.sensing, samples=as_list(control.times), delay=control.delay, controller=control.controller,
-    )  # fmt: skip
+        return _core.run(**common, **more, actuator_forces=resolver)
+    return _core.run_sampled(**common, **more)
 
 
 def motion_of(assembly: MechanismSystem, run: _core.Run | _core.FcidOutputs, times: Array) -> Motion:

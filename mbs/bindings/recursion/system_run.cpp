@@ -5,6 +5,7 @@
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/function.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
 #include <optional>
@@ -76,6 +77,30 @@ Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const V
   if (checkpoint)
     checkpoint->history = motion.history();
   return found;
+}
+
+using Controller = std::function<VectorXd(std::size_t, double, const VectorXd &)>;
+
+Run run_tree_sampled(const SystemOnTree &both, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
+                     const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
+                     std::size_t motors, std::vector<HeldCommands::Patches> patches, const VectorXd &first_command,
+                     Sensing &sensing, const std::vector<double> &samples, double delay, const Controller &controller) {
+  const VectorXd state = state_of(both, q, v);
+  const nb::gil_scoped_release unlocked;
+  HeldCommands commands(motors, std::move(patches));
+  commands.set(first_command);
+  SteeredTree steering(both, commands);
+  TreeMotion motion(both.tree, both.scene, times.front(), q.data(), v.data(), nullptr, &steering);
+  TreeOutputs outputs(both, times.size(), times.front(), state.data(), &commands);
+  const auto ask = [&](double t) {
+    const nb::gil_scoped_acquire locked;
+    return carry_on(t);
+  };
+  const auto command = [&](std::size_t k, double t, const VectorXd &y) {
+    const nb::gil_scoped_acquire locked;
+    return controller(k, t, y);
+  };
+  return run_sampled(motion, times, state, controls, outputs, commands, sensing, {samples, delay, command}, ask);
 }
 
 void bind_drives(nb::module_ &m) {
@@ -154,4 +179,7 @@ void bind_system_run(nb::module_ &m) {
   m.def("run_tree", &run_tree, "both"_a, nb::kw_only(), "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
         "external_loads"_a = nb::none(), "recording"_a = nb::none(), "checkpoint"_a = nb::none(),
         "As `run`, but integrates the tree from (q, v) of its own, in which recording and checkpoint are, too.");
+  m.def("run_tree_sampled", &run_tree_sampled, "both"_a, nb::kw_only(), "times"_a, "q"_a, "v"_a, "controls"_a,
+        "carry_on"_a, "motors"_a, "patches"_a, "first_command"_a, "sensing"_a, "samples"_a, "delay"_a, "controller"_a,
+        "As `run_tree`, under commands that `controller`(k, t, readings) gives at samples.");
 }

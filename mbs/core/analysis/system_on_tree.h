@@ -72,6 +72,8 @@ public:
   const Eigen::VectorXd &operator()(const double *state);
   const Eigen::VectorXd &operator()(const double *state, const std::vector<recursion::Pose<double>> &frames);
 
+  Eigen::Index n_q() const { return both_.system.n_q(); }
+
   // a (n_v of the system) for that of the tree, where frames move as they do
   void accelerations(const std::vector<recursion::FrameMotion> &frames, const double *a_tree, double *a) const;
 

@@ -14,4 +14,16 @@ Run run(TreeMotion &motion, const std::vector<double> &times, Eigen::VectorXd st
   return result;
 }
 
+Run run_sampled(TreeMotion &motion, const std::vector<double> &times, Eigen::VectorXd state,
+                const IntegrationControls &controls, TreeOutputs &outputs, HeldCommands &commands, Sensing &sensing,
+                const Sampling &sampling, const std::function<bool(double)> &carry_on) {
+  HeldPlant plant(commands, sensing, [&](double t, const double *y) -> HeldPlant::Observed {
+    const double *a = sensing.needs_accelerations() ? outputs.accelerations(t, y).data() : nullptr;
+    const Eigen::VectorXd &absolute = outputs.absolute()(y);
+    return {absolute.data(), absolute.data() + outputs.absolute().n_q(), a};
+  });
+  const SampledLoop loop(plant, sampling, times.back());
+  return run(motion, times, std::move(state), controls, outputs, carry_on, nullptr, &loop.breaks(), nullptr);
+}
+
 } // namespace ffrobot

@@ -1,6 +1,7 @@
 // A whole analysis of a planar system that is integrated in joint coordinates, and reported in the system's own.
 #pragma once
 
+#include "core/analysis/sampled.h"
 #include "core/analysis/tree_outputs.h"
 
 namespace ffrobot {
@@ -10,5 +11,10 @@ namespace ffrobot {
 Run run(TreeMotion &motion, const std::vector<double> &times, Eigen::VectorXd state,
         const IntegrationControls &controls, TreeOutputs &outputs, const std::function<bool(double)> &carry_on,
         Recording *recording, const Breaks *breaks, IntegrationCheckpoint *checkpoint);
+
+// The same under a sampled controller; `commands` are the external loads of `motion` and `outputs`.
+Run run_sampled(TreeMotion &motion, const std::vector<double> &times, Eigen::VectorXd state,
+                const IntegrationControls &controls, TreeOutputs &outputs, HeldCommands &commands, Sensing &sensing,
+                const Sampling &sampling, const std::function<bool(double)> &carry_on);
 
 } // namespace ffrobot
