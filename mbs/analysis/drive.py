@@ -1,7 +1,7 @@
 """Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here.
 
-Joint coordinates are integrated where the mechanism can be told in them (`model.planar_tree`), else those of the
-system. Outputs are evaluated by the system either way.
+Joint coordinates are integrated, and outputs evaluated in them, where the mechanism can be told in them
+(`model.planar_tree`), else those of the system.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ..solve.state import State
 from ..solve.statics import static_equilibrium
 from .earlier_check import check_earlier, kept_of
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
-from .tree_start import TreeStart, tree_start
+from .tree_start import TreeStart, tree_size, tree_start
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -86,7 +86,8 @@ def drive(
     times = analysis.times if times is None else times
     motors = len(assembly.motor_measures) if resolver is not None else None
     if earlier is not None and earlier.statistics.status == "completed":
-        check_earlier(earlier, assembly, times, motors, recorded=recording is not None)
+        size = tree_size(assembly, earlier)
+        check_earlier(earlier, assembly, times, motors, recorded=recording is not None, tree_size=size)
         integrated = None if reported is None else assembly
         return Outcome(
             analysis, reported or assembly, earlier.motion, earlier.forces, earlier.statistics,
@@ -96,8 +97,8 @@ def drive(
     integrator = with_steps_of(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
-    sampled = "under a sampled controller"
-    tree = tree_start(assembly, start, integrator, earlier) if control is None else sampled
+    wanted = list(assembly.model.motors.values()) if resolver is not None else []
+    tree = tree_start(assembly, start, integrator, earlier, wanted)
     point = _core.TreeCheckpoint() if isinstance(tree, TreeStart) else _core.Checkpoint()
     continuation = Continuation(point, recording)
     if earlier is not None:  # with the same candidates, and what they have become since
@@ -140,22 +141,27 @@ def _integrated(
     progress: Progress,
 ) -> _core.Run:
     common: dict[str, Any] = {
-        "system": assembly.system, "times": as_list(times), "q": start.q, "v": start.v,
-        "controls": integration_controls(analysis, integrator), "carry_on": progress,
+        "times": as_list(times), "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator),
+        "carry_on": progress,
     }  # fmt: skip
-    kept: dict[str, Any] = {
-        "external_loads": steering, "actuator_forces": resolver, "recording": continuation.recording,
-        "checkpoint": continuation.checkpoint,
-    }  # fmt: skip
-    if isinstance(start, TreeStart):
-        return _core.run_tree(**start.core_arguments, **common, **kept)
-    common |= {"groups": assembly.groups, "moments": assembly.moments, "joints": assembly.joint_measures}
     if control is None:
-        return _core.run(**common, **kept)
-    return _core.run_sampled(
-        **common, motors=control.motors, patches=control.voltages, first_command=control.first,
-        sensing=control.sensing, samples=as_list(control.times), delay=control.delay, controller=control.controller,
-    )  # fmt: skip
+        more: dict[str, Any] = {
+            "external_loads": steering, "recording": continuation.recording, "checkpoint": continuation.checkpoint,
+        }  # fmt: skip
+    else:
+        more = {
+            "motors": control.motors, "patches": control.voltages, "first_command": control.first,
+            "sensing": control.sensing, "samples": as_list(control.times), "delay": control.delay,
+            "controller": control.controller,
+        }  # fmt: skip
+    if isinstance(start, TreeStart):
+        run = _core.run_tree if control is None else _core.run_tree_sampled
+        return run(start.tree.both, **common, **more)
+    common |= {"system": assembly.system, "groups": assembly.groups, "moments": assembly.moments}
+    common["joints"] = assembly.joint_measures
+    if control is None:
+        return _core.run(**common, **more, actuator_forces=resolver)
+    return _core.run_sampled(**common, **more)
 
 
 def motion_of(assembly: MechanismSystem, run: _core.Run | _core.FcidOutputs, times: Array) -> Motion:

@@ -25,7 +25,7 @@ def check_earlier(
     """Make sure that `earlier` is a run of `assembly` with outputs at `times`.
 
     `motors`: as many as the analysis finds forces of; None where it finds none. `recorded`: whether a later analysis
-    replays it. `tree_size`: of q and of v where it goes on in joint coordinates.
+    replays it. `tree_size`: of q and of v of the tree; None where there is none.
 
     Raises `InputError` for sizes, times or numbers that are not those of such a run.
     """
@@ -77,8 +77,7 @@ class _Check:
         if isinstance(point, _core.Checkpoint):
             self._of_system(point, motors)
         else:
-            self.kept.expect(self.tree_size is not None, "checkpoint", "what a run of this scene remembers")
-            self.kept.tree_checkpoint(point, self.tree_size or 0, self.tree_size or 0)
+            self.kept.tree_checkpoint(point, self._size_of_tree, self._size_of_tree)
         self.kept.expect(point.steps.next_step > 0.0, "checkpoint", "a positive step")
 
     def _of_system(self, point: _core.Checkpoint, motors: int | None) -> None:
@@ -100,12 +99,19 @@ class _Check:
             return
         steps = recording.times
         self.kept.numbers("recording/times", steps, (len(steps),))
-        self.kept.numbers("recording/states", recording.states, (self._state_size * len(steps),))
+        in_tree = isinstance(self.earlier.continuation.checkpoint, _core.TreeCheckpoint)
+        size = 2 * self._size_of_tree if in_tree else self._state_size
+        self.kept.numbers("recording/states", recording.states, (size * len(steps),))
         last = self.times[-1] if self._completed else self.earlier.continuation.checkpoint.time
         fits = len(steps) > 0 and steps[0] == self.times[0] and bool(np.all(np.diff(steps) > 0.0))
         self.kept.expect(
             fits and abs(steps[-1] - last) <= self.kept.slack, "recording/times", f"steps up to t = {last:g} s"
         )
+
+    @property
+    def _size_of_tree(self) -> int:
+        self.kept.expect(self.tree_size is not None, "checkpoint", "what a run of this scene remembers")
+        return self.tree_size or 0
 
     @property
     def _state_size(self) -> int:

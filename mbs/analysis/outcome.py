@@ -13,6 +13,7 @@ from ...common.errors import SolveError
 from .. import _core
 from .._core import TimeFunction
 from ..joints.measure import Measure
+from ..model.planar_tree import PlanarTree
 from ..model.raised_mass import coordinate_factors, modal_factors
 from ..model.system import MechanismSystem
 from ..scene.analysis import Analysis
@@ -115,8 +116,7 @@ class Continuation:
     """Where an integration can be gone on with, and its steps where a later analysis replays them.
 
     Both are in the coordinates of `assembly`, what was integrated, where that is not the outcome's: see `raised_mass`.
-    The checkpoint is one of a tree where joint coordinates were integrated: the steps after it are then those that the
-    run would have made.
+    They are of its tree where joint coordinates were integrated.
     """
 
     checkpoint: _core.Checkpoint | _core.TreeCheckpoint
@@ -180,6 +180,9 @@ class Details:
             return None
         assembly = outcome.continuation.assembly or outcome.assembly
         recording, resolver = outcome.continuation.recording, outcome.resolver(assembly)
+        if isinstance(outcome.continuation.checkpoint, _core.TreeCheckpoint):
+            motors = () if resolver is None else assembly.model.motors.values()
+            return _core.TreeActuation(PlanarTree(assembly, motors).both, recording)
         return _core.RecordedActuation(assembly.system, recording, assembly.is_trajectory, resolver)
 
 

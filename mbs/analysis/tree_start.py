@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 from ...common.arrays import Array
 from .. import _core
+from ..joints.measure import Measure
 from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
 from ..model.tree_layout import NotInTreeError
@@ -29,19 +30,18 @@ class TreeStart:
     q: Array
     v: Array
 
-    @property
-    def core_arguments(self) -> dict[str, Any]:
-        """Of `_core.run_tree`, beside those that it shares with `_core.run`."""
-        tree = self.tree
-        return {"tree": tree.core, "scene": tree.scene, "bodies": tree.bodies, "drives": tree.drives}
-
 
 def tree_start(
-    assembly: MechanismSystem, start: State, integrator: Choice, earlier: EarlierRun | None
+    assembly: MechanismSystem,
+    start: State,
+    integrator: Choice,
+    earlier: EarlierRun | None,
+    motors: Iterable[Measure],
 ) -> TreeStart | str:
     """What is integrated in joint coordinates from `start`; or why nothing is.
 
-    A run that goes on with an `earlier` one stays in the coordinates in which that was stopped.
+    A run that goes on with an `earlier` one stays in the coordinates in which that was stopped. `motors`: along which
+    forces are to be found.
     """
     if earlier is not None and isinstance(earlier.continuation.checkpoint, _core.Checkpoint):
         return "as the run that it goes on with"
@@ -50,7 +50,17 @@ def tree_start(
     if assembly.model.scene.topology.loop_joints:
         return LOOPS
     try:
-        tree = PlanarTree(assembly)
+        tree = PlanarTree(assembly, motors)
         return TreeStart(tree, *tree.state(start.q, start.v))
     except NotInTreeError as why:
         return str(why)
+
+
+def tree_size(assembly: MechanismSystem, earlier: EarlierRun) -> int | None:
+    """Of q and of v of the tree in whose coordinates an `earlier` run was integrated; None where in absolute ones."""
+    if not isinstance(earlier.continuation.checkpoint, _core.TreeCheckpoint):
+        return None
+    try:
+        return int(PlanarTree(assembly).core.n_v)
+    except NotInTreeError:
+        return None

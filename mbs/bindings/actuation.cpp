@@ -1,6 +1,8 @@
+#include "core/actuation/actuator_forces.h"
 #include "core/actuation/actuators.h"
 #include "core/actuation/allocation.h"
 #include "core/actuation/points.h"
+#include "core/actuation/side_by_side.h"
 #include "core/actuation/source.h"
 
 #include <nanobind/eigen/dense.h>
@@ -30,20 +32,26 @@ RowMajorMatrix allocate(Allocation &allocation, const RowMajorMatrix &F_p) {
   return V;
 }
 
+VectorXd joined(const std::vector<VectorXd> &parts) {
+  Index size = 0;
+  for (const auto &part : parts)
+    size += part.size();
+  VectorXd whole(size);
+  collect(parts, 0, whole);
+  return whole;
+}
+
 // What a source gives at `times`: tau (T, motors) and F_p (T, modes of all bodies)
 std::tuple<RowMajorMatrix, RowMajorMatrix> sample(ActuationSource &source, const std::vector<double> &times) {
   const auto T = static_cast<Index>(times.size());
-  RowMajorMatrix tau, F_p(T, source.system().n_modes());
+  RowMajorMatrix tau, F_p;
   for (Index i = 0; i < T; ++i) {
     source.evaluate(times[static_cast<std::size_t>(i)]);
+    const VectorXd modal = joined(source.modal_force());
     if (i == 0)
-      tau.resize(T, source.tau().size());
+      tau.resize(T, source.tau().size()), F_p.resize(T, modal.size());
     tau.row(i) = source.tau().transpose();
-    Index column = 0;
-    for (const auto &part : source.modal_force()) {
-      F_p.row(i).segment(column, part.size()) = part.transpose();
-      column += part.size();
-    }
+    F_p.row(i) = modal.transpose();
   }
   return {tau, F_p};
 }

@@ -6,7 +6,7 @@ close loops and the trajectories are rows, loads act along coordinates of joints
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,14 @@ from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError
 MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
 COMPONENTS = {_core.MeasureKind.x: 0, _core.MeasureKind.y: 1, _core.MeasureKind.angle: 2, _core.MeasureKind.gear: 2}
 """Of a planar wrench, of the force along a measure whose direction is that of the ground."""
+
+TRANSMITTED = {
+    _core.MeasureKind.x: _core.JointComponent.x,
+    _core.MeasureKind.y: _core.JointComponent.y,
+    _core.MeasureKind.angle: _core.JointComponent.moment,
+    _core.MeasureKind.slide: _core.JointComponent.across,
+}
+"""What of a joint's force and moment a constraint of it is, by the kind of its measure."""
 
 
 class Share(NamedTuple):
@@ -40,11 +48,15 @@ class PlanarTree:
         scene: what rows follow, loads, friction.
         drives: where those drives of the system act whose forces are set from outside.
         bodies: number in the system of each body of the tree.
+        both: the system and the tree, with what is one in the other.
         constraints: of the system that are rows of `core`: trajectories, and joints that close loops.
     """
 
-    def __init__(self, assembly: MechanismSystem) -> None:
-        """Raises `NotInTreeError`."""
+    def __init__(self, assembly: MechanismSystem, motors: Iterable[Measure] = ()) -> None:
+        """`motors`: along which forces are to be found that take the place of those of trajectories.
+
+        Raises `NotInTreeError`.
+        """
         _check(assembly)
         model, self._assembly, self._layout = assembly.model, assembly, Layout(assembly.model)
         self.bodies = [assembly.index[node.body.name] for node in self._layout.nodes]
@@ -67,6 +79,9 @@ class PlanarTree:
         self.core = _core.PlanarModel(
             bodies, self._layout.ground_markers(), rows, wrenches, np.array(model.scene.gravity)
         )
+        self.both = _core.SystemOnTree(
+            assembly.system, self.core, self.scene, self.bodies, self.drives, self._reactions(motors)
+        )
 
     def state(self, q: Array, v: Array) -> tuple[Array, Array]:
         """(q, v) of the tree for those of the system, (coordinates,) each.
@@ -78,7 +93,7 @@ class PlanarTree:
             first, n = int(self._assembly.first[number]), node.body.n_modes
             for of_tree, of_system in zip(found, (q, v), strict=True):
                 of_tree[node.modes : node.modes + n] = of_system[first + 3 : first + 3 + n]
-                if node.joint == FREE.kind:
+                if node.kind == FREE.kind:
                     of_tree[node.first : node.modes] = of_system[first : first + 3]
         measures, coordinates = self._joints()
         along = [(measure, order) for order in (0, 1) for measure in measures]
@@ -141,6 +156,28 @@ class PlanarTree:
             direction[node.modes : node.modes + node.body.n_modes] = load.vector
             self.scene.add_load(direction, load.magnitude)
 
+    def _reactions(self, motors: Iterable[Measure]) -> _core.ReactionsOnTree:
+        """What the constraints of the system are in the tree, and `motors`."""
+        found, signs = _core.ReactionsOnTree(), self.row_signs
+        rows = {constraint: k for k, constraint in enumerate(self.constraints)}
+        nodes = {node.joint.name: k for k, node in enumerate(self._layout.nodes) if node.joint is not None}
+        rotors = {node.gear.rotor: node.body for node in self._layout.nodes if node.gear is not None}
+        for number, constraint in enumerate(self._assembly.constraints):
+            if (row := rows.get(constraint)) is not None:
+                found.add_row(number, row, signs[row], constraint.is_trajectory)
+            elif constraint.owner in rotors:
+                component = COMPONENTS[constraint.measure.kind]
+                found.add_weight(number, rotors[constraint.owner].mass * self._assembly.model.scene.gravity[component])
+            else:
+                node = nodes[constraint.owner]
+                component = TRANSMITTED[constraint.measure.kind]
+                found.add_joint(number, node, component, self._layout.nodes[node].backwards)
+        for measure in motors:
+            if (motor := self._layout.motor(measure)) is None:
+                raise NotInTreeError(f"a motor along a coordinate that is none of the tree ({measure.label})")
+            found.add_motor(*motor)
+        return found
+
     def _add_what_joints_have(self) -> None:
         """Friction, rotors, gears that give."""
         model = self._assembly.model
@@ -172,7 +209,7 @@ class PlanarTree:
         body = _core.PlanarBody()
         body.name, body.data = node.body.name, self._layout.data(number)
         body.parent, body.parent_marker, body.inboard_marker = node.inner.body, node.inner.marker, node.outer.marker
-        body.joint = node.joint
+        body.joint = node.kind
         coordinates = range(node.first, node.modes)
         body.driven = not self._driven.isdisjoint(coordinates)
         # Else the core may take the frame's coordinates where modes turn the section: same motion, other numbers.

@@ -52,15 +52,18 @@ class Coordinate(NamedTuple):
 class Node(NamedTuple):
     """A body, the joint that carries it from section `inner` to `outer`, first indices of both in v.
 
-    `gear`: of the output of one that gives, which is a body of no inertia; its `body` is the rotor of the system.
+    `joint`: None of one that nothing carries, and of the output of a `gear` that gives, a body of no inertia whose
+    `body` is the rotor of the system. `backwards`: `inner` is the second side of the joint.
     """
 
     body: PlanarBody
-    joint: _core.JointKind
+    kind: _core.JointKind
     inner: _core.MarkerAt
     outer: _core.MarkerAt
     first: int
     modes: int
+    joint: JointRecord | None = None
+    backwards: bool = False
     gear: ElasticGear | None = None
 
 
@@ -101,6 +104,27 @@ class Layout:
         """The coordinate of the tree that a measure is; None of others."""
         return self._coordinates.get(_key(measure))
 
+    def motor(self, measure: Measure) -> tuple[int, float, Array] | None:
+        """Number and sign of the coordinate along which a motor acts, and (n_v,) what modes add to its measure.
+
+        None of those at joints where loops are cut. Frames turn as sections do, less what modes turn these.
+        """
+        if (coordinate := self.coordinate(measure)) is not None:
+            return *coordinate, np.zeros(0)
+        for node in self.nodes:
+            if node.joint is None or node.joint.coordinate("frame") != measure:
+                continue
+            of_sections = node.joint.coordinate("section")
+            assert of_sections is not None
+            on_modes = np.zeros(self.size)
+            for marker, sign in ((of_sections.a, 1.0), (of_sections.b, -1.0)):
+                if marker.body is not None:
+                    turning = self._turning(marker)
+                    first = self.nodes[self._index[marker.body]].modes
+                    on_modes[first : first + len(turning)] += sign * turning
+            return *self._coordinates[_key(of_sections)], on_modes
+        return None
+
     def ground_markers(self) -> list[_core.PlanarMarker]:
         """All that were placed."""
         return [_marker(np.array(at.position), np.zeros((3, 0)), turn) for at, turn in self._markers[0]]
@@ -130,7 +154,7 @@ class Layout:
         if joint is not None and count:
             self._add_coordinate(joint, Coordinate(first, -1.0 if backwards else 1.0))
         self.size = first + count + body.n_modes
-        return Node(body, kind, inner, outer, first, first + count)
+        return Node(body, kind, inner, outer, first, first + count, joint, backwards)
 
     def _output(self, gear: ElasticGear) -> Node:
         """It turns on the first side of the gear's joint by θ_m, the rotor N times as fast."""
@@ -138,9 +162,8 @@ class Layout:
         self._coordinates[_key(gear.motor)] = Coordinate(first, 1.0)
         kind, count = JOINTS["revolute"]
         self.size += count
-        return Node(
-            self._bodies[self._index[gear.rotor]], kind, self.place(a), self.place(b), first, first + count, gear
-        )
+        body = self._bodies[self._index[gear.rotor]]
+        return Node(body, kind, self.place(a), self.place(b), first, first + count, gear=gear)
 
     def _sides(self, body: PlanarBody, joint: JointRecord | None) -> list[tuple[Marker, float]]:
         """Markers of a joint on its first and second side, and how their axes are turned: alike where it keeps these.

@@ -22,6 +22,13 @@ NOT_IN_TREE = {
 }
 
 
+RESOLVED = [
+    *("chain of 2", "chain of 3", "chain of 6", "backwards", "mixed", "mixed backwards", "tree", "loaded"),
+    *("four-bar", "slider-crank"),
+]
+AS_BUILT = [("mixed, as built", "section")]  # friction on frames that links turn against sections is not in the tree
+
+
 def bent_state(assembly, seed=1):
     """q and v at T on all constraints, with modes and twists of gears of any size and rate; a and multipliers there."""
     start, rng = undeformed_state(assembly), np.random.default_rng(seed)
@@ -33,32 +40,30 @@ def bent_state(assembly, seed=1):
 
 
 def outputs(tree, q, v):
-    return _core.tree_outputs(tree.core, tree.scene, [T], np.concatenate([q, v])[None])
+    """What a run of the tree reports of a state of its own at T."""
+    controls = _core.IntegrationControls(
+        tolerance=1e-6, max_steps=0, methods=[(_core.MethodKind.dop853, 1.0, 0.0)], spectral_radius=0.8
+    )
+    return _core.run_tree(tree.both, times=[T], q=q, v=v, controls=controls, carry_on=always)
+
+
+def both_at_one_state(assembly, motors=(), **keys):
+    """The tree, what it reports of a state, and what the system reports of the same."""
+    state, tree = bent_state(assembly), PlanarTree(assembly, motors)
+    found = outputs(tree, *tree.state(state.q[0], state.v[0]))
+    for of_tree, of_system in ((found.q, state.q), (found.v, state.v)):  # each is projected onto its own rows
+        np.testing.assert_allclose(of_tree, of_system, rtol=0, atol=1e-10)
+    return tree, found, core_run(assembly, found.q[0], found.v[0], [T], **keys)
 
 
 def compare(assembly):
-    """Accelerations of frames and modes, multipliers of trajectories and of joints that close loops."""
-    expected, tree = bent_state(assembly), PlanarTree(assembly)
-    found = outputs(tree, *tree.state(expected.q[0], expected.v[0]))
-    a, scale = expected.a[0], np.abs(expected.a).max()
-    frames = found.frames.reshape(-1, 6)
-    modes = {number: first for number, (_, _, _, first) in zip(tree.bodies, tree.core.first, strict=True)}
-    ratios = {assembly.index[gear.rotor]: gear.ratio for gear in assembly.model.gears}
-    for k, number in enumerate(tree.bodies):
-        first, n = assembly.first[number], assembly.model.bodies[number].n_modes
-        if number in ratios:  # the angle of a rotor over its ratio: of the output, and a share of what carries it
-            of_output = found.accelerations[0, modes[number] - 1]
-            turned = of_output + (frames[k, 5] - of_output) / ratios[number]
-            assert relative(turned, a[first + 2], scale) < 1e-11
-            continue
-        assert relative(frames[k, [0, 1, 5]], a[first : first + 3], scale) < 1e-11
-        if n:
-            p = found.accelerations[0, modes[number] : modes[number] + n]
-            assert relative(p, a[first + 3 : first + 3 + n], scale) < 1e-11
-    rows = [k for k, constraint in enumerate(assembly.constraints) if constraint in tree.constraints]
-    if rows:
-        multipliers = found.multipliers[0] * tree.row_signs
-        assert relative(multipliers, expected.multipliers[0, rows], np.abs(expected.multipliers).max()) < 1e-11
+    """Accelerations and all multipliers; those of joints come from an inverse sweep."""
+    tree, found, expected = both_at_one_state(assembly)
+    held = len(assembly.constraints)
+    assert relative(found.a, expected.a) < 1e-11
+    if held:
+        assert relative(found.multipliers, expected.multipliers[:, :held]) < 1e-11
+    assert found.residual.max() < 1e-12
     return tree
 
 
@@ -108,16 +113,46 @@ def test_states_there_and_back():
         q[assembly.first + 2] += 6 * np.pi
         if name.startswith("mixed") or name == "four-bar":  # prismatic joints and the ground keep angles
             q = expected.q[0]
-        start_q, start_v = tree.state(q, v)
-        controls = _core.IntegrationControls(
-            tolerance=1e-6, max_steps=0, methods=[(_core.MethodKind.dop853, 1.0, 0.0)], spectral_radius=0.8
-        )
-        run = _core.run_tree(
-            system=assembly.system, tree=tree.core, scene=tree.scene, bodies=tree.bodies, drives=tree.drives,
-            times=[T], q=start_q, v=start_v, controls=controls, carry_on=always,
-        )  # fmt: skip
+        run = outputs(tree, *tree.state(q, v))
         np.testing.assert_allclose(run.q[0], q, rtol=0, atol=1e-12)
         np.testing.assert_allclose(run.v[0], v, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("name", "motors"), [(name, side) for name in RESOLVED for side in ("section", "frame")] + AS_BUILT
+)
+def test_motor_and_modal_forces(name, motors):
+    """τ and F_p in place of the forces on trajectories, of loops with a motor in the tree, too."""
+    assembly = assemble(zoo.build(name, motors=motors))
+    forces = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
+    _, found, expected = both_at_one_state(assembly, assembly.model.motors.values(), actuator_forces=forces)
+    assert relative(found.tau, expected.tau) < 1e-11
+    assert relative(found.F_p, expected.F_p) < 1e-11
+
+
+def test_motor_where_a_loop_is_cut():
+    joints = [joint.model_dump(exclude_unset=True) for joint in zoo.build("four-bar").scene.joint]
+    joints[0]["motor"], joints[3]["motor"] = False, True
+    assembly = assemble(zoo.four_bar(np.random.default_rng(0), joint=joints))
+    with pytest.raises(NotInTreeError, match=r'a motor along a coordinate that is none of the tree .joint "j4", angle'):
+        PlanarTree(assembly, assembly.model.motors.values())
+
+
+@pytest.mark.parametrize("name", ["chain of 2", "mixed", "mixed backwards", "four-bar", "slider-crank", "tree"])
+def test_accelerations_that_violate_a_row_are_seen(name):
+    """By as much as the gradients of the rows say, which their rates are linear in."""
+    assembly = assemble(zoo.build(name))
+    state, tree = bent_state(assembly), PlanarTree(assembly)
+    q, v = tree.state(state.q[0], state.v[0])
+    target = tree.row_signs * [constraint.target(T)[2] for constraint in tree.constraints]
+    a = tree.core.evaluate(q, v, target, None, None)[0]
+    assert tree.both.acceleration_violation(T, q, v, a) < 1e-13
+    for k, unit in enumerate(np.eye(len(v))):
+        felt = np.abs(tree.core.measure(q, unit)[1]).max()
+        found = tree.both.acceleration_violation(T, q, v, a + 1e-3 * unit)
+        assert found <= 1e-3 * felt + 1e-13, k
+        assert found > 1e-8 or felt < 1e-2, k
+    assert tree.both.acceleration_violation(T, q, 0.0 * v, a) > 1e-3
 
 
 def test_more_rows_than_the_core_has():

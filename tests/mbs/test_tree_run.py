@@ -49,10 +49,15 @@ def compare(found, expected, share):
 
 @pytest.mark.parametrize("name", DRIVEN)
 def test_inverse_dynamics(name, in_absolute):
-    model = zoo.build(name)
-    found = run_pcid(model, pcid(**KEYS), False, always)
+    """At outputs, and between them, where recorded steps are made again."""
+    model, times = zoo.build(name), np.sort(np.random.default_rng(0).uniform(0.0, KEYS["end"], 20)).tolist()
+    found = run_pcid(model, pcid(**KEYS), True, always)
     in_absolute()
-    compare(found, run_pcid(model, pcid(**KEYS), False, always), 1e-7)
+    expected = run_pcid(model, pcid(**KEYS), True, always)
+    compare(found, expected, 1e-7)
+    forces = [source.details.actuation_source(source).sample(times) for source in (found, expected)]
+    for of_tree, of_system in zip(*forces, strict=True):
+        assert relative(of_tree, of_system) < 1e-7
 
 
 @pytest.mark.parametrize("name", [*DRIVEN, "free-flying", "loaded, frame motors"])
@@ -103,7 +108,7 @@ def test_replay_with_gears_that_give(in_absolute):
 
 @pytest.mark.parametrize("apply", ["joints", "trajectory"])
 def test_replay(apply, in_absolute):
-    """Steps recorded in joint coordinates are made again in absolute ones, and act on the tree."""
+    """What is recorded in joint coordinates acts in them, and in absolute ones."""
     model = arm()
     source = run_pcid(model, pcid(**KEYS), True, always)
     replay = forward(**KEYS, actuation="inverse", apply=apply)
@@ -112,6 +117,8 @@ def test_replay(apply, in_absolute):
     in_absolute()
     expected = run_forward(model, replay, source, ActuatorSet(), always)
     compare(found, expected, 1e-7)
+    in_system = run_pcid(model, pcid(**KEYS), True, always)
+    compare(found, run_forward(model, replay, in_system, ActuatorSet(), always), 1e-7)
     if apply == "trajectory":
         assert relative(found.q, source.q) < 1e-6
 

@@ -1,9 +1,11 @@
 // Runs in joint coordinates of systems in the plane: mbs/core/analysis/tree_run.h.
+#include "core/analysis/tree_replay.h"
 #include "core/analysis/tree_run.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/function.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
 #include <optional>
@@ -21,56 +23,87 @@ namespace {
 
 using PlanarModel = recursion::Model<Planar>;
 
-void check_drives(const System &system, const PlanarModel &tree, const DrivesOnTree &drives) {
-  const auto check_drive = [&](std::size_t drive) {
-    recursion::check_index("drive", static_cast<int>(drive), system.drives.size());
-  };
-  for (const auto &[drive, coordinate, share] : drives.along)
-    check_drive(drive), recursion::check_index("coordinate", coordinate, static_cast<std::size_t>(tree.mechanism.n_v));
-  for (const auto &[drive, wrench, component, share] : drives.at_points) {
-    check_drive(drive);
-    recursion::check_index("wrench", wrench, tree.mechanism.wrenches.size());
-    recursion::check_index("component", component, Planar::dim);
-  }
-  check_size("modes", static_cast<Index>(drives.modes.size()), static_cast<Index>(system.bodies.size()));
-  for (std::size_t b = 0; b < drives.modes.size(); ++b)
-    recursion::check_index("modes", drives.modes[b],
-                           static_cast<std::size_t>(tree.mechanism.n_v - system.bodies[b].modes() + 1));
+void make_both(SystemOnTree *made, const System &system, const PlanarModel &tree, const recursion::Scene &scene,
+               std::vector<std::size_t> bodies, const DrivesOnTree &drives, const ReactionsOnTree &reactions) {
+  recursion::check_scene(tree, scene);
+  SystemOnTree both{system, tree.mechanism, scene, std::move(bodies), drives, reactions};
+  both.check();
+  new (made) SystemOnTree(std::move(both));
 }
 
-Run run_tree(const System &system, const PlanarModel &tree, const recursion::Scene &scene,
-             std::vector<std::size_t> bodies, const DrivesOnTree &drives, const std::vector<double> &times,
-             const VectorXd &q, const VectorXd &v, const IntegrationControls &controls,
-             const std::function<bool(double)> &carry_on, ExternalLoads *external_loads,
-             ActuatorForces *actuator_forces, Recording *recording, recursion::TreeCheckpoint *checkpoint) {
-  tree.check_state(q, v);
-  recursion::check_scene(tree, scene);
-  check_drives(system, tree, drives);
+void check_state(const SystemOnTree &both, const VectorXd &q, const VectorXd &v) {
+  check_size("q", q.size(), both.tree.n_q);
+  check_size("v", v.size(), both.tree.n_v);
+}
+
+VectorXd state_of(const SystemOnTree &both, const VectorXd &q, const VectorXd &v) {
+  check_state(both, q, v);
+  VectorXd state(q.size() + v.size());
+  state << q, v;
+  return state;
+}
+
+double violation_of(const SystemOnTree &both, double t, const VectorXd &q, const VectorXd &v, const VectorXd &a) {
+  check_state(both, q, v);
+  check_size("a", a.size(), both.tree.n_v);
+  TreeMotion motion(both.tree, both.scene, t, q.data(), v.data());
+  VectorXd solved(a.size());
+  motion.evaluate(t, q.data(), v.data(), solved.data());
+  recursion::NewtonEuler forces(both.tree);
+  forces.accelerate(q.data(), a.data(), motion.workspace());
+  return acceleration_residual(both, t, a.data(), forces, motion.workspace());
+}
+
+Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
+             const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
+             ExternalLoads *external_loads, Recording *recording, recursion::TreeCheckpoint *checkpoint) {
+  const VectorXd state = state_of(both, q, v);
   const nb::gil_scoped_release unlocked;
   std::optional<SteeredTree> steering;
   if (external_loads)
-    steering.emplace(system, *external_loads, drives);
-  recursion::RecursiveMotion<Planar> motion(tree.mechanism, scene, times.front(), q.data(), v.data(), nullptr,
-                                            steering ? &*steering : nullptr);
+    steering.emplace(both, *external_loads);
+  TreeMotion motion(both.tree, both.scene, times.front(), q.data(), v.data(), nullptr, steering ? &*steering : nullptr);
   if (checkpoint && checkpoint->integration.has_begun()) {
-    check_size("state of the checkpoint", checkpoint->integration.state.size(), q.size() + v.size());
+    check_size("state of the checkpoint", checkpoint->integration.state.size(), state.size());
     motion.go_on(checkpoint->history);
   }
   const auto ask = [&](double t) {
     const nb::gil_scoped_acquire locked;
     return carry_on(t);
   };
-  Run found = run(motion, {system, tree.mechanism, std::move(bodies)}, times, q, v, controls,
-                  {system, times.size(), external_loads, actuator_forces}, ask, recording,
+  TreeOutputs outputs(both, times.size(), times.front(), state.data(), external_loads);
+  Run found = run(motion, times, state, controls, outputs, ask, recording, nullptr,
                   checkpoint ? &checkpoint->integration : nullptr);
   if (checkpoint)
     checkpoint->history = motion.history();
   return found;
 }
 
-} // namespace
+using Controller = std::function<VectorXd(std::size_t, double, const VectorXd &)>;
 
-void bind_system_run(nb::module_ &m) {
+Run run_tree_sampled(const SystemOnTree &both, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
+                     const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
+                     std::size_t motors, std::vector<HeldCommands::Patches> patches, const VectorXd &first_command,
+                     Sensing &sensing, const std::vector<double> &samples, double delay, const Controller &controller) {
+  const VectorXd state = state_of(both, q, v);
+  const nb::gil_scoped_release unlocked;
+  HeldCommands commands(motors, std::move(patches));
+  commands.set(first_command);
+  SteeredTree steering(both, commands);
+  TreeMotion motion(both.tree, both.scene, times.front(), q.data(), v.data(), nullptr, &steering);
+  TreeOutputs outputs(both, times.size(), times.front(), state.data(), &commands);
+  const auto ask = [&](double t) {
+    const nb::gil_scoped_acquire locked;
+    return carry_on(t);
+  };
+  const auto command = [&](std::size_t k, double t, const VectorXd &y) {
+    const nb::gil_scoped_acquire locked;
+    return controller(k, t, y);
+  };
+  return run_sampled(motion, times, state, controls, outputs, commands, sensing, {samples, delay, command}, ask);
+}
+
+void bind_drives(nb::module_ &m) {
   nb::class_<DrivesOnTree>(m, "DrivesOnTree", "Where drives and modal forces of a system act in a tree.")
       .def(
           "__init__",
@@ -89,9 +122,68 @@ void bind_system_run(nb::module_ &m) {
           },
           "drive"_a, "wrench"_a, "component"_a, "share"_a,
           "`share` times the drive is a component of (force, moment), global axes, on a wrench of the tree.");
-  m.def("run_tree", &run_tree, nb::kw_only(), "system"_a, "tree"_a, "scene"_a, "bodies"_a, "drives"_a, "times"_a, "q"_a,
-        "v"_a, "controls"_a, "carry_on"_a, "external_loads"_a = nb::none(), "actuator_forces"_a = nb::none(),
-        "recording"_a = nb::none(), "checkpoint"_a = nb::none(),
-        "As `run`, but integrates a tree of the same bodies from (q, v) of its own; bodies: number in the system of\n"
-        "each of the tree's.");
+}
+
+void bind_reactions(nb::module_ &m) {
+  using Component = ReactionsOnTree::Component;
+  nb::enum_<Component>(m, "JointComponent", "Of what a joint transmits: mbs/core/analysis/system_on_tree.h.")
+      .value("x", Component::x)
+      .value("y", Component::y)
+      .value("moment", Component::moment)
+      .value("across", Component::across);
+  nb::class_<ReactionsOnTree>(m, "ReactionsOnTree", "What constraints and motors of a system are in a tree.")
+      .def(nb::init<>())
+      .def(
+          "add_row",
+          [](ReactionsOnTree &r, int constraint, int row, double sign, bool is_trajectory) {
+            r.rows.push_back({constraint, row, sign, is_trajectory});
+          },
+          "constraint"_a, "row"_a, "sign"_a, "is_trajectory"_a,
+          "The multiplier of a constraint is `sign` times that of a row.")
+      .def(
+          "add_joint",
+          [](ReactionsOnTree &r, int constraint, int node, Component component, bool backwards) {
+            r.joints.push_back({constraint, node, component, backwards});
+          },
+          "constraint"_a, "node"_a, "component"_a, "backwards"_a,
+          "The constraint is one of the joint that carries a node, its first side where `backwards`.")
+      .def(
+          "add_weight",
+          [](ReactionsOnTree &r, int constraint, double value) { r.weights.push_back({constraint, value}); },
+          "constraint"_a, "value"_a, "The multiplier of a constraint that holds a rotor against gravity; N.")
+      .def(
+          "add_motor",
+          [](ReactionsOnTree &r, int coordinate, double sign, const VectorXd &on_modes) {
+            r.motors.push_back({coordinate, sign, on_modes});
+          },
+          "coordinate"_a, "sign"_a, "on_modes"_a,
+          "A motor along `sign` v[coordinate] + on_modes . v; on_modes (n_v,), or () for zeros.");
+}
+
+} // namespace
+
+void make_actuation(TreeActuation *made, const SystemOnTree &both, const Recording &recording) {
+  if (recording.times.size() < 2 ||
+      static_cast<Index>(recording.states.size()) != both.state_size() * static_cast<Index>(recording.times.size()))
+    throw nb::value_error("recording: expected one of this tree, with a step");
+  new (made) TreeActuation(both, recording);
+}
+
+void bind_system_run(nb::module_ &m) {
+  bind_drives(m);
+  bind_reactions(m);
+  nb::class_<SystemOnTree>(m, "SystemOnTree", "A system in the plane, and a tree of the same bodies.")
+      .def("__init__", &make_both, "system"_a, "tree"_a, "scene"_a, "bodies"_a, "drives"_a, "reactions"_a,
+           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
+           "bodies: number in the system of each of the tree's.")
+      .def("acceleration_violation", &violation_of, "t"_a, "q"_a, "v"_a, "a"_a,
+           "Largest violation of C_ddot = 0 by accelerations a (n_v) of the tree, relative to the terms that cancel.");
+  nb::class_<TreeActuation, ActuationSource>(m, "TreeActuation", "From the dense output of a recorded run of a tree.")
+      .def("__init__", &make_actuation, "both"_a, "recording"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
+  m.def("run_tree", &run_tree, "both"_a, nb::kw_only(), "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
+        "external_loads"_a = nb::none(), "recording"_a = nb::none(), "checkpoint"_a = nb::none(),
+        "As `run`, but integrates the tree from (q, v) of its own, in which recording and checkpoint are, too.");
+  m.def("run_tree_sampled", &run_tree_sampled, "both"_a, nb::kw_only(), "times"_a, "q"_a, "v"_a, "controls"_a,
+        "carry_on"_a, "motors"_a, "patches"_a, "first_command"_a, "sensing"_a, "samples"_a, "delay"_a, "controller"_a,
+        "As `run_tree`, under commands that `controller`(k, t, readings) gives at samples.");
 }

@@ -17,14 +17,14 @@ namespace ffrobot {
 class Actuator {
 public:
   virtual ~Actuator() = default;
-  virtual void act(const ActuationSource &source, Workspace &forward) = 0;
+  virtual void act(ActuationSource &source, Workspace &forward) = 0;
 };
 
 // The forces -lambda_s on their points: one drive per trajectory constraint.
 class TrajectoryForces final : public Actuator {
 public:
   explicit TrajectoryForces(std::size_t first_drive) : first_drive_(first_drive) {}
-  void act(const ActuationSource &source, Workspace &forward) override;
+  void act(ActuationSource &source, Workspace &forward) override;
 
 private:
   std::size_t first_drive_;
@@ -34,7 +34,7 @@ private:
 class Motors final : public Actuator {
 public:
   Motors(std::size_t first_drive, Eigen::VectorXd limit) : first_drive_(first_drive), limit_(std::move(limit)) {}
-  void act(const ActuationSource &source, Workspace &forward) override;
+  void act(ActuationSource &source, Workspace &forward) override;
 
 private:
   std::size_t first_drive_;
@@ -47,7 +47,7 @@ class Patches final : public Actuator {
 public:
   Patches(std::size_t body, Allocation allocation)
       : body_(body), allocation_(std::move(allocation)), force_(allocation_.Phi().rows()) {}
-  void act(const ActuationSource &source, Workspace &forward) override;
+  void act(ActuationSource &source, Workspace &forward) override;
 
 private:
   std::size_t body_;
@@ -60,12 +60,11 @@ class PointForces final : public Actuator {
 public:
   PointForces(std::size_t first_drive, std::size_t body, ActuationPoints points)
       : first_drive_(first_drive), body_(body), points_(std::move(points)) {}
-  void act(const ActuationSource &source, Workspace &forward) override;
+  void act(ActuationSource &source, Workspace &forward) override;
 
 private:
   std::size_t first_drive_, body_;
   ActuationPoints points_;
-  Eigen::VectorXd Q_a_;
 };
 
 class Actuation final : public ExternalLoads {

@@ -1,11 +1,9 @@
 // What an inverse analysis found, for the actuators of a forward run.
 #pragma once
 
-#include "core/actuation/actuator_forces.h"
 #include "core/system/system.h"
 
 #include <limits>
-#include <optional>
 #include <vector>
 
 namespace ffrobot {
@@ -23,27 +21,27 @@ public:
     time_ = t;
   }
 
-  virtual const System &system() const = 0;
-  virtual const Workspace &workspace() const = 0; // kinematics, multipliers
-  virtual const Eigen::VectorXd &q() const = 0;
-  const Eigen::VectorXd &tau() const { return tau_; }                                     // (motors)
-  const std::vector<Eigen::VectorXd> &modal_force() const { return modal_force_; }        // F_p of each body
-  virtual const std::vector<Eigen::VectorXd> &shape_force() const { return modal_zero_; } // -lambda_p of each body
-  bool is_trajectory(std::size_t constraint) const { return is_trajectory_[constraint]; }
+  const Eigen::VectorXd &trajectory_force() const { return trajectory_force_; } // -lambda_s, constraint by constraint
+  const Eigen::VectorXd &tau() const { return tau_; }                           // (motors)
+  const std::vector<Eigen::VectorXd> &modal_force() const { return modal_force_; } // F_p of each body
+
+  // Q_a of what holds trajectories, and a shape that is prescribed, on the coordinates (R, theta, p) of one body, and q
+  // of these.
+  struct OnBody {
+    Eigen::VectorXd q, Q_a;
+  };
+  virtual OnBody on_body(std::size_t body) = 0;
 
 protected:
-  // actuator_forces: empty where the motors do not fit the mechanism; then neither tau nor modal forces are asked for.
-  ActuationSource(const System &system, std::vector<bool> is_trajectory, std::optional<ActuatorForces> actuator_forces);
+  explicit ActuationSource(const System &system);
 
-  virtual void find(double t) = 0;
-  void resolve(); // tau and F_p from the workspace
+  virtual void find(double t) = 0; // fills what is below; tau and F_p where motors fit the mechanism
+
+  Eigen::VectorXd trajectory_force_, tau_;
+  std::vector<Eigen::VectorXd> modal_force_;
 
 private:
   double time_ = std::numeric_limits<double>::quiet_NaN();
-  std::vector<bool> is_trajectory_;
-  std::optional<ActuatorForces> actuator_forces_;
-  Eigen::VectorXd tau_;
-  std::vector<Eigen::VectorXd> modal_force_, modal_zero_;
 };
 
 } // namespace ffrobot

@@ -64,35 +64,6 @@ void HeldCommands::apply(double, Workspace &workspace) {
     distribute(modal_[i], patches_[i].first, workspace.external_modal);
 }
 
-namespace {
-
-// The system under held commands, as a sampled loop sees it
-class Plant final : public SampledPlant {
-public:
-  Plant(ConstrainedMotion &motion, HeldCommands &commands, Sensing &sensing)
-      : motion_(motion), commands_(commands), sensing_(sensing), a_(VectorXd::Zero(motion.system().n_v())) {}
-
-  void hold(const VectorXd &u) override { commands_.set(u); }
-
-  VectorXd read(double t, const double *y) override {
-    const System &system = motion_.system();
-    const double *rates = y + system.n_q();
-    if (sensing_.needs_accelerations()) {
-      commands_.apply(t, motion_.workspace());
-      accelerations(system, t, y, rates, motion_.workspace(), a_.data());
-    }
-    return sensing_.read(y, rates, a_.data());
-  }
-
-private:
-  ConstrainedMotion &motion_;
-  HeldCommands &commands_;
-  Sensing &sensing_;
-  VectorXd a_;
-};
-
-} // namespace
-
 Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
                 const IntegrationControls &controls, HeldCommands &commands, Sensing &sensing, const Sampling &sampling,
                 const std::function<bool(double)> &carry_on) {
@@ -100,7 +71,15 @@ Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, con
   OutputEvaluator evaluate(system, times.size(), &commands, nullptr);
   VectorXd y(q.size() + v.size());
   y << q, v;
-  Plant plant(motion, commands, sensing);
+  VectorXd a = VectorXd::Zero(system.n_v());
+  HeldPlant plant(commands, sensing, [&](double t, const double *state) -> HeldPlant::Observed {
+    const double *rates = state + system.n_q();
+    if (sensing.needs_accelerations()) {
+      commands.apply(t, motion.workspace());
+      accelerations(system, t, state, rates, motion.workspace(), a.data());
+    }
+    return {state, rates, a.data()};
+  });
   const SampledLoop loop(plant, sampling, times.back());
   Run result;
   result.report = integrate(

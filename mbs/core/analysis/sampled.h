@@ -58,6 +58,29 @@ private:
   std::vector<Eigen::VectorXd> modal_; // of each entry of patches_
 };
 
+// A system under held commands, as a sampled loop sees it.
+class HeldPlant final : public SampledPlant {
+public:
+  struct Observed {
+    const double *q, *v, *a; // of the system; accelerations where the sensors need them
+  };
+  using Observe = std::function<Observed(double, const double *)>; // at a time and a state of what is integrated
+
+  HeldPlant(HeldCommands &commands, Sensing &sensing, Observe observe)
+      : commands_(commands), sensing_(sensing), observe_(std::move(observe)) {}
+
+  void hold(const Eigen::VectorXd &u) override { commands_.set(u); }
+  Eigen::VectorXd read(double t, const double *y) override {
+    const auto [q, v, a] = observe_(t, y);
+    return sensing_.read(q, v, a);
+  }
+
+private:
+  HeldCommands &commands_;
+  Sensing &sensing_;
+  Observe observe_;
+};
+
 // As run(); `commands` are the external loads of `motion`, and hold what they were set to until the first command acts.
 Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q,
                 const Eigen::VectorXd &v, const IntegrationControls &controls, HeldCommands &commands, Sensing &sensing,

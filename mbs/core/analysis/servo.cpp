@@ -138,8 +138,8 @@ FcidOutputs servo_outputs(ServoConstraint &servo, const std::vector<double> &tim
 
 ServoActuation::ServoActuation(const System &driven, ServoConstraint servo, std::vector<ModalShape> shape,
                                std::vector<bool> is_motor, ActuatorForces actuator_forces)
-    : ActuationSource(driven, std::move(is_motor), std::move(actuator_forces)), system_(driven),
-      servo_(std::move(servo)), shape_(std::move(shape)) {}
+    : SystemSource(driven, std::move(is_motor), std::move(actuator_forces)), servo_(std::move(servo)),
+      shape_(std::move(shape)) {}
 
 void ServoActuation::find(double t) {
   servo_.solve(t, shape_); // was found at all output times before; a failure in between shows as a refused step

@@ -76,21 +76,17 @@ FcidOutputs servo_outputs(ServoConstraint &servo, const std::vector<double> &tim
                           const std::vector<ModalShape> &shape, ActuatorForces &actuator_forces);
 
 // The motors' forces for p(t), solved anew at every time.
-class ServoActuation final : public ActuationSource {
+class ServoActuation final : public SystemSource {
 public:
   ServoActuation(const System &driven, ServoConstraint servo, std::vector<ModalShape> shape, std::vector<bool> is_motor,
                  ActuatorForces actuator_forces);
 
-  const System &system() const override { return system_; }
+private:
   const Workspace &workspace() const override { return servo_.motion().workspace(); }
   const Eigen::VectorXd &q() const override { return servo_.motion().q(); }
   const std::vector<Eigen::VectorXd> &shape_force() const override { return servo_.motion().shape_force(); }
-
-protected:
   void find(double t) override;
 
-private:
-  const System &system_;
   ServoConstraint servo_;
   std::vector<ModalShape> shape_;
 };

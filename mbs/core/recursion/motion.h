@@ -164,6 +164,8 @@ public:
   MotionHistory history() const;
   void go_on(const MotionHistory &history); // throws std::invalid_argument where it is that of another mechanism
 
+  // Forces on the wrenches of the mechanism (wrenches, dim) as at the last evaluation; null where none act
+  const double *wrenches() const { return wrench_.size() > 0 ? wrench_.data() : nullptr; }
   const Workspace<Space, double> &workspace() const { return workspace_; }
   Workspace<Space, double> &workspace() { return workspace_; }
 

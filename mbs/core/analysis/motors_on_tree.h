@@ -1,0 +1,41 @@
+// What motors and modal forces must do in place of the forces that hold a trajectory, in joint coordinates.
+#pragma once
+
+#include "core/analysis/system_on_tree.h"
+#include "core/recursion/planar/newton_euler.h"
+
+#include <Eigen/LU>
+
+namespace ffrobot {
+
+// As ActuatorForces in absolute coordinates, of which those of joints are left,
+//
+//     -C_s^T lambda_s = C_c^T nu + T^T tau + (0, F_p)
+//
+// with rows C_c where loops are cut and motors' T: the rows of joint coordinates give nu and tau, those of modes F_p.
+// Needs as many motors as the mechanism with rigid links has degrees of freedom.
+class MotorsOnTree {
+public:
+  explicit MotorsOnTree(const SystemOnTree &both); // which must outlive this
+
+  // For multipliers lambda (rows of the tree), at the state of the accelerations() of w.
+  void resolve(const double *q, const double *lambda, const recursion::Workspace<recursion::Planar, double> &w);
+
+  const Eigen::VectorXd &tau() const { return tau_; }                    // (motors)
+  Eigen::Map<const Eigen::VectorXd> modal_force(std::size_t body) const; // F_p of a body of the system
+
+private:
+  using TreeWorkspace = recursion::Workspace<recursion::Planar, double>;
+  // Of rows with -lambda, into Q (n_v)
+  void project(const double *q, const TreeWorkspace &w, Eigen::Ref<Eigen::VectorXd> Q);
+  void close_loops(const double *q, const TreeWorkspace &w);
+
+  const SystemOnTree &both_;
+  recursion::NewtonEuler forces_;
+  std::vector<int> joint_coordinates_, cuts_; // in v; rows of the tree
+  Eigen::VectorXd lambda_, tau_, Q_;          // (rows), (motors), (n_v)
+  Eigen::MatrixXd cut_columns_;               // (n_v, cuts) -C_c^T
+  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;   // of joint coordinates by cuts, then motors
+};
+
+} // namespace ffrobot

@@ -1,0 +1,45 @@
+// What is reported of a planar system that is integrated in joint coordinates: the quantities of OutputEvaluator, from
+// the recursion.
+#pragma once
+
+#include "core/analysis/motors_on_tree.h"
+#include "core/analysis/run.h"
+
+#include <optional>
+
+namespace ffrobot {
+
+// Largest violation of C_ddot = 0 by accelerations of the tree, a (n_v), relative to the terms that cancel in it.
+// Computed from a alone, not from the elimination that made it: after the accelerate() of a, with its workspace.
+double acceleration_residual(const SystemOnTree &both, double t, const double *a, const recursion::NewtonEuler &forces,
+                             const recursion::Workspace<recursion::Planar, double> &w);
+
+class TreeOutputs {
+public:
+  // external_loads may be null. `both` and loads must outlive this.
+  TreeOutputs(const SystemOnTree &both, std::size_t count, double t, const double *state,
+              ExternalLoads *external_loads);
+
+  void operator()(std::size_t i, double t, const double *state); // (q, v) of the tree
+  Outputs take(std::size_t reached);
+
+  // Accelerations of the system's coordinates at a state of the tree
+  const Eigen::VectorXd &accelerations(double t, const double *state);
+  AbsoluteState &absolute() { return absolute_; }
+
+private:
+  void project(std::size_t output, double t); // state_, with what rows leave of it
+  void evaluate(double t, const double *state);
+  void write_multipliers(Eigen::Index i);
+
+  const SystemOnTree &both_;
+  std::optional<SteeredTree> steering_;
+  TreeMotion motion_;
+  AbsoluteState absolute_;
+  recursion::NewtonEuler forces_;
+  std::optional<MotorsOnTree> motors_;
+  Eigen::VectorXd state_, a_, system_a_, value_, rate_;
+  Outputs outputs_;
+};
+
+} // namespace ffrobot

@@ -1,0 +1,60 @@
+// Forces of a known motion, in the plane: the recursive Newton-Euler algorithm (R. Featherstone, Rigid Body Dynamics
+// Algorithms, 2008, ch. 5) for bodies with modes. It shares nothing with the elimination that finds accelerations but
+// the kinematics of a state, so that it judges them as well.
+#pragma once
+
+#include "core/recursion/workspace.h"
+
+#include <Eigen/Core>
+
+#include <array>
+
+namespace ffrobot::recursion {
+
+class NewtonEuler {
+public:
+  // (x, y, about z): an acceleration less gravity, or a force with its moment about the point where it acts
+  using Vector = std::array<double, 3>;
+
+  explicit NewtonEuler(const Mechanism<Planar> &mechanism); // which must outlive this
+
+  // Outward: accelerations of frames and ports by those of coordinates, a (n_v), and the forces that bodies and rotors
+  // take. `w` is that of an accelerations() at this state, nothing else having been done with it.
+  void accelerate(const double *q, const double *a, const Workspace<Planar, double> &w);
+
+  // What acts on ports beside joints: rows by their multipliers, with -lambda, and wrenches (wrenches, 3; may be null).
+  // `w` has kinematics, and frames where directions of rows move.
+  void load(const double *lambda, const double *wrench, const Workspace<Planar, double> &w);
+
+  // Inward: what joints do to their outer sections, so that the loads and what bodies take are balanced.
+  void transmit(const Workspace<Planar, double> &w);
+
+  // Inward: generalized forces Q (n_v) of the loads.
+  void project(const double *q, const Workspace<Planar, double> &w, double *Q);
+
+  // Second derivative of the value of a row by these accelerations, and the size of the terms that cancel in it.
+  struct RowAcceleration {
+    double value, size;
+  };
+  RowAcceleration of_row(std::size_t row, const Workspace<Planar, double> &w) const;
+
+  // After transmit(), of the joint of node i: force on the outer section, with its moment about the origin of that
+  // section, in axes of the joint; in global axes; the same moment about the origin of the inner section.
+  const Vector &in_joint_axes(std::size_t i) const { return of_joint_[i]; }
+  const Vector &in_global_axes(std::size_t i) const { return in_global_axes_[i]; }
+  double about_inner(std::size_t i) const { return about_inner_[i]; }
+
+private:
+  void inward(bool with_inertia, const Workspace<Planar, double> &w);
+  Eigen::VectorXd modal_products(const Node<Planar> &node, const double *a) const;
+
+  const Mechanism<Planar> &mechanism_;
+  std::vector<Vector> ports_, on_ports_, with_joints_; // of all ports: accelerations; loads; loads and what hangs there
+  std::vector<double> terms_;                          // of all ports: what modes accelerate by
+  std::vector<Vector> inertia_;                        // of bodies: (force, moment) at the frame, axes of the body
+  std::vector<double> rotor_;                          // moment that the rotor on the inner section takes from it
+  std::vector<Vector> of_joint_, in_global_axes_, at_section_; // by nodes; at_section_: in axes of the body
+  std::vector<double> about_inner_;
+};
+
+} // namespace ffrobot::recursion
