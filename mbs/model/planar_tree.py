@@ -137,7 +137,7 @@ class PlanarTree:
         return found
 
     def _add_loads(self) -> None:
-        """The drives of the system: `drives` has where they act, `scene` their magnitudes over time."""
+        """The drives of the system: `drives` has where they act, `scene` their magnitudes, and forces of the motion."""
         for number, (measure, magnitude) in enumerate(self._assembly.drives):
             if (coordinate := self._layout.coordinate(measure)) is not None:
                 self._driven.add(coordinate.number)
@@ -146,10 +146,12 @@ class PlanarTree:
                     self.scene.add_load(coordinate.sign * np.eye(self._layout.size)[coordinate.number], magnitude)
                 continue
             for marker, component, size in _shares(measure):
-                wrench = self._wrenches.setdefault(marker, len(self._wrenches))
+                wrench = self._wrench(marker)
                 self.drives.add_at_point(number, wrench, component, size)
                 if magnitude is not ZERO:
                     self.scene.add_point_load(wrench, component, magnitude, size)
+        for marker, function in self._assembly.model.state_forces:
+            self.scene.add_point_force(self._wrench(marker), function)
         for load in self._assembly.model.modal_loads:
             node = next(node for node in self._layout.nodes if node.body.name == load.body)
             direction = np.zeros(self._layout.size)
@@ -177,6 +179,9 @@ class PlanarTree:
                 raise NotInTreeError(f"a motor along a coordinate that is none of the tree ({measure.label})")
             found.add_motor(*motor)
         return found
+
+    def _wrench(self, marker: Marker) -> int:
+        return self._wrenches.setdefault(marker, len(self._wrenches))
 
     def _add_what_joints_have(self) -> None:
         """Friction, rotors, gears that give."""
@@ -227,7 +232,6 @@ def _check(assembly: MechanismSystem) -> None:
         # Errors of forces are judged between bodies: those on the ground are not known to the core.
         "a body that is joined to no other": any(body.name not in joined for body in model.links),
         "geometric stiffening": any(body.stiffening is not None for body in model.bodies),
-        "forces that depend on the motion of points": bool(model.state_forces),
     }
     if found := [what for what, is_there in missing.items() if is_there]:
         raise NotInTreeError(", ".join(found))

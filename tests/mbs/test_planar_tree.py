@@ -1,5 +1,9 @@
 """Planar mechanisms in joint coordinates have the numbers of their systems: every mechanism of the zoo, and others."""
 
+import ctypes
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import zoo
@@ -7,6 +11,8 @@ from mechanisms import always, assemble, core_run, make_model, relative, revolut
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.elastic_joints import with_compliance
+from ffrobot.mbs.fields.state_forces import state_function
+from ffrobot.mbs.joints.measure import Marker
 from ffrobot.mbs.model.planar_tree import PlanarTree
 from ffrobot.mbs.model.tree_layout import NotInTreeError
 from ffrobot.mbs.solve.initial_state import undeformed_state
@@ -77,6 +83,28 @@ def test_gears_that_give(name):
     model = with_compliance(zoo.geared(name))
     assert model.gears
     compare(assemble(model))
+
+
+NUMBERS = ctypes.POINTER(ctypes.c_double)
+
+
+@ctypes.CFUNCTYPE(None, ctypes.c_double, NUMBERS, NUMBERS, NUMBERS)
+def pull(t, position, rate, force):
+    """A cubic spring, a damper that grows with height, a moment of the angle and its rate."""
+    x, y, angle = position[:3]
+    force[0] = -30.0 * x * (1 + x * x) - 2.0 * rate[0]
+    force[1] = -(1 + y * y) * rate[1]
+    force[2] = 4.0 * (t + 1 - angle) - 0.3 * rate[2]
+
+
+@pytest.mark.parametrize("name", ["chain of 2", "backwards", "mixed backwards", "loaded", "free-flying"])
+def test_forces_of_the_motion_of_points(name):
+    bare, force = zoo.build(name), state_function(SimpleNamespace(address=ctypes.cast(pull, ctypes.c_void_p).value))
+    points = [Marker(body.name, list(body.points)[-1]) for body in bare.bodies]
+    model = replace(bare, state_forces=tuple((point, force) for point in points))
+    compare(assemble(model))
+    moved = bent_state(assemble(bare)).a[0] - bent_state(assemble(model)).a[0]
+    assert np.abs(moved).max() > 1e-2  # the forces act
 
 
 @pytest.mark.parametrize("name", NOT_IN_TREE)

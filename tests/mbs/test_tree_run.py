@@ -1,5 +1,7 @@
 """Runs in joint coordinates give what those in absolute ones do; which run in what is decided before the first step."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import zoo
@@ -14,6 +16,8 @@ from ffrobot.mbs.analysis.outcome import EarlierRun
 from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.analysis.tree_start import LOOPS
+from ffrobot.mbs.fields.state_forces import state_function
+from ffrobot.mbs.joints.measure import Marker
 
 KEYS = {"end": 0.05, "output_step": 0.005, "tolerance": 1e-10, "integrator": "dop853"}
 DRIVEN = (
@@ -63,6 +67,16 @@ def test_inverse_dynamics(name, in_absolute):
 @pytest.mark.parametrize("name", [*DRIVEN, "free-flying", "loaded, frame motors"])
 def test_free_motion(name, in_absolute):
     model = zoo.build(name)
+    found = run_forward(model, forward(**KEYS), None, ActuatorSet(), always)
+    in_absolute()
+    compare(found, run_forward(model, forward(**KEYS), None, ActuatorSet(), always), 1e-7)
+
+
+def test_motion_under_forces_of_the_motion_of_points(in_absolute):
+    def pull(_, position, velocity):
+        return *(-30 * position - 2 * velocity), 0.5 * position[0] * velocity[1]
+
+    model = replace(zoo.build("mixed"), state_forces=((Marker("b2", "side"), state_function(pull)),))
     found = run_forward(model, forward(**KEYS), None, ActuatorSet(), always)
     in_absolute()
     compare(found, run_forward(model, forward(**KEYS), None, ActuatorSet(), always), 1e-7)

@@ -224,6 +224,10 @@ void bind_tree_motion(nb::module_ &m) {
           "wrench"_a, "component"_a, "magnitude"_a, "share"_a = 1.0,
           "share magnitude(t) along a component of (force, moment), global axes, on a wrench of the model.")
       .def(
+          "add_point_force",
+          [](Scene &s, int wrench, const StateFunction &function) { s.point_forces.push_back({wrench, function}); },
+          "wrench"_a, "function"_a, "In the plane: of the motion of the section on which a wrench of the model acts.")
+      .def(
           "add_joint_force",
           [](Scene &s, int q, int v, double stiffness, double rest, double viscous, double coulomb, double speed) {
             s.joint_forces.push_back({q, v, stiffness, rest, {viscous, coulomb, speed}});

@@ -1,6 +1,7 @@
 #include "core/recursion/motion.h"
 
 #include "core/recursion/independent_rows.h"
+#include "core/recursion/observe.h"
 
 #include <algorithm>
 #include <cmath>
@@ -85,10 +86,12 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
       held_->add(q, force_.data());
     forces.generalized = force_.data();
   }
-  if (steering_ || !scene_.point_loads.empty() || !scene_.cut_joints.empty()) {
+  if (steering_ || !scene_.point_loads.empty() || !scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
     wrench_.setZero();
     for (const PointLoad &load : scene_.point_loads)
       wrench_[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
+    if (!scene_.point_forces.empty())
+      act_at_points(t, q, v);
     if (!scene_.cut_joints.empty())
       act_along_cuts(t, q, v);
     forces.wrench = wrench_.data();
@@ -96,6 +99,19 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
   if (steering_)
     steering_->add(t, force_.data(), wrench_.data());
   accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
+}
+
+template <class Space> void RecursiveMotion<Space>::act_at_points(double t, const double *q, const double *v) {
+  if constexpr (Space::dim == 3) {
+    frame_poses(mechanism_, q, v, measured_);
+    for (const PointForce &force : scene_.point_forces) {
+      const Pose<double> at = wrench_pose(mechanism_, static_cast<std::size_t>(force.wrench), measured_);
+      const double position[] = {at.r[0], at.r[1], at.angle}, rate[] = {at.v[0], at.v[1], at.omega[2]};
+      Eigen::Vector3d wrench = Eigen::Vector3d::Zero();
+      force.function.call(t, position, rate, wrench.data());
+      wrench_.template segment<3>(3 * force.wrench) += wrench;
+    }
+  }
 }
 
 template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t, const double *q, const double *v) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "core/constraint/constraint.h"
+#include "core/constraint/state_force.h"
 #include "core/integrate/ode.h"
 #include "core/recursion/cut.h"
 #include "core/recursion/frame_motor.h"
@@ -36,6 +37,12 @@ struct PointLoad {
   int wrench = 0, component = 0;
   TimeFunction magnitude;
   double share = 1;
+};
+
+// A force and a moment, global axes, of the motion of the section on which a wrench of a mechanism in the plane acts.
+struct PointForce {
+  int wrench = 0;
+  StateFunction function;
 };
 
 // How a marker of the ground turns.
@@ -92,6 +99,7 @@ struct Scene {
   std::vector<Target> targets; // of rows
   std::vector<Load> loads;
   std::vector<PointLoad> point_loads;
+  std::vector<PointForce> point_forces;
   std::vector<JointForce> joint_forces;
   std::vector<FrameMotor> frame_motors;
   std::vector<GearSpring> gears;
@@ -172,6 +180,7 @@ public:
 private:
   void update_targets(double t);
   void residuals(double t, const double *q, const double *v);
+  void act_at_points(double t, const double *q, const double *v);  // adds to wrench_
   void act_along_cuts(double t, const double *q, const double *v); // adds to wrench_
   void find_stiff_terms();
   void take_posture();

@@ -90,6 +90,13 @@ const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const do
 }
 
 template <class Space>
+Pose<double> wrench_pose(const Mechanism<Space> &m, std::size_t wrench, const Workspace<Space, double> &w) {
+  Pose<double> at;
+  attachment_pose(m, m.wrenches[wrench], w, at);
+  return at;
+}
+
+template <class Space>
 std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
                                        Workspace<Space, double> &w) {
   frame_poses(m, q, v, w);
@@ -142,6 +149,7 @@ Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Works
 
 template const std::vector<Pose<double>> &frame_poses(const Mechanism<Planar> &, const double *, const double *,
                                                       Workspace<Planar, double> &);
+template Pose<double> wrench_pose(const Mechanism<Planar> &, std::size_t, const Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Planar> &, const double *, const double *,
                                                 Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, const double *, const double *,
