@@ -58,7 +58,8 @@ std::tuple<VectorXd, VectorXd> row_values(Model<Space> &model, const VectorXd &q
   return {value, rate};
 }
 
-Derivatives derivatives_at(Model<Spatial> &model, const VectorXd &q, const VectorXd &v, const VectorXd &target,
+template <class Space>
+Derivatives derivatives_at(Model<Space> &model, const VectorXd &q, const VectorXd &v, const VectorXd &target,
                            const std::optional<VectorXd> &force, const std::optional<VectorXd> &wrench,
                            const Scene *given, double t) {
   const Scene none{}, &scene = given ? *given : none;
@@ -143,6 +144,10 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
       .def("measure", &row_values<Space>, "q"_a, "v"_a, "Values and rates of rows.")
       .def("response", &answer_of<Space>, "q"_a, "residual"_a,
            "-M^-1 C^T (C M^-1 C^T)^-1 residual, at the state of the last evaluation.")
+      .def("derivatives", &derivatives_at<Space>, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
+           "scene"_a.none() = nb::none(), "t"_a = 0.0,
+           "At a state under given forces and what acts along the cut joints of a scene at time t, while rows follow "
+           "`target` (rows): exact.")
       .def(
           "frames",
           [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
@@ -165,18 +170,14 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
 
 void bind_recursion(nb::module_ &m) {
   bind_tree_data(m);
-  bind_model<Planar>(m, "PlanarModel", "PlanarBody", "A mechanism in the plane, in joint coordinates.");
   nb::class_<Derivatives>(m, "Derivatives", "Of accelerations a and rows, by increments of q, by v and by forces f.")
       .def_ro("a_q", &Derivatives::a_q)
       .def_ro("a_v", &Derivatives::a_v)
       .def_ro("a_f", &Derivatives::a_f)
       .def_ro("value_q", &Derivatives::value_q)
       .def_ro("rate_q", &Derivatives::rate_q);
-  bind_model<Spatial>(m, "SpatialModel", "SpatialBody", "A mechanism in space, in joint coordinates.")
-      .def("derivatives", &derivatives_at, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
-           "scene"_a.none() = nb::none(), "t"_a = 0.0,
-           "At a state under given forces and what acts along the cut joints of a scene at time t, while rows follow "
-           "`target` (rows): exact.");
+  bind_model<Planar>(m, "PlanarModel", "PlanarBody", "A mechanism in the plane, in joint coordinates.");
+  bind_model<Spatial>(m, "SpatialModel", "SpatialBody", "A mechanism in space, in joint coordinates.");
   bind_tree_motion(m);
   bind_tree_sampled(m);
   bind_held_motion(m);

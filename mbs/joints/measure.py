@@ -54,6 +54,11 @@ class Measure:
         """Whether the force along it is a moment (N·m) and not a force (N)."""
         return bool(self.kind in (_core.MeasureKind.angle, _core.MeasureKind.gear))
 
+    @property
+    def angle_ratios(self) -> tuple[float, float]:
+        """(n_b, n_a) of one that carries a moment: n_b α_b − n_a α_a."""
+        return self.gear_ratios if self.kind == _core.MeasureKind.gear else (1.0, 1.0)
+
     def force_direction(self, section_angle: Array) -> Array:
         """Unit force on b along the measure in global axes (T, 2), for angles (T,) of the section at a, in rad.
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
-from ..fields.field_types import GROUND
+from .._core import TimeFunction
 from ..joints.measure import Marker, Measure
 from .model import ZERO, Constraint
 from .system import MechanismSystem
@@ -52,10 +52,10 @@ class PlanarTree:
         constraints: of the system that are rows of `core`: trajectories, and joints that close loops.
     """
 
-    def __init__(self, assembly: MechanismSystem, motors: Iterable[Measure] = ()) -> None:
+    def __init__(self, assembly: MechanismSystem, motors: Iterable[Measure] = (), *, is_forced: bool = False) -> None:
         """`motors`: along which forces are to be found that take the place of those of trajectories.
 
-        Raises `NotInTreeError`.
+        `is_forced`: forces from outside act along all joints. Raises `NotInTreeError`.
         """
         _check(assembly)
         model, self._assembly, self._layout = assembly.model, assembly, Layout(assembly.model)
@@ -63,7 +63,9 @@ class PlanarTree:
         modes = {number: node.modes for number, node in zip(self.bodies, self._layout.nodes, strict=True)}
         self.scene, self.drives = _core.TreeScene(), _core.DrivesOnTree([modes[k] for k in range(len(modes))])
         self._wrenches: dict[Marker, int] = {}
-        self._driven: set[int] = set()
+        self._along: list[tuple[Array, TimeFunction]] = []
+        self._at_points: list[tuple[int, int, float, TimeFunction]] = []
+        self._driven: set[int] = set(range(self._layout.size)) if is_forced else set()
         self._rotors: dict[int, tuple[float, float]] = {}
         loops = self._layout.loops
         self.constraints = tuple(c for c in assembly.constraints if c.is_trajectory or c.owner in loops)
@@ -88,21 +90,46 @@ class PlanarTree:
 
         Raises `NotInTreeError` where trajectories and loops depend on each other there.
         """
-        found = np.zeros((2, self._layout.size))
+        found = self.motion(q, v, np.zeros_like(v))
+        if len(self.core.keep_independent_rows(found[0], found[1])) < len(self.constraints):
+            raise NotInTreeError("trajectories and loops that depend on each other")
+        return found[0], found[1]
+
+    def motion(self, q: Array, v: Array, a: Array) -> Array:
+        """Coordinates of the tree, their rates and accelerations (3, n_v), for those of the system (coordinates,)."""
+        found = np.zeros((3, self._layout.size))
         for number, node in zip(self.bodies, self._layout.nodes, strict=True):
             first, n = int(self._assembly.first[number]), node.body.n_modes
-            for of_tree, of_system in zip(found, (q, v), strict=True):
+            for of_tree, of_system in zip(found, (q, v, a), strict=True):
                 of_tree[node.modes : node.modes + n] = of_system[first + 3 : first + 3 + n]
                 if node.kind == FREE.kind:
                     of_tree[node.first : node.modes] = of_system[first : first + 3]
         measures, coordinates = self._joints()
-        along = [(measure, order) for order in (0, 1) for measure in measures]
-        readings = _core.Sensing(self._assembly.system, along, []).read(q[None], v[None], np.zeros_like(v)[None])
+        along = [(measure, order) for order in range(3) for measure in measures]
+        readings = _core.Sensing(self._assembly.system, along, []).read(q[None], v[None], a[None])
         indices, signs = [c.number for c in coordinates], np.array([c.sign for c in coordinates])
-        found[:, indices] = signs * readings[0].reshape(2, -1)
-        if len(self.core.keep_independent_rows(*found)) < len(self.constraints):
-            raise NotInTreeError("trajectories and loops that depend on each other")
-        return found[0], found[1]
+        found[:, indices] = signs * readings[0].reshape(3, -1)
+        return found
+
+    @property
+    def modes(self) -> dict[str, range]:
+        """Where p of each body is in q and v."""
+        nodes = self._layout.nodes
+        return {node.body.name: range(node.modes, node.modes + node.body.n_modes) for node in nodes}
+
+    @property
+    def layout(self) -> Layout:
+        """Which coordinate is whose."""
+        return self._layout
+
+    def given_forces(self, t: float) -> tuple[Array, Array]:
+        """Of the loads at time t: along v (n_v,), and on the wrenches of `core` (3 wrenches,); N, N·m."""
+        force, wrench = np.zeros(self._layout.size), np.zeros((len(self._wrenches), 3))
+        for direction, magnitude in self._along:
+            force += magnitude(t)[0] * direction
+        for number, component, size, magnitude in self._at_points:
+            wrench[number, component] += size * magnitude(t)[0]
+        return force, wrench.ravel()
 
     def _joints(self) -> tuple[list[_core.Measure], list[Coordinate]]:
         """Measures of all joints of the tree that move, and their coordinates; those of motors behind gears, too."""
@@ -143,20 +170,24 @@ class PlanarTree:
                 self._driven.add(coordinate.number)
                 self.drives.add_along(number, coordinate.number, coordinate.sign)
                 if magnitude is not ZERO:
-                    self.scene.add_load(coordinate.sign * np.eye(self._layout.size)[coordinate.number], magnitude)
+                    self._along.append((coordinate.sign * np.eye(self._layout.size)[coordinate.number], magnitude))
                 continue
             for marker, component, size in _shares(measure):
                 wrench = self._wrench(marker)
                 self.drives.add_at_point(number, wrench, component, size)
                 if magnitude is not ZERO:
-                    self.scene.add_point_load(wrench, component, magnitude, size)
+                    self._at_points.append((wrench, component, size, magnitude))
         for marker, function in self._assembly.model.state_forces:
             self.scene.add_point_force(self._wrench(marker), function)
         for load in self._assembly.model.modal_loads:
             node = next(node for node in self._layout.nodes if node.body.name == load.body)
             direction = np.zeros(self._layout.size)
             direction[node.modes : node.modes + node.body.n_modes] = load.vector
-            self.scene.add_load(direction, load.magnitude)
+            self._along.append((direction, load.magnitude))
+        for direction, magnitude in self._along:
+            self.scene.add_load(direction, magnitude)
+        for wrench, component, size, magnitude in self._at_points:
+            self.scene.add_point_load(wrench, component, magnitude, size)
 
     def _reactions(self, motors: Iterable[Measure]) -> _core.ReactionsOnTree:
         """What the constraints of the system are in the tree, and `motors`."""
@@ -227,10 +258,7 @@ class PlanarTree:
 def _check(assembly: MechanismSystem) -> None:
     """Raise `NotInTreeError` for what the recursion in the plane does not have."""
     model = assembly.model
-    joined = {body for joint in model.scene.joint if GROUND not in joint.bodies for body in joint.bodies}
     missing = {
-        # Errors of forces are judged between bodies: those on the ground are not known to the core.
-        "a body that is joined to no other": any(body.name not in joined for body in model.links),
         "geometric stiffening": any(body.stiffening is not None for body in model.bodies),
     }
     if found := [what for what, is_there in missing.items() if is_there]:
@@ -241,7 +269,7 @@ def _shares(measure: Measure) -> Iterator[Share]:
     """Of a force along a measure that is no coordinate of the tree. Raises `NotInTreeError` where it turns."""
     if measure.kind not in COMPONENTS:
         raise NotInTreeError(f"a load along a direction that turns with its body ({measure.label})")
-    of_b, of_a = measure.gear_ratios if measure.kind == _core.MeasureKind.gear else (1.0, 1.0)
+    of_b, of_a = measure.angle_ratios
     for marker, size in ((measure.b, of_b), (measure.a, -of_a)):
         if marker.body is not None:
             yield Share(marker, COMPONENTS[measure.kind], size)

@@ -15,7 +15,7 @@ from .. import _core
 from ..joints.joint import JointRecord
 from ..joints.measure import FRAME, GROUND_FRAME, Marker, Measure
 from ..joints.transmission import ElasticGear
-from ..scene.topology import Carrier
+from ..scene.topology import Carrier, Edge, Topology, spanning_forest
 from .model import Model
 from .planar_body import PlanarBody, core_arguments
 
@@ -79,7 +79,7 @@ class Layout:
     """
 
     def __init__(self, model: Model) -> None:
-        topology = model.scene.topology
+        topology = _forest(model)
         names = [*topology.carriers, *(gear.rotor for gear in model.gears)]
         self._index = {name: number for number, name in enumerate(names)}
         self._bodies = [model.body(name) for name in names]
@@ -124,6 +124,31 @@ class Layout:
                     on_modes[first : first + len(turning)] += sign * turning
             return *self._coordinates[_key(of_sections)], on_modes
         return None
+
+    def section_angle(self, marker: Marker) -> Array:
+        """How the angle of a section, or of a frame, follows the coordinates of the tree: linear, by this row (size,).
+
+        Joint by joint, θ of the outer section is that of the inner one and the coordinate of a revolute joint.
+        """
+        if marker.body is None:
+            return np.zeros(self.size)
+        number = self._index[marker.body]
+        node = self.nodes[number]
+        if node.joint is None:
+            of_frame = np.eye(self.size)[node.first + 2]
+        else:
+            inner, outer = node.joint.markers[::-1] if node.backwards else node.joint.markers
+            of_frame = self.section_angle(inner) - self._on_modes(number, outer)
+            if node.joint.type == "revolute":
+                of_frame[node.first] += 1.0
+        return of_frame + self._on_modes(number, marker)
+
+    def _on_modes(self, number: int, marker: Marker) -> Array:
+        """(size,) Φ_r of a section at the modes of its body."""
+        found, turning = np.zeros(self.size), self._turning(marker)
+        first = self.nodes[number].modes
+        found[first : first + len(turning)] = turning
+        return found
 
     def ground_markers(self) -> list[_core.PlanarMarker]:
         """All that were placed."""
@@ -190,10 +215,19 @@ class Layout:
             self._coordinates[_key(of_frames)] = coordinate
 
     def _turning(self, marker: Marker) -> Array:
-        """Φ_r (n,) of a section; () of the ground."""
-        if marker.body is None:
+        """Φ_r (n,) of a section; () of the ground and of frames."""
+        if marker.body is None or marker.point == FRAME:
             return np.zeros(0)
         return self._bodies[self._index[marker.body]].points[marker.point].rotation
+
+
+def _forest(model: Model) -> Topology:
+    """Loops are cut at revolute joints where these go round with others: their angles are linear in those of the tree."""
+    scene = model.scene
+    if scene.topology.is_open_chain:
+        return scene.topology
+    edges = [Edge(joint.between, int(joint.type == "revolute")) for joint in scene.joint]
+    return spanning_forest([body.name for body in scene.body], edges)
 
 
 def _key(measure: Measure) -> tuple[object, ...]:

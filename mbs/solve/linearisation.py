@@ -1,6 +1,6 @@
 """The equations of motion, linear about a configuration or a motion, in independent coordinates.
 
-The core differentiates them exactly (core/tangent.h, core/reduction.h): M δs̈ + D δṡ + K δs = Σ inputs · δu, where
+M δs̈ + D δṡ + K δs = Σ inputs · δu, where
 s = (motor coordinates, p of all bodies). About a motion the matrices belong to it: centrifugal and Coriolis terms, the
 forces that drive it, and how H = ∂q/∂s turns along it are in D and K.
 """
@@ -17,8 +17,12 @@ from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
 from ..joints.measure import FRAME, GROUND_FRAME, Marker, Measure, marker_at
+from ..model.masses import system_mass_matrix
 from ..model.model import ZERO, Constraint, Model
 from ..model.system import MechanismSystem
+from ..model.tree_layout import NotInTreeError
+from .gradients import gradient_rates, gradients
+from .tree_linearisation import TreeLinearisation
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
 
@@ -35,7 +39,6 @@ class LinearMechanism:
         transformation: H = ∂q/∂s (coordinates, f).
         transformation_rate: its rate along the motion: δv = H δṡ + H_dot δs.
         force: (f,) what drives the motion itself: forces along the independent rows, modal forces beside the loads.
-        lambda_: (constraints,) multipliers of the joints.
         names: (f,) of s: "joint/NAME" (or what was chosen instead), then "modal/BODY/k", k from 1.
     """
 
@@ -51,7 +54,6 @@ class LinearMechanism:
     transformation: Array
     transformation_rate: Array
     force: Array
-    lambda_: Array
     names: tuple[str, ...]
 
     def modal(self, body: str) -> list[int]:
@@ -87,6 +89,8 @@ class Linearisation:
         self._places = known[4]
         independent = _choose(self.assembly, q, known[:3])
         self.independent = list(independent.values())
+        by_name = {name: measure for group in candidates for name, measure in group.items()}
+        self.tree = _on_tree(model, [by_name[name] for name in independent])
         modal = [f"modal/{body.name}/{k}" for body in model.bodies for k in range(1, body.n_modes + 1)]
         self.names = (*independent, *modal)
 
@@ -95,26 +99,51 @@ class Linearisation:
 
         Raises `SolveError` in a configuration in which the independent coordinates do not determine the others.
         """
-        system = self.assembly.system
-        linear = _core.reduce(system, self.independent, t, q, v, a)
-        if not linear.reciprocal_condition > DEPENDENT**2 or not np.all(np.isfinite(linear.K)):
-            rows = ", ".join(self.names[: len(self.independent)])
+        rows = [*self.assembly.constraint_measures, *self.independent]
+        G, frames = gradients(self.assembly, rows, q), self.assembly.frame_coordinates
+        if not 1.0 / np.linalg.cond(G[:, frames], 1) > DEPENDENT**2:
+            independent = ", ".join(self.names[: len(self.independent)])
             raise SolveError(
-                f"{self.model.scene.path}: linear model at t = {t:g} s: {rows} do not determine the configuration there"
-                " (a singular one)"
+                f"{self.model.scene.path}: linear model at t = {t:g} s: {independent} do not determine the configuration"
+                " there (a singular one)"
             )
+        H = self._followers(G)
+        H_dot = np.zeros_like(H)
+        H_dot[frames] = -np.linalg.solve(G[:, frames], gradient_rates(self.assembly, rows, q, v) @ H)
+        force = H.T @ self.assembly.system.required_forces(np.array([t]), q[None], v[None], a[None])[0]
+        M = H.T @ system_mass_matrix(self.assembly, q) @ H
+        if self.tree is None:
+            resistance = _core.reduce(self.assembly.system, self.independent, t, q, v, a)
+        else:
+            resistance = self.tree.at(t, q, v, a, force, M)
         inputs = self._motors | {f"force/{place}": row for place, row in self._places.items()}
         outputs = self._joints | {f"point/{place}": row for place, row in self._places.items()}
         return LinearMechanism(
-            t, q, v, a, linear.M, linear.D, linear.K,
-            self._gradients(inputs, linear.H, q), self._gradients(outputs, linear.H, q),
-            linear.H, linear.H_dot, linear.force, linear.multipliers, self.names,
+            t, q, v, a, M, resistance.D, resistance.K,
+            self._gradients(inputs, H, q), self._gradients(outputs, H, q), H, H_dot, force, self.names,
         )  # fmt: skip
 
+    def _followers(self, G: Array) -> Array:
+        """H (coordinates, f) by the gradients of joints and of what is independent: frames follow this, and p."""
+        frames, independent = self.assembly.frame_coordinates, len(self.independent)
+        modes = np.setdiff1d(np.arange(G.shape[1]), frames)
+        H = np.zeros((G.shape[1], len(self.names)))
+        H[modes, independent:] = np.eye(len(modes))
+        of_s = np.eye(len(G))[:, len(G) - independent :]
+        H[frames] = np.linalg.solve(G[:, frames], np.hstack([of_s, -G[:, modes]]))
+        return H
+
     def _gradients(self, rows: dict[str, _core.Measure], H: Array, q: Array) -> Mapping[str, Array]:
-        rest = np.zeros_like(q)
-        gradients = _core.row_tangents(self.assembly.system, list(rows.values()), q, rest, rest)[0] @ H
-        return MappingProxyType(dict(zip(rows, gradients, strict=True)))
+        found = gradients(self.assembly, list(rows.values()), q) @ H
+        return MappingProxyType(dict(zip(rows, found, strict=True)))
+
+
+def _on_tree(model: Model, independent: Sequence[Measure]) -> TreeLinearisation | None:
+    """None of what the recursion does not have: geometric stiffening, …; that is told in absolute coordinates."""
+    try:
+        return TreeLinearisation(model, independent)
+    except NotInTreeError:
+        return None
 
 
 def linearise(model: Model, t: float, q: Array, v: Array, a: Array, points: Sequence[str] = ()) -> LinearMechanism:
@@ -157,19 +186,14 @@ def _choose(
     """The rows that, with the joints, determine the frames: earlier groups first, those of a group as QR pivots."""
     from scipy.linalg import qr
 
-    rest, frames = np.zeros_like(q), assembly.frame_coordinates
-
-    def gradients(rows: Sequence[_core.Measure]) -> Array:
-        result: Array = _core.row_tangents(assembly.system, rows, q, rest, rest)[0][:, frames]
-        return result
-
-    basis = np.linalg.qr(gradients(assembly.constraint_measures).T)[0]
+    frames = assembly.frame_coordinates
+    basis = np.linalg.qr(gradients(assembly, assembly.constraint_measures, q)[:, frames].T)[0]
     chosen: dict[str, _core.Measure] = {}
     for group in groups:
         missing = len(frames) - basis.shape[1]
         if not missing or not group:
             continue
-        rows = gradients(list(group.values()))
+        rows = gradients(assembly, list(group.values()), q)[:, frames]
         Q, R, order = qr((rows - (rows @ basis) @ basis.T).T, mode="economic", pivoting=True)
         independent = np.abs(np.diag(R)) > DEPENDENT * np.linalg.norm(rows, axis=1).max()
         count = min(missing, int(np.count_nonzero(independent)))

@@ -80,7 +80,7 @@ class SpatialLinearisation:
             t, q, v, a, sides * (M + M.T) / 2, H.T @ D_more @ H - sides * (M @ by_rate),
             H.T @ (K_more @ H + D_more @ H_dot) - sides * (M @ by_s),
             self._inputs(state, H, shares), self._outputs(state, H), H, H_dot,
-            self._signs * force - on_modes @ H, np.zeros(0), self.names,
+            self._signs * force - on_modes @ H, self.names,
         )  # fmt: skip
 
     def _followers(self, state: Accelerated, t: float) -> tuple[Array, Array]:

@@ -55,16 +55,17 @@ template <class Values> void take(const Values &x, Index first, Index count, Mat
 
 } // namespace
 
-Derivatives derivatives(const Mechanism<Spatial> &m, const Workspace<Spatial, double> &kept, const double *q,
+template <class Space>
+Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double> &kept, const double *q,
                         const double *v, const Forces<double> &forces, const LoadedCuts &cuts, const double *target) {
   const ConfigurationSpace space(m.n_v, m.rotations);
   const Index n = m.n_v, rows = static_cast<Index>(m.rows.size());
   const auto n_v = static_cast<std::size_t>(n), n_rows = m.rows.size();
-  Workspace<Spatial, Dual> w(m);
+  Workspace<Space, Dual> w(m);
   w.keep(kept.active), w.turning = kept.turning;
   const Duals q0 = constants(q, static_cast<std::size_t>(m.n_q)), v0 = constants(v, n_v);
   const Duals force0 = constants(forces.generalized, n_v), held = constants(target, n_rows);
-  const Duals wrench = constants(forces.wrench, Spatial::dim * m.wrenches.size());
+  const Duals wrench = constants(forces.wrench, Space::dim * m.wrenches.size());
   Duals a(n_v), value(n_rows), rate(n_rows), along(cuts.joints.size()), acting_wrench;
   const auto answer = [&](const Duals &at_q, const Duals &at_v, const Duals &force) {
     Forces<Dual> acting;
@@ -96,5 +97,10 @@ Derivatives derivatives(const Mechanism<Spatial> &m, const Workspace<Spatial, do
   }
   return found;
 }
+
+template Derivatives derivatives(const Mechanism<Planar> &, const Workspace<Planar, double> &, const double *,
+                                 const double *, const Forces<double> &, const LoadedCuts &, const double *);
+template Derivatives derivatives(const Mechanism<Spatial> &, const Workspace<Spatial, double> &, const double *,
+                                 const double *, const Forces<double> &, const LoadedCuts &, const double *);
 
 } // namespace ffrobot::recursion

@@ -23,7 +23,8 @@ struct LoadedCuts {
 
 // At q, v under `forces`, those along `cuts` and second derivatives `target` (rows) of the rows that `kept` keeps;
 // markers of the ground stand and turn as there. Friction in cut joints changes with q and v.
-Derivatives derivatives(const Mechanism<Spatial> &m, const Workspace<Spatial, double> &kept, const double *q,
+template <class Space>
+Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double> &kept, const double *q,
                         const double *v, const Forces<double> &forces, const LoadedCuts &cuts, const double *target);
 
 } // namespace ffrobot::recursion

@@ -55,3 +55,32 @@ def test_rows_have_the_values_and_rates_of_the_core():
     value, rate = tree.model.measure(q, v)
     assert np.abs(value - offsets - targets[:, 0] - C[tree.rows]).max() < 1e-13
     assert np.abs(rate - targets[:, 1] - C_dot[tree.rows]).max() < 1e-13
+
+
+def differences(function, n, h):
+    """∂function/∂x (…, n) at x = 0 by differences of fourth order."""
+    steps = h * np.eye(n)
+    columns = [function(-2 * x) - 8 * function(-x) + 8 * function(x) - function(2 * x) for x in steps]
+    return np.stack(columns, axis=-1) / (12 * h)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_derivatives_are_those_of_evaluations(name):
+    tree = tree_of(assemble(zoo.build(name)))
+    model, rng = tree.model, np.random.default_rng(5)
+    q, v = 0.1 * rng.standard_normal(model.n_q) + 0.5, rng.standard_normal(model.n_v)
+    target, force = rng.standard_normal(len(tree.rows)), rng.standard_normal(model.n_v)
+    found = model.derivatives(q, v, target, force, None)
+
+    def a(dq=0.0, dv=0.0, df=0.0):
+        return model.evaluate(q + dq, v + dv, target, force + df, None)[0]
+
+    # By v accelerations are quadratic, by forces linear: with long steps differences are exact but for rounding.
+    for key, by, h in (("a_q", "dq", 1e-3), ("a_v", "dv", 1.0), ("a_f", "df", 1.0)):
+        expected = differences(lambda x, by=by: a(**{by: x}), model.n_v, h)
+        atol = (1e-8 if by == "dq" else 1e-11) * max(1.0, np.abs(expected).max())
+        np.testing.assert_allclose(getattr(found, key), expected, rtol=0, atol=atol, err_msg=key)
+    if tree.rows:
+        for derivative, which in ((found.value_q, 0), (found.rate_q, 1)):
+            expected = differences(lambda x, which=which: model.measure(q + x, v)[which], model.n_v, 1e-3)
+            np.testing.assert_allclose(derivative, expected, rtol=0, atol=1e-9 * max(1.0, np.abs(expected).max()))
