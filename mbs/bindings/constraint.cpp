@@ -48,6 +48,16 @@ void bind_constraint(nb::module_ &m) {
       .def_ro("a", &Measure::a)
       .def_ro("b", &Measure::b);
   nb::class_<StateFunction>(m, "StateFunction", "A force of the user's, of time, position and velocity.")
+      .def(
+          "__call__",
+          [](const StateFunction &function, double t, double x, double y, double angle, double v_x, double v_y,
+             double angular_velocity) {
+            const double position[] = {x, y, angle}, rate[] = {v_x, v_y, angular_velocity};
+            double force[3] = {};
+            function.call(t, position, rate, force);
+            return std::make_tuple(force[0], force[1], force[2]);
+          },
+          "t"_a, "x"_a, "y"_a, "angle"_a, "v_x"_a, "v_y"_a, "angular_velocity"_a, "(x, y, moment): N, N m.")
       .def_static("python", &python_force, "function"_a, "A callable of t, x, y, v_x, v_y that returns (x, y, moment).")
       .def_static(
           "compiled", &compiled_force, "address"_a,

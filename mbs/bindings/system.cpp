@@ -23,5 +23,4 @@ void bind_system(nb::module_ &m) {
       .def_ro("first_coordinate", &System::first_coordinate);
   bind_parts(system);
   bind_evaluations(m, system);
-  bind_tangent(m);
 }

@@ -222,7 +222,7 @@ class Layout:
 
 
 def _forest(model: Model) -> Topology:
-    """Loops are cut at revolute joints where these go round with others: their angles are linear in those of the tree."""
+    """Loops with revolute joints are cut at one of these: angles are linear in coordinates of the tree."""
     scene = model.scene
     if scene.topology.is_open_chain:
         return scene.topology

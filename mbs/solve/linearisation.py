@@ -21,6 +21,7 @@ from ..model.masses import system_mass_matrix
 from ..model.model import ZERO, Constraint, Model
 from ..model.system import MechanismSystem
 from ..model.tree_layout import NotInTreeError
+from .absolute_linearisation import AbsoluteLinearisation
 from .gradients import gradient_rates, gradients
 from .tree_linearisation import TreeLinearisation
 
@@ -91,6 +92,7 @@ class Linearisation:
         self.independent = list(independent.values())
         by_name = {name: measure for group in candidates for name, measure in group.items()}
         self.tree = _on_tree(model, [by_name[name] for name in independent])
+        self.absolute = AbsoluteLinearisation(model, [by_name[name] for name in independent])
         modal = [f"modal/{body.name}/{k}" for body in model.bodies for k in range(1, body.n_modes + 1)]
         self.names = (*independent, *modal)
 
@@ -104,18 +106,18 @@ class Linearisation:
         if not 1.0 / np.linalg.cond(G[:, frames], 1) > DEPENDENT**2:
             independent = ", ".join(self.names[: len(self.independent)])
             raise SolveError(
-                f"{self.model.scene.path}: linear model at t = {t:g} s: {independent} do not determine the configuration"
-                " there (a singular one)"
+                f"{self.model.scene.path}: linear model at t = {t:g} s: {independent} do not determine the"
+                " configuration there (a singular one)"
             )
         H = self._followers(G)
         H_dot = np.zeros_like(H)
         H_dot[frames] = -np.linalg.solve(G[:, frames], gradient_rates(self.assembly, rows, q, v) @ H)
         force = H.T @ self.assembly.system.required_forces(np.array([t]), q[None], v[None], a[None])[0]
         M = H.T @ system_mass_matrix(self.assembly, q) @ H
-        if self.tree is None:
-            resistance = _core.reduce(self.assembly.system, self.independent, t, q, v, a)
-        else:
+        if self.tree is not None:
             resistance = self.tree.at(t, q, v, a, force, M)
+        else:
+            resistance = self.absolute.at(t, q, v, a, H, H_dot)
         inputs = self._motors | {f"force/{place}": row for place, row in self._places.items()}
         outputs = self._joints | {f"point/{place}": row for place, row in self._places.items()}
         return LinearMechanism(

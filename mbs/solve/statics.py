@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
-from .. import _core
 from ..model.system import MechanismSystem
+from .absolute_linearisation import ForcesOfMotion
 from .position import with_rates
 from .state import State
 
@@ -56,6 +58,8 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
 
 def _jacobian(assembly: MechanismSystem, q: Array, multipliers: Array) -> Array:
     """Exact derivative of Q − C_qᵀλ and C with respect to (q, λ), at rest."""
-    rest = np.zeros(assembly.system.n_v)
-    _, _, K, C_q = _core.tangent(assembly.system, 0.0, q, rest, rest, multipliers, [])
+    rest = np.zeros_like(q)
+    pulls = [(c.measure, -pull) for c, pull in zip(assembly.constraints, multipliers, strict=True)]
+    K = ForcesOfMotion(replace(assembly.model, loads=assembly.drives), pulls, 0.0, q, rest).stiffness(rest)
+    C_q = assembly.system.constraints(0.0, q, rest)[2]
     return np.block([[-K, -C_q.T], [C_q, np.zeros((len(C_q), len(C_q)))]])

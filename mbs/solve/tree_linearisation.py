@@ -18,12 +18,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
-from .. import _core
 from ..joints.measure import Marker, Measure
+from ..model.masses import block_diagonal
 from ..model.model import Model
 from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
 from ..model.tree_layout import NotInTreeError
+from .answering_forces import AnsweringForces
 
 
 class Resistance(NamedTuple):
@@ -58,31 +59,28 @@ class TreeLinearisation:
         self._p = [k for body in bare.bodies for k in self._tree.modes[body.name]]
         self._S = np.vstack([self._lines(independent), self._identity[self._p]])
         self._of_rotors = self._lines(measure for measure, _ in model.rotors)
-        self._of_friction = self._lines(measure for measure, _ in model.frictions)
+        self._answering = AnsweringForces(model)
+        self._of_answers = self._lines(self._answering.measures)
         self._of_moments = self._lines(measure for measure, _ in model.loads if measure.carries_moment)
-        motors, joints = [gear.motor for gear in model.gears], [gear.coordinate for gear in model.gears]
-        self._of_twists = self._lines(motors) - self._lines(joints)
-        self._gears = MechanismSystem(model, model.joints, (), [*motors, *joints])
-        self._gear_stiffness = np.array([gear.stiffness for gear in model.gears])
-        self._modal_stiffness = np.concatenate([body.stiffness for body in model.links])
         self._inertia = np.array([inertia for _, inertia in model.rotors])
-        self._K = self._of_twists.T * self._gear_stiffness @ self._of_twists
-        self._K[self._p, self._p] += self._modal_stiffness
-        self._D = self._of_twists.T * [gear.damping for gear in model.gears] @ self._of_twists
-        for body in model.links:
-            modes = self._tree.modes[body.name]
-            self._D[np.ix_(modes, modes)] += body.damping
+        self._stiffness = np.concatenate([body.stiffness for body in model.links])
+        self._damping = block_diagonal([body.damping for body in model.links])
 
     def at(self, t: float, q: Array, v: Array, a: Array, force: Array, M: Array) -> Resistance:
         """About a motion (coordinates,) that `force` (f,) along s drives; M (f, f) of s."""
-        S, motion = self._S, self._motion(q, v, a)
-        acting, D = self._along_lines(t, q, motion)
-        core = self._answer(t, motion[0], motion[1], acting + S.T @ force)
+        S, E, (y, y_dot, y_ddot) = self._S, self._of_answers, self._motion(q, v, a)
+        answer, K, D, p = self._answering.at(t, q, v), 0.0 * self._identity, 0.0 * self._identity, self._p
+        K[p, p], D[np.ix_(p, p)] = self._stiffness, self._damping
+        moments = [size(t)[0] for measure, size in self._model.loads if measure.carries_moment]
+        held = S.T @ force - K @ y - D @ y_dot + E.T @ answer.force + self._of_moments.T @ moments
+        held -= self._of_rotors.T * self._inertia @ (self._of_rotors @ y_ddot)
+        K, D = K - E.T @ answer.by_value @ E, D - E.T @ answer.by_rate @ E
+        core = self._answer(t, y, y_dot, held)
         left = np.vstack([core.C, S])
         H = np.linalg.solve(left, np.eye(len(left))[:, len(core.C) :])
         H_dot = np.linalg.solve(left, np.vstack([-core.C_dot @ H, np.zeros((len(S), len(S)))]))
         by_s = core.a_y @ H + core.a_y_dot @ H_dot
-        return Resistance(H.T @ D @ H - M @ (S @ core.a_y_dot @ H), H.T @ (self._K @ H + D @ H_dot) - M @ (S @ by_s))
+        return Resistance(H.T @ D @ H - M @ (S @ core.a_y_dot @ H), H.T @ (K @ H + D @ H_dot) - M @ (S @ by_s))
 
     @property
     def _identity(self) -> Array:
@@ -111,27 +109,6 @@ class TreeLinearisation:
         states = np.array([q, v, a])
         of_tree = self._tree.motion(*states[:, : self._bare_size])
         return np.hstack([of_tree, states[:, self._bare_size + 2 :: 3]])  # of rotors θ in (R, θ)
-
-    def _along_lines(self, t: float, q: Array, motion: Array) -> tuple[Array, Array]:
-        """What acts along lines in the `motion` itself: forces (n,), and −∂/∂ẏ of these (n, n)."""
-        y, y_dot, y_ddot = motion
-        model, rates = self._model, self._of_friction @ y_dot
-        resisting = [friction for _, friction in model.frictions]
-        slopes = np.array([friction.slope(rate) for friction, rate in zip(resisting, rates, strict=True)])
-        resistance = [friction.resistance(rate) for friction, rate in zip(resisting, rates, strict=True)]
-        moments = [size(t)[0] for measure, size in model.loads if measure.carries_moment]
-        forces = self._of_moments.T @ moments - self._of_friction.T @ resistance - self._D @ y_dot
-        forces -= self._of_rotors.T * self._inertia @ (self._of_rotors @ y_ddot)
-        forces -= self._of_twists.T * self._gear_stiffness @ self._twists(q)
-        forces[self._p] -= self._modal_stiffness * y[self._p]
-        return forces, self._D + self._of_friction.T * slopes @ self._of_friction
-
-    def _twists(self, q: Array) -> Array:
-        """(gears,) rad, of motors before their joints."""
-        rest, sides = np.zeros_like(q)[None], [(measure, 0) for measure in self._gears.motor_measures]
-        motors, joints = _core.Sensing(self._gears.system, sides, []).read(q[None], rest, rest)[0].reshape(2, -1)
-        found: Array = motors - joints
-        return found
 
     def _answer(self, t: float, y: Array, y_dot: Array, forces: Array) -> Answer:
         """Of the tree with rotors, under `forces` (n,) and the loads at time t."""
@@ -162,5 +139,5 @@ def _bare(model: Model) -> Model:
         ),
         joints=tuple(constraint for constraint in model.joints if constraint.owner not in rotors),
         loads=tuple((measure, size) for measure, size in model.loads if not measure.carries_moment),
-        trajectories=(), motors={}, rotors=(), frictions=(), gears=(),
+        trajectories=(), motors={}, rotors=(), frictions=(), gears=(), state_forces=(),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The exact tangent of the equations of motion against differences of the readable ones: they close in with h²."""
+"""The tangent of the equations of motion against differences of the readable ones: they close in with h²."""
 
 from dataclasses import replace
 
@@ -10,8 +10,12 @@ from mechanisms import assemble, oracle_of, random_state, relative
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.state_forces import state_function
 from ffrobot.mbs.joints.measure import Marker
+from ffrobot.mbs.model.masses import system_mass_matrix
 from ffrobot.mbs.model.system import MechanismSystem
+from ffrobot.mbs.solve.absolute_linearisation import ForcesOfMotion, position_derivative
+from ffrobot.mbs.solve.gradients import gradient_rates, gradients
 from ffrobot.mbs.solve.initial_state import undeformed_state
+from ffrobot.mbs.solve.linearisation import Linearisation
 
 T = 0.37
 STEP = 2e-3
@@ -44,16 +48,16 @@ def case(request):
 
 def test_tangent_is_the_derivative_of_the_equations_of_motion(case):
     assembly, oracle, (q, v, a), multipliers = case
-    M, D, K, C_q = _core.tangent(assembly.system, T, q, v, a, multipliers, [])
+    pulls = [(c.measure, -pull) for c, pull in zip(assembly.constraints, multipliers, strict=True)]
+    forces = ForcesOfMotion(assembly.model, pulls, T, q, v)
 
     def residual(q, v):
         forces = oracle.mass_matrix(q) @ a - oracle.forces(T, q, v)
         return forces + oracle.constraint_values(T, q, v)[2].T @ multipliers
 
-    assert relative(M, oracle.mass_matrix(q)) < 1e-14
-    assert relative(C_q, oracle.constraint_values(T, q, v)[2]) < 1e-14
-    assert_derivative(D, lambda v: residual(q, v), v)
-    assert_derivative(K, lambda q: residual(q, v), q)
+    assert relative(system_mass_matrix(assembly, q), oracle.mass_matrix(q)) < 1e-14
+    assert_derivative(forces.damping(a), lambda v: residual(q, v), v)
+    assert_derivative(forces.stiffness(a), lambda q: residual(q, v), q)
 
 
 def pull(t, position, velocity):
@@ -68,48 +72,56 @@ def test_tangent_of_a_force_that_depends_on_the_motion(name):
     bare = assemble(zoo.build(name))
     model = replace(bare.model, state_forces=((Marker("b2", "side"), state_function(pull)),))
     q, v = random_state(np.random.default_rng(2), bare.system.coordinates)
-    a, multipliers = np.zeros_like(q), np.zeros(len(bare.constraints))
 
     def tangents(assembly):
-        return _core.tangent(assembly.system, T, q, v, a, multipliers, [])
+        forces, rest = ForcesOfMotion(assembly.model, [], T, q, v), np.zeros_like(q)
+        return forces.damping(rest), forces.stiffness(rest)
 
     def force(q, v):
         """Q of the pull alone: M a + C_qᵀλ with it, and without."""
         totals = []
         for assembly in (assemble(model), bare):
             a, multipliers = assembly.system.evaluate(T, q, v)
-            M, _, _, C_q = _core.tangent(assembly.system, T, q, v, a, multipliers, [])
-            totals.append(M @ a + C_q.T @ multipliers[: len(C_q)])
+            C_q = assembly.system.constraints(T, q, v)[2]
+            totals.append(system_mass_matrix(assembly, q) @ a + C_q.T @ multipliers[: len(C_q)])
         return totals[0] - totals[1]
 
-    (_, D, K, _), (_, D_bare, K_bare, _) = tangents(assemble(model)), tangents(bare)
+    (D, K), (D_bare, K_bare) = tangents(assemble(model)), tangents(bare)
     assert_derivative(D_bare - D, lambda v: force(q, v), v)
     assert_derivative(K_bare - K, lambda q: force(q, v), q)
 
 
 def test_tangents_of_rows_are_the_derivatives_of_their_accelerations(case):
     assembly, oracle, (q, v, a), _ = case
-    rows = [(c.measure, core) for c, core in zip(assembly.constraints, assembly.constraint_measures, strict=True)]
-    by_acceleration, by_velocity, by_position = _core.row_tangents(assembly.system, [r for _, r in rows], q, v, a)
+    measures, rows = assembly.constraint_measures, [constraint.measure for constraint in assembly.constraints]
+    sensing = _core.Sensing(assembly.system, [(measure, 2) for measure in measures], [])
+
+    def by_core(x):
+        return sensing.read(x, np.tile(v, (len(x), 1)), np.tile(a, (len(x), 1)))
 
     def accelerations(q, v):
-        return np.array([state.gradient @ a + state.bias for state in (oracle.row(row, q, v) for row, _ in rows)])
+        return np.array([state.gradient @ a + state.bias for state in (oracle.row(row, q, v) for row in rows)])
 
-    assert relative(by_acceleration, np.array([oracle.row(row, q, v).gradient for row, _ in rows])) < 1e-14
-    assert_derivative(by_velocity, lambda v: accelerations(q, v), v)
-    assert_derivative(by_position, lambda q: accelerations(q, v), q)
+    assert (
+        relative(gradients(assembly, measures, q), np.array([oracle.row(row, q, v).gradient for row in rows])) < 1e-14
+    )
+    assert_derivative(2 * gradient_rates(assembly, measures, q, v), lambda v: accelerations(q, v), v)
+    assert_derivative(position_derivative(assembly, by_core, q), lambda q: accelerations(q, v), q)
 
 
-def test_external_drives_take_part():
+def test_loads_take_part():
     """A force along a slide, whose direction turns with the configuration."""
-    assembly = assemble(zoo.build("mixed", load=[{"joint": "j3", "moment": "2.0"}]))
-    q, v = random_state(np.random.default_rng(3), assembly.system.coordinates)
-    zero, none = np.zeros_like(q), np.zeros(len(assembly.constraints))
-    given = _core.tangent(assembly.system, T, q, v, zero, none, [])[2]
-    cancelled = _core.tangent(assembly.system, T, q, v, zero, none, [-2.0])[2]
-    free = _core.tangent(assemble(zoo.build("mixed")).system, T, q, v, zero, none, [])[2]
-    assert np.abs(given - free).max() > 0.1
-    assert relative(cancelled, free) < 1e-14
+    loaded, free = (zoo.build("mixed", load=load) for load in ([{"joint": "j3", "moment": "2.0"}], []))
+    ((measure, _),) = (load for load in loaded.loads if load not in free.loads)
+    size = assemble(loaded).system.coordinates
+    q, v = random_state(np.random.default_rng(3), size)
+    rest = np.zeros(size)
+    given, cancelled, none = (
+        ForcesOfMotion(model, pulls, T, q, v).stiffness(rest)
+        for model, pulls in ((loaded, []), (loaded, [(measure, -2.0)]), (free, []))
+    )
+    assert np.abs(given - none).max() > 0.1
+    assert relative(cancelled, none) < 1e-14
 
 
 def reduced_force(assembly, oracle, near, t):
@@ -144,10 +156,10 @@ def reduced_force(assembly, oracle, near, t):
     return values, force
 
 
-@pytest.mark.parametrize("name", ["mixed backwards", "slider-crank", "loaded", "stiffened"])
-def test_reduction_is_the_derivative_of_the_equations_in_independent_coordinates(name):
+@pytest.mark.parametrize("name", ["mixed backwards", "slider-crank", "loaded", "stiffened", "stiffened, driven"])
+def test_linear_equations_are_the_derivative_of_those_in_independent_coordinates(name):
     """About a motion far from equilibrium, so that every term with Ḣ and Ḧ counts."""
-    model = zoo.build(name)
+    model = replace(zoo.build(name), trajectories=())
     assembly = MechanismSystem(model, model.joints, model.loads, list(model.motors.values()))
     rng = np.random.default_rng(4)
     near = undeformed_state(assembly).q
@@ -156,15 +168,12 @@ def test_reduction_is_the_derivative_of_the_equations_in_independent_coordinates
     s, force = reduced_force(assembly, oracle_of(assembly), near, T)
     s_dot, s_ddot = rng.standard_normal((2, len(s)))
     expected, (q, v, a) = force(s, s_dot, s_ddot)
-    linear = _core.reduce(assembly.system, assembly.motor_measures, T, q, v, a)
-    assert relative(linear.force, expected) < 1e-10
-    assert_derivative(linear.M, lambda x: force(s, s_dot, x)[0], s_ddot)
-    assert_derivative(linear.D, lambda x: force(s, x, s_ddot)[0], s_dot)
-    assert_derivative(linear.K, lambda x: force(x, s_dot, s_ddot)[0], s)
-
-
-def test_reduction_refuses_rows_that_do_not_fit():
-    assembly = assemble(zoo.build("chain of 2"))
-    q = np.zeros(assembly.system.coordinates)
-    with pytest.raises(ValueError, match="expected 6 constraints and independent rows, got 8"):
-        _core.reduce(assembly.system, assembly.motor_measures, T, q, q, q)
+    linearisation = Linearisation(model, q)
+    assert (linearisation.tree is None) == name.startswith("stiffened")
+    linear = linearisation.at(T, q, v, a)
+    motors = [linear.names.index(f"joint/{name}") for name in model.motors]
+    order = [*motors, *range(len(motors), len(s))]
+    assert relative(linear.force[order], expected) < 1e-10
+    assert_derivative(linear.M[np.ix_(order, order)], lambda x: force(s, s_dot, x)[0], s_ddot)
+    assert_derivative(linear.D[np.ix_(order, order)], lambda x: force(s, x, s_ddot)[0], s_dot)
+    assert_derivative(linear.K[np.ix_(order, order)], lambda x: force(x, s_dot, s_ddot)[0], s)

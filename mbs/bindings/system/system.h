@@ -7,4 +7,3 @@
 
 void bind_parts(nanobind::class_<ffrobot::System> &system);                             // bodies, constraints, loads
 void bind_evaluations(nanobind::module_ &m, nanobind::class_<ffrobot::System> &system); // what is computed of a state
-void bind_tangent(nanobind::module_ &m); // linear equations about a motion

@@ -28,15 +28,6 @@ Matrix4d mass_of_affine_fields(double m, const Vector2d &s, double J) {
   return N;
 }
 
-// (K x)^T, (4, n)
-Matrix4Xd products(const AffineInertia &inertia, const VectorMap &x) {
-  Matrix4Xd K_x = Matrix4Xd::Zero(4, inertia.modes());
-  for (Index i = 0; i < 4; ++i)
-    if (const MatrixXd &K = inertia.K[static_cast<std::size_t>(i)]; K.size())
-      K_x.row(i).noalias() = (K * x).transpose();
-  return K_x;
-}
-
 } // namespace
 
 AffineInertia::AffineInertia(double mass, const Vector2d &first_moment, double J, const Matrix4Xd &F_,
@@ -142,7 +133,7 @@ double kinetic_energy(const AffineInertia &inertia, const AffineMotion &motion, 
 
 // f = X^T N^-1 gamma + that of the rest, gamma = X a - theta_dot^2 g + 2 i theta_dot g_dot - p_dot^T K p_dot
 VectorXd inertia_force(const AffineInertia &inertia, const AffineMotion &motion, const double *p, const double *p_dot,
-                       double w, const VectorXd &a, InertiaTangent *tangent) {
+                       double w, const VectorXd &a) {
   const Index n = inertia.modes();
   const VectorMap p_(p, n), p_dot_(p_dot, n), p_ddot(a.data() + 3, n);
   const MatrixXd &m_rest = inertia.m_xy_rest, &S_rest = inertia.S_tilde_rest;
@@ -151,38 +142,11 @@ VectorXd inertia_force(const AffineInertia &inertia, const AffineMotion &motion,
   X << inertia.N.leftCols<2>(), quarter_turn(motion.g), motion.F;
   const Vector4d gamma = X * a - w * w * motion.g + 2 * w * quarter_turn(motion.g_dot) - motion.curvature;
   const Vector4d y = inertia.N_inverse * gamma;
-  const VectorXd m_p = m_rest * p_, m_p_dot = m_rest * p_dot_, S_p_ddot = S_rest * p_ddot;
+  const VectorXd m_p = m_rest * p_, S_p_ddot = S_rest * p_ddot;
 
   VectorXd f = X.transpose() * y;
   f[2] += theta_ddot * m_p.dot(p_) + 2 * w * m_p.dot(p_dot_) + p_.dot(S_p_ddot);
   f.tail(n) += inertia.m_ff_rest * p_ddot - w * w * m_p - S_rest * (theta_ddot * p_ + 2 * w * p_dot_);
-  if (!tangent)
-    return f;
-
-  auto &[M, D, K] = *tangent;
-  M = X.transpose() * inertia.N_inverse * X;
-  M(2, 2) += m_p.dot(p_);
-  M.bottomRightCorner(n, n) += inertia.m_ff_rest;
-  M.block(2, 3, 1, n) += p_.transpose() * S_rest;
-  M.block(3, 2, n, 1) = M.block(2, 3, 1, n).transpose();
-
-  const Matrix4Xd K_p_dot = products(inertia, p_dot_), i_F = quarter_turn(motion.F);
-  Matrix4Xd by_velocity(4, 1 + n); // of gamma
-  by_velocity << -2 * w * motion.g + 2 * quarter_turn(motion.g_dot), 2 * w * i_F - 2 * K_p_dot;
-  D = X.transpose() * inertia.N_inverse * by_velocity;
-  D(2, 0) += 2 * m_p.dot(p_dot_);
-  D.block(2, 1, 1, n) += 2 * w * m_p.transpose();
-  D.block(3, 0, n, 1) -= 2 * w * m_p + 2 * (S_rest * p_dot_);
-  D.bottomRightCorner(n, n) -= 2 * w * S_rest;
-
-  const Matrix4Xd by_position =
-      theta_ddot * i_F - w * w * motion.F - 2 * w * quarter_turn(K_p_dot) - products(inertia, p_ddot);
-  K = X.transpose() * inertia.N_inverse * by_position;
-  K.row(2) += y.transpose() * i_F + (2 * theta_ddot * m_p + 2 * w * m_p_dot + S_p_ddot).transpose();
-  K.bottomRows(n) -= w * w * m_rest + theta_ddot * S_rest;
-  for (Index i = 0; i < 4; ++i)
-    if (const MatrixXd &K_i = inertia.K[static_cast<std::size_t>(i)]; K_i.size())
-      K.bottomRows(n) -= y[i] * K_i;
   return f;
 }
 

@@ -76,13 +76,8 @@ double velocity_force(const AffineInertia &inertia, const AffineMotion &motion, 
 double kinetic_energy(const AffineInertia &inertia, const AffineMotion &motion, const double *p, const double *p_dot,
                       const Eigen::Vector2d &R_dot, double theta_dot);
 
-// Inertia forces M a - Q (3 + n), R in body axes, under accelerations a = (A^T (R_ddot - g), theta_ddot, p_ddot); with
-// derivatives by a, by (theta_dot, p_dot) and by p where these are asked for.
-struct InertiaTangent {
-  Eigen::MatrixXd by_acceleration, by_velocity, by_position; // (3 + n) x (3 + n), (1 + n), n
-};
+// Inertia forces M a - Q (3 + n), R in body axes, under accelerations a = (A^T (R_ddot - g), theta_ddot, p_ddot).
 Eigen::VectorXd inertia_force(const AffineInertia &inertia, const AffineMotion &motion, const double *p,
-                              const double *p_dot, double theta_dot, const Eigen::VectorXd &a,
-                              InertiaTangent *tangent = nullptr);
+                              const double *p_dot, double theta_dot, const Eigen::VectorXd &a);
 
 } // namespace ffrobot

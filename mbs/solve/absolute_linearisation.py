@@ -1,0 +1,114 @@
+"""The linear equations of a planar mechanism in absolute coordinates, for what the recursion does not have yet.
+
+The forces f = M a − Q that a motion needs and accelerations of measures are polynomials in R and p, of degree 4 at
+most, quadratic in v, and of degree 2 in sine and cosine of each angle. Differences of two steps have the derivatives of
+such functions exactly but for rounding, however long the steps. Forces that answer otherwise to the motion are held,
+and their derivatives added (`AnsweringForces`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.arrays import Array
+from .. import _core
+from ..joints.measure import Measure
+from ..model.masses import system_mass_matrix
+from ..model.model import Model
+from ..model.system import MechanismSystem
+from .answering_forces import AnsweringForces
+from .gradients import gradient_rates, gradients
+from .tree_linearisation import Resistance
+
+Pulls = Sequence[tuple[Measure, float]]
+"""Forces along measures."""
+
+
+class AbsoluteLinearisation:
+    """As `TreeLinearisation`, of any model."""
+
+    def __init__(self, model: Model, independent: Sequence[Measure]) -> None:
+        self._model, self._rows = model, [*(constraint.measure for constraint in model.joints), *independent]
+        self._assembly = MechanismSystem(model, (), model.loads, self._rows)
+
+    def at(self, t: float, q: Array, v: Array, a: Array, H: Array, H_dot: Array) -> Resistance:
+        """About a motion (coordinates,) with H = ∂q/∂s (coordinates, f), where δv = H δṡ + Ḣ δs.
+
+        With the rows' gradients G, G a + Ġ v = (0; s̈): δa = H δs̈ + 2 Ḣ δṡ + Ḧ δs.
+        """
+        rows, frames = self._assembly.motor_measures, self._assembly.frame_coordinates
+        G, G_dot = gradients(self._assembly, rows, q), gradient_rates(self._assembly, rows, q, v)
+        bent = position_derivative(self._assembly, lambda x: self._accelerations(x, v, a), q) @ H
+        H_ddot = np.zeros_like(H)
+        H_ddot[frames] = -np.linalg.solve(G[:, frames], 2 * G_dot @ H_dot + bent)
+        f = self._assembly.system.required_forces(np.array([t]), q[None], v[None], a[None])[0]
+        pulls = list(zip(self._rows, np.linalg.solve(G[:, frames].T, f[frames]), strict=True))
+        forces, M = ForcesOfMotion(self._model, pulls, t, q, v), system_mass_matrix(self._assembly, q)
+        K, D = forces.stiffness(a), forces.damping(a)
+        return Resistance(H.T @ (D @ H + 2 * M @ H_dot), H.T @ (K @ H + D @ H_dot + M @ H_ddot))
+
+    def _accelerations(self, q: Array, v: Array, a: Array) -> Array:
+        """Of rows (T, rows) at q (T, coordinates)."""
+        along = [(row, 2) for row in self._assembly.motor_measures]
+        found: Array = _core.Sensing(self._assembly.system, along, []).read(q, *_tiled(len(q), v, a))
+        return found
+
+
+class ForcesOfMotion:
+    """f = M a − Q of a motion through q with v (coordinates,) at time t, `pulls` held beside the model's loads."""
+
+    def __init__(self, model: Model, pulls: Pulls, t: float, q: Array, v: Array) -> None:
+        answering = AnsweringForces(model)
+        self._answer = answering.at(t, q, v)
+        held = [*pulls, *zip(answering.measures, self._answer.force, strict=True)]
+        drives = [*model.loads, *((row, _core.TimeFunction.constant(float(pull))) for row, pull in held)]
+        passive = replace(model, frictions=(), gears=(), state_forces=())
+        self._assembly = MechanismSystem(passive, (), drives, answering.measures)
+        self._t, self._q, self._v = t, q, v
+
+    def stiffness(self, a: Array) -> Array:
+        """∂f/∂q (coordinates, coordinates)."""
+        q, v, rows = self._q, self._v, self._assembly.motor_measures
+        K = position_derivative(self._assembly, lambda x: self._forces(x, *_tiled(len(x), v, a)), q)
+        E, E_dot = gradients(self._assembly, rows, q), gradient_rates(self._assembly, rows, q, v)
+        return K - E.T @ (self._answer.by_value @ E + self._answer.by_rate @ E_dot)
+
+    def damping(self, a: Array) -> Array:
+        """∂f/∂v (coordinates, coordinates)."""
+        q, v, scales = self._q, self._v, self._assembly.scales
+        u = scales * max(1.0, np.abs(v / scales).max(initial=0.0))
+        at, under = _tiled(len(q), q, a)
+        ahead, behind = (self._forces(at, v + sign * np.diag(u), under) for sign in (1.0, -1.0))
+        E = gradients(self._assembly, self._assembly.motor_measures, q)
+        found: Array = ((ahead - behind) / (2 * u[:, None])).T - E.T @ self._answer.by_rate @ E
+        return found
+
+    def _forces(self, q: Array, v: Array, a: Array) -> Array:
+        found: Array = self._assembly.system.required_forces(np.full(len(q), self._t), q, v, a)
+        return found
+
+
+def position_derivative(assembly: MechanismSystem, function: Callable[[Array], Array], q: Array) -> Array:
+    """∂function/∂q (m, coordinates) of the functions above, (T, m) of q (T, coordinates).
+
+    The odd part of a function along a coordinate x is c₁x + c₃x³, along an angle s₁ sin x + s₂ sin 2x.
+    """
+    is_angle = np.zeros(len(q), dtype=bool)
+    is_angle[assembly.first + 2] = True
+    h = assembly.scales
+
+    def odd(steps: Array) -> Array:
+        found: Array = (function(q + np.diag(steps)) - function(q - np.diag(steps))).T / 2
+        return found
+
+    near, far = odd(np.where(is_angle, np.pi / 4, h)), odd(np.where(is_angle, np.pi / 2, 2 * h))
+    by_angle = 2 * near + (1 - np.sqrt(2)) * far
+    return np.where(is_angle, by_angle, (8 * near - far) / (6 * h))
+
+
+def _tiled(count: int, *x: Array) -> tuple[Array, ...]:
+    """Each (count, n) of (n,)."""
+    return tuple(np.tile(values, (count, 1)) for values in x)
