@@ -1,4 +1,4 @@
-"""Linear equations by dual numbers in joint coordinates: equal to those by exact differences in absolute coordinates."""
+"""Linear equations by dual numbers in joint coordinates: equal to those by differences in absolute coordinates."""
 
 from dataclasses import replace
 
@@ -13,11 +13,11 @@ from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.linearisation import Linearisation
 
 ABSOLUTE = ("stiffened", "stiffened, driven", "stiffened, as built", "driven, as built", "free-flying")
-"""With geometric stiffening, or with places of frames among the coordinates, which are not linear in those of a tree."""
+"""With geometric stiffening, or places of frames among the coordinates: these are not linear in those of a tree."""
 
 
 def motion_of(model, seed=1):
-    """q, v and a with closed joints: modes of any size and rate, accelerations as loads and any force along s have it."""
+    """q, v and a with closed joints: modes of any size and rate, accelerations as loads and forces along s have it."""
     assembly, rng = MechanismSystem(model, model.joints, model.loads), np.random.default_rng(seed)
     start, is_mode = undeformed_state(assembly), np.ones(assembly.system.coordinates, dtype=bool)
     is_mode[assembly.frame_coordinates] = False
