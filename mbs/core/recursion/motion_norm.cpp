@@ -63,7 +63,7 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
   length_ = length_ > 0 ? length_ : 1;
   for (std::size_t i = 0; i < n; ++i)
     group_[n + i] = group_[i] + static_cast<int>(pace_.size());
-  size_ = peak_ = std::vector<double>(2 * pace_.size(), 0.0);
+  size_.assign(2 * pace_.size(), 0.0), peak_.assign(3 * pace_.size(), 0.0);
   std::map<std::pair<std::string, bool>, int> known;
   for (const Row &row : mechanism.rows) {
     const auto key = std::pair(row.model.name, is_moment(mechanism, row));
@@ -94,6 +94,16 @@ template <class Space> double MotionNorm<Space>::of_state(const double *e) const
   double worst = 0;
   for (std::size_t g = 0; g < size_.size(); ++g)
     if (const double size = std::sqrt(size_[g]) / std::max(peak_[g], nothing); !(size <= worst))
+      worst = size; // keeps NaN
+  return worst;
+}
+
+template <class Space> double MotionNorm<Space>::of_change(const double *change, double rate) const {
+  const std::size_t groups = pace_.size();
+  double worst = of_state(change);
+  for (std::size_t g = 0; g < groups; ++g)
+    if (const double size = rate * std::sqrt(size_[groups + g]) / std::max(peak_[2 * groups + g], nothing);
+        !(size <= worst))
       worst = size; // keeps NaN
   return worst;
 }
@@ -139,10 +149,12 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const double 
                              const Workspace<Space, double> &w) {
   const std::size_t n = frequency_.size();
   // what the forces on modes will do to them, and what given ones would do alone, which may hold a link straight
-  std::vector<double> of_forces(size_.size(), 0.0), of_given(size_.size(), 0.0);
+  std::vector<double> of_forces(size_.size(), 0.0), of_given(size_.size(), 0.0), of_rates(pace_.size(), 0.0);
   std::fill(size_.begin(), size_.end(), 0.0);
   for (std::size_t i = 0; i < group_.size(); ++i)
     size_[static_cast<std::size_t>(group_[i])] += z[i] * z[i];
+  for (std::size_t i = 0; i < n; ++i)
+    of_rates[static_cast<std::size_t>(group_[i])] += z_dot[n + i] * z_dot[n + i];
   for (std::size_t i = 0; i < n; ++i)
     if (frequency_[i] > 0) {
       const double rate = z_dot[n + i] / frequency_[i], way = rate / frequency_[i];
@@ -154,6 +166,8 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const double 
     }
   for (std::size_t g = 0; g < size_.size(); ++g)
     peak_[g] = std::max({peak_[g], std::sqrt(size_[g]), std::sqrt(of_forces[g]), std::sqrt(of_given[g])});
+  for (std::size_t g = 0; g < pace_.size(); ++g)
+    peak_[size_.size() + g] = std::max(peak_[size_.size() + g], std::sqrt(of_rates[g]));
   take_accelerations(w);
   // Rotation vectors start at zero in every step: an angle is compared with one radian at least, a way with a length.
   peak_[0] = std::max(peak_[0], length_), peak_[1] = std::max(peak_[1], 1.0);
@@ -166,7 +180,8 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const double 
 }
 
 template <class Space> void MotionNorm<Space>::take_accelerations(const Workspace<Space, double> &w) {
-  double inertial = 0;
+  double inertial = 0, &of_ways = peak_[size_.size()], &of_angles = peak_[size_.size() + 1];
+  of_ways = std::max(of_ways, mechanism_.gravity.norm());
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
     const auto &A = w.bodies[i].A;
@@ -175,20 +190,25 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
       square += A[k] * A[k];
     const double acceleration = std::sqrt(square), mass = node.body.mass;
     inertial += mass * acceleration;
+    of_ways = std::max(of_ways, acceleration);
     if (node.n() > 0) {
       // where nothing has happened yet, or what acts holds the link straight
       const auto g = static_cast<std::size_t>(group_[static_cast<std::size_t>(node.p_v())]);
       const double force = std::sqrt(mass) * std::max(acceleration, mechanism_.gravity.norm());
       peak_[g] = std::max(peak_[g], small_bend * force / (pace_[g] * pace_[g]));
+      peak_[size_.size() + g] = std::max(peak_[size_.size() + g], force);
     }
   }
+  of_angles = std::max(of_angles, of_ways / length_);
   inertial_ = std::max(inertial_, inertial);
 }
 
 template <class Space> void MotionNorm<Space>::set_peaks(const NormPeaks &peaks) {
-  if (peaks.state.size() != peak_.size() || peaks.force.size() != force_peak_.size())
+  const bool without_accelerations = peaks.state.size() == size_.size(); // as before 0.2.0
+  if ((peaks.state.size() != peak_.size() && !without_accelerations) || peaks.force.size() != force_peak_.size())
     throw std::invalid_argument("peaks: expected those of the same mechanism, found those of another one");
-  peak_ = peaks.state, force_peak_ = peaks.force, inertial_ = peaks.inertial;
+  std::copy(peaks.state.begin(), peaks.state.end(), peak_.begin());
+  force_peak_ = peaks.force, inertial_ = peaks.inertial;
 }
 
 template class MotionNorm<Planar>;

@@ -21,6 +21,9 @@ public:
 
   double of_state(const double *e) const;
 
+  // of_state, and the accelerations that a change of rates is worth at `rate` (1/s).
+  double of_change(const double *change, double rate) const;
+
   // Keeps the forces of the last evaluation: multipliers, then those at ports; then, of another at a state that an
   // error has shifted, by how much these differ.
   void observe(const Workspace<Space, double> &w);
@@ -43,8 +46,8 @@ private:
   double length_ = 0;      // m, of a body
   std::vector<int> group_; // of each of 2 n_v entries of z; those of rates follow those of what they are of
   std::vector<double> pace_,
-      frequency_; // 1/s: of each group, below which rates are small; of each entry of v, of modes
-  std::vector<double> peak_;
+      frequency_;            // 1/s: of each group, below which rates are small; of each entry of v, of modes
+  std::vector<double> peak_; // of each group: of what it is of, of rates, of accelerations
   mutable std::vector<double> size_;
   std::vector<std::size_t> carriers_; // of all ports: on which a joint of the tree hangs
   std::vector<int> force_group_;      // of each row, then of each component at these ports
