@@ -97,7 +97,7 @@ def drive(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
     sampled = "under a sampled controller"
-    tree = tree_start(assembly, start, integrator, earlier) if control is None else sampled
+    tree = tree_start(assembly, start, earlier) if control is None else sampled
     point = _core.TreeCheckpoint() if isinstance(tree, TreeStart) else _core.Checkpoint()
     continuation = Continuation(point, recording)
     if earlier is not None:  # with the same candidates, and what they have become since
