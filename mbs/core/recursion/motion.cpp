@@ -196,8 +196,9 @@ template <class Space> double RecursiveMotion<Space>::error_size(double t, const
   return of_forces <= size ? size : of_forces; // keeps NaN
 }
 
-template <class Space> double RecursiveMotion<Space>::change_size(const double *, const double *e, double) const {
-  return norm_.of_state(e);
+template <class Space>
+double RecursiveMotion<Space>::change_size(const double *, const double *change, double rate) const {
+  return norm_.of_change(change, rate);
 }
 
 template <class Space> void RecursiveMotion<Space>::accepted(double t, const double *z, const double *z_dot) {

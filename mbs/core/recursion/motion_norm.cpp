@@ -13,12 +13,13 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double small_force = 2e-4; // of the largest: forces below count like this one
-constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them
-constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
-constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
-constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
-constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
+constexpr double small_force = 2e-4;  // of the largest: forces below count like this one
+constexpr double leverage = 2;        // of multipliers: motors' moments follow from them, and may be small beside them
+constexpr double small_arm = 1e-2;    // of a body's length: moments count like the largest force at it
+constexpr double slow = 1e-3;         // 1/s: of joints, times the peak of what the rate is of,
+constexpr double slow_to_fall = 1e-2; // or in terms of what gravity does to a body, sqrt(g / length)
+constexpr double small_bend = 1e-3;   // of what a body's acceleration would do to its softest mode
+constexpr double small_twist = 1e-5;  // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
 constexpr double nothing = 1e-12;
 
 template <class Space> bool is_moment(const Mechanism<Space> &m, const Row &row) {
@@ -44,11 +45,12 @@ double farthest(const spatial::Body &b) {
 
 template <class Space>
 MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
-    : mechanism_(mechanism), pace_{slow, slow} {
+    : mechanism_(mechanism), is_strict_(is_strict), pace_{slow, slow} {
   const auto n = static_cast<std::size_t>(mechanism.n_v);
   group_.assign(2 * n, 0), frequency_.assign(n, 0);
   for (const Node<Space> &node : mechanism.nodes) {
-    length_ = std::max(length_, farthest(node.body));
+    reach_.push_back(farthest(node.body));
+    length_ = std::max(length_, reach_.back());
     for (int k = 0; k < node.shape.freedoms.count; ++k)
       group_[static_cast<std::size_t>(node.v + k)] = node.shape.freedoms.component[k] < Space::linear ? 0 : 1;
     double lowest = std::numeric_limits<double>::infinity();
@@ -64,7 +66,7 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
   length_ = length_ > 0 ? length_ : 1;
   for (std::size_t i = 0; i < n; ++i)
     group_[n + i] = group_[i] + static_cast<int>(pace_.size());
-  size_ = peak_ = std::vector<double>(2 * pace_.size(), 0.0);
+  size_.assign(2 * pace_.size(), 0.0), peak_.assign(3 * pace_.size(), 0.0);
   std::map<std::pair<std::string, bool>, int> known;
   for (const Row &row : mechanism.rows) {
     const auto key = std::pair(row.model.name, is_moment(mechanism, row));
@@ -82,8 +84,10 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
       for (int i = 0; i < Space::dim; ++i)
         force_group_.push_back(i < Space::linear ? force : force + 1);
     }
-  if (is_strict)
+  if (is_strict) {
     levers_ = is_moment_.size();
+    pace_[0] = pace_[1] = std::max(slow, slow_to_fall * std::sqrt(mechanism.gravity.norm() / length_));
+  }
   force_now_ = force_error_ = force_peak_ = std::vector<double>(is_moment_.size(), 0.0);
   observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
 }
@@ -100,6 +104,16 @@ template <class Space> double MotionNorm<Space>::of_state(const double *e) const
   double worst = 0;
   for (std::size_t g = 0; g < size_.size(); ++g)
     if (const double size = std::sqrt(size_[g]) / std::max(peak_[g], nothing); !(size <= worst))
+      worst = size; // keeps NaN
+  return worst;
+}
+
+template <class Space> double MotionNorm<Space>::of_change(const double *change, double rate) const {
+  const std::size_t groups = pace_.size();
+  double worst = of_state(change);
+  for (std::size_t g = 0; g < groups; ++g)
+    if (const double size = rate * std::sqrt(size_[groups + g]) / std::max(peak_[2 * groups + g], nothing);
+        !(size <= worst))
       worst = size; // keeps NaN
   return worst;
 }
@@ -146,10 +160,12 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const double 
                              const Workspace<Space, double> &w) {
   const std::size_t n = frequency_.size();
   // what the forces on modes will do to them, and what given ones would do alone, which may hold a link straight
-  std::vector<double> of_forces(size_.size(), 0.0), of_given(size_.size(), 0.0);
+  std::vector<double> of_forces(size_.size(), 0.0), of_given(size_.size(), 0.0), of_rates(pace_.size(), 0.0);
   std::fill(size_.begin(), size_.end(), 0.0);
   for (std::size_t i = 0; i < group_.size(); ++i)
     size_[static_cast<std::size_t>(group_[i])] += z[i] * z[i];
+  for (std::size_t i = 0; i < n; ++i)
+    of_rates[static_cast<std::size_t>(group_[i])] += z_dot[n + i] * z_dot[n + i];
   for (std::size_t i = 0; i < n; ++i)
     if (frequency_[i] > 0) {
       const double rate = z_dot[n + i] / frequency_[i], way = rate / frequency_[i];
@@ -161,6 +177,8 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const double 
     }
   for (std::size_t g = 0; g < size_.size(); ++g)
     peak_[g] = std::max({peak_[g], std::sqrt(size_[g]), std::sqrt(of_forces[g]), std::sqrt(of_given[g])});
+  for (std::size_t g = 0; g < pace_.size(); ++g)
+    peak_[size_.size() + g] = std::max(peak_[size_.size() + g], std::sqrt(of_rates[g]));
   take_accelerations(w);
   // Rotation vectors start at zero in every step: an angle is compared with one radian at least, a way with a length.
   peak_[0] = std::max(peak_[0], length_), peak_[1] = std::max(peak_[1], 1.0);
@@ -173,7 +191,8 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const double 
 }
 
 template <class Space> void MotionNorm<Space>::take_accelerations(const Workspace<Space, double> &w) {
-  double inertial = 0;
+  double inertial = 0, &of_ways = peak_[size_.size()], &of_angles = peak_[size_.size() + 1];
+  of_ways = std::max(of_ways, mechanism_.gravity.norm());
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
     const auto &A = w.bodies[i].A;
@@ -182,20 +201,30 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
       square += A[k] * A[k];
     const double acceleration = std::sqrt(square), mass = node.body.mass;
     inertial += mass * acceleration;
+    of_ways = std::max(of_ways, acceleration);
     if (node.n() > 0) {
       // where nothing has happened yet, or what acts holds the link straight
       const auto g = static_cast<std::size_t>(group_[static_cast<std::size_t>(node.p_v())]);
       const double force = std::sqrt(mass) * std::max(acceleration, mechanism_.gravity.norm());
       peak_[g] = std::max(peak_[g], small_bend * force / (pace_[g] * pace_[g]));
+      peak_[size_.size() + g] = std::max(peak_[size_.size() + g], force);
+      if constexpr (Space::dim == 3) // rates of modes as parts of the velocity of a link that turns
+        if (is_strict_) {
+          double &of_modes = peak_[pace_.size() + g];
+          of_modes = std::max(of_modes, std::sqrt(mass) * reach_[i] * std::abs(w.bodies[i].omega));
+        }
     }
   }
+  of_angles = std::max(of_angles, of_ways / length_);
   inertial_ = std::max(inertial_, inertial);
 }
 
 template <class Space> void MotionNorm<Space>::set_peaks(const NormPeaks &peaks) {
-  if (peaks.state.size() != peak_.size() || peaks.force.size() != force_peak_.size())
+  const bool without_accelerations = peaks.state.size() == size_.size(); // as before 0.2.0
+  if ((peaks.state.size() != peak_.size() && !without_accelerations) || peaks.force.size() != force_peak_.size())
     throw std::invalid_argument("peaks: expected those of the same mechanism, found those of another one");
-  peak_ = peaks.state, force_peak_ = peaks.force, inertial_ = peaks.inertial;
+  std::copy(peaks.state.begin(), peaks.state.end(), peak_.begin());
+  force_peak_ = peaks.force, inertial_ = peaks.inertial;
 }
 
 template class MotionNorm<Planar>;

@@ -16,7 +16,8 @@ struct NormPeaks {
 // Errors e and states z are local coordinates (space/local_coordinates.h).
 template <class Space> class MotionNorm {
 public:
-  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed.
+  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed; rates are judged as
+  // in absolute coordinates (core/system/error_norm.*), where those of modes are parts of a body's velocity.
   explicit MotionNorm(const Mechanism<Space> &mechanism, bool is_strict = false);
 
   // Of a spring in front of which an inertia swings (N m/rad, kg m^2): moments and rates of a small twist are small,
@@ -24,6 +25,9 @@ public:
   void add_spring(double stiffness, double inertia);
 
   double of_state(const double *e) const;
+
+  // of_state, and the accelerations that a change of rates is worth at `rate` (1/s).
+  double of_change(const double *change, double rate) const;
 
   // Keeps the forces of the last evaluation: multipliers, then those at ports; then, of another at a state that an
   // error has shifted, by how much these differ.
@@ -44,11 +48,13 @@ private:
   void sizes_of_forces(const Eigen::VectorXd &values, std::vector<double> &size) const;
 
   const Mechanism<Space> &mechanism_;
-  double length_ = 0;      // m, of a body
-  std::vector<int> group_; // of each of 2 n_v entries of z; those of rates follow those of what they are of
+  bool is_strict_;
+  double length_ = 0;         // m, of a body
+  std::vector<double> reach_; // m, of each body from its frame
+  std::vector<int> group_;    // of each of 2 n_v entries of z; those of rates follow those of what they are of
   std::vector<double> pace_,
-      frequency_; // 1/s: of each group, below which rates are small; of each entry of v, of modes
-  std::vector<double> peak_;
+      frequency_;            // 1/s: of each group, below which rates are small; of each entry of v, of modes
+  std::vector<double> peak_; // of each group: of what it is of, of rates, of accelerations
   mutable std::vector<double> size_;
   std::vector<std::size_t> carriers_; // of all ports: on which a joint of the tree hangs
   std::vector<int> force_group_;      // of each row, then of each component at these ports
