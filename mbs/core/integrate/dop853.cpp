@@ -2,7 +2,9 @@
 
 #include "core/integrate/explicit_stages.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace ffrobot {
 
@@ -22,16 +24,19 @@ bool Dop853::step(double t, const double *y, double h, double) {
 // A coordinate and its rate have one factor, and every pair its own: large slow motion, whose estimate of order 5 is
 // far below that of order 3, would bring the error of fast vibration down as well.
 void Dop853::estimate(double h, Eigen::VectorXd &error) {
-  constexpr auto all = std::make_index_sequence<Tableau::stages + 1>();
-  const auto e5 = [&](Index i) { return combine<Tableau::e5>(K_.data(), n_, i, all); };
-  const auto e3 = [&](Index i) { return combine<Tableau::e3>(K_.data(), n_, i, all); };
+  constexpr double least = std::numeric_limits<double>::min(); // where nothing moves there is no error
+  combine_all<Tableau::e5, Tableau::stages + 1>(K_.data(), n_, error.data());
+  combine_all<Tableau::e3, Tableau::stages + 1>(K_.data(), n_, stage_.data());
   const Index n_v = n_ / 2;
+  double *q = error.data(), *v = q + n_v;
+  const double *of_q = stage_.data(), *of_v = of_q + n_v;
+#pragma GCC ivdep
   for (Index i = 0; i < n_v; ++i) {
-    const double q5 = e5(i), v5 = h * e5(n_v + i), q3 = e3(i), v3 = h * e3(n_v + i);
+    const double q5 = q[i], v5 = h * v[i], q3 = of_q[i], v3 = h * of_v[i];
     const double square5 = q5 * q5 + v5 * v5, square = square5 + 0.01 * (q3 * q3 + v3 * v3);
-    const double factor = square == 0 ? 1.0 : std::sqrt(square5 / square);
-    error[i] = h * factor * q5;
-    error[n_v + i] = factor * v5;
+    const double factor = std::sqrt(square5 / std::max(square, least));
+    q[i] = h * factor * q5;
+    v[i] = factor * v5;
   }
 }
 

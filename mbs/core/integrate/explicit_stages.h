@@ -19,7 +19,14 @@ double combine(const double *K, Eigen::Index n, Eigen::Index i, std::index_seque
   return (term.template operator()<j>() + ...);
 }
 
-// out = y + h sum of coefficients times slopes; K holds the slopes one after the other
+// out = sum of coefficients times slopes; K holds the slopes one after the other
+template <const auto &Coefficients, int Count>
+void combine_all(const double *K, Eigen::Index n, double *__restrict out) {
+  for (Eigen::Index i = 0; i < n; ++i)
+    out[i] = combine<Coefficients>(K, n, i, std::make_index_sequence<Count>());
+}
+
+// out = y + h times that sum
 template <const auto &Coefficients, int Count>
 void advance(const double *K, Eigen::Index n, double h, const double *y, double *__restrict out) {
   for (Eigen::Index i = 0; i < n; ++i)

@@ -36,7 +36,8 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
       correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
       target_time_(std::numeric_limits<double>::quiet_NaN()), norm_(mechanism, scene.is_strict),
-      shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(VectorXd::Zero(mechanism.n_v)), posture_(mechanism) {
+      shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(VectorXd::Zero(mechanism.n_v)),
+      evaluated_(VectorXd::Zero(mechanism.n_q)), rates_(force_), posture_(mechanism) {
   has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
                !scene_.frame_motors.empty() || !scene_.gears.empty();
   update_targets(t);
@@ -129,8 +130,8 @@ template <class Space> void RecursiveMotion<Space>::slope(double t, const double
   local().rate(z, z_dot);
   const double *q = local().state(z);
   evaluate(t, q, z + n_v(), z_dot + n_v());
-  evaluated_ = Eigen::Map<const VectorXd>(q, mechanism_.n_q);
-  rates_ = Eigen::Map<const VectorXd>(z + n_v(), n_v());
+  std::copy_n(q, mechanism_.n_q, evaluated_.data());
+  std::copy_n(z + n_v(), n_v(), rates_.data());
   posture_is_old_ = true;
 }
 

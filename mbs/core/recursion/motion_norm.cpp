@@ -22,6 +22,8 @@ constexpr double small_bend = 1e-3;   // of what a body's acceleration would do 
 constexpr double small_twist = 1e-5;  // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
 constexpr double nothing = 1e-12;
 
+double square(double x) { return x * x; }
+
 template <class Space> bool is_moment(const Mechanism<Space> &m, const Row &row) {
   if (row.model.kind != RowKind::coordinate)
     return row.model.kind == RowKind::rotation || row.model.kind == RowKind::dot;
@@ -47,7 +49,7 @@ template <class Space>
 MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
     : mechanism_(mechanism), is_strict_(is_strict), pace_{slow, slow} {
   const auto n = static_cast<std::size_t>(mechanism.n_v);
-  group_.assign(2 * n, 0), frequency_.assign(n, 0);
+  group_.assign(2 * n, 0), radian_.assign(n, 0);
   for (const Node<Space> &node : mechanism.nodes) {
     reach_.push_back(farthest(node.body));
     length_ = std::max(length_, reach_.back());
@@ -57,8 +59,9 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
     for (int k = 0; k < node.n(); ++k) {
       const auto i = static_cast<std::size_t>(node.p_v() + k);
       group_[i] = static_cast<int>(pace_.size());
-      frequency_[i] = std::sqrt(node.body.K[static_cast<std::size_t>(k)]);
-      lowest = std::min(lowest, frequency_[i]);
+      const double frequency = std::sqrt(node.body.K[static_cast<std::size_t>(k)]);
+      radian_[i] = frequency > 0 ? 1 / frequency : 0;
+      lowest = std::min(lowest, frequency);
     }
     if (node.n() > 0)
       pace_.push_back(lowest);
@@ -66,7 +69,14 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
   length_ = length_ > 0 ? length_ : 1;
   for (std::size_t i = 0; i < n; ++i)
     group_[n + i] = group_[i] + static_cast<int>(pace_.size());
-  size_.assign(2 * pace_.size(), 0.0), peak_.assign(3 * pace_.size(), 0.0);
+  size_ = by_forces_ = by_given_ = std::vector<double>(2 * pace_.size(), 0.0);
+  of_rates_.assign(pace_.size(), 0.0), peak_.assign(3 * pace_.size(), 0.0);
+  for (std::size_t i = 0; i < 2 * n; ++i) {
+    const auto group = static_cast<std::size_t>(group_[i]);
+    if (runs_.empty() || runs_.back().group != group)
+      runs_.push_back({static_cast<Index>(i), 0, group});
+    ++runs_.back().count;
+  }
   std::map<std::pair<std::string, bool>, int> known;
   for (const Row &row : mechanism.rows) {
     const auto key = std::pair(row.model.name, is_moment(mechanism, row));
@@ -97,10 +107,15 @@ template <class Space> void MotionNorm<Space>::add_spring(double stiffness, doub
   pace_[1] = std::max(pace_[1], small_twist * std::sqrt(stiffness / inertia));
 }
 
-template <class Space> double MotionNorm<Space>::of_state(const double *e) const {
+// size_: of all groups
+template <class Space> void MotionNorm<Space>::add_squares(const double *z) const {
   std::fill(size_.begin(), size_.end(), 0.0);
-  for (std::size_t i = 0; i < group_.size(); ++i)
-    size_[static_cast<std::size_t>(group_[i])] += e[i] * e[i];
+  for (const auto &[first, count, group] : runs_)
+    size_[group] += Eigen::Map<const VectorXd>(z + first, count).squaredNorm();
+}
+
+template <class Space> double MotionNorm<Space>::of_state(const double *e) const {
+  add_squares(e);
   double worst = 0;
   for (std::size_t g = 0; g < size_.size(); ++g)
     if (const double size = std::sqrt(size_[g]) / std::max(peak_[g], nothing); !(size <= worst))
@@ -130,7 +145,7 @@ template <class Space>
 void MotionNorm<Space>::sizes_of_forces(const VectorXd &values, std::vector<double> &size) const {
   std::fill(size.begin(), size.end(), 0.0);
   for (std::size_t r = 0; r < force_group_.size(); ++r)
-    size[static_cast<std::size_t>(force_group_[r])] += std::pow(values[static_cast<Index>(r)], 2);
+    size[static_cast<std::size_t>(force_group_[r])] += square(values[static_cast<Index>(r)]);
   for (double &x : size)
     x = std::sqrt(x);
 }
@@ -158,27 +173,29 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
 template <class Space>
 void MotionNorm<Space>::take(const double *z, const double *z_dot, const double *applied,
                              const Workspace<Space, double> &w) {
-  const std::size_t n = frequency_.size();
+  const std::size_t n = radian_.size();
   // what the forces on modes will do to them, and what given ones would do alone, which may hold a link straight
-  std::vector<double> of_forces(size_.size(), 0.0), of_given(size_.size(), 0.0), of_rates(pace_.size(), 0.0);
-  std::fill(size_.begin(), size_.end(), 0.0);
-  for (std::size_t i = 0; i < group_.size(); ++i)
-    size_[static_cast<std::size_t>(group_[i])] += z[i] * z[i];
+  for (std::vector<double> *sizes : {&by_forces_, &by_given_, &of_rates_})
+    std::fill(sizes->begin(), sizes->end(), 0.0);
+  add_squares(z);
+  for (const auto &[first, count, group] : runs_)
+    if (group < pace_.size())
+      of_rates_[group] += Eigen::Map<const VectorXd>(z_dot + n + first, count).squaredNorm();
   for (std::size_t i = 0; i < n; ++i)
-    of_rates[static_cast<std::size_t>(group_[i])] += z_dot[n + i] * z_dot[n + i];
-  for (std::size_t i = 0; i < n; ++i)
-    if (frequency_[i] > 0) {
-      const double rate = z_dot[n + i] / frequency_[i], way = rate / frequency_[i];
-      of_forces[static_cast<std::size_t>(group_[i])] += way * way;
-      of_forces[static_cast<std::size_t>(group_[n + i])] += rate * rate;
-      const double bend = applied ? applied[i] / std::pow(frequency_[i], 2) : 0;
-      of_given[static_cast<std::size_t>(group_[i])] += bend * bend;
-      of_given[static_cast<std::size_t>(group_[n + i])] += std::pow(bend * frequency_[i], 2);
+    if (const double radian = radian_[i]; radian > 0) {
+      const double rate = z_dot[n + i] * radian, way = rate * radian;
+      by_forces_[static_cast<std::size_t>(group_[i])] += square(way);
+      by_forces_[static_cast<std::size_t>(group_[n + i])] += square(rate);
+      if (applied) {
+        const double bent_rate = applied[i] * radian;
+        by_given_[static_cast<std::size_t>(group_[i])] += square(bent_rate * radian);
+        by_given_[static_cast<std::size_t>(group_[n + i])] += square(bent_rate);
+      }
     }
   for (std::size_t g = 0; g < size_.size(); ++g)
-    peak_[g] = std::max({peak_[g], std::sqrt(size_[g]), std::sqrt(of_forces[g]), std::sqrt(of_given[g])});
+    peak_[g] = std::max(peak_[g], std::sqrt(std::max({size_[g], by_forces_[g], by_given_[g]})));
   for (std::size_t g = 0; g < pace_.size(); ++g)
-    peak_[size_.size() + g] = std::max(peak_[size_.size() + g], std::sqrt(of_rates[g]));
+    peak_[size_.size() + g] = std::max(peak_[size_.size() + g], std::sqrt(of_rates_[g]));
   take_accelerations(w);
   // Rotation vectors start at zero in every step: an angle is compared with one radian at least, a way with a length.
   peak_[0] = std::max(peak_[0], length_), peak_[1] = std::max(peak_[1], 1.0);
@@ -196,10 +213,10 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
     const auto &A = w.bodies[i].A;
-    double square = 0;
+    double sum = 0;
     for (int k = 0; k < Space::linear; ++k)
-      square += A[k] * A[k];
-    const double acceleration = std::sqrt(square), mass = node.body.mass;
+      sum += square(A[k]);
+    const double acceleration = std::sqrt(sum), mass = node.body.mass;
     inertial += mass * acceleration;
     of_ways = std::max(of_ways, acceleration);
     if (node.n() > 0) {

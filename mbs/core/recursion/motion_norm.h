@@ -43,6 +43,7 @@ public:
   void set_peaks(const NormPeaks &peaks); // throws std::invalid_argument where they are those of another mechanism
 
 private:
+  void add_squares(const double *z) const;
   void forces(const Workspace<Space, double> &w, Eigen::VectorXd &values) const;
   void take_accelerations(const Workspace<Space, double> &w);
   void sizes_of_forces(const Eigen::VectorXd &values, std::vector<double> &size) const;
@@ -52,14 +53,20 @@ private:
   double length_ = 0;         // m, of a body
   std::vector<double> reach_; // m, of each body from its frame
   std::vector<int> group_;    // of each of 2 n_v entries of z; those of rates follow those of what they are of
-  std::vector<double> pace_,
-      frequency_;            // 1/s: of each group, below which rates are small; of each entry of v, of modes
-  std::vector<double> peak_; // of each group: of what it is of, of rates, of accelerations
+  struct Run {                // entries side by side of one group
+    Eigen::Index first, count;
+    std::size_t group;
+  };
+  std::vector<Run> runs_;
+  std::vector<double> pace_;   // 1/s, of each group: below it rates are small
+  std::vector<double> radian_; // s, that a mode takes for one, by entries of v; 0 of all others
+  std::vector<double> peak_;   // of each group: of what it is of, of rates, of accelerations
   mutable std::vector<double> size_;
-  std::vector<std::size_t> carriers_; // of all ports: on which a joint of the tree hangs
-  std::vector<int> force_group_;      // of each row, then of each component at these ports
-  std::vector<bool> is_moment_;       // of each group of these
-  std::size_t levers_ = 0;            // how many groups other forces follow from: those of rows, or all
+  std::vector<double> by_forces_, by_given_, of_rates_; // as in take(), squared
+  std::vector<std::size_t> carriers_;                   // of all ports: on which a joint of the tree hangs
+  std::vector<int> force_group_;                        // of each row, then of each component at these ports
+  std::vector<bool> is_moment_;                         // of each group of these
+  std::size_t levers_ = 0; // how many groups other forces follow from: those of rows, or all
   std::vector<double> force_peak_, force_now_, force_error_;
   Eigen::VectorXd observed_, change_;
   double of_springs_ = 0; // N m, moments below count like this one

@@ -145,6 +145,7 @@ Expression::Expression(std::span<const Op> program, std::span<const double> cons
       throw std::invalid_argument("expression: fewer constants than the program uses");
     program_.push_back({op, op == Op::constant ? constants[used++] : 0.0});
     fold_constants();
+    take_constant();
   }
   if (depth != 1)
     throw std::invalid_argument("expression: expected one result, found " + std::to_string(depth));
@@ -152,9 +153,11 @@ Expression::Expression(std::span<const Op> program, std::span<const double> cons
     throw std::invalid_argument("expression: more constants than the program uses");
 }
 
+int Expression::Instruction::operands() const { return operand_count(op) - (takes_constant ? 1 : 0); }
+
 // The last instruction, where all its operands are constants and its result is a number.
 void Expression::fold_constants() {
-  const auto length = operand_count(program_.back().op) + 1;
+  const auto length = program_.back().operands() + 1;
   if (length == 1 || length > std::ssize(program_))
     return;
   const auto begin = program_.end() - length;
@@ -169,34 +172,52 @@ void Expression::fold_constants() {
   program_.push_back({Op::constant, jet.value});
 }
 
+// The last instruction takes an operand that is constant along: it is not pushed, and has no derivatives to work with.
+void Expression::take_constant() {
+  Instruction &last = program_.back();
+  const bool commutes = last.op == Op::add || last.op == Op::multiply;
+  if (!commutes && last.op != Op::subtract && last.op != Op::divide)
+    return;
+  auto operand = program_.end() - 2; // the second one; then the first, before what the second is made of
+  if (operand->op != Op::constant && commutes)
+    for (int missing = 1; missing > 0; --operand)
+      missing += operand->operands() - 1;
+  if (operand->op != Op::constant)
+    return;
+  int exponent = 0;
+  if (last.op == Op::divide && std::abs(std::frexp(operand->constant, &exponent)) == 0.5) // as exact, and faster
+    last.op = Op::multiply, operand->constant = 1.0 / operand->constant;
+  last.constant = operand->constant, last.takes_constant = true;
+  program_.erase(operand);
+}
+
 Jet Expression::operator()(double t) const {
-  std::array<Jet, max_depth + 1> stack; // one spare below: `top` always points at a valid entry
-  Jet *top = stack.data();
-  for (const auto &[op, constant] : program_) {
-    top += 1 - operand_count(op);
-    // The result goes to top[0], where the first operand stands; the others are above it.
-    Jet &a = top[0];
+  std::array<Jet, max_depth> stack; // what is below the last operand
+  Jet *top = stack.data(), a{};     // that operand, in registers
+  for (const auto &[op, constant, takes_constant] : program_) {
     switch (op) {
     case Op::constant:
+      *top++ = a;
       a = {constant, 0.0, 0.0};
       break;
     case Op::time:
+      *top++ = a;
       a = {t, 1.0, 0.0};
       break;
     case Op::add:
-      a = a + top[1];
+      a = takes_constant ? Jet{a.value + constant, a.rate, a.acceleration} : *--top + a;
       break;
     case Op::subtract:
-      a = a - top[1];
+      a = takes_constant ? Jet{a.value - constant, a.rate, a.acceleration} : *--top - a;
       break;
     case Op::multiply:
-      a = a * top[1];
+      a = takes_constant ? Jet{a.value * constant, a.rate * constant, a.acceleration * constant} : *--top * a;
       break;
     case Op::divide:
-      a = a / top[1];
+      a = takes_constant ? Jet{a.value / constant, a.rate / constant, a.acceleration / constant} : *--top / a;
       break;
     case Op::power:
-      a = power(a, top[1]);
+      a = power(*--top, a);
       break;
     case Op::negate:
       a = -a;
@@ -230,32 +251,32 @@ Jet Expression::operator()(double t) const {
       a = tanh(a);
       break;
     case Op::less:
-      a = truth(a.value < top[1].value, a, top[1]);
+      --top, a = truth(top->value < a.value, *top, a);
       break;
     case Op::less_equal:
-      a = truth(a.value <= top[1].value, a, top[1]);
+      --top, a = truth(top->value <= a.value, *top, a);
       break;
     case Op::greater:
-      a = truth(a.value > top[1].value, a, top[1]);
+      --top, a = truth(top->value > a.value, *top, a);
       break;
     case Op::greater_equal:
-      a = truth(a.value >= top[1].value, a, top[1]);
+      --top, a = truth(top->value >= a.value, *top, a);
       break;
     case Op::logical_and:
-      a = truth(a.value != 0.0 && top[1].value != 0.0, a, top[1]);
+      --top, a = truth(top->value != 0.0 && a.value != 0.0, *top, a);
       break;
     case Op::logical_or:
-      a = truth(a.value != 0.0 || top[1].value != 0.0, a, top[1]);
+      --top, a = truth(top->value != 0.0 || a.value != 0.0, *top, a);
       break;
     case Op::logical_not:
       a = truth(a.value == 0.0, a, a);
       break;
     case Op::select:
-      a = select(a, top[1], top[2]);
+      top -= 2, a = select(top[0], top[1], a);
       break;
     }
   }
-  return *top;
+  return a;
 }
 
 PiecewisePolynomial::PiecewisePolynomial(std::vector<double> breaks, std::vector<double> coefficients)

@@ -68,10 +68,13 @@ public:
 private:
   struct Instruction {
     Op op;
-    double constant;
+    double constant = 0;
+    bool takes_constant = false; // in place of an operand: of the second one, or of either of a sum or a product
+    int operands() const;
   };
   Expression() = default;
   void fold_constants();
+  void take_constant();
 
   std::vector<Instruction> program_;
 };

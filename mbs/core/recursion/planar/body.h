@@ -47,6 +47,8 @@ struct Body {
   int width() const { return 8 * blocks; }
   int row_count() const { return width(); }
   double gram(int r, int c) const { return G[static_cast<std::size_t>(r * width() + c)]; }
+  // The same of a body that has one block, as those between pins have
+  double gram_of_block(int r, int c) const { return G[static_cast<std::size_t>(8 * r + c)]; }
 };
 
 // The same body with its frame at `position`, turned by `angle`.
@@ -199,28 +201,21 @@ template <class T> FFROBOT_INLINE Inertia<T> inertia(const Body &b, const T *p, 
   return M;
 }
 
-// p_ddot = Q_f - m^T A + sum of P^T f, by multipliers without Q_f; z holds, by rows of W, -A and forces on ports
+// p_ddot = Q_f - m^T A + sum of P^T f, by multipliers without Q_f; z holds, by rows of W, -A and forces on ports, zeros
+// elsewhere
 template <bool by_multipliers>
 FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, const double *z, State<double> &s, double *a) {
   const double ww = s.omega * s.omega;
-  const int n = b.n, stride = b.padded;
+  const int n = b.n, stride = b.padded, width = b.width();
   for (int i = 0; i < n; i += 8) {
     const int left = n - i;
     const double *W = b.rows.data() + i;
     Eight sum = Eight::zero();
     if (!by_multipliers)
       sum = ww * (left >= 8 ? Eight::load(p + i) : load_part(p + i, left)) - Eight::load(s.elastic.data() + i);
-    Eight sum2 = z[0] * Eight::load(W) + z[2] * Eight::load(W + 2 * stride);
-    sum += z[1] * Eight::load(W + stride);
-    for (const Port &port : b.ports)
-      if (port.is_soft) {
-        const int r = port.row;
-        sum += z[r] * Eight::load(W + r * stride), sum2 += z[r + 1] * Eight::load(W + (r + 1) * stride);
-        if (port.turns)
-          sum += z[r + 2] * Eight::load(W + (r + 2) * stride);
-      }
-    if (b.is_tilted && !by_multipliers)
-      sum += z[Body::TILT] * Eight::load(W + Body::TILT * stride);
+    Eight sum2 = Eight::zero();
+    for (int r = 0; r < width; r += 2, W += 2 * stride)
+      sum += z[r] * Eight::load(W), sum2 += z[r + 1] * Eight::load(W + stride);
     if (b.has_more) {
       sum += z[2] * Eight::load(s.h.data() + i);
       if (!by_multipliers)

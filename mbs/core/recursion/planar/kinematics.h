@@ -8,11 +8,6 @@ namespace ffrobot::recursion {
 // All angles at once: 4 lanes, |x| below 1e5, within an ulp or two. Reduction after Cody and Waite, polynomials of
 // Cephes.
 FFROBOT_INLINE void sines_and_cosines(const double *x, double *s, double *c, std::size_t count) {
-  if (count <= 2) {
-    for (std::size_t i = 0; i < count; ++i)
-      sine_and_cosine(x[i], s[i], c[i]);
-    return;
-  }
   using V = double __attribute__((vector_size(32)));
   using I = std::int64_t __attribute__((vector_size(32)));
   for (std::size_t i = 0; i < count; i += 4) {

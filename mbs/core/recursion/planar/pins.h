@@ -41,7 +41,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   if (body.is_tilted && forces.generalized) {
     on_modes = forces.generalized[node.v];
     for (int r = 0; r < 8; ++r)
-      s.Q[r] -= body.gram(planar::Body::TILT, r) * on_modes;
+      s.Q[r] -= body.gram_of_block(planar::Body::TILT, r) * on_modes;
   }
   planar::Inertia<T> I = inertia(body, q + node.p_q(), v + node.p_v(), s);
   if (body.has_more && body.is_tilted)
@@ -66,7 +66,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
     const Cols P0 = Cols::read(from), P1 = Cols::read(from + stride);
     Cols E0 = P0, E1 = P1;
     const bool loaded = m.children[index] >= 0;
-    const double Gx = body.gram(3, 3), Gc = body.gram(3, 4), Gy = body.gram(4, 4);
+    const double Gx = body.gram_of_block(3, 3), Gc = body.gram_of_block(3, 4), Gy = body.gram_of_block(4, 4);
     T Y_xx(0.), Y_xy(0.), Y_yy(0.);
     if (loaded) {
       load_pin(m, index, w);
@@ -186,13 +186,13 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
     port.A[0] = by_multipliers ? Xx : Xx + port.beta_x, port.A[1] = by_multipliers ? Xy : Xy + port.beta_y;
     T rotation = Aa;
     if (constants.is_soft) {
-      const double Gx = body.gram(3, 3), Gc = body.gram(3, 4), Gy = body.gram(4, 4);
+      const double Gx = body.gram_of_block(3, 3), Gc = body.gram_of_block(3, 4), Gy = body.gram_of_block(4, 4);
       port.A[0] += Gx * fx + Gc * fy, port.A[1] += Gc * fx + Gy * fy;
       if (constants.turns) {
         if (!by_multipliers)
           rotation += s.Q[5];
-        rotation += body.gram(5, 3) * fx + body.gram(5, 4) * fy - body.gram(5, 0) * Ax - body.gram(5, 1) * Ay -
-                    body.gram(5, 2) * Aa;
+        rotation += body.gram_of_block(5, 3) * fx + body.gram_of_block(5, 4) * fy - body.gram_of_block(5, 0) * Ax -
+                    body.gram_of_block(5, 1) * Ay - body.gram_of_block(5, 2) * Aa;
         if (body.has_more)
           rotation -= s.WH[5] * Aa;
       }
@@ -201,8 +201,8 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
   }
   if (body.is_tilted) {
     constexpr int r = planar::Body::TILT;
-    a[node.v] += body.gram(r, 3) * z[3] + body.gram(r, 4) * z[4] - body.gram(r, 0) * Ax - body.gram(r, 1) * Ay -
-                 body.gram(r, 2) * Aa;
+    a[node.v] += body.gram_of_block(r, 3) * z[3] + body.gram_of_block(r, 4) * z[4] - body.gram_of_block(r, 0) * Ax -
+                 body.gram_of_block(r, 1) * Ay - body.gram_of_block(r, 2) * Aa;
     if (!by_multipliers)
       a[node.v] += s.Q[r];
     if (body.has_more)
