@@ -30,6 +30,8 @@ CLOSED_FORMS = [
     ("sqrt(t)", lambda t: (t**0.5, 0.5 * t**-0.5, -0.25 * t**-1.5)),
     ("tan(t)", lambda t: ((f := math.tan(t)), 1 + f * f, 2 * f * (1 + f * f))),
     ("tanh(t)", lambda t: ((f := math.tanh(t)), 1 - f * f, -2 * f * (1 - f * f))),
+    ("3 - (t - 2)/-8", lambda t: (3 + (t - 2) / 8, 0.125, 0.0)),
+    ("7*(1 + t**2/3)", lambda t: (7 + 7 * t * t / 3, 14 * t / 3, 14 / 3)),
     ("abs(-t)", lambda t: (t, 1.0, 0.0)),
     ("where(t < 1, t, t**2)", lambda t: (t, 1.0, 0.0) if t < 1 else (t**2, 2 * t, 2.0)),
 ]  # fmt: skip
