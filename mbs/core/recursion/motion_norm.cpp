@@ -13,13 +13,12 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double small_force = 2e-4;  // of the largest: forces below count like this one
-constexpr double leverage = 2;        // of multipliers: motors' moments follow from them, and may be small beside them
-constexpr double small_arm = 1e-2;    // of a body's length: moments count like the largest force at it
-constexpr double slow = 1e-3;         // 1/s: of joints, times the peak of what the rate is of,
-constexpr double slow_to_fall = 1e-2; // or in terms of what gravity does to a body, sqrt(g / length)
-constexpr double small_bend = 1e-3;   // of what a body's acceleration would do to its softest mode
-constexpr double small_twist = 1e-5;  // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
+constexpr double small_force = 2e-4; // of the largest: forces below count like this one
+constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them
+constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
+constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
+constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
+constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
 constexpr double nothing = 1e-12;
 
 double square(double x) { return x * x; }
@@ -47,12 +46,11 @@ double farthest(const spatial::Body &b) {
 
 template <class Space>
 MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
-    : mechanism_(mechanism), is_strict_(is_strict), pace_{slow, slow} {
+    : mechanism_(mechanism), pace_{slow, slow} {
   const auto n = static_cast<std::size_t>(mechanism.n_v);
   group_.assign(2 * n, 0), radian_.assign(n, 0);
   for (const Node<Space> &node : mechanism.nodes) {
-    reach_.push_back(farthest(node.body));
-    length_ = std::max(length_, reach_.back());
+    length_ = std::max(length_, farthest(node.body));
     for (int k = 0; k < node.shape.freedoms.count; ++k)
       group_[static_cast<std::size_t>(node.v + k)] = node.shape.freedoms.component[k] < Space::linear ? 0 : 1;
     double lowest = std::numeric_limits<double>::infinity();
@@ -94,10 +92,8 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
       for (int i = 0; i < Space::dim; ++i)
         force_group_.push_back(i < Space::linear ? force : force + 1);
     }
-  if (is_strict) {
+  if (is_strict)
     levers_ = is_moment_.size();
-    pace_[0] = pace_[1] = std::max(slow, slow_to_fall * std::sqrt(mechanism.gravity.norm() / length_));
-  }
   force_now_ = force_error_ = force_peak_ = std::vector<double>(is_moment_.size(), 0.0);
   observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
 }
@@ -225,11 +221,6 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
       const double force = std::sqrt(mass) * std::max(acceleration, mechanism_.gravity.norm());
       peak_[g] = std::max(peak_[g], small_bend * force / (pace_[g] * pace_[g]));
       peak_[size_.size() + g] = std::max(peak_[size_.size() + g], force);
-      if constexpr (Space::dim == 3) // rates of modes as parts of the velocity of a link that turns
-        if (is_strict_) {
-          double &of_modes = peak_[pace_.size() + g];
-          of_modes = std::max(of_modes, std::sqrt(mass) * reach_[i] * std::abs(w.bodies[i].omega));
-        }
     }
   }
   of_angles = std::max(of_angles, of_ways / length_);

@@ -16,8 +16,7 @@ struct NormPeaks {
 // Errors e and states z are local coordinates (space/local_coordinates.h).
 template <class Space> class MotionNorm {
 public:
-  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed; rates are judged as
-  // in absolute coordinates (core/system/error_norm.*), where those of modes are parts of a body's velocity.
+  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed.
   explicit MotionNorm(const Mechanism<Space> &mechanism, bool is_strict = false);
 
   // Of a spring in front of which an inertia swings (N m/rad, kg m^2): moments and rates of a small twist are small,
@@ -49,11 +48,9 @@ private:
   void sizes_of_forces(const Eigen::VectorXd &values, std::vector<double> &size) const;
 
   const Mechanism<Space> &mechanism_;
-  bool is_strict_;
-  double length_ = 0;         // m, of a body
-  std::vector<double> reach_; // m, of each body from its frame
-  std::vector<int> group_;    // of each of 2 n_v entries of z; those of rates follow those of what they are of
-  struct Run {                // entries side by side of one group
+  double length_ = 0;      // m, of a body
+  std::vector<int> group_; // of each of 2 n_v entries of z; those of rates follow those of what they are of
+  struct Run {             // entries side by side of one group
     Eigen::Index first, count;
     std::size_t group;
   };
