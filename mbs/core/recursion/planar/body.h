@@ -219,7 +219,7 @@ FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, const do
         if (port.turns)
           sum += z[r + 2] * Eight::load(W + (r + 2) * stride);
       }
-    if (b.is_tilted && !by_multipliers)
+    if (b.is_tilted)
       sum += z[Body::TILT] * Eight::load(W + Body::TILT * stride);
     if (b.has_more) {
       sum += z[2] * Eight::load(s.h.data() + i);
