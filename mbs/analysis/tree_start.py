@@ -20,7 +20,7 @@ UNITS = "they take the same steps in any units of measure there"
 OTHERS = {"radau": UNITS, "generalized-alpha": UNITS}
 """Integrators that a run does not begin with in joint coordinates, and why: docs/recursion.md."""
 
-LOOPS = "closed loops keep small tolerances there, and stop where they are singular"
+LOOPS = "closed loops stop there where they are singular"
 
 ALONE = "a body that is joined to no other"  # errors of forces are judged between bodies, not on the ground
 

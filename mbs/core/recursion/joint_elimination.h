@@ -34,6 +34,20 @@ template <class F, int d, class T> FFROBOT_INLINE void both_sides(const F &chang
   }
 }
 
+// What unit multipliers do along a freedom of the node's joint, by columns: rows that are this coordinate take it away.
+template <class T, int W, class Space>
+FFROBOT_INLINE Pack<T, W> multiplier_forces(const Mechanism<Space> &m, const Node<Space> &node, int freedom,
+                                            const Workspace<Space, T> &w) {
+  auto forces = Pack<T, W>::zero();
+  if (node.has_rows)
+    for (std::size_t r = 0; r < w.active.size(); ++r) {
+      const Row &row = m.rows[w.active[r]];
+      if (row.node >= 0 && &m.nodes[row.node] == &node && row.freedom == freedom)
+        forces.set(static_cast<int>(r) + 1, T(-1.));
+    }
+  return forces;
+}
+
 // One freedom along component f: row and column of M leave, with what the rotor on the inner section adds.
 template <class Space, class T, int W>
 FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, const T *force, Hinge<Space, T> &hinge,
@@ -42,15 +56,9 @@ FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, cons
   constexpr int d = Space::dim, stride = stride_of(W);
   using Cols = Pack<T, W>;
   const int f = node.shape.freedoms.component[freedom];
-  Cols applied = Cols::zero(); // force along the freedom
+  Cols applied = multiplier_forces<T, W>(m, node, freedom, w); // along the freedom
   if (force)
     applied.set(0, force[freedom]);
-  if (node.has_rows)
-    for (std::size_t r = 0; r < w.active.size(); ++r) {
-      const Row &row = m.rows[w.active[r]];
-      if (row.node >= 0 && &m.nodes[row.node] == &node && row.freedom == freedom)
-        applied.set(static_cast<int>(r) + 1, T(-1.));
-    }
   const Cols su = H[f] - applied;
   Pack<T, d> &U = hinge.U[freedom];
   U = M[f];

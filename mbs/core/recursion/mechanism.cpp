@@ -218,8 +218,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     bool tilts = false; // modes turn the section, and nothing but that
     if constexpr (in_plane) {
       node.is_pin = node.joint == JointKind::revolute && node.rotor_inertia == 0 && node.outboard <= 1 &&
-                    !passes_moment[i] && !(node.has_rows && !sits) &&
-                    frame_sits_at_joint<Space>(model, node.shape, false);
+                    !passes_moment[i] && frame_sits_at_joint<Space>(model, node.shape, false);
       tilts = node.is_pin && !sits;
     }
     if (sits || tilts)

@@ -5,7 +5,8 @@
 // and numbers stay in registers. The same steps as in articulated.h and release.h.
 //
 // Where modes turn the section at the joint by phi = Phi_r p (simply supported links), the recursion is that of the
-// frame, which turns by the joint's coordinate less phi; a moment along the coordinate acts on the modes by Phi_r, too.
+// frame, which turns by the joint's coordinate less phi; a moment along the coordinate acts on the modes by Phi_r, too,
+// and so do the multipliers of rows that are the coordinate: what they do to the modes goes along in their columns.
 #pragma once
 
 #include "core/recursion/release.h"
@@ -38,6 +39,12 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   const planar::Body &body = node.body;
   planar::State<T> &s = w.bodies[&node - m.nodes.data()];
   T on_modes(0.);
+  // Forces along the coordinate by columns; those of multipliers act on the modes, too, where these turn the section.
+  Cols applied = multiplier_forces<T, W>(m, node, 0, w);
+  const Cols multipliers = applied;
+  const bool rows_on_modes = W > 1 && body.is_tilted && node.has_rows;
+  if (forces.generalized)
+    applied.set(0, forces.generalized[node.v]);
   if (body.is_tilted && forces.generalized) {
     on_modes = forces.generalized[node.v];
     for (int r = 0; r < 8; ++r)
@@ -87,9 +94,18 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
         gain(S, P0, Cols(Gx * E0 + Gc * E1));
         gain(S, P1, Cols(Gc * E0 + Gy * E1));
       }
-      gamma += beta_x * E0 + beta_y * E1;
+      if (rows_on_modes) { // the port is accelerated by columns, as by other ports in ports.h
+        Cols B0 = body.gram_of_block(planar::Body::TILT, 3) * multipliers,
+             B1 = body.gram_of_block(planar::Body::TILT, 4) * multipliers;
+        B0.add(0, beta_x), B1.add(0, beta_y);
+        lose(S, B0, E0), lose(S, B1, E1);
+        if (loaded)
+          E0 += Y_xx * B0 + Y_xy * B1, E1 += Y_xy * B0 + Y_yy * B1;
+        lose(S, E0, B0), lose(S, E1, B1);
+      } else
+        gamma += beta_x * E0 + beta_y * E1;
     }
-    if (loaded)
+    if (loaded && !rows_on_modes)
       E0.add(0, Y_xx * beta_x + Y_xy * beta_y), E1.add(0, Y_xy * beta_x + Y_yy * beta_y);
     T *answer = w.answer.data() + node.port_slot(0) * stride;
     E0.write(answer), E1.write(answer + stride);
@@ -104,21 +120,20 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   } else
     H[0] = H[1] = H[2] = Cols::zero();
   H[0].add(0, I.bx), H[1].add(0, I.by), H[2].add(0, I.ba);
+  if (rows_on_modes) {
+    for (int r = 0; r < 3; ++r)
+      H[r] += body.gram_of_block(planar::Body::TILT, r) * multipliers;
+    if (body.has_more)
+      H[2] += s.WH[planar::Body::TILT] * multipliers;
+    Cols turned = body.gram_of_block(planar::Body::TILT, planar::Body::TILT) * multipliers;
+    turned.add(0, s.Q[planar::Body::TILT]);
+    gain(S, multipliers, turned);
+  }
 
   // the joint
   Hinge<Planar, T> &hinge = w.hinges[&node - m.nodes.data()];
   const T D_inverse = T(1.) / M_aa;
-  Cols applied = Cols::zero();
-  bool moment = false;
-  if (forces.generalized)
-    applied.set(0, forces.generalized[node.v]), moment = true;
-  if (node.has_rows) {
-    moment = true;
-    for (std::size_t r = 0; r < w.active.size(); ++r)
-      if (const Row &row = m.rows[w.active[r]]; row.node >= 0 && &m.nodes[row.node] == &node)
-        applied.set(static_cast<int>(r) + 1, T(-1.));
-  }
-  const Cols su = moment ? Cols(H[2] - applied) : H[2], sd = D_inverse * su;
+  const Cols su = forces.generalized || node.has_rows ? Cols(H[2] - applied) : H[2], sd = D_inverse * su;
   sd.write(w.answer.data() + node.joint_slot(0) * stride);
   if constexpr (W > 1)
     gain(S, sd, su);
@@ -172,7 +187,10 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
   const T Aa = -(answer<Planar, T, W>(w, node.joint_slot(0), y) + hinge.pin[0] * Ax + hinge.pin[1] * Ay);
   a[node.v] = Aa - P_rotation;
   s.A[0] = Ax, s.A[1] = Ay, s.A[2] = Aa;
-  T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), T(0.), by_multipliers ? T(0.) : s.on_modes, T(0.)};
+  constexpr int tilt = planar::Body::TILT;
+  const bool rows_on_modes = W > 1 && body.is_tilted && node.has_rows;
+  const T on_modes = rows_on_modes ? (multiplier_forces<T, W>(m, node, 0, w) * y).sum() : T(0.); // by multipliers
+  T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), T(0.), by_multipliers ? on_modes : s.on_modes + on_modes, T(0.)};
   if (node.outboard) {
     const planar::Port &constants = body.ports[0];
     PortWork<Planar, T> &port = w.ports[node.first_port];
@@ -185,6 +203,10 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
     port.f[0] = fx, port.f[1] = fy, port.f[2] = T(0.);
     port.A[0] = by_multipliers ? Xx : Xx + port.beta_x, port.A[1] = by_multipliers ? Xy : Xy + port.beta_y;
     T rotation = Aa;
+    if (rows_on_modes) {
+      port.A[0] += body.gram_of_block(tilt, 3) * on_modes, port.A[1] += body.gram_of_block(tilt, 4) * on_modes;
+      rotation += body.gram_of_block(tilt, 5) * on_modes;
+    }
     if (constants.is_soft) {
       const double Gx = body.gram_of_block(3, 3), Gc = body.gram_of_block(3, 4), Gy = body.gram_of_block(4, 4);
       port.A[0] += Gx * fx + Gc * fy, port.A[1] += Gc * fx + Gy * fy;
@@ -200,13 +222,14 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
     port.A[2] = rotation;
   }
   if (body.is_tilted) {
-    constexpr int r = planar::Body::TILT;
-    a[node.v] += body.gram_of_block(r, 3) * z[3] + body.gram_of_block(r, 4) * z[4] - body.gram_of_block(r, 0) * Ax -
-                 body.gram_of_block(r, 1) * Ay - body.gram_of_block(r, 2) * Aa;
+    a[node.v] += body.gram_of_block(tilt, 3) * z[3] + body.gram_of_block(tilt, 4) * z[4] -
+                 body.gram_of_block(tilt, 0) * Ax - body.gram_of_block(tilt, 1) * Ay - body.gram_of_block(tilt, 2) * Aa;
+    if (rows_on_modes)
+      a[node.v] += body.gram_of_block(tilt, tilt) * on_modes;
     if (!by_multipliers)
-      a[node.v] += s.Q[r];
+      a[node.v] += s.Q[tilt];
     if (body.has_more)
-      a[node.v] -= s.WH[r] * Aa;
+      a[node.v] -= s.WH[tilt] * Aa;
   }
   if (body.n)
     modal_accelerations<by_multipliers>(body, q + node.p_q(), z, s, a + node.p_v());
