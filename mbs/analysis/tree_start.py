@@ -14,8 +14,8 @@ from ..solve.integrators import Choice
 from ..solve.state import State
 from .outcome import EarlierRun
 
-SPARSE = "Newton's matrices are sparse there"
-OTHERS = {"radau": SPARSE, "generalized-alpha": SPARSE, "dopri5": "multipliers keep its tolerance there"}
+UNITS = "they take the same steps in any units of measure there"
+OTHERS = {"radau": UNITS, "generalized-alpha": UNITS}
 """Integrators that a run does not begin with in joint coordinates, and why: docs/recursion.md."""
 
 LOOPS = "closed loops keep small tolerances there, and stop where they are singular"
