@@ -199,8 +199,8 @@ class PlanarTree:
             if (row := rows.get(constraint)) is not None:
                 found.add_row(number, row, signs[row], constraint.is_trajectory)
             elif constraint.owner in rotors:
-                component = COMPONENTS[constraint.measure.kind]
-                found.add_weight(number, rotors[constraint.owner].mass * self._assembly.model.scene.gravity[component])
+                g = self._assembly.model.scene.gravity[COMPONENTS[constraint.measure.kind]]
+                found.add_weight(number, rotors[constraint.owner].mass * g)
             else:
                 node = nodes[constraint.owner]
                 component = TRANSMITTED[constraint.measure.kind]

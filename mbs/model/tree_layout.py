@@ -141,7 +141,8 @@ class Layout:
             of_frame = self.section_angle(inner) - self._on_modes(number, outer)
             if node.joint.type == "revolute":
                 of_frame[node.first] += 1.0
-        return of_frame + self._on_modes(number, marker)
+        of_section: Array = of_frame + self._on_modes(number, marker)
+        return of_section
 
     def _on_modes(self, number: int, marker: Marker) -> Array:
         """(size,) Φ_r of a section at the modes of its body."""

@@ -93,15 +93,18 @@ class TreeLinearisation:
 
     def _line(self, measure: Measure) -> Array:
         if (coordinate := self._tree.layout.coordinate(measure)) is not None:
-            return coordinate.sign * self._identity[coordinate.number]
+            along: Array = coordinate.sign * self._identity[coordinate.number]
+            return along
         if not measure.carries_moment:
             raise NotInTreeError(f"a coordinate that is not linear in those of the tree ({measure.label})")
         of_b, of_a = measure.angle_ratios
-        return of_b * self._angle(measure.b) - of_a * self._angle(measure.a)
+        between: Array = of_b * self._angle(measure.b) - of_a * self._angle(measure.a)
+        return between
 
     def _angle(self, marker: Marker) -> Array:
         if marker.body in self._rotors:
-            return self._identity[self._rotors[marker.body]]
+            own: Array = self._identity[self._rotors[marker.body]]
+            return own
         return np.pad(self._tree.layout.section_angle(marker), (0, len(self._rotors)))
 
     def _motion(self, q: Array, v: Array, a: Array) -> Array:
