@@ -1,7 +1,7 @@
 #include "core/integrate/rounding.h"
 
-#include <cmath>
 #include <limits>
+#include <random>
 
 namespace ffrobot {
 
@@ -14,15 +14,14 @@ constexpr double notable = 0.1;                                         // of th
 constexpr double rounding = 2 * std::numeric_limits<double>::epsilon(); // of an entry, relative, after some sums
 constexpr double reach = 100; // roundings that entries are shifted by at most: so many that no two shifts are equal
 
-// Entries shifted each by another amount: springs between angles that are equal are to notice. Multiples of the golden
-// ratio are spread evenly over the interval from -1 to 1.
+// Entries shifted each by another amount: springs between angles that are equal are to notice. Evenly spread sequences
+// will not do: their members nearly agree at some distances.
 VectorXd shifted(const double *z, Index n) {
-  constexpr double golden = 0.6180339887498949;
+  std::minstd_rand random;
+  std::uniform_real_distribution<double> share(-1, 1);
   VectorXd moved(n);
-  for (Index i = 0; i < n; ++i) {
-    const double multiple = golden * static_cast<double>(i + 1), share = 2 * (multiple - std::floor(multiple)) - 1;
-    moved[i] = z[i] * (1 + reach * rounding * share);
-  }
+  for (Index i = 0; i < n; ++i)
+    moved[i] = z[i] * (1 + reach * rounding * share(random));
   return moved;
 }
 
