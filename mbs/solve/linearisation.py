@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -91,8 +92,8 @@ class Linearisation:
         independent = _choose(self.assembly, q, known[:3])
         self.independent = list(independent.values())
         by_name = {name: measure for group in candidates for name, measure in group.items()}
-        self.tree = _on_tree(model, [by_name[name] for name in independent])
-        self.absolute = AbsoluteLinearisation(model, [by_name[name] for name in independent])
+        self._rows = [by_name[name] for name in independent]
+        self.tree = _on_tree(model, self._rows)
         modal = [f"modal/{body.name}/{k}" for body in model.bodies for k in range(1, body.n_modes + 1)]
         self.names = (*independent, *modal)
 
@@ -124,6 +125,11 @@ class Linearisation:
             t, q, v, a, M, resistance.D, resistance.K,
             self._gradients(inputs, H, q), self._gradients(outputs, H, q), H, H_dot, force, self.names,
         )  # fmt: skip
+
+    @cached_property
+    def absolute(self) -> AbsoluteLinearisation:
+        """In absolute coordinates, where nothing is missing; made where it is asked for."""
+        return AbsoluteLinearisation(self.model, self._rows)
 
     def _followers(self, G: Array) -> Array:
         """H (coordinates, f) by the gradients of joints and of what is independent: frames follow this, and p."""

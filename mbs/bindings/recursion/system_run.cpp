@@ -160,14 +160,14 @@ void bind_reactions(nb::module_ &m) {
           "A motor along `sign` v[coordinate] + on_modes . v; on_modes (n_v,), or () for zeros.");
 }
 
-} // namespace
-
 void make_actuation(TreeActuation *made, const SystemOnTree &both, const Recording &recording) {
   if (recording.times.size() < 2 ||
       static_cast<Index>(recording.states.size()) != both.state_size() * static_cast<Index>(recording.times.size()))
     throw nb::value_error("recording: expected one of this tree, with a step");
   new (made) TreeActuation(both, recording);
 }
+
+} // namespace
 
 void bind_system_run(nb::module_ &m) {
   bind_drives(m);
