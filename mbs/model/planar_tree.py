@@ -57,7 +57,6 @@ class PlanarTree:
 
         `is_forced`: forces from outside act along all joints. Raises `NotInTreeError`.
         """
-        _check(assembly)
         model, self._assembly, self._layout = assembly.model, assembly, Layout(assembly.model)
         self.bodies = [assembly.index[node.body.name] for node in self._layout.nodes]
         modes = {number: node.modes for number, node in zip(self.bodies, self._layout.nodes, strict=True)}
@@ -253,16 +252,6 @@ class PlanarTree:
         for index in self._rotors.keys() & coordinates:
             body.rotor_inertia, body.gear_ratio = self._rotors[index]
         return body
-
-
-def _check(assembly: MechanismSystem) -> None:
-    """Raise `NotInTreeError` for what the recursion in the plane does not have."""
-    model = assembly.model
-    missing = {
-        "geometric stiffening": any(body.stiffening is not None for body in model.bodies),
-    }
-    if found := [what for what, is_there in missing.items() if is_there]:
-        raise NotInTreeError(", ".join(found))
 
 
 def _shares(measure: Measure) -> Iterator[Share]:

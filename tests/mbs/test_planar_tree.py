@@ -20,10 +20,6 @@ from ffrobot.mbs.solve.initial_state import undeformed_state
 
 T = 0.0
 NOT_IN_TREE = {
-    "stiffened": "geometric stiffening",
-    "stiffened, driven": "geometric stiffening",
-    "stiffened, as built": "geometric stiffening",
-    "driven, as built": "geometric stiffening",
     "slider-crank, as built": r'friction along a coordinate that is none of the tree \(joint "j3"',
 }
 

@@ -178,7 +178,7 @@ def test_driven_coordinate_in_space():
     check_mechanism(mechanism, rng)
 
 
-NAMES = [name for name in zoo.ALL if "stiffened" not in name and "as built" not in name and "loaded" not in name]
+NAMES = [name for name in zoo.ALL if "as built" not in name and "loaded" not in name]
 
 
 @pytest.mark.parametrize("free", [False, True], ids=["tree", "rows"])

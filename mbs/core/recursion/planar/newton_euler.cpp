@@ -17,12 +17,19 @@ using State = planar::State<double>;
 using Vector = NewtonEuler::Vector;
 using Turn = PlanarTurn<double>;
 
-// W of a body, (rows, n)
-Eigen::Map<const Eigen::MatrixXd> rows_of(const Body &body) { return {body.columns.data(), body.width(), body.n}; }
-
 std::array<double, 2> place(const planar::Port &port, const State &s) {
   const auto row = static_cast<std::size_t>(port.row);
   return {port.x + s.u[row], port.y + s.u[row + 1]};
+}
+
+// Of rows of W: W p_ddot, with geometric stiffening less p_dot^T K p_dot
+VectorXd elastic_accelerations(const Node<Planar> &node, const State &s, const double *a) {
+  if (node.n() == 0)
+    return VectorXd::Zero(node.body.width());
+  VectorXd found = planar::rows_of(node.body, s) * Eigen::Map<const VectorXd>(a + node.p_v(), node.n());
+  if (node.body.stiffening)
+    found -= Eigen::Map<const VectorXd>(s.bent.curvature.data(), found.size());
+  return found;
 }
 
 // Of a port against the frame: what its acceleration has beside the frame's linear one. alpha: of the frame
@@ -83,12 +90,6 @@ NewtonEuler::NewtonEuler(const Mechanism<Planar> &mechanism)
       terms_(ports_.size()), inertia_(mechanism.nodes.size()), rotor_(inertia_.size()), of_joint_(inertia_),
       in_global_axes_(inertia_), at_section_(inertia_), about_inner_(rotor_) {}
 
-VectorXd NewtonEuler::modal_products(const Node<Planar> &node, const double *a) const {
-  if (node.n() == 0)
-    return VectorXd::Zero(node.body.width());
-  return rows_of(node.body) * Eigen::Map<const VectorXd>(a + node.p_v(), node.n());
-}
-
 void NewtonEuler::accelerate(const double *q, const double *a, const Workspace<Planar, double> &w) {
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Planar> &node = mechanism_.nodes[i];
@@ -110,7 +111,7 @@ void NewtonEuler::accelerate(const double *q, const double *a, const Workspace<P
     add(along, A);
     for (std::size_t k = 0; k < 3; ++k)
       A[k] += hinge.c[k];
-    const VectorXd u_ddot = modal_products(node, a);
+    const VectorXd u_ddot = elastic_accelerations(node, s, a);
     if (node.inboard >= 0) { // from the section to the frame
       const planar::Port &port = node.body.ports[static_cast<std::size_t>(node.inboard)];
       Vector section = A;
@@ -198,7 +199,7 @@ void NewtonEuler::project(const double *q, const Workspace<Planar, double> &w, d
       put(node.inboard, at_section_[i]);
     else if (node.body.is_tilted)
       z[Body::TILT] = at_section_[i][2];
-    Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) = rows_of(node.body).transpose() * z;
+    Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) = planar::rows_of(node.body, w.bodies[i]).transpose() * z;
   }
 }
 

@@ -46,7 +46,6 @@ public:
 
 private:
   void inward(bool with_inertia, const Workspace<Planar, double> &w);
-  Eigen::VectorXd modal_products(const Node<Planar> &node, const double *a) const;
 
   const Mechanism<Planar> &mechanism_;
   std::vector<Vector> ports_, on_ports_, with_joints_; // of all ports: accelerations; loads; loads and what hangs there
