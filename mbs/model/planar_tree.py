@@ -20,7 +20,6 @@ from .model import ZERO, Constraint
 from .system import MechanismSystem
 from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError
 
-MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
 COMPONENTS = {_core.MeasureKind.x: 0, _core.MeasureKind.y: 1, _core.MeasureKind.angle: 2, _core.MeasureKind.gear: 2}
 """Of a planar wrench, of the force along a measure whose direction is that of the ground."""
 
@@ -70,8 +69,6 @@ class PlanarTree:
         loops = self._layout.loops
         self.constraints = tuple(c for c in assembly.constraints if c.is_trajectory or c.owner in loops)
         rows = [self._row(constraint) for constraint in self.constraints]
-        if len(rows) > MOST_ROWS:
-            raise NotInTreeError(f"{len(rows)} components of trajectories and loops, more than {MOST_ROWS}")
         self._add_loads()
         self._add_what_joints_have()
         self.scene.is_strict = True

@@ -74,6 +74,18 @@ def test_free_motion(name, in_absolute):
     compare(found, run_forward(model, forward(**KEYS), None, ActuatorSet(), always), 1e-7)
 
 
+def test_rows_in_several_blocks(in_absolute):
+    """Joints of a chain that keep their angles, all but the last, and projection onto them."""
+    angles = {f"b{k}": 0.1 * k for k in range(1, 19)}
+    kept = [
+        {"name": f"turn {k}", "joint": f"j{k}", "value": f"0.1+{0.1 * (-1) ** k}*t+0.05*t**2"} for k in range(1, 18)
+    ]
+    model = zoo.chain(np.random.default_rng(1), 18, trajectory=kept, initial={"angles": angles})
+    found = run_pcid(model, pcid(**KEYS), False, always)
+    in_absolute()
+    compare(found, run_pcid(model, pcid(**KEYS), False, always), 1e-7)
+
+
 def test_motion_under_forces_of_the_motion_of_points(in_absolute):
     def pull(_, position, velocity):
         return *(-30 * position - 2 * velocity), 0.5 * position[0] * velocity[1]

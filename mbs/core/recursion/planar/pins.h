@@ -32,7 +32,7 @@ template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int 
 
 template <class T, int W>
 FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q, const T *v,
-                               const Forces<T> &forces, Workspace<Planar, T> &w, Pack<T, W> (&S)[W],
+                               const Forces<T> &forces, Workspace<Planar, T> &w, Schur<T, W> &S,
                                Pack<T, W> &gamma) {
   constexpr int stride = stride_of(W);
   using Cols = Pack<T, W>;
@@ -191,7 +191,7 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
   s.A[0] = Ax, s.A[1] = Ay, s.A[2] = Aa;
   constexpr int tilt = planar::Body::TILT;
   const bool rows_on_modes = W > 1 && body.is_tilted && node.has_rows;
-  const T on_modes = rows_on_modes ? (multiplier_forces<T, W>(m, node, 0, w) * y).sum() : T(0.); // by multipliers
+  const T on_modes = rows_on_modes ? multiplier_force<T, W>(m, node, 0, w, y) : T(0.); // by multipliers
   T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), T(0.), by_multipliers ? on_modes : s.on_modes + on_modes, T(0.)};
   if (node.outboard) {
     const planar::Port &constants = body.ports[0];
