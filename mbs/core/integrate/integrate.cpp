@@ -56,7 +56,7 @@ public:
         limit_(system, times.front(), times.back(), controls.tolerance),
         methods_(controls.methods, times.front(), times.back()), method_(make_method(methods_.at_work(), system)),
         control_(method_->error_order()), t_(times.front()), end_(times.back()),
-        duration_(times.back() - times.front()), z_(system.size()), error_(system.size()) {
+        duration_(times.back() - times.front()), rounding_(system), z_(system.size()), error_(system.size()) {
     is_repeatable_ = !breaks && !method_->lands_on_outputs();
     system_.local().set_centre(y.data());
     system_.local().from_state(y.data(), z_.data());
@@ -220,7 +220,7 @@ private:
 
   // What of that size is more than rounding
   double beyond_rounding(const Attempt &attempt, const Allowance &allowance, double size) {
-    const Eigen::VectorXd left = rounding_error(system_, t_, z_.data(), method_->first_slope(), attempt.step, error_);
+    const Eigen::VectorXd &left = rounding_.error(t_, z_.data(), method_->first_slope(), attempt.step, error_);
     if (left.isZero(0))
       return size;
     system_.slope(attempt.end, method_->end(), method_->last_slope());
@@ -331,7 +331,8 @@ private:
   bool is_repeatable_;         // by the ends of steps alone
   std::optional<Jump> jump_;   // the next one that is known
   double searched_until_ = t_; // there is no other before
-  Eigen::VectorXd z_, error_;  // local coordinates (ode.h)
+  Rounding rounding_;
+  Eigen::VectorXd z_, error_; // local coordinates (ode.h)
 };
 
 } // namespace

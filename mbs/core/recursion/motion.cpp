@@ -17,6 +17,13 @@ namespace {
 constexpr double singular_ratio = 1e-6; // of Posture: below, joints cannot follow
 constexpr double least_shift = 1e-8;    // of a state, relative: forces change by more than their rounding
 
+std::vector<TimeFunction> laws_of(const Scene &scene) {
+  std::vector<TimeFunction> laws;
+  for (const Target &target : scene.targets)
+    laws.push_back(target.law);
+  return laws;
+}
+
 } // namespace
 
 Load::Load(const VectorXd &direction, TimeFunction magnitude_) : magnitude(std::move(magnitude_)) {
@@ -34,10 +41,11 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       wrench_(VectorXd::Zero(Space::dim * static_cast<Index>(mechanism.wrenches.size()))),
       along_cuts_(VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()))),
       target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
-      correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), jets_(mechanism.rows.size()),
-      target_time_(std::numeric_limits<double>::quiet_NaN()), norm_(mechanism, scene.is_strict),
-      shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(VectorXd::Zero(mechanism.n_v)),
-      evaluated_(VectorXd::Zero(mechanism.n_q)), rates_(force_), posture_(mechanism) {
+      correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), laws_(laws_of(scene)),
+      jets_(mechanism.rows.size()), target_time_(std::numeric_limits<double>::quiet_NaN()),
+      norm_(mechanism, scene.is_strict), shifted_(VectorXd::Zero(2 * mechanism.n_v)),
+      unused_(VectorXd::Zero(mechanism.n_v)), evaluated_(VectorXd::Zero(mechanism.n_q)), rates_(force_),
+      posture_(mechanism) {
   has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
                !scene_.frame_motors.empty() || !scene_.gears.empty();
   update_targets(t);
@@ -56,8 +64,9 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
 template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
   if (t == target_time_)
     return;
+  laws_(t, jets_.data());
   for (std::size_t r = 0; r < scene_.targets.size(); ++r)
-    jets_[r] = scene_.targets[r](t), target_[static_cast<Index>(r)] = jets_[r].acceleration;
+    jets_[r] = scene_.targets[r].of(jets_[r]), target_[static_cast<Index>(r)] = jets_[r].acceleration;
   for (const DrivenMarker &driven : scene_.driven) {
     const auto i = static_cast<std::size_t>(driven.marker);
     workspace_.turning[i] = measured_.turning[i] = newton_.turning[i] = driven.law(t);
@@ -234,8 +243,8 @@ template <class Space> Index RecursiveMotion<Space>::prescribed() const {
 }
 
 template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *f) {
-  for (const Target &target : scene_.targets)
-    *f++ = target(t).acceleration;
+  update_targets(t);
+  f = std::copy_n(target_.data(), scene_.targets.size(), f);
   for (const Load &load : scene_.loads)
     *f++ = load.magnitude(t).value;
   for (const PointLoad &load : scene_.point_loads)

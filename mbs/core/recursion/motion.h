@@ -15,7 +15,7 @@
 #include "core/recursion/posture.h"
 #include "core/recursion/workspace.h"
 #include "core/space/configuration_space.h"
-#include "core/time_function/time_function.h"
+#include "core/time_function/functions_of_time.h"
 
 #include <optional>
 
@@ -81,10 +81,8 @@ struct Target {
   TimeFunction law;
   double sign = 1;
 
-  Jet operator()(double t) const {
-    const Jet jet = law(t);
-    return {sign * jet.value, sign * jet.rate, sign * jet.acceleration};
-  }
+  Jet of(const Jet &jet) const { return {sign * jet.value, sign * jet.rate, sign * jet.acceleration}; }
+  Jet operator()(double t) const { return of(law(t)); }
 };
 
 // Forces from outside that depend on time alone.
@@ -199,6 +197,7 @@ private:
   Workspace<Space, double> workspace_, measured_, newton_;
   bool has_given_; // generalized forces: force_
   Eigen::VectorXd force_, wrench_, along_cuts_, target_, value_, rate_, correction_, state_;
+  FunctionsOfTime laws_; // of the scene's targets
   std::vector<Jet> jets_;
   double target_time_;
   double fastest_ = 1; // 1/s

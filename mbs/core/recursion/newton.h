@@ -31,7 +31,7 @@ public:
     Matrix S = rows.template cast<Scalar>() * response_;
     S.bottomRows(extra).array().colwise() *= E_extra.array();
     S.diagonal().tail(extra).array() += Scalar(1);
-    schur_.compute(S);
+    schur_.factorise(std::move(S));
   }
 
   // x (n_v): B^T r in, the solution out; c of the kept rows, or null for zero
@@ -45,7 +45,8 @@ public:
     if (c)
       nu.head(kept) -= Eigen::Map<const Vector>(c, kept);
     nu.tail(extra).array() *= E_extra_.array();
-    x_.noalias() -= response_ * schur_.solve(nu);
+    schur_.solve(nu.data());
+    x_.noalias() -= response_ * nu;
   }
 
 private:
@@ -53,7 +54,7 @@ private:
   const Eigen::MatrixXd *rows_ = nullptr;
   Matrix response_; // (n_v, rows) N_0^-1 of them, transposed
   Vector E_extra_;
-  Eigen::PartialPivLU<Matrix> schur_;
+  Lu<Scalar> schur_;
 };
 
 } // namespace ffrobot::recursion

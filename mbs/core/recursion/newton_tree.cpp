@@ -10,32 +10,33 @@ namespace {
 
 // Products of real rows with numbers that may be complex are written for the parts of these: compilers take detours
 // through memory otherwise.
-template <class Scalar> constexpr int parts = static_cast<int>(sizeof(Scalar) / sizeof(double));
+template <class Scalar> constexpr int parts_in = static_cast<int>(sizeof(Scalar) / sizeof(double));
 template <class Scalar> const double *parts_of(const Scalar *x) { return reinterpret_cast<const double *>(x); }
 
 // Sum of x_i times columns i of `rows`, their part k
 template <int d, class Scalar>
-Eigen::Matrix<Scalar, d, 1> combined(const Eigen::MatrixXd &rows, const Eigen::Matrix<Scalar, Eigen::Dynamic, 1> &x,
-                                     int k) {
-  constexpr int size = parts<Scalar>;
+Column<Scalar, d> combined(const Eigen::MatrixXd &rows, const std::vector<Scalar> &x, int k) {
+  constexpr int size = parts_in<Scalar>;
   double sum[size * d] = {};
   const double *x_ = parts_of(x.data());
-  for (Index i = 0; i < x.size(); ++i) {
+  for (Index i = 0; i < rows.cols(); ++i) {
     const double *column = &rows(d * k, i);
     for (int c = 0; c < d; ++c)
       for (int part = 0; part < size; ++part)
         sum[size * c + part] += x_[size * i + part] * column[c];
   }
-  return Eigen::Map<const Eigen::Matrix<Scalar, d, 1>>(reinterpret_cast<const Scalar *>(sum));
+  Column<Scalar, d> found;
+  std::copy_n(reinterpret_cast<const Scalar *>(sum), d, found.x);
+  return found;
 }
 
-// f times column i of `rows`, as far as f goes
-template <class Scalar>
-Scalar times_column(const Eigen::MatrixXd &rows, Index i, const Eigen::Matrix<Scalar, Eigen::Dynamic, 1> &f) {
-  constexpr int size = parts<Scalar>;
+// Column i of `rows` times f, as far as f goes
+template <int d, class Scalar>
+Scalar times_column(const Eigen::MatrixXd &rows, Index i, const std::vector<Column<Scalar, d>> &f) {
+  constexpr int size = parts_in<Scalar>;
   double sum[size] = {};
-  const double *column = &rows(0, i), *f_ = parts_of(f.data());
-  for (Index c = 0; c < f.size(); ++c)
+  const double *column = &rows(0, i), *f_ = parts_of(f.data()->x);
+  for (Index c = 0; c < d * static_cast<Index>(f.size()); ++c)
     for (int part = 0; part < size; ++part)
       sum[part] += column[c] * f_[size * c + part];
   return *reinterpret_cast<const Scalar *>(sum);
@@ -43,103 +44,125 @@ Scalar times_column(const Eigen::MatrixXd &rows, Index i, const Eigen::Matrix<Sc
 
 // Sum of w_i a b^T over modes: a, b parts of columns i of `rows`
 template <int d, class Scalar>
-Eigen::Matrix<Scalar, d, d> products(const Eigen::MatrixXd &rows, const Eigen::Matrix<Scalar, Eigen::Dynamic, 1> &w,
-                                     int a, int b) {
-  constexpr int size = parts<Scalar>;
+Square<Scalar, d> products(const Eigen::MatrixXd &rows, const std::vector<Scalar> &w, int a, int b) {
+  constexpr int size = parts_in<Scalar>;
   double sum[size * d * d] = {};
   const double *w_ = parts_of(w.data());
-  for (Index i = 0; i < w.size(); ++i) {
+  for (Index i = 0; i < rows.cols(); ++i) {
     const double *a_i = &rows(d * a, i), *b_i = &rows(d * b, i);
     for (int c = 0; c < d; ++c)
       for (int r = 0; r < d; ++r)
         for (int part = 0; part < size; ++part)
           sum[size * (d * c + r) + part] += w_[size * i + part] * (a_i[r] * b_i[c]);
   }
-  return Eigen::Map<const Eigen::Matrix<Scalar, d, d>>(reinterpret_cast<const Scalar *>(sum));
+  Square<Scalar, d> found;
+  std::copy_n(reinterpret_cast<const Scalar *>(sum), d * d, found.column[0].x);
+  return found;
 }
 
 } // namespace
 
 template <class Space, class Scalar>
-void NewtonTree<Space, Scalar>::eliminate_modes(const NewtonBody<Space> &body, const Scalar *E_, Node &node) {
-  const int linked = body.linked();
-  const Index n = body.modes(), size = d * (1 + linked);
-  node.blocks.resize(size, size);
-  block(node.blocks, 0, 0) = body.M.template cast<Scalar>();
-  for (int k = 0; k < linked; ++k)
-    block(node.blocks, 1 + k, 0) = body.X[static_cast<std::size_t>(k)].template cast<Scalar>();
-  node.blocks.rightCols(size - d).setZero();
-  const Eigen::Map<const Vector> E(E_, n);
+void NewtonTree<Space, Scalar>::eliminate_modes(const NewtonBody<Space> &body, const Scalar *E, Node &node) {
+  const auto n = static_cast<std::size_t>(body.modes());
+  node.parts = 1 + body.linked();
+  node.blocks.resize(static_cast<std::size_t>(node.parts * node.parts));
+  node.block(0, 0) = Block::of(body.M);
+  for (int k = 1; k < node.parts; ++k)
+    node.block(k, 0) = Block::of(body.X[static_cast<std::size_t>(k - 1)]);
   if (body.m_ff.size()) {
-    const Matrix rows = body.rows.topRows(size).template cast<Scalar>();
-    Matrix e = body.m_ff.template cast<Scalar>(), taken = E.asDiagonal() * body.p_by_A.template cast<Scalar>();
-    e.diagonal() += E;
-    node.e.compute(e);
-    node.blocks.leftCols(d) += rows * node.e.solve(taken);
-    if (linked > 0)
-      node.blocks.rightCols(size - d) = rows * node.e.solve(rows.bottomRows(size - d).transpose());
+    eliminate_bent_modes(body, E, node);
     return;
   }
-  node.inverse = (E.array() + Scalar(1)).inverse();
-  const Vector taken = node.inverse.cwiseProduct(E);
-  for (int k = 0; k <= linked; ++k)
-    block(node.blocks, k, 0) += products<d>(body.rows, taken, k, 0);
-  for (int k = 1; k <= linked; ++k)
-    for (int l = 1; l <= linked; ++l)
-      block(node.blocks, k, l) = products<d>(body.rows, node.inverse, k, l);
+  node.inverse.resize(n);
+  std::vector<Scalar> &taken = node.u;
+  taken.resize(n);
+  for (std::size_t i = 0; i < n; ++i)
+    node.inverse[i] = 1. / (1. + E[i]), taken[i] = node.inverse[i] * E[i];
+  for (int k = 0; k < node.parts; ++k)
+    node.block(k, 0) += products<d>(body.rows, taken, k, 0);
+  for (int k = 1; k < node.parts; ++k)
+    for (int l = 1; l < node.parts; ++l)
+      node.block(k, l) = products<d>(body.rows, node.inverse, k, l);
+}
+
+// With m_ff + E in the place of 1 + E: column by column of what a part of the body does to modes
+template <class Space, class Scalar>
+void NewtonTree<Space, Scalar>::eliminate_bent_modes(const NewtonBody<Space> &body, const Scalar *E, Node &node) {
+  const Index n = body.modes();
+  typename Lu<Scalar>::Matrix e = body.m_ff.template cast<Scalar>();
+  for (Index i = 0; i < n; ++i)
+    e(i, i) += E[i];
+  node.e.factorise(std::move(e));
+  node.u.resize(static_cast<std::size_t>(n));
+  for (int l = 0; l < node.parts; ++l)
+    for (int c = 0; c < d; ++c) {
+      for (Index i = 0; i < n; ++i)
+        node.u[static_cast<std::size_t>(i)] = l ? Scalar(body.rows(d * l + c, i)) : E[i] * body.p_by_A(i, c);
+      node.e.solve(node.u.data());
+      for (int k = l ? 1 : 0; k < node.parts; ++k) {
+        const Part found = combined<d>(body.rows, node.u, k);
+        Part &to = node.block(k, l).column[c];
+        to = l ? found : to + found;
+      }
+    }
 }
 
 template <class Space, class Scalar>
 void NewtonTree<Space, Scalar>::eliminate_ports(const NewtonBody<Space> &body, Node &node) {
-  const int linked = body.linked();
-  Matrix &all = node.blocks;
   node.ports.resize(body.children.size());
-  for (int k = 0; k < static_cast<int>(body.children.size()); ++k) {
-    const Square &Lambda = nodes_[static_cast<std::size_t>(body.children[static_cast<std::size_t>(k)])].Lambda;
-    Port &port = node.ports[static_cast<std::size_t>(k)];
-    port.passed = (Square::Identity() + Lambda * block(all, 1 + k, 1 + k)).inverse();
-    port.Y.noalias() = port.passed * Lambda;
-    const Square YX = port.Y * block(all, 1 + k, 0);
-    block(all, 0, 0).noalias() += block(all, 1 + k, 0).transpose() * YX;
-    for (int l = k + 1; l < linked; ++l) {
-      block(all, 1 + l, 0).noalias() -= block(all, 1 + l, 1 + k) * YX;
-      const Square GY = block(all, 1 + l, 1 + k) * port.Y;
-      for (int m = k + 1; m < linked; ++m)
-        block(all, 1 + l, 1 + m).noalias() -= GY * block(all, 1 + k, 1 + m);
+  for (int k = 1; k <= static_cast<int>(body.children.size()); ++k) {
+    const auto child = static_cast<std::size_t>(body.children[static_cast<std::size_t>(k - 1)]);
+    const Block &Lambda = nodes_[child].Lambda;
+    Port &port = node.ports[static_cast<std::size_t>(k - 1)];
+    port.passed = inverse(Block::identity() + Lambda * node.block(k, k));
+    port.Y = port.passed * Lambda;
+    const Block YX = port.Y * node.block(k, 0);
+    node.block(0, 0) += node.block(k, 0).transpose() * YX;
+    for (int l = k + 1; l < node.parts; ++l) {
+      node.block(l, 0) -= node.block(l, k) * YX;
+      const Block GY = node.block(l, k) * port.Y;
+      for (int m = k + 1; m < node.parts; ++m)
+        node.block(l, m) -= GY * node.block(k, m);
     }
   }
   if (!body.is_moved)
     return;
-  const auto X = block(all, linked, 0);
-  node.M_inverse = block(all, 0, 0).inverse();
-  node.N = Square(X * node.M_inverse * X.transpose() + block(all, linked, linked)).inverse();
+  const int at = node.parts - 1;
+  const Block &X = node.block(at, 0);
+  node.M_inverse = inverse(node.block(0, 0));
+  node.N = inverse(X * node.M_inverse * X.transpose() + node.block(at, at));
 }
 
 template <class Space, class Scalar>
 void NewtonTree<Space, Scalar>::eliminate_joint(const recursion::Node<Space> &joint, const NewtonBody<Space> &body,
                                                 const Scalar *E, Node &node) {
-  Square I = block(node.blocks, 0, 0);
-  if (body.is_moved)
-    I = body.tilt.transpose() * node.N * body.tilt;
-  const auto J = body.J.template cast<Scalar>();
-  const Index count = body.J.cols();
-  const double rotor = joint.rotor_inertia, N = joint.gear_ratio, c = joint.rotor_turns;
-  if (count > 0) {
-    node.U.noalias() = I * J;
-    Freedoms D = J.transpose() * node.U;
-    D.diagonal() += Eigen::Map<const Along>(E, count);
-    if (rotor > 0) {
-      D(0, 0) += N * N * rotor;
-      node.U(Space::axis, 0) += c * N * rotor;
-      I(Space::axis, Space::axis) += c * c * rotor;
-    }
-    if (count == 1)
-      node.D_inverse = D.cwiseInverse();
-    else
-      node.D_inverse = Freedoms(D.inverse());
-    I.noalias() -= node.U * node.D_inverse * node.U.transpose();
+  Block I = node.block(0, 0);
+  if (body.is_moved) {
+    node.tilt = Real::of(body.tilt);
+    I = node.tilt.transpose() * node.N * node.tilt;
   }
-  node.Lambda.noalias() = body.to_section.transpose() * I * body.to_section;
+  node.J = Real::of(body.J), node.to_section = Real::of(body.to_section);
+  const int count = static_cast<int>(body.J.cols());
+  const double rotor = joint.rotor_inertia, N = joint.gear_ratio, c = joint.rotor_turns;
+  Block D;
+  for (int j = 0; j < count; ++j) {
+    node.U.column[j] = I * node.J.column[j];
+    for (int i = 0; i < count; ++i)
+      D(i, j) = dot(node.J.column[i], node.U.column[j]);
+    D(j, j) += E[j];
+  }
+  if (rotor > 0 && count > 0) {
+    D(0, 0) += N * N * rotor;
+    node.U(Space::axis, 0) += c * N * rotor;
+    I(Space::axis, Space::axis) += c * c * rotor;
+  }
+  node.D_inverse = inverse(D, count);
+  for (int i = 0; i < count; ++i)
+    for (int j = 0; j < count; ++j)
+      for (int k = 0; k < d; ++k)
+        I.column[k].add(-node.D_inverse(i, j) * node.U(k, j), node.U.column[i]);
+  node.Lambda = node.to_section.transpose() * I * node.to_section;
 }
 
 template <class Space, class Scalar>
@@ -159,81 +182,93 @@ void NewtonTree<Space, Scalar>::factorise(const NewtonPosture<Space> &posture, c
 template <class Space, class Scalar>
 void NewtonTree<Space, Scalar>::inward(const recursion::Node<Space> &joint, const NewtonBody<Space> &body, Scalar *x,
                                        Node &node) {
-  const Index n = body.modes(), size = node.blocks.rows();
-  const Eigen::Map<const Along> force(x + joint.v, body.J.cols());
-  const Eigen::Map<const Vector> force_on_modes(x + joint.p_v(), n);
-  node.u = force_on_modes;
-  if (body.turn.size())
-    node.u += force[0] * body.turn;
+  const int freedoms = static_cast<int>(body.J.cols());
+  const Scalar *force_on_modes = x + joint.p_v();
+  node.u.assign(force_on_modes, force_on_modes + body.modes());
+  for (Index i = 0; i < body.turn.size(); ++i)
+    node.u[static_cast<std::size_t>(i)] += x[joint.v] * body.turn[i];
   if (body.m_ff.size())
-    node.u = node.e.solve(node.u).eval();
+    node.e.solve(node.u.data());
   else
-    node.u.array() *= node.inverse.array();
-  node.motion.resize(size);
-  for (int k = 0; k <= body.linked(); ++k)
-    part(node.motion, k) = combined<d>(body.rows, node.u, k);
-  node.forces.setZero(size);
-  Six H = part(node.motion, 0);
+    for (std::size_t i = 0; i < node.u.size(); ++i)
+      node.u[i] *= node.inverse[i];
+  node.motion.resize(static_cast<std::size_t>(node.parts));
+  node.forces.assign(node.motion.size(), Part());
+  for (int k = 0; k < node.parts; ++k)
+    node.motion[static_cast<std::size_t>(k)] = combined<d>(body.rows, node.u, k);
+  Part H = node.motion[0];
   for (std::size_t k = 0; k < body.children.size(); ++k) {
     const int at = 1 + static_cast<int>(k);
     const Port &port = node.ports[k];
-    const Six f = port.Y * part(node.motion, at) + port.passed * nodes_[static_cast<std::size_t>(body.children[k])].pi;
-    H.noalias() += block(node.blocks, at, 0).transpose() * f;
-    for (int l = at + 1; l <= body.linked(); ++l)
-      part(node.motion, l).noalias() -= block(node.blocks, l, at) * f;
-    part(node.forces, at) = -f;
+    const Part f = port.Y * node.motion[k + 1] + port.passed * nodes_[static_cast<std::size_t>(body.children[k])].pi;
+    H += transposed_product(node.block(at, 0), f);
+    for (int l = at + 1; l < node.parts; ++l)
+      node.motion[static_cast<std::size_t>(l)] -= node.block(l, at) * f;
+    node.forces[k + 1] = -f;
   }
   if (body.is_moved) {
-    const int at = body.linked();
-    part(node.forces, 0) = node.M_inverse * H; // of the frame, no force acting at the section
-    const Six moved = part(node.motion, at) - block(node.blocks, at, 0) * part(node.forces, 0);
-    part(node.forces, at) = -(node.N * moved);
-    H.noalias() = body.tilt.transpose() * part(node.forces, at);
+    node.forces[0] = node.M_inverse * H; // of the frame, no force acting at the section
+    const Part moved = node.motion.back() - node.block(node.parts - 1, 0) * node.forces[0];
+    node.forces.back() = -(node.N * moved);
+    H = transposed_product(node.tilt, node.forces.back());
   }
-  node.pi = H;
-  if (body.J.cols() > 0) {
-    node.along.noalias() = node.D_inverse * (force - body.J.transpose() * H);
-    node.pi.noalias() += node.U * node.along;
+  Part left;
+  for (int i = 0; i < freedoms; ++i)
+    left[i] = x[joint.v + i] - dot(node.J.column[i], H);
+  node.along = Part();
+  for (int i = 0; i < freedoms; ++i) {
+    for (int j = 0; j < freedoms; ++j)
+      node.along[i] += node.D_inverse(i, j) * left[j];
+    H.add(node.along[i], node.U.column[i]);
   }
-  node.pi = (body.to_section.transpose() * node.pi).eval();
+  node.pi = transposed_product(node.to_section, H);
 }
 
 template <class Space, class Scalar>
 void NewtonTree<Space, Scalar>::outward(const recursion::Node<Space> &joint, const NewtonBody<Space> &body, Scalar *x,
                                         Node &node) {
-  const Index n = body.modes();
-  Eigen::Map<Along> x_joint(x + joint.v, body.J.cols());
-  Six A = Six::Zero();
+  const int freedoms = static_cast<int>(body.J.cols());
+  Part A;
   if (joint.parent >= 0)
-    A.noalias() = body.to_section * A_port_[static_cast<std::size_t>(joint.parent_port)];
-  if (body.J.cols() > 0) {
-    x_joint = node.along - node.D_inverse * (node.U.transpose() * A);
-    A.noalias() += body.J * x_joint;
+    A = node.to_section * A_port_[static_cast<std::size_t>(joint.parent_port)];
+  Part there;
+  for (int i = 0; i < freedoms; ++i)
+    there[i] = dot(node.U.column[i], A);
+  for (int i = 0; i < freedoms; ++i) {
+    x[joint.v + i] = node.along[i];
+    for (int j = 0; j < freedoms; ++j)
+      x[joint.v + i] -= node.D_inverse(i, j) * there[j];
+    A.add(x[joint.v + i], node.J.column[i]);
   }
   if (body.is_moved) {
-    const int at = body.linked();
-    part(node.forces, at).noalias() += node.N * (body.tilt * A);
-    A = node.M_inverse * (block(node.blocks, at, 0).transpose() * part(node.forces, at)) - part(node.forces, 0);
+    node.forces.back() += node.N * (node.tilt * A);
+    A = node.M_inverse * transposed_product(node.block(node.parts - 1, 0), node.forces.back()) - node.forces[0];
   }
-  part(node.forces, 0) = -A;
+  node.forces[0] = -A;
   for (std::size_t k = body.children.size(); k-- > 0;) {
     const int at = 1 + static_cast<int>(k);
-    Six there = block(node.blocks, at, 0) * A;
-    for (int l = at + 1; l <= body.linked(); ++l)
-      there.noalias() += block(node.blocks, l, at).transpose() * part(node.forces, l);
-    part(node.forces, at).noalias() -= node.ports[k].Y * there;
+    there = node.block(at, 0) * A;
+    for (int l = at + 1; l < node.parts; ++l)
+      there += transposed_product(node.block(l, at), node.forces[static_cast<std::size_t>(l)]);
+    node.forces[k + 1] -= node.ports[k].Y * there;
     A_port_[static_cast<std::size_t>(joint.first_port + body.ports[k])] =
-        there + part(node.motion, at) + block(node.blocks, at, at) * part(node.forces, at);
+        there + node.motion[k + 1] + node.block(at, at) * node.forces[k + 1];
   }
-  Eigen::Map<Vector> x_modes(x + joint.p_v(), n);
+  Scalar *x_modes = x + joint.p_v();
+  const auto n = static_cast<std::size_t>(body.modes());
+  std::vector<Scalar> &by_forces = x_of_modes_;
+  by_forces.resize(n);
+  for (std::size_t i = 0; i < n; ++i)
+    by_forces[i] = times_column(body.rows, static_cast<Index>(i), node.forces);
   if (body.m_ff.size())
-    x_modes =
-        node.u + node.e.solve(body.rows.topRows(node.forces.size()).transpose().template cast<Scalar>() * node.forces);
+    node.e.solve(by_forces.data());
   else
-    for (Index i = 0; i < n; ++i)
-      x_modes[i] = node.u[i] + node.inverse[i] * times_column(body.rows, i, node.forces);
-  if (body.turn.size())
-    x_joint[0] += body.turn.cwiseProduct(x_modes).sum();
+    for (std::size_t i = 0; i < n; ++i)
+      by_forces[i] *= node.inverse[i];
+  for (std::size_t i = 0; i < n; ++i)
+    x_modes[i] = node.u[i] + by_forces[i];
+  for (Index i = 0; i < body.turn.size(); ++i)
+    x[joint.v] += body.turn[i] * x_modes[i];
 }
 
 template <class Space, class Scalar> void NewtonTree<Space, Scalar>::solve(Scalar *x) {

@@ -8,16 +8,15 @@
 // Y = (1 + Lambda G)^-1 Lambda. Numbers may be complex; matrices are symmetric then, not Hermitian.
 #pragma once
 
+#include "core/linear/lu.h"
+#include "core/linear/square.h"
 #include "core/recursion/newton_posture.h"
-
-#include <Eigen/LU>
 
 namespace ffrobot::recursion {
 
 template <class Space, class Scalar> class NewtonTree {
 public:
   using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
-  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
 
   // E (n_v), zero along pins whose section modes turn. The posture must outlive this.
   void factorise(const NewtonPosture<Space> &posture, const Vector &E);
@@ -27,35 +26,35 @@ public:
 
 private:
   static constexpr int d = Space::dim;
-  using Square = Eigen::Matrix<Scalar, d, d>;
-  using Six = Eigen::Matrix<Scalar, d, 1>;
-  using Joint = Eigen::Matrix<Scalar, d, Eigen::Dynamic, Eigen::ColMajor, d, d>;
-  using Along = Eigen::Matrix<Scalar, Eigen::Dynamic, 1, Eigen::ColMajor, d, 1>;
-  using Freedoms = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, d, d>;
+  using Block = Square<Scalar, d>;
+  using Real = Square<double, d>;
+  using Part = Column<Scalar, d>;
 
   // What hangs on a port
   struct Port {
-    Square Y, passed; // (1 + Lambda G)^-1 Lambda, (1 + Lambda G)^-1
+    Block Y, passed; // (1 + Lambda G)^-1 Lambda, (1 + Lambda G)^-1
   };
   struct Node {
-    Vector inverse;                // (n) e^-1
-    Eigen::PartialPivLU<Matrix> e; // m_ff + E, where modes are not orthonormal
-    Matrix blocks;                 // (d (1 + linked))^2: first columns M, then X of ports; behind them G
-    std::vector<Port> ports;       // with a child
-    Square M_inverse, N;           // of an inboard port: N = (X M^-1 X^T + G)^-1
-    Joint U;
-    Freedoms D_inverse;
-    Square Lambda; // in axes of the port on which it hangs
+    int parts = 1;               // 1 + linked ports
+    std::vector<Scalar> inverse; // (n) e^-1
+    Lu<Scalar> e;                // m_ff + E, where modes are not orthonormal
+    std::vector<Block> blocks;   // (parts, parts) by rows: in the first column M, then X of ports; behind it G
+    std::vector<Port> ports;     // with a child
+    Block M_inverse, N;          // of an inboard port: N = (X M^-1 X^T + G)^-1
+    Real J, tilt, to_section;    // of the body, J with
+    Block U, D_inverse;          // columns of freedoms, as U = I J
+    Block Lambda;                // in axes of the port on which it hangs
     // of a solve
-    Vector u, motion, forces; // e^-1 r; (d (1 + linked)) rows times u; -A and forces on ports
-    Along along;              // D^-1 (r - J^T H)
-    Six pi;                   // in axes of the port on which it hangs
+    std::vector<Scalar> u;            // (n) e^-1 r
+    std::vector<Part> motion, forces; // of parts: rows times u; -A and forces on ports
+    Part along;                       // D^-1 (r - J^T H)
+    Part pi;                          // in axes of the port on which it hangs
+
+    Block &block(int r, int c) { return blocks[static_cast<std::size_t>(parts * r + c)]; }
   };
 
-  static auto block(Matrix &of, int r, int c) { return of.template block<d, d>(d * r, d * c); }
-  static auto part(Vector &of, int r) { return of.template segment<d>(d * r); }
-
   void eliminate_modes(const NewtonBody<Space> &body, const Scalar *E, Node &node);
+  void eliminate_bent_modes(const NewtonBody<Space> &body, const Scalar *E, Node &node);
   void eliminate_ports(const NewtonBody<Space> &body, Node &node);
   void eliminate_joint(const recursion::Node<Space> &joint, const NewtonBody<Space> &body, const Scalar *E, Node &node);
   void inward(const recursion::Node<Space> &joint, const NewtonBody<Space> &body, Scalar *x, Node &node);
@@ -63,7 +62,8 @@ private:
 
   const NewtonPosture<Space> *posture_ = nullptr;
   std::vector<Node> nodes_;
-  std::vector<Six> A_port_; // of all ports
+  std::vector<Part> A_port_;       // of all ports
+  std::vector<Scalar> x_of_modes_; // of one body
 };
 
 extern template class NewtonTree<Planar, double>;

@@ -1,4 +1,5 @@
 #include "core/time_function/time_function.h"
+#include "core/time_function/jet.h"
 
 #include <algorithm>
 #include <array>
@@ -10,100 +11,6 @@
 namespace ffrobot {
 
 namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-Jet operator+(const Jet &a, const Jet &b) {
-  return {a.value + b.value, a.rate + b.rate, a.acceleration + b.acceleration};
-}
-Jet operator-(const Jet &a, const Jet &b) {
-  return {a.value - b.value, a.rate - b.rate, a.acceleration - b.acceleration};
-}
-Jet operator-(const Jet &a) { return {-a.value, -a.rate, -a.acceleration}; }
-
-Jet operator*(const Jet &a, const Jet &b) {
-  return {a.value * b.value, a.rate * b.value + a.value * b.rate,
-          a.acceleration * b.value + 2.0 * a.rate * b.rate + a.value * b.acceleration};
-}
-
-/// Leibniz' rule on a = q b, solved for q.
-Jet operator/(const Jet &a, const Jet &b) {
-  const double value = a.value / b.value;
-  const double rate = (a.rate - value * b.rate) / b.value;
-  return {value, rate, (a.acceleration - 2.0 * rate * b.rate - value * b.acceleration) / b.value};
-}
-
-/// Chain rule: f(u(t)) from f, df/du and d²f/du².
-Jet chain(const Jet &u, double f, double df, double ddf) {
-  return {f, df * u.rate, ddf * u.rate * u.rate + df * u.acceleration};
-}
-
-Jet exp(const Jet &u) {
-  const double f = std::exp(u.value);
-  return chain(u, f, f, f);
-}
-
-Jet log(const Jet &u) {
-  if (!(u.value > 0.0))
-    return {nan, nan, nan};
-  return chain(u, std::log(u.value), 1.0 / u.value, -1.0 / (u.value * u.value));
-}
-
-Jet sqrt(const Jet &u) {
-  const double f = std::sqrt(u.value);
-  return chain(u, f, 0.5 / f, -0.25 / (f * u.value));
-}
-
-Jet tan(const Jet &u) {
-  const double f = std::tan(u.value);
-  return chain(u, f, 1.0 + f * f, 2.0 * f * (1.0 + f * f));
-}
-
-Jet tanh(const Jet &u) {
-  const double f = std::tanh(u.value);
-  return chain(u, f, 1.0 - f * f, -2.0 * f * (1.0 - f * f));
-}
-
-Jet abs(const Jet &u) {
-  // At a zero the first derivative that is not 0 tells the sign just after it.
-  const double sign = u.value != 0.0 ? u.value : u.rate != 0.0 ? u.rate : u.acceleration;
-  return sign < 0.0 ? -u : u;
-}
-
-/// u^n for a small integer n ≥ 2, by squaring: exact where the products are, and several times faster than pow.
-Jet integer_power(const Jet &u, int n) {
-  double lower = 1.0; // uⁿ⁻²
-  double square = u.value;
-  for (int rest = n - 2; rest > 0; rest >>= 1, square *= square)
-    if (rest & 1)
-      lower *= square;
-  return chain(u, lower * u.value * u.value, n * lower * u.value, n * (n - 1) * lower);
-}
-
-Jet power(const Jet &u, const Jet &exponent) {
-  if (exponent.rate != 0.0 || exponent.acceleration != 0.0)
-    return exp(exponent * log(u));
-  const double n = exponent.value;
-  if (n == 0.0)
-    return {1.0, 0.0, 0.0};
-  if (n == 1.0)
-    return u;
-  if (n >= 2.0 && n <= 16.0 && n == std::floor(n))
-    return integer_power(u, static_cast<int>(n));
-  return chain(u, std::pow(u.value, n), n * std::pow(u.value, n - 1.0), n * (n - 1.0) * std::pow(u.value, n - 2.0));
-}
-
-Jet truth(bool holds, const Jet &a, const Jet &b) {
-  if (std::isnan(a.value) || std::isnan(b.value))
-    return {nan, nan, nan};
-  return {holds ? 1.0 : 0.0, 0.0, 0.0};
-}
-
-Jet select(const Jet &condition, const Jet &a, const Jet &b) {
-  if (std::isnan(condition.value))
-    return condition;
-  return condition.value != 0.0 ? a : b;
-}
 
 int operand_count(Op op) {
   switch (op) {
@@ -127,8 +34,6 @@ int operand_count(Op op) {
     return 2;
   }
 }
-
-double finite_or_nan(double x) { return std::isfinite(x) ? x : nan; }
 
 } // namespace
 
@@ -194,88 +99,21 @@ void Expression::take_constant() {
 Jet Expression::operator()(double t) const {
   std::array<Jet, max_depth> stack; // what is below the last operand
   Jet *top = stack.data(), a{};     // that operand, in registers
-  for (const auto &[op, constant, takes_constant] : program_) {
-    switch (op) {
-    case Op::constant:
+  for (const Instruction &i : program_)
+    switch (i.operands()) {
+    case 0:
       *top++ = a;
-      a = {constant, 0.0, 0.0};
+      a = i.op == Op::time ? Jet{t, 1.0, 0.0} : Jet{i.constant, 0.0, 0.0};
       break;
-    case Op::time:
-      *top++ = a;
-      a = {t, 1.0, 0.0};
+    case 1:
+      a = apply(i, a, a, a);
       break;
-    case Op::add:
-      a = takes_constant ? Jet{a.value + constant, a.rate, a.acceleration} : *--top + a;
+    case 2:
+      --top, a = apply(i, *top, a, a);
       break;
-    case Op::subtract:
-      a = takes_constant ? Jet{a.value - constant, a.rate, a.acceleration} : *--top - a;
-      break;
-    case Op::multiply:
-      a = takes_constant ? Jet{a.value * constant, a.rate * constant, a.acceleration * constant} : *--top * a;
-      break;
-    case Op::divide:
-      a = takes_constant ? Jet{a.value / constant, a.rate / constant, a.acceleration / constant} : *--top / a;
-      break;
-    case Op::power:
-      a = power(*--top, a);
-      break;
-    case Op::negate:
-      a = -a;
-      break;
-    case Op::sin: {
-      const double x = a.value, s = std::sin(x), c = std::cos(x); // one call of sincos
-      a = chain(a, s, c, -s);
-      break;
+    default:
+      top -= 2, a = apply(i, top[0], top[1], a);
     }
-    case Op::cos: {
-      const double x = a.value, s = std::sin(x), c = std::cos(x);
-      a = chain(a, c, -s, -c);
-      break;
-    }
-    case Op::tan:
-      a = tan(a);
-      break;
-    case Op::exp:
-      a = exp(a);
-      break;
-    case Op::log:
-      a = log(a);
-      break;
-    case Op::sqrt:
-      a = sqrt(a);
-      break;
-    case Op::abs:
-      a = abs(a);
-      break;
-    case Op::tanh:
-      a = tanh(a);
-      break;
-    case Op::less:
-      --top, a = truth(top->value < a.value, *top, a);
-      break;
-    case Op::less_equal:
-      --top, a = truth(top->value <= a.value, *top, a);
-      break;
-    case Op::greater:
-      --top, a = truth(top->value > a.value, *top, a);
-      break;
-    case Op::greater_equal:
-      --top, a = truth(top->value >= a.value, *top, a);
-      break;
-    case Op::logical_and:
-      --top, a = truth(top->value != 0.0 && a.value != 0.0, *top, a);
-      break;
-    case Op::logical_or:
-      --top, a = truth(top->value != 0.0 || a.value != 0.0, *top, a);
-      break;
-    case Op::logical_not:
-      a = truth(a.value == 0.0, a, a);
-      break;
-    case Op::select:
-      top -= 2, a = select(top[0], top[1], a);
-      break;
-    }
-  }
   return a;
 }
 
@@ -325,8 +163,7 @@ TimeFunction TimeFunction::held(double begin, double end) const {
 }
 
 Jet TimeFunction::operator()(double t) const {
-  const Jet jet = std::visit([t](const auto &function) { return function(t); }, function_);
-  return {finite_or_nan(jet.value), finite_or_nan(jet.rate), finite_or_nan(jet.acceleration)};
+  return finite_or_nan(std::visit([t](const auto &function) { return function(t); }, function_));
 }
 
 } // namespace ffrobot

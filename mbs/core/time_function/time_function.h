@@ -59,19 +59,23 @@ class Expression {
 public:
   static constexpr int max_depth = 64;
 
+  struct Instruction {
+    Op op;
+    double constant = 0;
+    bool takes_constant = false; // in place of an operand: of the second one, or of either of a sum or a product
+
+    int operands() const;
+  };
+
   /// Throws std::invalid_argument unless the program leaves exactly one value, stays within `max_depth` and
   /// uses exactly the given constants.
   Expression(std::span<const Op> program, std::span<const double> constants);
 
   Jet operator()(double t) const;
 
+  const std::vector<Instruction> &program() const { return program_; }
+
 private:
-  struct Instruction {
-    Op op;
-    double constant = 0;
-    bool takes_constant = false; // in place of an operand: of the second one, or of either of a sum or a product
-    int operands() const;
-  };
   Expression() = default;
   void fold_constants();
   void take_constant();
@@ -130,6 +134,8 @@ public:
 
   /// The same between `begin` and `end`, and at rest with its values there outside.
   TimeFunction held(double begin, double end) const;
+
+  const Expression *expression() const { return std::get_if<Expression>(&function_); } // null where it is none
 
 private:
   std::variant<Constant, Expression, PiecewisePolynomial, UserFunction> function_;

@@ -116,6 +116,28 @@ def test_a_flexible_tree_keeps_momentum_and_energy():
     assert relative(kept(states[-1]), kept(states[0])) < 1e-9
 
 
+def test_laws_that_share_parts():
+    """A mass on sines and cosines of one angle: place, rate and, opposite to multipliers, m (a - g), by calculus."""
+    body, data = r.SpatialBody(), r.SpatialData()
+    data.mass, data.J2, data.markers = 2.0, np.eye(3), [r.SpatialMarker()]
+    body.name, body.joint, body.data = "mass", J.free, data
+    rows = [row(r.RowKind.point, (-1, 0), (0, 0), axis)[0] for axis in np.eye(3)]
+    gravity = np.array([0.0, 0, -9.81])
+    model = r.SpatialModel([body], [r.SpatialMarker()], rows, [], gravity)
+    scene = _core.TreeScene()
+    for law in ("2+0.5*cos(3*t-1)", "0.3*sin(3*t-1)-(3*t-1)/7", "0.1*cos(3*t-1)*sin(3*t-1)-0.3*sin(3*t-1)"):
+        scene.add_target(parse_expression(law))
+    q, v, _ = _core.tree_projected(model, scene, 0.7, np.array([0, 0, 0, 1.0, 0, 0, 0]), np.zeros(6))
+    run = _core.tree_motion(model, scene, [0.7, 0.8], q, v, controls(), on)
+    for t, state, force in zip((0.7, 0.8), run.states, run.multipliers, strict=True):
+        c, s = np.cos(3 * t - 1), np.sin(3 * t - 1)
+        place = [2 + 0.5 * c, 0.3 * s - (3 * t - 1) / 7, 0.1 * c * s - 0.3 * s]
+        rate = [-1.5 * s, 0.9 * c - 3 / 7, 0.3 * (c * c - s * s) - 0.9 * c]
+        acceleration = np.array([-4.5 * c, -2.7 * s, -3.6 * s * c + 2.7 * s])
+        np.testing.assert_allclose(model.measure(state[:7], state[7:]), [place, rate], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(-force, 2.0 * (acceleration - gravity), rtol=0, atol=1e-11)
+
+
 def test_dependent_rows_are_found_and_left_out():
     """The same point held twice: three of six rows are kept, motion as with three."""
     rng = np.random.default_rng(8)

@@ -1,0 +1,170 @@
+// Arithmetic of jets (time_function.h), and what instructions of expressions do to them.
+#pragma once
+
+#include "core/time_function/time_function.h"
+
+#include <cmath>
+#include <limits>
+
+namespace ffrobot {
+
+inline constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+inline Jet operator+(const Jet &a, const Jet &b) {
+  return {a.value + b.value, a.rate + b.rate, a.acceleration + b.acceleration};
+}
+inline Jet operator-(const Jet &a, const Jet &b) {
+  return {a.value - b.value, a.rate - b.rate, a.acceleration - b.acceleration};
+}
+inline Jet operator-(const Jet &a) { return {-a.value, -a.rate, -a.acceleration}; }
+
+inline Jet operator*(const Jet &a, const Jet &b) {
+  return {a.value * b.value, a.rate * b.value + a.value * b.rate,
+          a.acceleration * b.value + 2.0 * a.rate * b.rate + a.value * b.acceleration};
+}
+
+/// Leibniz' rule on a = q b, solved for q.
+inline Jet operator/(const Jet &a, const Jet &b) {
+  const double value = a.value / b.value;
+  const double rate = (a.rate - value * b.rate) / b.value;
+  return {value, rate, (a.acceleration - 2.0 * rate * b.rate - value * b.acceleration) / b.value};
+}
+
+/// Chain rule: f(u(t)) from f, df/du and d²f/du².
+inline Jet chain(const Jet &u, double f, double df, double ddf) {
+  return {f, df * u.rate, ddf * u.rate * u.rate + df * u.acceleration};
+}
+
+inline Jet exp(const Jet &u) {
+  const double f = std::exp(u.value);
+  return chain(u, f, f, f);
+}
+
+inline Jet log(const Jet &u) {
+  if (!(u.value > 0.0))
+    return {nan, nan, nan};
+  return chain(u, std::log(u.value), 1.0 / u.value, -1.0 / (u.value * u.value));
+}
+
+inline Jet sqrt(const Jet &u) {
+  const double f = std::sqrt(u.value);
+  return chain(u, f, 0.5 / f, -0.25 / (f * u.value));
+}
+
+inline void sine_and_cosine(const Jet &u, Jet &sine, Jet &cosine) {
+  const double s = std::sin(u.value), c = std::cos(u.value); // one call of sincos
+  sine = chain(u, s, c, -s), cosine = chain(u, c, -s, -c);
+}
+
+inline Jet tan(const Jet &u) {
+  const double f = std::tan(u.value);
+  return chain(u, f, 1.0 + f * f, 2.0 * f * (1.0 + f * f));
+}
+
+inline Jet tanh(const Jet &u) {
+  const double f = std::tanh(u.value);
+  return chain(u, f, 1.0 - f * f, -2.0 * f * (1.0 - f * f));
+}
+
+inline Jet abs(const Jet &u) {
+  // At a zero the first derivative that is not 0 tells the sign just after it.
+  const double sign = u.value != 0.0 ? u.value : u.rate != 0.0 ? u.rate : u.acceleration;
+  return sign < 0.0 ? -u : u;
+}
+
+/// u^n for a small integer n ≥ 2, by squaring: exact where the products are, and several times faster than pow.
+inline Jet integer_power(const Jet &u, int n) {
+  double lower = 1.0; // uⁿ⁻²
+  double square = u.value;
+  for (int rest = n - 2; rest > 0; rest >>= 1, square *= square)
+    if (rest & 1)
+      lower *= square;
+  return chain(u, lower * u.value * u.value, n * lower * u.value, n * (n - 1) * lower);
+}
+
+inline Jet power(const Jet &u, const Jet &exponent) {
+  if (exponent.rate != 0.0 || exponent.acceleration != 0.0)
+    return exp(exponent * log(u));
+  const double n = exponent.value;
+  if (n == 0.0)
+    return {1.0, 0.0, 0.0};
+  if (n == 1.0)
+    return u;
+  if (n >= 2.0 && n <= 16.0 && n == std::floor(n))
+    return integer_power(u, static_cast<int>(n));
+  return chain(u, std::pow(u.value, n), n * std::pow(u.value, n - 1.0), n * (n - 1.0) * std::pow(u.value, n - 2.0));
+}
+
+inline Jet truth(bool holds, const Jet &a, const Jet &b) {
+  if (std::isnan(a.value) || std::isnan(b.value))
+    return {nan, nan, nan};
+  return {holds ? 1.0 : 0.0, 0.0, 0.0};
+}
+
+inline Jet select(const Jet &condition, const Jet &a, const Jet &b) {
+  if (std::isnan(condition.value))
+    return condition;
+  return condition.value != 0.0 ? a : b;
+}
+
+inline double finite_or_nan(double x) { return std::isfinite(x) ? x : nan; }
+inline Jet finite_or_nan(const Jet &jet) {
+  return {finite_or_nan(jet.value), finite_or_nan(jet.rate), finite_or_nan(jet.acceleration)};
+}
+
+// Of an instruction with operands: of one z, of two x and z, of three x, y and z
+[[gnu::always_inline]] inline Jet apply(const Expression::Instruction &i, const Jet &x, const Jet &y, const Jet &z) {
+  const double constant = i.constant;
+  switch (i.op) {
+  case Op::add:
+    return i.takes_constant ? Jet{z.value + constant, z.rate, z.acceleration} : x + z;
+  case Op::subtract:
+    return i.takes_constant ? Jet{z.value - constant, z.rate, z.acceleration} : x - z;
+  case Op::multiply:
+    return i.takes_constant ? Jet{z.value * constant, z.rate * constant, z.acceleration * constant} : x * z;
+  case Op::divide:
+    return i.takes_constant ? Jet{z.value / constant, z.rate / constant, z.acceleration / constant} : x / z;
+  case Op::power:
+    return power(x, z);
+  case Op::negate:
+    return -z;
+  case Op::sin:
+    return chain(z, std::sin(z.value), std::cos(z.value), -std::sin(z.value));
+  case Op::cos:
+    return chain(z, std::cos(z.value), -std::sin(z.value), -std::cos(z.value));
+  case Op::tan:
+    return tan(z);
+  case Op::exp:
+    return exp(z);
+  case Op::log:
+    return log(z);
+  case Op::sqrt:
+    return sqrt(z);
+  case Op::abs:
+    return abs(z);
+  case Op::tanh:
+    return tanh(z);
+  case Op::less:
+    return truth(x.value < z.value, x, z);
+  case Op::less_equal:
+    return truth(x.value <= z.value, x, z);
+  case Op::greater:
+    return truth(x.value > z.value, x, z);
+  case Op::greater_equal:
+    return truth(x.value >= z.value, x, z);
+  case Op::logical_and:
+    return truth(x.value != 0.0 && z.value != 0.0, x, z);
+  case Op::logical_or:
+    return truth(x.value != 0.0 || z.value != 0.0, x, z);
+  case Op::logical_not:
+    return truth(z.value == 0.0, z, z);
+  case Op::select:
+    return select(x, y, z);
+  case Op::constant:
+  case Op::time:
+    break;
+  }
+  return {constant, 0.0, 0.0};
+}
+
+} // namespace ffrobot
