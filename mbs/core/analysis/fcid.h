@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/actuation/actuator_forces.h"
+#include "core/analysis/prescribed_motion.h"
 #include "core/system/frame_system.h"
 #include "core/system/system.h"
 
@@ -11,8 +12,6 @@
 #include <vector>
 
 namespace ffrobot {
-
-using ModalShape = std::vector<TimeFunction>; // p_k(t) of one body
 
 // C_m = 0, C_s = 0 and p = p(t) are as many equations as coordinates (Shaban 2022, sec. 5.1). With p known, (R, theta)
 // follow from C = 0, and their rates and accelerations from linear equations in the same matrix C_q,r; then

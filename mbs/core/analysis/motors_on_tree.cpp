@@ -20,9 +20,6 @@ MotorsOnTree::MotorsOnTree(const SystemOnTree &both)
 void MotorsOnTree::project(const double *q, const TreeWorkspace &w, Eigen::Ref<VectorXd> Q) {
   forces_.load(lambda_.data(), nullptr, w);
   forces_.project(q, w, Q.data());
-  for (std::size_t r = 0; r < both_.tree.rows.size(); ++r)
-    if (const recursion::Row &row = both_.tree.rows[r]; row.node >= 0)
-      Q[both_.tree.nodes[static_cast<std::size_t>(row.node)].v + row.freedom] -= lambda_[static_cast<Index>(r)];
 }
 
 void MotorsOnTree::resolve(const double *q, const double *lambda, const TreeWorkspace &w) {
