@@ -66,7 +66,7 @@ std::pair<RowMajorMatrix, RowMajorMatrix> left_on_modes(PrescribedMotion &motion
   return {q, left};
 }
 
-Run outputs_of(PrescribedMotion &motion, const std::vector<double> &times, const RowMajorMatrix &p,
+Run prescribed_outputs(PrescribedMotion &motion, const std::vector<double> &times, const RowMajorMatrix &p,
                const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const VectorXd &q) {
   const Modes modes = checked(motion, times, p, p_dot, p_ddot);
   check_size("q", q.size(), motion.both().tree.n_q);
@@ -91,7 +91,7 @@ void bind_prescribed(nb::module_ &m) {
           "(q (T, n_q), forces on modes (T, n)) that neither motors, or rows without any, nor loads supply, with modes "
           "of all\nbodies (T, n), from postures near (T, n_q), or each from the last, the first near (1, n_q); NaN "
           "where none is found.")
-      .def("outputs", &outputs_of, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "q"_a,
+      .def("outputs", &prescribed_outputs, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "q"_a,
            "What a run reports, as far as positions were found, the first from q (n_q).");
   nb::class_<PrescribedActuation, ActuationSource>(m, "PrescribedActuation", "Solved anew at every time.")
       .def(nb::init<const SystemOnTree &, std::vector<ModalShape>, VectorXd>(), "both"_a, "shape"_a, "q"_a,

@@ -142,8 +142,8 @@ void PrescribedMotion::balance() {
   forces_.require(q(), a_.data(), w_, f_.data());
   for (const int i : joints_)
     f_[i] -= acting_.generalized ? acting_.generalized[i] : 0;
-  const VectorXd of_joints = f_(joints_);
-  lambda_ = -C_J_.transpose().solve(of_joints);
+  const VectorXd of_others = -f_(joints_);
+  lambda_ = C_J_.transpose().solve(of_others);
   f_ += C_v_.transpose() * lambda_;
   std::copy_n(lambda_.data(), lambda_.size(), w_.lambda.data());
 }
