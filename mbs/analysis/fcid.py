@@ -99,7 +99,7 @@ class PrescribedShape(Details):
         """Everything is algebraic: it is solved for again at any time."""
         tree = known_motion_tree(outcome.assembly, outcome.analysis, has_motors=outcome.tau is not None)
         posture = tree.motion(outcome.q[0], outcome.v[0], outcome.a[0])[0]
-        return _core.PrescribedActuation(tree.both, self.functions, posture)
+        return _core.PrescribedActuation(_core.PrescribedMotion(tree.both, posture), self.functions, posture)
 
 
 def run_fcid(model: Model, analysis: Fcid) -> Outcome:

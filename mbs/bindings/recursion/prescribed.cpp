@@ -67,7 +67,7 @@ std::pair<RowMajorMatrix, RowMajorMatrix> left_on_modes(PrescribedMotion &motion
 }
 
 Run prescribed_outputs(PrescribedMotion &motion, const std::vector<double> &times, const RowMajorMatrix &p,
-               const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const VectorXd &q) {
+                       const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const VectorXd &q) {
   const Modes modes = checked(motion, times, p, p_dot, p_ddot);
   check_size("q", q.size(), motion.both().tree.n_q);
   motion.start_at(q);
@@ -94,6 +94,10 @@ void bind_prescribed(nb::module_ &m) {
       .def("outputs", &prescribed_outputs, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "q"_a,
            "What a run reports, as far as positions were found, the first from q (n_q).");
   nb::class_<PrescribedActuation, ActuationSource>(m, "PrescribedActuation", "Solved anew at every time.")
-      .def(nb::init<const SystemOnTree &, std::vector<ModalShape>, VectorXd>(), "both"_a, "shape"_a, "q"_a,
+      .def(nb::init<PrescribedMotion &, std::vector<ModalShape>, VectorXd>(), "motion"_a, "shape"_a, "q"_a,
            nb::keep_alive<1, 2>());
+  nb::class_<RedefinedMotion, PrescribedMotion>(m, "RedefinedMotion",
+                                                "With the motors of the motion that follows a path.")
+      .def(nb::init<const SystemOnTree &, const SystemOnTree &, VectorXd, double, std::vector<TimeFunction>>(),
+           "driven"_a, "path"_a, "q"_a, "factor"_a, "offset"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
 }

@@ -93,21 +93,21 @@ bool PrescribedMotion::find_position() {
     measure();
     factorise();
     const double left = value_.lpNorm<Eigen::Infinity>() / (1 + state_.head(both_.tree.n_q).lpNorm<Eigen::Infinity>());
-    if (left <= tolerance || (left <= floor && left > 0.2 * previous))
-      return true;
     if (!std::isfinite(left))
       return false;
-    previous = left;
     put_on_joints(-C_J_.solve(value_), state_.data());
+    if (left <= tolerance || (left <= floor && left > 0.2 * previous))
+      return true; // with a last step: splines through shapes take second derivatives of what is left
+    previous = left;
   }
   return false;
 }
 
 bool PrescribedMotion::move(double t, const ModalMotion &modes) {
-  return move(t, modes, recursion::targets_at(both_.scene, t));
+  return follow(t, modes, recursion::targets_at(both_.scene, t));
 }
 
-bool PrescribedMotion::move(double t, const ModalMotion &modes, std::vector<Jet> targets) {
+bool PrescribedMotion::follow(double t, const ModalMotion &modes, std::vector<Jet> targets) {
   targets_ = std::move(targets);
   double *q = state_.data(), *v = q + both_.tree.n_q;
   for (const int i : joints_) {
@@ -126,13 +126,30 @@ bool PrescribedMotion::move(double t, const ModalMotion &modes, std::vector<Jet>
   forces_.prepare(q, v, acting_.generalized, w_);
   forces_.accelerate(q, a_.data(), w_);
   VectorXd bias(C_v_.rows());
-  for (std::size_t r = 0; r < targets_.size(); ++r) {
-    const recursion::Row &row = both_.tree.rows[r];
-    const double value = row.node >= 0 ? 0 : forces_.of_row(r, w_).value;
-    bias[static_cast<Index>(r)] = value - targets_[r].acceleration;
-  }
+  for (std::size_t r = 0; r < targets_.size(); ++r)
+    bias[static_cast<Index>(r)] = row_acceleration(r, a_) - targets_[r].acceleration;
   put_on_joints(-C_J_.solve(bias), a_.data());
   return a_.allFinite();
+}
+
+double PrescribedMotion::row_acceleration(std::size_t r, const VectorXd &a) const {
+  const recursion::Row &row = both_.tree.rows[r];
+  if (row.node >= 0)
+    return a[both_.tree.nodes[static_cast<std::size_t>(row.node)].v + row.freedom];
+  return forces_.of_row(r, w_).value;
+}
+
+std::vector<Jet> PrescribedMotion::measured_in(const PrescribedMotion &other) {
+  const double *q = other.q(), *v = q + both_.tree.n_q;
+  recursion::measure(both_.tree, q, v, w_, value_.data(), rate_.data());
+  forces_.prepare(q, v, nullptr, w_);
+  forces_.accelerate(q, other.a_.data(), w_);
+  std::vector<Jet> found;
+  for (std::size_t r = 0; r < targets_.size(); ++r) {
+    const auto i = static_cast<Index>(r);
+    found.push_back({value_[i], rate_[i], row_acceleration(r, other.a_)});
+  }
+  return found;
 }
 
 void PrescribedMotion::balance() {
@@ -160,6 +177,26 @@ VectorXd PrescribedMotion::left() {
     column += F_p.size();
   }
   return found;
+}
+
+RedefinedMotion::RedefinedMotion(const SystemOnTree &driven, const SystemOnTree &path, const VectorXd &q, double factor,
+                                 std::vector<TimeFunction> offset)
+    : PrescribedMotion(driven, q), path_(path, q), factor_(factor), offset_(std::move(offset)) {}
+
+bool RedefinedMotion::move(double t, const ModalMotion &modes) {
+  ModalMotion seen{factor_ * modes.p, factor_ * modes.p_dot, factor_ * modes.p_ddot};
+  if (!offset_.empty()) {
+    const ModalMotion more = modes_at({offset_}, t);
+    seen.p += more.p, seen.p_dot += more.p_dot, seen.p_ddot += more.p_ddot;
+  }
+  if (!path_.move(t, seen))
+    return false;
+  std::vector<Jet> targets = recursion::targets_at(both().scene, t), motors = measured_in(path_);
+  for (const auto &row : both().reactions.rows)
+    if (row.is_trajectory)
+      targets[static_cast<std::size_t>(row.row)] = motors[static_cast<std::size_t>(row.row)];
+  PrescribedMotion::start_at(path_.state().head(both().tree.n_q));
+  return follow(t, modes, std::move(targets));
 }
 
 VectorXd PrescribedMotion::shape_force() const {

@@ -31,14 +31,14 @@ public:
   // both must outlive this. Throws std::invalid_argument where rows are not as many as coordinates of joints.
   PrescribedMotion(const SystemOnTree &both, const Eigen::VectorXd &q);
 
+  virtual ~PrescribedMotion() = default;
+
   // The next position is found from the joints of q (n_q), without looking at the last one.
-  void start_at(const Eigen::VectorXd &q);
+  virtual void start_at(const Eigen::VectorXd &q);
 
   // The joints' motion at time t for these modes; false where no position is found. From the last position, along its
   // velocity, or from where it starts.
-  bool move(double t, const ModalMotion &modes);
-  // The same, where rows follow these targets in place of their own.
-  bool move(double t, const ModalMotion &modes, std::vector<Jet> targets);
+  virtual bool move(double t, const ModalMotion &modes);
   void balance(); // then: the forces of that motion
 
   const Eigen::VectorXd &state() const { return state_; } // (q, v) of the tree
@@ -56,12 +56,18 @@ public:
   const Workspace &workspace() const { return w_; }
   const double *wrenches() const { return acting_.wrench; }
 
+protected:
+  bool follow(double t, const ModalMotion &modes, std::vector<Jet> targets); // of rows
+  // What rows of `both` measure in another motion of the same bodies.
+  std::vector<Jet> measured_in(const PrescribedMotion &other);
+
 private:
   void set_modes(const ModalMotion &modes);
   bool find_position();
   void measure();
   void factorise();
   void put_on_joints(const Eigen::VectorXd &values, double *to) const;
+  double row_acceleration(std::size_t r, const Eigen::VectorXd &a) const; // after accelerate() of a
 
   const SystemOnTree &both_;
   std::unique_ptr<TreeMotion> motion_; // what acts
@@ -76,6 +82,23 @@ private:
   Eigen::PartialPivLU<Eigen::MatrixXd> C_J_;
   double time_ = 0;
   bool goes_on_ = false;
+};
+
+// The motion with the motors' coordinates that another one has, whose rows are the path: where the deflections are
+// factor p + offset(t). Its own rows are those of the motors, in the place of the path.
+class RedefinedMotion final : public PrescribedMotion {
+public:
+  // Both must outlive this. offset: one function for each mode of all bodies, or none.
+  RedefinedMotion(const SystemOnTree &driven, const SystemOnTree &path, const Eigen::VectorXd &q, double factor,
+                  std::vector<TimeFunction> offset);
+
+  void start_at(const Eigen::VectorXd &q) override { path_.start_at(q); }
+  bool move(double t, const ModalMotion &modes) override;
+
+private:
+  PrescribedMotion path_;
+  double factor_;
+  ModalShape offset_;
 };
 
 } // namespace ffrobot

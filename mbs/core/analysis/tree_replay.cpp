@@ -75,8 +75,10 @@ void TreeActuation::find(double t) {
   take(state_.data(), motion_.workspace());
 }
 
-PrescribedActuation::PrescribedActuation(const SystemOnTree &both, std::vector<ModalShape> shape, const VectorXd &q)
-    : TreeSource(both), motion_(both, q), shape_(std::move(shape)) {}
+PrescribedActuation::PrescribedActuation(PrescribedMotion &motion, std::vector<ModalShape> shape, const VectorXd &q)
+    : TreeSource(motion.both()), motion_(motion), shape_(std::move(shape)) {
+  motion_.start_at(q);
+}
 
 void PrescribedActuation::find(double t) {
   // was found at all output times before; a failure in between shows as a step that is refused

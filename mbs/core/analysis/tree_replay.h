@@ -47,15 +47,16 @@ private:
   Eigen::VectorXd state_, a_;
 };
 
-// Of a motion that is wholly prescribed: solved anew at every time, first from the posture q (n_q).
+// Of a motion that is wholly prescribed, which must outlive this: solved anew at every time, first from the posture q
+// (n_q).
 class PrescribedActuation final : public TreeSource {
 public:
-  PrescribedActuation(const SystemOnTree &both, std::vector<ModalShape> shape, const Eigen::VectorXd &q);
+  PrescribedActuation(PrescribedMotion &motion, std::vector<ModalShape> shape, const Eigen::VectorXd &q);
 
 private:
   void find(double t) override;
 
-  PrescribedMotion motion_;
+  PrescribedMotion &motion_;
   std::vector<ModalShape> shape_;
 };
 
