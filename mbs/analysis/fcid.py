@@ -20,11 +20,10 @@ from ..fields.references import Reference
 from ..fields.waypoints import spline
 from ..model.model import ZERO, Model
 from ..model.planar_body import PlanarBody
-from ..model.planar_tree import PlanarTree
+from ..model.planar_tree import PlanarTree, told_in_joints
 from ..model.spatial_body import SpatialBody
 from ..model.system import MechanismSystem
-from ..model.tree_layout import NotInTreeError
-from ..scene.analysis import Analysis, Check, Need, TimedAnalysis
+from ..scene.analysis import Check, Need, TimedAnalysis
 from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
 from ..solve.quasi_static import quasi_static_shape
@@ -97,7 +96,7 @@ class PrescribedShape(Details):
 
     def actuation_source(self, outcome: Outcome) -> _core.ActuationSource:
         """Everything is algebraic: it is solved for again at any time."""
-        tree = known_motion_tree(outcome.assembly, outcome.analysis, has_motors=outcome.tau is not None)
+        tree = _tree(outcome.assembly, has_motors=outcome.tau is not None)
         posture = tree.motion(outcome.q[0], outcome.v[0], outcome.a[0])[0]
         return _core.PrescribedActuation(_core.PrescribedMotion(tree.both, posture), self.functions, posture)
 
@@ -120,14 +119,15 @@ def run_fcid(model: Model, analysis: Fcid) -> Outcome:
     check_smooth(assembly, analysis.end)
     check_reach(assembly, start, analysis.times)
     has_motors = motors_fit(model)
-    tree = known_motion_tree(assembly, analysis, has_motors=has_motors)
+    tree = _tree(assembly, has_motors=has_motors)
     posture = tree.motion(start.q, start.v, 0 * start.v)[0]
     motion = _core.PrescribedMotion(tree.both, posture)
     if analysis.shape != "zero":
         import scipy.interpolate  # noqa: F401, loading takes longer than solving
     began = time.perf_counter()
     shape = prescribed_shape(model, analysis, motion, posture)
-    run = motion.outputs(as_list(analysis.times), *sampled(shape, analysis.times), posture)
+    p, p_dot, p_ddot = sampled(shape, analysis.times)
+    run = motion.outputs(as_list(analysis.times), p, p_dot, p_ddot, posture)
     seconds = time.perf_counter() - began
     if len(run.q) < len(analysis.times):
         t = analysis.times[len(run.q)]
@@ -143,17 +143,6 @@ def run_fcid(model: Model, analysis: Fcid) -> Outcome:
         statistics=Statistics(wall_seconds=seconds),
         details=PrescribedShape(shape, run.shape_force),
     )
-
-
-def known_motion_tree(assembly: MechanismSystem, analysis: Analysis, *, has_motors: bool) -> PlanarTree:
-    """The mechanism in joint coordinates. Raises `InputError` for what cannot be told in these."""
-    try:
-        return PlanarTree(assembly, assembly.model.motors.values() if has_motors else ())
-    except NotInTreeError as why:
-        raise InputError(
-            f'{assembly.model.scene.path}: analysis "{analysis.name}": expected for "{analysis.kind}" a mechanism that'
-            f" can be told in joint coordinates, found {why}"
-        ) from None
 
 
 def prescribed_shape(model: Model, analysis: Fcid, motion: _core.PrescribedMotion, posture: Array) -> Shape:
@@ -215,6 +204,10 @@ def given_shape(scene_path: Path, bodies: Sequence[PlanarBody | SpatialBody], an
             p = np.column_stack([function.sample(nodes)[0] for function in functions])
             shape.append(spline(nodes, np.linalg.lstsq(body.modal_transform, p.T, rcond=None)[0].T))
     return shape
+
+
+def _tree(assembly: MechanismSystem, *, has_motors: bool) -> PlanarTree:
+    return told_in_joints(assembly, "fcid", assembly.model.motors.values() if has_motors else ())
 
 
 def _by_body(bodies: Sequence[PlanarBody], functions: list[TimeFunction]) -> Shape:

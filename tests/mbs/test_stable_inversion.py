@@ -7,13 +7,13 @@ from mechanisms import always, forward, make_model, oracle_of, relative, revolut
 from numpy.polynomial import Polynomial
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase, path_error, run_motors_only
 from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.mbs.solve import stable_inversion
-from ffrobot.mbs.solve.servo import equilibrium, is_unstable, linear_dynamics, make_servo, zeros
+from ffrobot.mbs.solve.internal_dynamics import equilibrium, is_unstable, linear_dynamics, zeros
+from ffrobot.mbs.solve.servo import make_servo
 
 C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
 
@@ -34,11 +34,10 @@ def single_link(path, modes=4, damping_ratio=0.0, **keys):
 
 
 def at_rest(model, factor=1.0):
-    """The equations of motors only with the robot at rest at t = 0: evaluator, scale, M, D and K."""
+    """The equations of motors only with the robot at rest at t = 0: output, M, D and K."""
     servo = make_servo(model, 1.0, factor)
-    core = servo.core()
-    p, rest = equilibrium(servo, core, 0.0), np.zeros((1, len(servo.scale)))
-    return servo, linear_dynamics(core, np.zeros(1), p[None], rest, rest)
+    p, rest = equilibrium(servo, 0.0), np.zeros((1, len(servo.scale)))
+    return servo, linear_dynamics(servo, np.zeros(1), p[None], rest, rest)
 
 
 def exact_forward(model, outcome, **keys):
@@ -74,9 +73,8 @@ def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
     """M of r is Lᵀ M Z: Z keeps C_m and C_s, L C_m and the motors' coordinates (docs/theory.md, Motors alone)."""
     model = arm()
     servo, dynamics = at_rest(model)
-    p = iter(equilibrium(servo, servo.core(), 0.0))
-    shape = [[TimeFunction.constant(next(p)) for _ in body.stiffness] for body in model.bodies]
-    q = servo.core().outputs([0.0], shape, servo.resolver()).q[0]
+    p = equilibrium(servo, 0.0)[None]
+    q = servo.motion.outputs([0.0], p, 0 * p, 0 * p, servo.near[0]).q[0]
     modes = np.setdiff1d(np.arange(len(q)), servo.path.frame_coordinates)
 
     def keeps(assembly):

@@ -42,26 +42,34 @@ std::pair<RowMajorMatrix, RowMajorMatrix> left_on_modes(PrescribedMotion &motion
                                                         const RowMajorMatrix &p, const RowMajorMatrix &p_dot,
                                                         const RowMajorMatrix &p_ddot, const RowMajorMatrix &near) {
   const Modes modes = checked(motion, times, p, p_dot, p_ddot);
-  check_size("near", near.cols(), motion.both().tree.n_q);
-  constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
-  RowMajorMatrix q = RowMajorMatrix::Constant(p.rows(), near.cols(), NaN),
-                 left = RowMajorMatrix::Constant(p.rows(), p.cols(), NaN);
+  const Index n_q = motion.both().tree.n_q;
+  check_size("near", near.cols(), n_q);
   const bool follows = near.rows() == 1;
   if (!follows)
     check_size("near", near.rows(), p.rows());
-  motion.start_at(near.row(0));
+  constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
+  RowMajorMatrix q = RowMajorMatrix::Constant(p.rows(), n_q, NaN);
+  RowMajorMatrix left = RowMajorMatrix::Constant(p.rows(), p.cols(), NaN);
+  VectorXd last = near.row(0);
+  motion.start_at(last);
+  const auto move = [&](std::size_t i) {
+    if (follows)
+      return motion.move(times[i], modes[i]);
+    motion.start_at(near.row(static_cast<Index>(i)));
+    if (motion.move(times[i], modes[i]))
+      return true;
+    motion.start_at(last); // links that are bent far are nearer to that
+    return motion.move(times[i], modes[i]);
+  };
   for (std::size_t i = 0; i < times.size(); ++i) {
-    const auto row = static_cast<Index>(i);
-    if (!follows)
-      motion.start_at(near.row(row));
-    if (!motion.move(times[i], modes[i])) {
-      if (follows)
-        break;
-      continue;
-    }
-    motion.balance();
-    q.row(row) = motion.state().head(q.cols()).transpose();
-    left.row(row) = motion.left().transpose();
+    if (move(i)) {
+      const auto row = static_cast<Index>(i);
+      motion.balance();
+      last = motion.state().head(n_q);
+      q.row(row) = last.transpose();
+      left.row(row) = motion.left().transpose();
+    } else if (follows)
+      break;
   }
   return {q, left};
 }
