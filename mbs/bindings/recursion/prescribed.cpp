@@ -51,13 +51,16 @@ std::pair<RowMajorMatrix, RowMajorMatrix> left_on_modes(PrescribedMotion &motion
   RowMajorMatrix q = RowMajorMatrix::Constant(p.rows(), n_q, NaN);
   RowMajorMatrix left = RowMajorMatrix::Constant(p.rows(), p.cols(), NaN);
   VectorXd last = near.row(0);
+  double found_at = NaN;
   motion.start_at(last);
   const auto move = [&](std::size_t i) {
     if (follows)
       return motion.move(times[i], modes[i]);
-    motion.start_at(near.row(static_cast<Index>(i)));
-    if (motion.move(times[i], modes[i]))
-      return true;
+    if (times[i] != found_at) {
+      motion.start_at(near.row(static_cast<Index>(i)));
+      if (motion.move(times[i], modes[i]))
+        return true;
+    }
     motion.start_at(last); // links that are bent far are nearer to that
     return motion.move(times[i], modes[i]);
   };
@@ -66,6 +69,7 @@ std::pair<RowMajorMatrix, RowMajorMatrix> left_on_modes(PrescribedMotion &motion
       const auto row = static_cast<Index>(i);
       motion.balance();
       last = motion.state().head(n_q);
+      found_at = times[i];
       q.row(row) = last.transpose();
       left.row(row) = motion.left().transpose();
     } else if (follows)
