@@ -165,7 +165,7 @@ def _integrated(
     return _core.run_sampled(**common, **more)
 
 
-def motion_of(assembly: MechanismSystem, run: _core.Run | _core.FcidOutputs, times: Array) -> Motion:
+def motion_of(assembly: MechanismSystem, run: _core.Run, times: Array) -> Motion:
     """The motion of a run of the core, as far as it got."""
     reached, held = len(run.q), len(assembly.constraints)
     return Motion(times[:reached], run.q, run.v, run.a, run.multipliers[:, :held], run.residual)

@@ -31,7 +31,7 @@ class Servo:
 
     Attributes:
         path, driven: the mechanism under its joints and the path, and under its joints and the motors' coordinates.
-        path_tree, driven_tree: both in joint coordinates.
+        path_tree, driven_tree: both in joint coordinates, with what motors do.
         near_times, near: along the path, (N,) s, postures of the trees without deflections (N, n_q).
         loads: of the scene, held before and after the path as it is.
         offset: one for each mode of all bodies, or none.
@@ -53,10 +53,16 @@ class Servo:
         trees = self.driven_tree.both, self.path_tree.both
         return _core.RedefinedMotion(*trees, self.near[0], self.factor, list(self.offset))
 
+    @cached_property
+    def _output(self) -> _core.PrescribedMotion:
+        """What leaves r on the modes: that of the path where it is the output itself, at half the work."""
+        is_itself = self.factor == 1.0 and not self.offset
+        return _core.PrescribedMotion(self.path_tree.both, self.near[0]) if is_itself else self.motion
+
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
         """Modal forces r (N, n) that motors do not supply; NaN where no posture is found."""
         near = self.near[np.abs(times[:, None] - self.near_times).argmin(axis=1)]
-        found: Array = self.motion.left_on_modes(as_list(times), p, v, a, near)[1]
+        found: Array = self._output.left_on_modes(as_list(times), p, v, a, near)[1]
         return found
 
     def source(self, shape: list[list[TimeFunction]]) -> _core.ActuationSource:
@@ -121,7 +127,7 @@ def make_servo(model: Model, end: float, factor: float) -> Servo:
     loads = tuple((row, size.held(0.0, end)) for row, size in model.loads)
     path = MechanismSystem(model, [*model.joints, *held], loads, rows)
     driven = MechanismSystem(model, [*model.joints, *motors], loads, rows)
-    path_tree, driven_tree = told_in_joints(path, "motors-only"), told_in_joints(driven, "motors-only", rows)
+    path_tree, driven_tree = (told_in_joints(system, "motors-only", rows) for system in (path, driven))
     near = check_reach(path, undeformed_state(path), as_floats(np.linspace(0.0, end, REACH_CHECKS)))
     postures = np.array([path_tree.motion(q, 0 * q, 0 * q)[0] for q in near.q])
     return Servo(path, driven, path_tree, driven_tree, factor, near.times, postures, loads)

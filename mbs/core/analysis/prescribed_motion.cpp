@@ -86,19 +86,19 @@ void PrescribedMotion::put_on_joints(const VectorXd &values, double *to) const {
 }
 
 bool PrescribedMotion::find_position() {
-  constexpr double tolerance = 1e-13, floor = 1e-11;
+  constexpr double tolerance = 1e-15, floor = 1e-11; // second derivatives of splines through shapes are taken
   constexpr int most_iterations = 30;
   double previous = 1e300;
   for (int i = 0; i < most_iterations; ++i) {
     measure();
     factorise();
     const double left = value_.lpNorm<Eigen::Infinity>() / (1 + state_.head(both_.tree.n_q).lpNorm<Eigen::Infinity>());
+    if (left <= tolerance || (left <= floor && left > 0.2 * previous))
+      return true;
     if (!std::isfinite(left))
       return false;
-    put_on_joints(-C_J_.solve(value_), state_.data());
-    if (left <= tolerance || (left <= floor && left > 0.2 * previous))
-      return true; // with a last step: splines through shapes take second derivatives of what is left
     previous = left;
+    put_on_joints(-C_J_.solve(value_), state_.data());
   }
   return false;
 }
