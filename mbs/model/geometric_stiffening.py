@@ -35,6 +35,16 @@ class GeometricStiffening:
     K_points: Mapping[str, Array]
     rotary: Array
 
+    @property
+    def by_affine_fields(self) -> list[Array]:
+        """Four (n, n): of translations along x and y, of stretch and of turn, as the core takes them."""
+        return [*self.K_s, self.K_omega + self.rotary, self.K_h]
+
+    def turns(self, point: str) -> bool:
+        """Whether the section at a point turns to second order, which those of beams do not."""
+        largest = max((float(np.abs(K).max(initial=0.0)) for K in self.K_points.values()), default=0.0)
+        return point in self.K_points and bool(np.abs(self.K_points[point][2]).max(initial=0.0) > NEGLIGIBLE * largest)
+
     def transformed(self, T: Array) -> GeometricStiffening:
         """In coordinates p' with p = T p'."""
         points = {name: T.T @ K @ T for name, K in self.K_points.items()}
@@ -96,7 +106,7 @@ def core_arguments(stiffening: GeometricStiffening | None, markers: list[str]) -
         return {"second_order": [], "geometric_stiffness": [none] * 4}
     n = len(stiffening.K_omega)
     at_markers = [K for name in markers for K in stiffening.K_points.get(name, np.zeros((3, n, n)))]
-    affine = [*stiffening.K_s, stiffening.K_omega + stiffening.rotary, stiffening.K_h]
+    affine = stiffening.by_affine_fields
     largest = max(float(np.abs(K).max(initial=0.0)) for K in [*at_markers, *affine])
 
     def kept(matrices: list[Array]) -> list[Array]:

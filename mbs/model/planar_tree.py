@@ -21,7 +21,6 @@ from .model import ZERO, Constraint
 from .system import MechanismSystem
 from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError
 
-MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
 COMPONENTS = {_core.MeasureKind.x: 0, _core.MeasureKind.y: 1, _core.MeasureKind.angle: 2, _core.MeasureKind.gear: 2}
 """Of a planar wrench, of the force along a measure whose direction is that of the ground."""
 
@@ -59,7 +58,6 @@ class PlanarTree:
 
         `is_forced`: forces from outside act along all joints. Raises `NotInTreeError`.
         """
-        _check(assembly)
         model, self._assembly, self._layout = assembly.model, assembly, Layout(assembly.model)
         self.bodies = [assembly.index[node.body.name] for node in self._layout.nodes]
         modes = {number: node.modes for number, node in zip(self.bodies, self._layout.nodes, strict=True)}
@@ -72,8 +70,6 @@ class PlanarTree:
         loops = self._layout.loops
         self.constraints = tuple(c for c in assembly.constraints if c.is_trajectory or c.owner in loops)
         rows = [self._row(constraint) for constraint in self.constraints]
-        if len(rows) > MOST_ROWS:
-            raise NotInTreeError(f"{len(rows)} components of trajectories and loops, more than {MOST_ROWS}")
         self._add_loads()
         self._add_what_joints_have()
         self.scene.is_strict = True
@@ -275,16 +271,6 @@ def told_in_joints(assembly: MechanismSystem, kind: str, motors: Iterable[Measur
         raise InputError(
             f'{assembly.model.scene.path}: expected for kind = "{kind}" what joint coordinates can tell, found {why}'
         ) from None
-
-
-def _check(assembly: MechanismSystem) -> None:
-    """Raise `NotInTreeError` for what the recursion in the plane does not have."""
-    model = assembly.model
-    missing = {
-        "geometric stiffening": any(body.stiffening is not None for body in model.bodies),
-    }
-    if found := [what for what, is_there in missing.items() if is_there]:
-        raise NotInTreeError(", ".join(found))
 
 
 def _shares(measure: Measure) -> Iterator[Share]:

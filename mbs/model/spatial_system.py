@@ -26,7 +26,6 @@ from .spatial_transmission import gear_forces, tree_resistance, tree_resistance_
 from .spatial_tree import Section
 
 ZERO = _core.TimeFunction.constant(0.0)
-MOST_ROWS = 15  # of the core: most_rows in mbs/core/recursion/workspace.h
 
 
 class Derivatives(NamedTuple):
@@ -138,7 +137,7 @@ class SpatialSystem:
 
     def _check(self) -> None:
         """Raise `InputError` for what the core does not take."""
-        path, rows = self.model.scene.path, self.model.rows
+        path = self.model.scene.path
         loaded = {load.joint for load in self.model.scene.load}
         for node in self.model.tree.nodes:
             if node.joint.type == "planar" and node.joint.frictions and node.backwards:
@@ -157,11 +156,6 @@ class SpatialSystem:
                     f' "{node.outer.point}" of "{node.body.name}": leave the joint out (a body without one is free from'
                     " the origin on)"
                 )
-        if len(rows) > MOST_ROWS:
-            raise InputError(
-                f"{path}: expected at most {MOST_ROWS} rows of paths and cut loops in all, found {len(rows)}: scenes in"
-                " space with more of them are not available yet"
-            )
 
     def turn_markers(self, t: float) -> None:
         """Put the orientations that rows follow where they are at time t, for `core`'s next evaluations."""

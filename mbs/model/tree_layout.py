@@ -104,31 +104,25 @@ class Layout:
         """The coordinate of the tree that a measure is; None of others."""
         return self._coordinates.get(_key(measure))
 
-    def motor(self, measure: Measure) -> tuple[int, float, Array] | None:
-        """Number and sign of the coordinate along which a motor acts, and (n_v,) what modes add to its measure.
+    def motor(self, measure: Measure) -> tuple[int, float, bool] | None:
+        """Number and sign of the coordinate along which a motor acts, and whether it turns frames in place of sections.
 
-        None of those at joints where loops are cut. Frames turn as sections do, less what modes turn these.
+        None of those at joints where loops are cut.
         """
         if (coordinate := self.coordinate(measure)) is not None:
-            return *coordinate, np.zeros(0)
+            return *coordinate, False
         for node in self.nodes:
-            if node.joint is None or node.joint.coordinate("frame") != measure:
-                continue
-            of_sections = node.joint.coordinate("section")
-            assert of_sections is not None
-            on_modes = np.zeros(self.size)
-            for marker, sign in ((of_sections.a, 1.0), (of_sections.b, -1.0)):
-                if marker.body is not None:
-                    turning = self._turning(marker)
-                    first = self.nodes[self._index[marker.body]].modes
-                    on_modes[first : first + len(turning)] += sign * turning
-            return *self._coordinates[_key(of_sections)], on_modes
+            if node.joint is not None and node.joint.coordinate("frame") == measure:
+                of_sections = node.joint.coordinate("section")
+                assert of_sections is not None
+                return *self._coordinates[_key(of_sections)], True
         return None
 
     def section_angle(self, marker: Marker) -> Array:
         """How the angle of a section, or of a frame, follows the coordinates of the tree: linear, by this row (size,).
 
         Joint by joint, θ of the outer section is that of the inner one and the coordinate of a revolute joint.
+        Raises `NotInTreeError` where geometric stiffening turns a section on the way.
         """
         if marker.body is None:
             return np.zeros(self.size)
@@ -166,8 +160,17 @@ class Layout:
             for key in ("stiffness", "damping", "j", "S_tilde", "m_xy"):
                 setattr(found, key, of_core[key])
             found.S_bar, found.h = body.S_bar, body.h
-        found.markers = [_marker(*_section(body, at.point), turn) for at, turn in self._markers[number + 1]]
+        if body.stiffening is not None:
+            found.K = body.stiffening.by_affine_fields
+        found.markers = [self._section_marker(body, at.point, turn) for at, turn in self._markers[number + 1]]
         return found
+
+    @staticmethod
+    def _section_marker(body: PlanarBody, point: str, turn: float) -> _core.PlanarMarker:
+        marker = _marker(*_section(body, point), turn)
+        if body.stiffening is not None and point in body.stiffening.K_points:
+            marker.K = list(body.stiffening.K_points[point])
+        return marker
 
     def _node(self, body: PlanarBody, joint: JointRecord | None, carrier: Carrier | None) -> Node:
         first = self.size
@@ -212,14 +215,23 @@ class Layout:
         assert of_sections is not None
         assert of_frames is not None
         self._coordinates[_key(of_sections)] = coordinate
-        if not any(np.any(self._turning(marker)) for marker in joint.markers):
+        if not any(self._turns_more(marker) or np.any(self._turning(marker)) for marker in joint.markers):
             self._coordinates[_key(of_frames)] = coordinate
 
     def _turning(self, marker: Marker) -> Array:
-        """Φ_r (n,) of a section; () of the ground and of frames."""
+        """Φ_r (n,) of a section; () of the ground and of frames. Raises `NotInTreeError` where it changes with p."""
         if marker.body is None or marker.point == FRAME:
             return np.zeros(0)
+        if self._turns_more(marker):
+            raise NotInTreeError(f"an angle of {marker.body}.{marker.point}, which geometric stiffening turns")
         return self._bodies[self._index[marker.body]].points[marker.point].rotation
+
+    def _turns_more(self, marker: Marker) -> bool:
+        """Whether geometric stiffening turns a section."""
+        if marker.body is None or marker.point == FRAME:
+            return False
+        stiffening = self._bodies[self._index[marker.body]].stiffening
+        return stiffening is not None and stiffening.turns(marker.point)
 
 
 def _forest(model: Model) -> Topology:

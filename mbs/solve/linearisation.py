@@ -147,7 +147,7 @@ class Linearisation:
 
 
 def _on_tree(model: Model, independent: Sequence[Measure]) -> TreeLinearisation | None:
-    """None of what the recursion does not have: geometric stiffening, …; that is told in absolute coordinates."""
+    """None of what the recursion does not have, which is told in absolute coordinates."""
     try:
         return TreeLinearisation(model, independent)
     except NotInTreeError:

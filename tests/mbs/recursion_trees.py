@@ -17,6 +17,8 @@ def planar_data(body):
     data.stiffness, data.damping = body.stiffness, body.damping
     data.S_bar, data.h, data.j = body.S_bar, body.h, body.j
     data.S_tilde, data.m_xy = body.S_tilde, body.m_xy
+    if body.stiffening is not None:
+        data.K, data.m_xy = body.stiffening.by_affine_fields, body.m_xy + body.stiffening.rotary
     return data
 
 
@@ -41,6 +43,8 @@ class Markers:
         if self.body and point:
             at = self.body.points[point]
             marker.position, marker.Phi = at.position, np.vstack([at.translation, at.rotation])
+            if self.body.stiffening is not None:
+                marker.K = list(self.body.stiffening.K_points.get(point, []))
         return marker
 
 

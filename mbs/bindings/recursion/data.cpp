@@ -18,7 +18,8 @@ void bind_data(nb::module_ &m) {
       .def(nb::init<>())
       .def_rw("position", &PlanarMarker::position)
       .def_rw("angle", &PlanarMarker::angle)
-      .def_rw("Phi", &PlanarMarker::Phi);
+      .def_rw("Phi", &PlanarMarker::Phi)
+      .def_rw("K", &PlanarMarker::K);
   nb::class_<SpatialMarker>(m, "SpatialMarker")
       .def(nb::init<>())
       .def_rw("position", &SpatialMarker::position)
@@ -38,6 +39,7 @@ void bind_data(nb::module_ &m) {
       .def_rw("j", &PlanarData::j)
       .def_rw("S_tilde", &PlanarData::S_tilde)
       .def_rw("m_xy", &PlanarData::m_xy)
+      .def_rw("K", &PlanarData::K)
       .def_rw("markers", &PlanarData::markers);
   nb::class_<SpatialData>(m, "SpatialData")
       .def(nb::init<>())

@@ -153,11 +153,11 @@ void bind_reactions(nb::module_ &m) {
           "constraint"_a, "value"_a, "The multiplier of a constraint that holds a rotor against gravity; N.")
       .def(
           "add_motor",
-          [](ReactionsOnTree &r, int coordinate, double sign, const VectorXd &on_modes) {
-            r.motors.push_back({coordinate, sign, on_modes});
+          [](ReactionsOnTree &r, int coordinate, double sign, bool turns_frames) {
+            r.motors.push_back({coordinate, sign, turns_frames});
           },
-          "coordinate"_a, "sign"_a, "on_modes"_a,
-          "A motor along `sign` v[coordinate] + on_modes . v; on_modes (n_v,), or () for zeros.");
+          "coordinate"_a, "sign"_a, "turns_frames"_a,
+          "A motor along `sign` v[coordinate], or between the frames of the bodies there.");
 }
 
 void make_actuation(TreeActuation *made, const SystemOnTree &both, const Recording &recording) {

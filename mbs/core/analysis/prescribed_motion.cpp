@@ -127,16 +127,9 @@ bool PrescribedMotion::follow(double t, const ModalMotion &modes, std::vector<Je
   forces_.accelerate(q, a_.data(), w_);
   VectorXd bias(C_v_.rows());
   for (std::size_t r = 0; r < targets_.size(); ++r)
-    bias[static_cast<Index>(r)] = row_acceleration(r, a_) - targets_[r].acceleration;
+    bias[static_cast<Index>(r)] = forces_.of_row(r, a_.data(), w_).value - targets_[r].acceleration;
   put_on_joints(-C_J_.solve(bias), a_.data());
   return a_.allFinite();
-}
-
-double PrescribedMotion::row_acceleration(std::size_t r, const VectorXd &a) const {
-  const recursion::Row &row = both_.tree.rows[r];
-  if (row.node >= 0)
-    return a[both_.tree.nodes[static_cast<std::size_t>(row.node)].v + row.freedom];
-  return forces_.of_row(r, w_).value;
 }
 
 std::vector<Jet> PrescribedMotion::measured_in(const PrescribedMotion &other) {
@@ -147,7 +140,7 @@ std::vector<Jet> PrescribedMotion::measured_in(const PrescribedMotion &other) {
   std::vector<Jet> found;
   for (std::size_t r = 0; r < targets_.size(); ++r) {
     const auto i = static_cast<Index>(r);
-    found.push_back({value_[i], rate_[i], row_acceleration(r, other.a_)});
+    found.push_back({value_[i], rate_[i], forces_.of_row(r, other.a_.data(), w_).value});
   }
   return found;
 }

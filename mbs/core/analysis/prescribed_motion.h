@@ -67,7 +67,6 @@ private:
   void measure();
   void factorise();
   void put_on_joints(const Eigen::VectorXd &values, double *to) const;
-  double row_acceleration(std::size_t r, const Eigen::VectorXd &a) const; // after accelerate() of a
 
   const SystemOnTree &both_;
   std::unique_ptr<TreeMotion> motion_; // what acts

@@ -13,11 +13,8 @@ double acceleration_residual(const SystemOnTree &both, const std::vector<Jet> &t
                              const recursion::Workspace<recursion::Planar, double> &w) {
   double worst = 0;
   for (std::size_t r = 0; r < both.tree.rows.size(); ++r) {
-    const recursion::Row &row = both.tree.rows[r];
     const double target = targets[r].acceleration;
-    auto [value, size] = forces.of_row(r, w);
-    if (row.node >= 0)
-      value = a[both.tree.nodes[static_cast<std::size_t>(row.node)].v + row.freedom], size = std::abs(value);
+    const auto [value, size] = forces.of_row(r, a, w);
     worst = std::max(worst, std::abs(value - target) / (1 + std::abs(target) + size));
   }
   return worst;

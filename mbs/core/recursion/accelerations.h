@@ -2,58 +2,24 @@
 // (space, scalar) alone: two scalars in one translation unit exhaust the compiler's budget for inlining.
 #pragma once
 
+#include "core/recursion/blocks.h"
 #include "core/recursion/multipliers.h"
-#include "core/recursion/planar/pins.h"
-#include "core/recursion/release.h"
-#include "core/recursion/rows.h"
 
 #include <algorithm>
 #include <numeric>
 
 namespace ffrobot::recursion {
 
-template <bool by_multipliers, class Space, class T, int W>
-FFROBOT_INLINE void release_all(const Mechanism<Space> &m, const T *q, const Pack<T, W> &y, Workspace<Space, T> &w,
-                                T *a) {
-  for (const Node<Space> &node : m.nodes) {
-    if constexpr (Space::dim == 3)
-      if (node.is_pin) {
-        release_pin<by_multipliers, T, W>(m, node, q, w, y, a);
-        continue;
-      }
-    release<Space, T, W>(m, node, q, by_multipliers, w, y, a);
-  }
-}
-
-// Of coordinates that rows prescribe: exactly what these say. Where a light link carries a heavy one, multipliers leave
-// them more rounding than the tolerance of a step at rest has room for.
-template <class Space, class T>
-void prescribe(const Mechanism<Space> &m, const T *target, const Workspace<Space, T> &w, T *a) {
-  for (const int r : w.active)
-    if (const Row &row = m.rows[static_cast<std::size_t>(r)]; row.model.kind == RowKind::coordinate)
-      a[m.nodes[static_cast<std::size_t>(row.node)].v + row.freedom] = target[r];
-}
-
 template <class Space, class T, int W>
 inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
                 Workspace<Space, T> &w, T *a) {
   using Cols = Pack<T, W>;
-  constexpr int stride = stride_of(W);
-  kinematics(m, q, v, forces, w);
-  if (m.needs_positions)
-    locate(m, q, w);
-  Cols S[W], gamma = Cols::zero();
-  for (int r = 0; r < W; ++r)
-    S[r] = Cols::zero();
-  attach_all<Space, T, W>(m, forces, w, S);
-  for (auto node = m.nodes.rbegin(); node != m.nodes.rend(); ++node) {
-    if constexpr (Space::dim == 3)
-      if (node->is_pin) {
-        inward_pin<T, W>(m, *node, q, v, forces, w, S, gamma);
-        continue;
-      }
-    inward<Space, T, W>(m, *node, q, v, forces, w, S, gamma);
-  }
+  Schur<T, W> S;
+  Cols gamma;
+  if constexpr (W == most_columns)
+    sweep_block(m, q, v, forces, w, S, gamma);
+  else
+    sweep_inward<Space, T, W>(m, q, v, forces, w, S, gamma);
   Cols y = Cols::zero();
   y.set(0, T(1.));
   if constexpr (W > 1) {
@@ -66,16 +32,20 @@ inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<
       else
         S[r].set(r, T(1.)), lambda[r - 1] = T(0.);
     if (w.keeps_schur)
-      for (int r = 0; r < W; ++r)
-        S[r].write(w.schur.data() + r * stride);
-    solve_multipliers<T, W>(S, lambda, w.factor.data());
+      for (int r = 0; r < rows; ++r)
+        for (int c = 0; c < rows; ++c)
+          w.schur[r * rows + c] = S[r + 1][c + 1];
+    solve_multipliers<T, W>(S.row, lambda, w.factor.data());
 #pragma GCC unroll 8
     for (int r = 1; r < W; ++r)
       y.set(r, lambda[r - 1]);
     for (int r = 0; r < rows; ++r)
       w.lambda[w.active[r]] = lambda[r];
   }
-  release_all<false, Space, T, W>(m, q, y, w, a);
+  if constexpr (W == most_columns)
+    release_block<false>(m, q, y, w, a);
+  else
+    release_all<false, Space, T, W>(m, q, y, w, a);
   if constexpr (W > 1)
     prescribe(m, target, w, a);
   ++w.evaluations;
@@ -98,19 +68,26 @@ template <class Space, class T, class F> FFROBOT_INLINE void with_columns(int co
 template <class Space, class T>
 void accelerations(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
                    Workspace<Space, T> &w, T *a) {
+  if (!w.blocks.empty())
+    return run_in_blocks(m, q, v, forces, target, w, a);
   with_columns<Space, T>(w.columns, [&](auto W) { run<Space, T, W>(m, q, v, forces, target, w, a); });
 }
 
 template <class Space, class T>
 void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq) {
-  const int count = w.columns - 1;
-  for (int r = 0; r <= count; ++r)
-    w.y[r] = T(0.);
+  std::fill(w.y.begin(), w.y.end(), T(0.));
   for (std::size_t r = 0; r < w.active.size(); ++r)
     w.y[r + 1] = residual[w.active[r]];
-  solve_again(w.factor.data(), count, w.y.data() + 1);
-  with_columns<Space, T>(w.columns,
-                         [&](auto W) { release_all<true, Space, T, W>(m, q, Pack<T, W>::read(w.y.data()), w, dq); });
+  if (!w.blocks.empty())
+    return respond_in_blocks(m, q, w, dq);
+  solve_again(w.factor.data(), w.columns - 1, w.y.data() + 1);
+  with_columns<Space, T>(w.columns, [&](auto W) {
+    const auto y = Pack<T, W>::read(w.y.data());
+    if constexpr (W == most_columns)
+      release_block<true>(m, q, y, w, dq);
+    else
+      release_all<true, Space, T, W>(m, q, y, w, dq);
+  });
 }
 
 template <class Space, class T>
@@ -137,9 +114,6 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
   if constexpr (std::is_same_v<T, double>)
     columns = *std::find_if(std::begin(column_counts<Space>), std::end(column_counts<Space>) - 1,
                             [&](int c) { return c >= needed; });
-  if (m.rows.size() > static_cast<std::size_t>(most_rows))
-    throw std::invalid_argument("rows: expected at most " + std::to_string(most_rows) + ", got " +
-                                std::to_string(m.rows.size()));
   const auto stride = static_cast<std::size_t>(stride_of(columns));
   std::size_t widest = 8, softs = 0;
   for (const Node<Space> &node : m.nodes) {
@@ -155,9 +129,10 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
   answer.assign(static_cast<std::size_t>(m.slots) * stride + 8, T(0.));
   angle.assign(m.nodes.size() + 4, T(0.)), sine = cosine = angle;
   z.assign(widest, T(0.));
-  schur.assign(stride * stride, T(0.)), factor = schur;
-  lambda.assign(m.rows.size() + 1, T(0.)), y.assign(stride, T(0.));
-  std::vector<int> all(m.rows.size());
+  const std::size_t rows = m.rows.size(), factored = std::max(rows, static_cast<std::size_t>(columns - 1));
+  schur.assign(rows * rows, T(0.)), factor.assign(factored * factored, T(0.));
+  lambda.assign(rows + 1, T(0.)), y.assign(std::max(stride, rows + 1), T(0.));
+  std::vector<int> all(rows);
   std::iota(all.begin(), all.end(), 0);
   keep(all);
   for (std::size_t i = 0; i < m.nodes.size(); ++i) {
@@ -178,6 +153,14 @@ template <class Space, class T> void Workspace<Space, T>::keep(std::vector<int> 
   std::fill(lambda.begin(), lambda.end(), T(0.));
   for (std::size_t k = 0; k < active.size(); ++k)
     column[static_cast<std::size_t>(active[k])] = static_cast<int>(k) + 1;
+  blocks.clear();
+  if (active.size() <= block_rows)
+    return;
+  for (auto first = active.begin(); first != active.end();) {
+    const auto last = first + std::min<std::ptrdiff_t>(block_rows, active.end() - first);
+    blocks.push_back({{first, last}, {}, answer, bias});
+    first = last;
+  }
 }
 
 } // namespace ffrobot::recursion

@@ -53,7 +53,7 @@ inline void hand_over(const Mechanism<Space> &m, const Node<Space> &node, Worksp
 
 template <class Space, class T, int W>
 inline void inward(const Mechanism<Space> &m, const Node<Space> &node, const T *q, const T *v, const Forces<T> &forces,
-                   Workspace<Space, T> &w, Pack<T, W> (&S)[W], Pack<T, W> &gamma) {
+                   Workspace<Space, T> &w, Schur<T, W> &S, Pack<T, W> &gamma) {
   constexpr int d = Space::dim;
   using Cols = Pack<T, W>;
   // M becomes Lambda, where that is in axes of the section

@@ -8,24 +8,43 @@ namespace ffrobot::recursion {
 // How far columns lie apart in memory
 constexpr int stride_of(int columns) { return static_cast<int>(std::bit_ceil(static_cast<unsigned>(columns))); }
 
-// C M^-1 C^T as it is summed up: row r gains, or loses, a_r b. Column 0, what rows measure, grows along.
-template <class Cols, int W> FFROBOT_INLINE void gain(Cols (&S)[W], const Cols &a, const Cols &b) {
+// C M^-1 C^T as it is summed up, of the rows of the block; column 0, what rows measure, grows along. Where there are
+// several blocks (blocks.h), what it is summed up of is kept, since products between blocks are made of it.
+template <class T, int W> struct Schur {
+  static constexpr bool may_keep = W == most_columns;
+  Pack<T, W> row[W];
+  std::conditional_t<may_keep, Terms<T> *, std::nullptr_t> terms = nullptr;
+
+  FFROBOT_INLINE Pack<T, W> &operator[](int r) { return row[r]; }
+  FFROBOT_INLINE void keep(const Pack<T, W> &a, const Pack<T, W> &b) {
+    if constexpr (may_keep)
+      if (terms)
+        terms->add(a, b);
+  }
+};
+
+// Row r gains, or loses, a_r b.
+template <class T, int W> FFROBOT_INLINE void gain(Schur<T, W> &S, const Pack<T, W> &a, const Pack<T, W> &b) {
+  S.keep(a, b);
 #pragma GCC unroll 8
   for (int r = 1; r < W; ++r)
     S[r] += a[r] * b;
 }
-template <class Cols, int W> FFROBOT_INLINE void lose(Cols (&S)[W], const Cols &a, const Cols &b) {
+template <class T, int W> FFROBOT_INLINE void lose(Schur<T, W> &S, const Pack<T, W> &a, const Pack<T, W> &b) {
+  S.keep(T(-1.) * a, b);
 #pragma GCC unroll 8
   for (int r = 1; r < W; ++r)
     S[r] -= a[r] * b;
 }
 
 // Of `count` pairs, one row of S after the other: that stays in a register
-template <int count, class Cols, int W>
-FFROBOT_INLINE void gain_all(Cols (&S)[W], const Cols (&a)[count], const Cols (&b)[count]) {
+template <int count, class T, int W>
+FFROBOT_INLINE void gain_all(Schur<T, W> &S, const Pack<T, W> (&a)[count], const Pack<T, W> (&b)[count]) {
+  for (int i = 0; i < count; ++i)
+    S.keep(a[i], b[i]);
 #pragma GCC unroll 8
   for (int r = 1; r < W; ++r) {
-    Cols row = S[r];
+    Pack<T, W> row = S[r];
     for (int i = 0; i < count; ++i)
       row += a[i][r] * b[i];
     S[r] = row;

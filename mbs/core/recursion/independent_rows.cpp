@@ -45,11 +45,7 @@ std::vector<int> keep_independent_rows(const Mechanism<Space> &m, const double *
   w.keeps_schur = true;
   accelerations(m, q, v, Forces<double>(), target.data(), w, a.data());
   w.keeps_schur = false;
-  const auto stride = static_cast<Eigen::Index>(std::bit_ceil(static_cast<unsigned>(w.columns)));
-  Eigen::MatrixXd S(count, count);
-  for (Eigen::Index i = 0; i < count; ++i)
-    for (Eigen::Index j = 0; j < count; ++j)
-      S(i, j) = w.schur[static_cast<std::size_t>((i + 1) * stride + j + 1)];
+  const Eigen::MatrixXd S = Eigen::Map<const Eigen::MatrixXd>(w.schur.data(), count, count);
   w.keep(pivots(S));
   return w.active;
 }

@@ -34,25 +34,44 @@ template <class F, int d, class T> FFROBOT_INLINE void both_sides(const F &chang
   }
 }
 
+// Whether a row is the coordinate of a freedom of the node's joint
+template <class Space>
+FFROBOT_INLINE bool is_along(const Mechanism<Space> &m, const Row &row, const Node<Space> &node, int freedom) {
+  return row.node >= 0 && &m.nodes[row.node] == &node && row.freedom == freedom;
+}
+
 // What unit multipliers do along a freedom of the node's joint, by columns: rows that are this coordinate take it away.
 template <class T, int W, class Space>
 FFROBOT_INLINE Pack<T, W> multiplier_forces(const Mechanism<Space> &m, const Node<Space> &node, int freedom,
                                             const Workspace<Space, T> &w) {
   auto forces = Pack<T, W>::zero();
   if (node.has_rows)
-    for (std::size_t r = 0; r < w.active.size(); ++r) {
-      const Row &row = m.rows[w.active[r]];
-      if (row.node >= 0 && &m.nodes[row.node] == &node && row.freedom == freedom)
+    for (std::size_t r = 0; r < w.active.size(); ++r)
+      if (is_along(m, m.rows[w.active[r]], node, freedom))
         forces.set(static_cast<int>(r) + 1, T(-1.));
-    }
   return forces;
+}
+
+// What the multipliers y do along it
+template <class T, int W, class Space>
+FFROBOT_INLINE T multiplier_force(const Mechanism<Space> &m, const Node<Space> &node, int freedom,
+                                  const Workspace<Space, T> &w, const Pack<T, W> &y) {
+  if constexpr (W == most_columns)
+    if (!w.blocks.empty()) { // y is 1 then, and the answers of all columns are added up
+      T sum(0.);
+      for (std::size_t r = 0; r < w.active.size(); ++r)
+        if (is_along(m, m.rows[w.active[r]], node, freedom))
+          sum -= w.y[r + 1];
+      return sum;
+    }
+  return (multiplier_forces<T, W>(m, node, freedom, w) * y).sum();
 }
 
 // One freedom along component f: row and column of M leave, with what the rotor on the inner section adds.
 template <class Space, class T, int W>
 FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, const T *force, Hinge<Space, T> &hinge,
                                       const Mechanism<Space> &m, Workspace<Space, T> &w, Pack<T, Space::dim> *M,
-                                      Pack<T, W> *H, Pack<T, W> (&S)[W]) {
+                                      Pack<T, W> *H, Schur<T, W> &S) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Cols = Pack<T, W>;
   const int f = node.shape.freedoms.component[freedom];
@@ -90,7 +109,7 @@ FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, cons
 
 template <class Space, class T, int W>
 inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, const T *q, const T *force,
-                            Workspace<Space, T> &w, Pack<T, Space::dim> *M, Pack<T, W> *H, Pack<T, W> (&S)[W]) {
+                            Workspace<Space, T> &w, Pack<T, Space::dim> *M, Pack<T, W> *H, Schur<T, W> &S) {
   constexpr int d = Space::dim;
   Hinge<Space, T> &hinge = w.hinges[&node - m.nodes.data()];
   T applied[6], outer[6];

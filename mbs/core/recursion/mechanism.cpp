@@ -29,7 +29,9 @@ Eigen::MatrixXd section_rows(const SpatialMarker &marker) {
 }
 
 // Whether they have terms of second order along one of them
-bool is_curved(const PlanarData &, const PlanarMarker &, int) { return false; }
+bool is_curved(const PlanarData &data, const PlanarMarker &marker, int row) {
+  return planar::is_curved(data, marker, row);
+}
 bool is_curved(const SpatialData &data, const SpatialMarker &marker, int row) {
   const std::vector<Eigen::MatrixXd> K = spatial::section_K(marker);
   return !K.empty() && K[static_cast<std::size_t>(row)].cwiseAbs().maxCoeff() > spatial::negligible_K(data);
@@ -72,21 +74,29 @@ bool frame_sits_at_joint(const BodyModel<typename Space::Data> &body, const Join
   return true;
 }
 
-void check_stiffening(const std::string &, const PlanarData &) {}
+// `count` matrices over the modes
+void check_K(const std::string &name, const char *key, const std::vector<Eigen::MatrixXd> &all, std::size_t count,
+             Index n) {
+  bool fits = all.size() == count;
+  for (const Eigen::MatrixXd &K : all)
+    fits = fits && K.rows() == n && K.cols() == n;
+  if (!fits)
+    refuse(name + ": " + key + ": expected " + std::to_string(count) + " matrices (" + std::to_string(n) + ", " +
+           std::to_string(n) + ")");
+}
+
+void check_stiffening(const std::string &name, const PlanarData &data) {
+  const bool stiffened = planar::is_stiffened(data);
+  check_K(name, "K", data.K, stiffened ? 4 : 0, data.modes());
+  for (const PlanarMarker &marker : data.markers)
+    check_K(name, "K of a marker", marker.K, stiffened && !marker.K.empty() ? 3 : 0, data.modes());
+}
 void check_stiffening(const std::string &name, const SpatialData &data) {
-  const auto n = data.modes();
-  const auto check = [&](const char *key, const std::vector<Eigen::MatrixXd> &all, std::size_t count) {
-    bool fits = all.size() == count;
-    for (const Eigen::MatrixXd &K : all)
-      fits = fits && K.rows() == n && K.cols() == n;
-    if (!fits)
-      refuse(name + ": " + key + ": expected " + std::to_string(count) + " matrices (" + std::to_string(n) + ", " +
-             std::to_string(n) + ")");
-  };
   const bool stiffened = spatial::is_stiffened(data);
-  check("K_s", data.K_s, stiffened ? 3 : 0), check("K_x", data.K_x, stiffened ? 9 : 0);
+  check_K(name, "K_s", data.K_s, stiffened ? 3 : 0, data.modes());
+  check_K(name, "K_x", data.K_x, stiffened ? 9 : 0, data.modes());
   for (const SpatialMarker &marker : data.markers)
-    check("K of a marker", marker.K, stiffened && !marker.K.empty() ? 6 : 0);
+    check_K(name, "K of a marker", marker.K, stiffened && !marker.K.empty() ? 6 : 0, data.modes());
 }
 
 template <class Data>
@@ -218,7 +228,8 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     bool tilts = false; // modes turn the section, and nothing but that
     if constexpr (in_plane) {
       node.is_pin = node.joint == JointKind::revolute && node.rotor_inertia == 0 && node.outboard <= 1 &&
-                    !passes_moment[i] && frame_sits_at_joint<Space>(model, node.shape, false);
+                    !passes_moment[i] && frame_sits_at_joint<Space>(model, node.shape, false) &&
+                    !is_curved(model.data, inboard, Space::axis);
       tilts = node.is_pin && !sits;
     }
     if (sits || tilts)

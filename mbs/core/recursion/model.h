@@ -15,8 +15,9 @@ namespace ffrobot::recursion {
 // A section of a body: where joints, rows and forces attach. Its rows of Phi are displacements, then rotations.
 struct PlanarMarker {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  double angle = 0;    // of its axes
-  Eigen::MatrixXd Phi; // (3, n)
+  double angle = 0;               // of its axes
+  Eigen::MatrixXd Phi;            // (3, n)
+  std::vector<Eigen::MatrixXd> K; // three (n, n): it moves and turns by -1/2 p^T K p besides; empty: it does not
 };
 struct SpatialMarker {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
@@ -35,6 +36,9 @@ struct PlanarData {
   Eigen::MatrixXd S_bar;         // (2, n)
   Eigen::VectorXd h, j;          // (n) I_bar_12 - I_bar_21, I_bar_11 + I_bar_22
   Eigen::MatrixXd S_tilde, m_xy; // (n, n) S_bar_12 - S_bar_21, S_bar_11 + S_bar_22
+  // Geometric stiffening, empty without: points move by -1/2 p^T G p besides. Integrals of G_x, G_y, x G_x + y G_y and
+  // x G_y - y G_x dm, each (n, n) and symmetric.
+  std::vector<Eigen::MatrixXd> K;
   std::vector<PlanarMarker> markers;
   Eigen::Index modes() const { return stiffness.size(); }
 };

@@ -2,6 +2,7 @@
 
 #include "core/recursion/rows.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 namespace ffrobot::recursion {
@@ -17,18 +18,22 @@ using Padded = Eigen::Map<const RowMajor, 0, Eigen::OuterStride<>>;
 
 // m and P at p, and the mass matrix of modes that are not orthonormal
 void modal_rows(const planar::Body &body, const planar::State<double> &s, NewtonBody<Planar> &to) {
-  const Padded W(body.rows.data(), body.width(), body.n, Eigen::OuterStride<>(body.padded));
+  const Eigen::Map<const MatrixXd> W = planar::rows_of(body, s);
   to.rows.topRows<3>() = W.topRows<3>();
   if (body.has_more)
     to.rows.row(planar::Body::H) += Eigen::Map<const VectorXd>(s.h.data(), body.n).transpose();
   for (std::size_t k = 0; k < to.ports.size(); ++k)
     to.rows.middleRows<3>(3 + 3 * static_cast<Index>(k)) =
         W.middleRows<3>(body.ports[static_cast<std::size_t>(to.ports[k])].row);
+  if (!body.stiffening)
+    return;
+  to.m_ff = planar::bent_mass(body, s);
+  to.p_by_A = to.m_ff.llt().solve(to.rows.topRows<3>().transpose());
 }
 
 void modal_rows(const spatial::Body &body, const spatial::State<double> &s, NewtonBody<Spatial> &to) {
   const bool bent = body.stiffening != nullptr; // rows there are W L^-T, m_ff = L L^T
-  const int stride = spatial::padded(body.n);
+  const int stride = padded(body.n);
   const Padded W(bent ? s.bent.rows.data() : body.rows.data(), body.width, body.n, Eigen::OuterStride<>(stride));
   to.rows.topRows<6>() = W.topRows<6>();
   for (std::size_t c = 0; c < body.twists.size() && !bent; ++c)

@@ -8,9 +8,6 @@ using Eigen::Index;
 
 namespace {
 
-// Whether modes of bodies may be other than orthonormal
-template <class Space> constexpr bool may_bend = Space::dim == 6;
-
 // Products of real rows with numbers that may be complex are written for the parts of these: compilers take detours
 // through memory otherwise.
 template <class Scalar> constexpr int parts = static_cast<int>(sizeof(Scalar) / sizeof(double));
@@ -73,17 +70,16 @@ void NewtonTree<Space, Scalar>::eliminate_modes(const NewtonBody<Space> &body, c
     block(node.blocks, 1 + k, 0) = body.X[static_cast<std::size_t>(k)].template cast<Scalar>();
   node.blocks.rightCols(size - d).setZero();
   const Eigen::Map<const Vector> E(E_, n);
-  if constexpr (may_bend<Space>)
-    if (body.m_ff.size()) {
-      const Matrix rows = body.rows.topRows(size).template cast<Scalar>();
-      Matrix e = body.m_ff.template cast<Scalar>(), taken = E.asDiagonal() * body.p_by_A.template cast<Scalar>();
-      e.diagonal() += E;
-      node.e.compute(e);
-      node.blocks.leftCols(d) += rows * node.e.solve(taken);
-      if (linked > 0)
-        node.blocks.rightCols(size - d) = rows * node.e.solve(rows.bottomRows(size - d).transpose());
-      return;
-    }
+  if (body.m_ff.size()) {
+    const Matrix rows = body.rows.topRows(size).template cast<Scalar>();
+    Matrix e = body.m_ff.template cast<Scalar>(), taken = E.asDiagonal() * body.p_by_A.template cast<Scalar>();
+    e.diagonal() += E;
+    node.e.compute(e);
+    node.blocks.leftCols(d) += rows * node.e.solve(taken);
+    if (linked > 0)
+      node.blocks.rightCols(size - d) = rows * node.e.solve(rows.bottomRows(size - d).transpose());
+    return;
+  }
   node.inverse = (E.array() + Scalar(1)).inverse();
   const Vector taken = node.inverse.cwiseProduct(E);
   for (int k = 0; k <= linked; ++k)
@@ -166,12 +162,13 @@ void NewtonTree<Space, Scalar>::inward(const recursion::Node<Space> &joint, cons
   const Index n = body.modes(), size = node.blocks.rows();
   const Eigen::Map<const Along> force(x + joint.v, body.J.cols());
   const Eigen::Map<const Vector> force_on_modes(x + joint.p_v(), n);
-  if (may_bend<Space> && body.m_ff.size())
-    node.u = node.e.solve(force_on_modes);
-  else if (body.turn.size())
-    node.u = node.inverse.cwiseProduct(force_on_modes + force[0] * body.turn);
+  node.u = force_on_modes;
+  if (body.turn.size())
+    node.u += force[0] * body.turn;
+  if (body.m_ff.size())
+    node.u = node.e.solve(node.u).eval();
   else
-    node.u = node.inverse.cwiseProduct(force_on_modes);
+    node.u.array() *= node.inverse.array();
   node.motion.resize(size);
   for (int k = 0; k <= body.linked(); ++k)
     part(node.motion, k) = combined<d>(body.rows, node.u, k);
@@ -229,7 +226,7 @@ void NewtonTree<Space, Scalar>::outward(const recursion::Node<Space> &joint, con
         there + part(node.motion, at) + block(node.blocks, at, at) * part(node.forces, at);
   }
   Eigen::Map<Vector> x_modes(x + joint.p_v(), n);
-  if (may_bend<Space> && body.m_ff.size())
+  if (body.m_ff.size())
     x_modes =
         node.u + node.e.solve(body.rows.topRows(node.forces.size()).transpose().template cast<Scalar>() * node.forces);
   else

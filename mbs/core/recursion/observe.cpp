@@ -46,6 +46,8 @@ Inertia inertia_of(const planar::Body &b, const double *p, const double *v, plan
     to.h_p_dot[2] = s.u_dot[2], to.J(2, 2) += s.p_p;
     for (int i = 0; b.has_more && i < b.n; ++i)
       to.h_p_dot[2] += s.h[i] * v[i];
+    if (b.stiffening)
+      to.modal += planar::bending_energy(s);
   }
   return to;
 }

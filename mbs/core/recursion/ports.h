@@ -77,7 +77,7 @@ FFROBOT_INLINE void gain_by_transpose(const Pack<T, d> *X, const Pack<T, W> *F, 
 // Ports of the body, one after the other: M, H, S and gamma gain what hangs there.
 template <class Space, class T, int W>
 inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
-                            Pack<T, Space::dim> *M, Pack<T, W> *H, Pack<T, W> (&S)[W], Pack<T, W> &gamma) {
+                            Pack<T, Space::dim> *M, Pack<T, W> *H, Schur<T, W> &S, Pack<T, W> &gamma) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Cols = Pack<T, W>;
   auto &state = w.bodies[&node - m.nodes.data()];
@@ -162,7 +162,7 @@ inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, 
 // and acceleration change their parts. f = N^-1 (A_section - B'), N = X M^-1 X^T + G, B' = B - X M^-1 H.
 template <class Space, class T, int W>
 inline void move_to_section(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
-                            Pack<T, Space::dim> *M, Pack<T, W> *H, Pack<T, W> (&S)[W]) {
+                            Pack<T, Space::dim> *M, Pack<T, W> *H, Schur<T, W> &S) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Row = Pack<T, d>;
   using Cols = Pack<T, W>;

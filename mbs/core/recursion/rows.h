@@ -292,7 +292,7 @@ FFROBOT_INLINE void in_port_axes(const spatial::Body &body, int port, const spat
 // what they measure by velocities and, at the ground, by its acceleration -g.
 template <class Space, class T, int W>
 FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &forces, Workspace<Space, T> &w,
-                               Pack<T, W> (&S)[W]) {
+                               Schur<T, W> &S) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Cols = Pack<T, W>;
   RowMotion<T> motion;

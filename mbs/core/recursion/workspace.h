@@ -10,10 +10,29 @@ namespace ffrobot::recursion {
 
 // Columns side by side: 0 is what acts without constraints, column r what a unit of multiplier r does. Sizes that are
 // compiled (the first with a row: of a point); where there are fewer rows the rest is zero. Of other scalars than
-// doubles the largest alone.
+// doubles the largest alone. More rows go in blocks, one after the other (blocks.h).
 template <class Space> constexpr int column_counts[] = {1, Space::linear + 1, 7, 16};
 constexpr int most_columns = 16;
-constexpr int most_rows = 15;
+constexpr int block_rows = most_columns - 1;
+
+// What sums of a_i b_i^T are made of, columns of block after block
+template <class T> struct Terms {
+  using Columns = Pack<T, most_columns>;
+  Aligned<T> a, b; // (terms, most_columns); they grow in the first evaluation alone
+  FFROBOT_APART void add(const Columns &a_i, const Columns &b_i) {
+    const std::size_t end = a.size();
+    a.resize(end + most_columns, T(0.)), b.resize(end + most_columns, T(0.));
+    a_i.write(a.data() + end), b_i.write(b.data() + end);
+  }
+  void clear() { a.clear(), b.clear(); }
+};
+
+// A part of many rows
+template <class T> struct Block {
+  std::vector<int> rows;
+  Terms<T> terms;
+  Aligned<T> answer, bias; // of the workspace, their columns
+};
 
 // A joint, in axes of the outer section
 template <class Space, class T> struct Hinge {
@@ -65,13 +84,14 @@ template <class Space, class T> struct Workspace {
   Aligned<T> answer;              // (slots, columns)
   Aligned<T> angle, sine, cosine; // (nodes) in the plane
   Aligned<T> z;                   // of the widest body
-  Aligned<T> schur;               // (columns, columns) C M^-1 C^T, without row and column of what is not constrained
+  Aligned<T> schur;               // (all rows)^2 C M^-1 C^T of active ones
   bool keeps_schur = false;       // asked for
-  Aligned<T> factor;              // (columns - 1)^2, L and 1/D of it
+  Aligned<T> factor;              // (columns - 1, or all rows)^2, L and 1/D of it
   std::vector<int> active;        // rows that are kept; others depend on them
-  std::vector<int> column;        // of each row; 0: not kept
+  std::vector<int> column;        // of each row; 0: not kept, or not in the block at hand
+  std::vector<Block<T>> blocks;   // of active rows where they are more than columns; else none
   Aligned<T> lambda;              // (all rows)
-  Aligned<T> y;                   // (columns): 1, multipliers of active rows
+  Aligned<T> y;                   // (columns, or 1 + all rows): 1, multipliers of active rows
   std::vector<Pose<T>> frames;    // of nodes
   std::vector<Turning> turning;   // of ground markers, in space: those that turn are to be kept up to date
   unsigned long evaluations = 0;

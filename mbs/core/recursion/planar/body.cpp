@@ -22,7 +22,9 @@ PlanarData moved(const PlanarData &data, const Eigen::Vector2d &position, double
            y * data.S_bar.row(0).transpose();
     to.j = (data.j.size() ? data.j : Eigen::VectorXd::Zero(n)) - data.S_bar.transpose() * position;
   }
+  to.K = moved_K(data, position, R);
   for (PlanarMarker &marker : to.markers) {
+    marker.K = turned(R, marker.K);
     marker.position = R * (marker.position - position);
     marker.angle -= angle;
     if (n)
@@ -51,12 +53,26 @@ Body::Body(const PlanarData &data, const std::vector<int> &used, int tilted) : n
   mass = data.mass, J = data.inertia, sx = data.first_moment.x(), sy = data.first_moment.y();
   blocks = 1 + static_cast<int>(used.size()) / 2;
   padded = (n + 7) / 8 * 8;
+  fill_rows(data, used, tilted);
+  fill_damping(data);
+  const double length = std::sqrt(J / std::max(mass, 1e-300));
+  if (n && !vanishes(data.j, length))
+    j = data.j;
+  if (n && !vanishes(data.S_tilde, 1))
+    S_tilde = data.S_tilde;
+  if (n && data.m_xy.size() && !vanishes(data.m_xy - MatrixXd::Identity(n, n), 1))
+    m_xy = data.m_xy;
+  has_more = j.size() || S_tilde.size() || m_xy.size() || D_full.size() || stiffening;
+}
+
+void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int tilted) {
   MatrixXd W = MatrixXd::Zero(width(), n);
   if (n) {
     W.topRows<2>() = data.S_bar;
     if (data.h.size())
       W.row(H) = data.h.transpose();
   }
+  std::vector<int> first_rows;
   for (std::size_t k = 0; k < used.size(); ++k) {
     const PlanarMarker &marker = data.markers[static_cast<std::size_t>(used[k])];
     Port port;
@@ -68,7 +84,14 @@ Body::Body(const PlanarData &data, const std::vector<int> &used, int tilted) : n
       port.is_soft = !vanishes(marker.Phi, 1 / std::sqrt(mass));
       port.turns = !vanishes(marker.Phi.row(2), 1 / std::sqrt(mass));
     }
-    ports.push_back(port);
+    ports.push_back(port), first_rows.push_back(port.row);
+  }
+  if (n && is_stiffened(data)) {
+    stiffening = std::make_shared<const Stiffening>(data, used, first_rows);
+    for (Port &port : ports)
+      for (const Stiffening::Row &curved : stiffening->at_ports)
+        if (const int component = curved.row - port.row; component >= 0 && component < 3)
+          port.is_soft = true, port.turns = port.turns || component == 2;
   }
   is_tilted = n && tilted >= 0;
   if (is_tilted)
@@ -78,20 +101,26 @@ Body::Body(const PlanarData &data, const std::vector<int> &used, int tilted) : n
   for (int r = 0; r < width(); ++r)
     for (int i = 0; i < n; ++i)
       columns[static_cast<std::size_t>(i * width() + r)] = rows[static_cast<std::size_t>(r * padded + i)] = W(r, i);
-  G.assign(static_cast<std::size_t>(width() * width()), 0.0);
+  fill_products(W);
+}
+
+void Body::fill_products(const MatrixXd &W) {
   for (int r = 0; r < width(); ++r)
     for (int c = 0; c < width(); ++c)
-      G[static_cast<std::size_t>(r * width() + c)] = -less(0, W.row(r), W.row(c));
+      products.push_back(-less(0, W.row(r), W.row(c)));
+  for (const Port &port : ports) {
+    const double X[3][3] = {{1, 0, -port.y}, {0, 1, port.x}, {0, 0, 1}};
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c)
+        products.push_back(less(X[r][c], W.row(port.row + r), W.row(c)));
+  }
   const double M[3][3] = {{mass, 0, -sy}, {0, mass, sx}, {-sy, sx, J}};
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c)
       residual[r][c] = less(M[r][c], W.row(r), W.row(c));
-  for (Port &port : ports) {
-    const double X[3][3] = {{1, 0, -port.y}, {0, 1, port.x}, {0, 0, 1}};
-    for (int r = 0; r < 3; ++r)
-      for (int c = 0; c < 3; ++c)
-        port.T[r][c] = less(X[r][c], W.row(port.row + r), W.row(c));
-  }
+}
+
+void Body::fill_damping(const PlanarData &data) {
   K.assign(static_cast<std::size_t>(padded), 0.0), D = K;
   for (int i = 0; i < n; ++i)
     K[static_cast<std::size_t>(i)] = data.stiffness[i];
@@ -107,14 +136,6 @@ Body::Body(const PlanarData &data, const std::vector<int> &used, int tilted) : n
     } else
       D_full = data.damping;
   }
-  const double length = std::sqrt(J / std::max(mass, 1e-300));
-  if (n && !vanishes(data.j, length))
-    j = data.j;
-  if (n && !vanishes(data.S_tilde, 1))
-    S_tilde = data.S_tilde;
-  if (n && data.m_xy.size() && !vanishes(data.m_xy - MatrixXd::Identity(n, n), 1))
-    m_xy = data.m_xy;
-  has_more = j.size() || S_tilde.size() || m_xy.size() || D_full.size();
 }
 
 } // namespace ffrobot::recursion::planar

@@ -3,27 +3,28 @@
 //
 // Everything that p_ddot = Q_f - m^T A + sum of P^T f meets are products with the rows
 //     W = [S_bar_x; S_bar_y; h; Phi_x, Phi_y, Phi_rotation of port 0; of port 1; ...]
-// and G = W W^T, both constant (but for h where S_tilde is not zero). They lie in blocks of eight: the frame's three
-// and port 0, ports 1 and 2, ports 3 and 4 … Where modes turn the section of a pin (pins.h), that rotation is row TILT
-// of the first block.
+// and G = W W^T, both constant (but for h where S_tilde is not zero, and with geometric stiffening: bent.h). They lie
+// in blocks of eight: the frame's three and port 0, ports 1 and 2, ports 3 and 4 … Where modes turn the section of a
+// pin (pins.h), that rotation is row TILT of the first block.
 #pragma once
 
-#include "core/recursion/model.h"
+#include "core/recursion/planar/stiffening.h"
 #include "core/recursion/register.h"
 #include "core/recursion/small.h"
+
+#include <memory>
 
 namespace ffrobot::recursion::planar {
 
 struct Port {
   double x = 0, y = 0, angle = 0; // undeformed, body axes
   int row = 3;                    // its first in W
-  double T[3][3] = {};            // X - P m^T: (x, y, rotation) by A
   bool is_soft = false;           // some row of Phi is not zero
   bool turns = false;             // Phi_rotation is not zero
 };
 
 struct Body {
-  enum { Sx, Sy, H, TILT = 6 };
+  enum { Sx, Sy, H, TILT = 6, FORCE = 7 };
   Body() = default;
   // `used`: markers of `data` that are ports; `tilted`: that of the section that the joint holds, -1 where the frame
   // turns with it
@@ -34,35 +35,55 @@ struct Body {
   double residual[3][3] = {}; // M_rr - m m^T, constant part
   Aligned<double> columns;    // (n, 8 blocks) W transposed
   Aligned<double> rows;       // (8 blocks, padded) W
-  Aligned<double> G;          // (8 blocks, 8 blocks)
+  Aligned<double> products;   // G (8 blocks, 8 blocks); of ports X - P m^T, (x, y, rotation) by A, (ports, 3, 3)
   Aligned<double> K, D;       // (padded) stiffness; damping where it is diagonal
   bool is_damped = false;     // by a diagonal
   std::vector<Port> ports;
   // Where these are not empty, an evaluation takes the long way round: modal forces one by one.
   Eigen::MatrixXd D_full, S_tilde, m_xy;
   Eigen::VectorXd j;
-  bool has_more = false;  // any of these
-  bool is_tilted = false; // has row TILT
+  std::shared_ptr<const Stiffening> stiffening; // null without
+  bool has_more = false;                        // any of these
+  bool is_tilted = false;                       // has row TILT
 
   int width() const { return 8 * blocks; }
   int row_count() const { return width(); }
-  double gram(int r, int c) const { return G[static_cast<std::size_t>(r * width() + c)]; }
-  // The same of a body that has one block, as those between pins have
-  double gram_of_block(int r, int c) const { return G[static_cast<std::size_t>(8 * r + c)]; }
+
+private:
+  void fill_rows(const PlanarData &data, const std::vector<int> &used, int tilted);
+  void fill_products(const Eigen::MatrixXd &W);
+  void fill_damping(const PlanarData &data);
 };
 
 // The same body with its frame at `position`, turned by `angle`.
 PlanarData moved(const PlanarData &data, const Eigen::Vector2d &position, double angle);
 
-template <class T> struct Inertia {
-  T xx, xy, xa, yy, ya, aa; // M_rr - m m^T
-  T bx, by, ba;             // -(Q_r - m Q_f)
+// Of a body with geometric stiffening (bent.h); names as in stiffening.h
+template <class T> struct Bent {
+  using Fields = Pack<T, fields>;
+  explicit Bent(int n, int width)
+      : p(padded(n), T(0.)), v(p), K_p(p), K_v(p), F(n * fields, T(0.)), rows(n * width, T(0.)), solved(rows),
+        factor(n * n, T(0.)), curvature(width, T(0.)) {}
+
+  struct Affine { // of the fields
+    Fields g, g_dot;
+  };
+  Affine linear, all;   // without and with terms of second order
+  Fields bending;       // p_dot^T K p_dot
+  Aligned<T> p, v;      // padded
+  Aligned<T> K_p, K_v;  // one after the other
+  Aligned<T> F;         // (n, 4) F(p) transposed
+  Aligned<T> rows;      // (n, width) W(p) transposed, with Q_f in lane FORCE
+  Aligned<T> solved;    // (n, width) L^-1 of these
+  Aligned<T> factor;    // (n, n) m_ff = L D L^T: L, with 1/D in the place of its diagonal
+  Aligned<T> curvature; // (width) p_dot^T K p_dot of rows
 };
 
 template <class T> struct State {
   explicit State(const Body &body)
       : u(body.width(), T(0.)), u_dot(u), Q(u), elastic(body.padded, T(0.)), more(body.padded, T(0.)),
-        h(body.padded, T(0.)), WH(body.width(), T(0.)) {}
+        h(body.padded, T(0.)), WH(body.width(), T(0.)), products(body.products.begin(), body.products.end()),
+        bent(body.stiffening ? body.n : 0, body.stiffening ? body.width() : 0) {}
 
   T cosine, sine;                   // of the frame against the port it hangs on
   T absolute_cosine, absolute_sine; // of the frame
@@ -73,6 +94,14 @@ template <class T> struct State {
   Aligned<T> u, u_dot, Q; // W p, W p_dot, W Q_f
   Aligned<T> elastic;     // (n) K p + D p_dot - applied modal forces
   Aligned<T> more, h, WH; // (n) other modal forces; change of row h; W times it
+  Aligned<T> products;    // as of the body: constant without geometric stiffening
+  Bent<T> bent;           // empty without
+
+  const T &gram(const Body &b, int r, int c) const { return products[static_cast<std::size_t>(r * b.width() + c)]; }
+  const T *X(const Body &b, int port) const { return products.data() + b.width() * b.width() + 9 * port; }
+  // The same of a body that has one block, as those between pins have
+  const T &gram_of_block(int r, int c) const { return products[static_cast<std::size_t>(8 * r + c)]; }
+  const T &X_of_block(int r, int c) const { return products[static_cast<std::size_t>(64 + 3 * r + c)]; }
 };
 
 // --- W p, W p_dot, W (K p + D p_dot - force), p.p, p.p_dot; force (n) may be null
@@ -127,116 +156,6 @@ template <class T> inline void project(const Body &b, const T *p, const T *v, co
     for (int r = 0; r < width; ++r)
       if (const double w = b.columns[i * width + r]; w != 0)
         s.u[r] += w * p[i], s.u_dot[r] += w * v[i], s.Q[r] += w * k;
-  }
-}
-
-// Forces that the common case has not, in `more`, with J beyond J + p.p and its rate in s.p_p, s.p_v; row h at p.
-template <class T> void more_forces(const Body &b, const T *p, const T *v, State<T> &s) {
-  const T w = s.omega, ww = w * w;
-  const int n = b.n;
-  for (int i = 0; i < n; ++i)
-    s.more[i] = T(0.), s.h[i] = T(0.);
-  if (b.m_xy.size()) {
-    s.p_p = s.p_v = T(0.);
-    for (int i = 0; i < n; ++i) {
-      T x(0.);
-      for (int k = 0; k < n; ++k)
-        x += b.m_xy(k, i) * p[k];
-      s.more[i] += ww * (x - p[i]);
-      s.p_p += x * p[i], s.p_v += x * v[i];
-    }
-  }
-  for (int i = 0; i < b.j.size(); ++i) {
-    s.more[i] += b.j[i] * ww;
-    s.p_p += (2 * b.j[i]) * p[i], s.p_v += b.j[i] * v[i];
-  }
-  if (b.S_tilde.size())
-    for (int i = 0; i < n; ++i)
-      for (int k = 0; k < n; ++k) {
-        s.more[i] += (2 * b.S_tilde(i, k)) * (w * v[k]);
-        s.h[i] += b.S_tilde(k, i) * p[k];
-      }
-  if (b.D_full.size())
-    for (int i = 0; i < n; ++i)
-      for (int k = 0; k < n; ++k)
-        s.more[i] -= b.D_full(i, k) * v[k];
-  for (int r = 0; r < b.width(); ++r) {
-    T Q(0.), WH(0.);
-    for (int i = 0; i < n; ++i) {
-      const double W = b.columns[i * b.width() + r];
-      Q += W * s.more[i], WH += W * s.h[i];
-    }
-    s.Q[r] += Q, s.WH[r] = WH;
-  }
-  for (int i = 0; i < n; ++i)
-    s.Q[Body::H] += s.h[i] * (ww * p[i] - s.elastic[i] + s.more[i]);
-}
-
-// M_rr - m m^T and -(Q_r - m Q_f)
-template <class T> FFROBOT_INLINE Inertia<T> inertia(const Body &b, const T *p, const T *v, State<T> &s) {
-  Inertia<T> M;
-  const T ww = s.omega * s.omega, w2 = 2. * s.omega;
-  const int width = b.width();
-  if constexpr (std::is_same_v<T, double>)
-    for (int r = 0; r < width; r += 8)
-      (ww * Eight::load(s.u.data() + r) - Eight::load(s.Q.data() + r)).store(s.Q.data() + r);
-  else
-    for (int r = 0; r < width; ++r)
-      s.Q[r] = ww * s.u[r] - s.Q[r];
-  const T *u = s.u.data(), *Q = s.Q.data();
-  T p_p = s.p_p;
-  M.xa = b.residual[0][2] - u[Body::Sy], M.ya = b.residual[1][2] + u[Body::Sx];
-  if (b.has_more) {
-    more_forces(b, p, v, s);
-    p_p = s.p_p - 2. * s.WH[Body::H];
-    for (int i = 0; i < b.n; ++i)
-      p_p -= s.h[i] * s.h[i];
-    M.xa -= s.WH[Body::Sx], M.ya -= s.WH[Body::Sy];
-  }
-  const T sx = b.sx + u[Body::Sx], sy = b.sy + u[Body::Sy];
-  M.bx = Q[Body::Sx] - (ww * sx + w2 * s.u_dot[Body::Sy]), M.by = Q[Body::Sy] - (ww * sy - w2 * s.u_dot[Body::Sx]);
-  M.ba = Q[Body::H] + w2 * s.p_v;
-  M.xx = T(b.residual[0][0]), M.xy = T(b.residual[0][1]), M.yy = T(b.residual[1][1]);
-  M.aa = b.residual[2][2] + p_p;
-  return M;
-}
-
-// p_ddot = Q_f - m^T A + sum of P^T f, by multipliers without Q_f; z holds, by rows of W, -A and forces on ports, zeros
-// elsewhere
-template <bool by_multipliers>
-FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, const double *z, State<double> &s, double *a) {
-  const double ww = s.omega * s.omega;
-  const int n = b.n, stride = b.padded, width = b.width();
-  for (int i = 0; i < n; i += 8) {
-    const int left = n - i;
-    const double *W = b.rows.data() + i;
-    Eight sum = Eight::zero();
-    if (!by_multipliers)
-      sum = ww * (left >= 8 ? Eight::load(p + i) : load_part(p + i, left)) - Eight::load(s.elastic.data() + i);
-    Eight sum2 = Eight::zero();
-    for (int r = 0; r < width; r += 2, W += 2 * stride)
-      sum += z[r] * Eight::load(W), sum2 += z[r + 1] * Eight::load(W + stride);
-    if (b.has_more) {
-      sum += z[2] * Eight::load(s.h.data() + i);
-      if (!by_multipliers)
-        sum += Eight::load(s.more.data() + i);
-    }
-    sum += sum2;
-    left >= 8 ? sum.store(a + i) : store_part(a + i, sum, left);
-  }
-}
-
-template <bool by_multipliers, class T>
-inline void modal_accelerations(const Body &b, const T *p, const T *z, State<T> &s, T *a) {
-  const T ww = s.omega * s.omega;
-  for (int i = 0; i < b.n; ++i) {
-    T sum = by_multipliers ? T(0.) : T(ww * p[i] - s.elastic[i]);
-    for (int r = 0; r < b.width(); ++r)
-      if (const double w = b.columns[i * b.width() + r]; w != 0)
-        sum += w * z[r];
-    if (b.has_more)
-      sum += by_multipliers ? s.h[i] * z[2] : s.more[i] + s.h[i] * z[2];
-    a[i] = sum;
   }
 }
 

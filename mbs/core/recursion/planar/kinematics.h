@@ -1,6 +1,7 @@
 // Outward, in the plane: angles, angular velocities, what velocities do at joints.
 #pragma once
 
+#include "core/recursion/planar/inertia.h"
 #include "core/recursion/workspace.h"
 
 namespace ffrobot::recursion {
@@ -52,6 +53,8 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
     planar::State<T> &s = w.bodies[i];
     project(node.body, q + node.p_q(), v + node.p_v(), forces.generalized ? forces.generalized + node.p_v() : nullptr,
             s);
+    if (node.body.stiffening)
+      bend(node.body, q + node.p_q(), v + node.p_v(), s);
     T angle = T(0.);
     if (node.joint == JointKind::revolute || node.joint == JointKind::free)
       angle = q[node.joint == JointKind::free ? node.q + 2 : node.q];
@@ -130,10 +133,10 @@ FFROBOT_APART void evaluate_inertia(const Node<Planar> &node, const T *p, const 
 }
 
 template <class T>
-FFROBOT_APART void port_gram(const planar::Body &b, const planar::State<T> &, int i, int j, Pack<T, 3> *G) {
+FFROBOT_APART void port_gram(const planar::Body &b, const planar::State<T> &s, int i, int j, Pack<T, 3> *G) {
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c)
-      G[r].set(c, T(b.gram(b.ports[i].row + r, b.ports[j].row + c)));
+      G[r].set(c, s.gram(b, b.ports[i].row + r, b.ports[j].row + c));
 }
 
 template <class T>
@@ -141,12 +144,13 @@ FFROBOT_APART void port_rows(const planar::Body &b, int i, planar::State<T> &s, 
   const planar::Port &port = b.ports[i];
   const T *u = s.u.data() + port.row, *u_dot = s.u_dot.data() + port.row, *Q = s.Q.data() + port.row;
   const T ww = s.omega * s.omega, w2 = 2. * s.omega;
-  T column[3] = {port.T[0][2] - u[1], port.T[1][2] + u[0], T(port.T[2][2])};
+  const T *constant = s.X(b, i);
+  T column[3] = {constant[2] - u[1], constant[5] + u[0], constant[8]};
   if (b.has_more)
     for (int r = 0; r < 3; ++r)
       column[r] -= s.WH[port.row + r];
   for (int r = 0; r < 3; ++r) {
-    X[r].set(0, T(port.T[r][0])), X[r].set(1, T(port.T[r][1])), X[r].set(2, column[r]);
+    X[r].set(0, constant[3 * r]), X[r].set(1, constant[3 * r + 1]), X[r].set(2, column[r]);
   }
   beta[0] = Q[0] - ww * (port.x + u[0]) - w2 * u_dot[1];
   beta[1] = Q[1] - ww * (port.y + u[1]) + w2 * u_dot[0];
@@ -162,7 +166,7 @@ FFROBOT_INLINE void put_force(const planar::Body &b, const planar::State<T> &, i
 }
 
 template <bool by_multipliers, class T>
-FFROBOT_APART void modes(const Node<Planar> &node, const T *p, const T *z, planar::State<T> &s, T *a) {
+FFROBOT_APART void modes(const Node<Planar> &node, const T *p, T *z, planar::State<T> &s, T *a) {
   modal_accelerations<by_multipliers>(node.body, p, z, s, a);
 }
 

@@ -17,12 +17,19 @@ using State = planar::State<double>;
 using Vector = NewtonEuler::Vector;
 using Turn = PlanarTurn<double>;
 
-// W of a body, (rows, n)
-Eigen::Map<const Eigen::MatrixXd> rows_of(const Body &body) { return {body.columns.data(), body.width(), body.n}; }
-
 std::array<double, 2> place(const planar::Port &port, const State &s) {
   const auto row = static_cast<std::size_t>(port.row);
   return {port.x + s.u[row], port.y + s.u[row + 1]};
+}
+
+// Of rows of W: W p_ddot, with geometric stiffening less p_dot^T K p_dot
+VectorXd elastic_accelerations(const Node<Planar> &node, const State &s, const double *a) {
+  if (node.n() == 0)
+    return VectorXd::Zero(node.body.width());
+  VectorXd found = planar::rows_of(node.body, s) * Eigen::Map<const VectorXd>(a + node.p_v(), node.n());
+  if (node.body.stiffening)
+    found -= Eigen::Map<const VectorXd>(s.bent.curvature.data(), found.size());
+  return found;
 }
 
 // Of a port against the frame: what its acceleration has beside the frame's linear one. alpha: of the frame
@@ -94,12 +101,6 @@ void NewtonEuler::prepare(const double *q, const double *v, const double *genera
   }
 }
 
-VectorXd NewtonEuler::modal_products(const Node<Planar> &node, const double *a) const {
-  if (node.n() == 0)
-    return VectorXd::Zero(node.body.width());
-  return rows_of(node.body) * Eigen::Map<const VectorXd>(a + node.p_v(), node.n());
-}
-
 void NewtonEuler::accelerate(const double *q, const double *a, const Workspace<Planar, double> &w) {
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Planar> &node = mechanism_.nodes[i];
@@ -121,7 +122,7 @@ void NewtonEuler::accelerate(const double *q, const double *a, const Workspace<P
     add(along, A);
     for (std::size_t k = 0; k < 3; ++k)
       A[k] += hinge.c[k];
-    const VectorXd u_ddot = modal_products(node, a);
+    const VectorXd u_ddot = elastic_accelerations(node, s, a);
     if (node.inboard >= 0) { // from the section to the frame
       const planar::Port &port = node.body.ports[static_cast<std::size_t>(node.inboard)];
       Vector section = A;
@@ -234,7 +235,7 @@ void NewtonEuler::project(const double *q, const Workspace<Planar, double> &w, d
       continue;
     VectorXd z = VectorXd::Zero(node.body.width());
     collect_ports(i, z);
-    Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) = rows_of(node.body).transpose() * z;
+    Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) = planar::rows_of(node.body, w.bodies[i]).transpose() * z;
   }
 }
 
@@ -254,12 +255,22 @@ void NewtonEuler::require(const double *q, const double *a, Workspace<Planar, do
       z[static_cast<Index>(k)] = -frames_[i][k];
     collect_ports(i, z);
     modal_accelerations<false>(node.body, q + node.p_q(), z.data(), w.bodies[i], by_forces.data());
-    Eigen::Map<VectorXd>(f + node.p_v(), node.n()) = Eigen::Map<const VectorXd>(a + node.p_v(), node.n()) - by_forces;
+    const VectorXd beside = Eigen::Map<const VectorXd>(a + node.p_v(), node.n()) - by_forces;
+    Eigen::Map<VectorXd> modal(f + node.p_v(), node.n());
+    if (node.body.stiffening)
+      modal = bent_mass(node.body, w.bodies[i]) * beside;
+    else
+      modal = beside;
   }
 }
 
-NewtonEuler::RowAcceleration NewtonEuler::of_row(std::size_t r, const Workspace<Planar, double> &w) const {
+NewtonEuler::RowAcceleration NewtonEuler::of_row(std::size_t r, const double *a,
+                                                 const Workspace<Planar, double> &w) const {
   const Row &row = mechanism_.rows[r];
+  if (row.node >= 0) {
+    const double along = a[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom];
+    return {along, std::abs(along)};
+  }
   RowMotion<double> motion;
   row_motion(mechanism_, row, w, row.moves, motion);
   const double along = mechanism_.gravity[0] * motion.force[0] + mechanism_.gravity[1] * motion.force[1];

@@ -44,7 +44,7 @@ public:
   struct RowAcceleration {
     double value, size;
   };
-  RowAcceleration of_row(std::size_t row, const Workspace<Planar, double> &w) const;
+  RowAcceleration of_row(std::size_t row, const double *a, const Workspace<Planar, double> &w) const;
 
   // After transmit(), of the joint of node i: force on the outer section, with its moment about the origin of that
   // section, in axes of the joint; in global axes; the same moment about the origin of the inner section.
@@ -56,7 +56,6 @@ private:
   void inward(bool with_inertia, const Workspace<Planar, double> &w);
   Vector along_joint(std::size_t i, const double *q) const;
   void collect_ports(std::size_t i, Eigen::VectorXd &z) const;
-  Eigen::VectorXd modal_products(const Node<Planar> &node, const double *a) const;
 
   const Mechanism<Planar> &mechanism_;
   std::vector<Vector> ports_, on_ports_, with_joints_; // of all ports: accelerations; loads; loads and what hangs there

@@ -32,7 +32,7 @@ template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int 
 
 template <class T, int W>
 FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q, const T *v,
-                               const Forces<T> &forces, Workspace<Planar, T> &w, Pack<T, W> (&S)[W],
+                               const Forces<T> &forces, Workspace<Planar, T> &w, Schur<T, W> &S,
                                Pack<T, W> &gamma) {
   constexpr int stride = stride_of(W);
   using Cols = Pack<T, W>;
@@ -45,14 +45,16 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   const bool rows_on_modes = W > 1 && body.is_tilted && node.has_rows;
   if (forces.generalized)
     applied.set(0, forces.generalized[node.v]);
-  if (body.is_tilted && forces.generalized) {
+  if (body.is_tilted && forces.generalized)
     on_modes = forces.generalized[node.v];
-    for (int r = 0; r < 8; ++r)
-      s.Q[r] -= body.gram_of_block(planar::Body::TILT, r) * on_modes;
-  }
   planar::Inertia<T> I = inertia(body, q + node.p_q(), v + node.p_v(), s);
-  if (body.has_more && body.is_tilted)
-    I.ba += s.WH[planar::Body::TILT] * on_modes;
+  if (body.is_tilted && forces.generalized) {
+    constexpr int tilt = planar::Body::TILT;
+    for (int r = 0; r < 8; ++r)
+      s.Q[r] += s.gram_of_block(tilt, r) * on_modes;
+    I.bx += s.gram_of_block(tilt, 0) * on_modes, I.by += s.gram_of_block(tilt, 1) * on_modes;
+    I.ba += (s.gram_of_block(tilt, 2) + s.WH[tilt]) * on_modes;
+  }
   s.on_modes = on_modes;
   T M_xx = I.xx, M_xy = I.xy, M_xa = I.xa, M_yy = I.yy, M_ya = I.ya, M_aa = I.aa;
   Cols H[3];
@@ -62,7 +64,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
     PortWork<Planar, T> &port = w.ports[index];
     const T *u = s.u.data() + 3, *u_dot = s.u_dot.data() + 3, *Q = s.Q.data() + 3;
     const T ww = s.omega * s.omega, w2 = 2. * s.omega;
-    T X_xa = constants.T[0][2] - u[1], X_ya = constants.T[1][2] + u[0];
+    T X_xa = s.X_of_block(0, 2) - u[1], X_ya = s.X_of_block(1, 2) + u[0];
     if (body.has_more)
       X_xa -= s.WH[3], X_ya -= s.WH[4];
     port.X_xa = X_xa, port.X_ya = X_ya;
@@ -73,7 +75,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
     const Cols P0 = Cols::read(from), P1 = Cols::read(from + stride);
     Cols E0 = P0, E1 = P1;
     const bool loaded = m.children[index] >= 0;
-    const double Gx = body.gram_of_block(3, 3), Gc = body.gram_of_block(3, 4), Gy = body.gram_of_block(4, 4);
+    const T Gx = s.gram_of_block(3, 3), Gc = s.gram_of_block(3, 4), Gy = s.gram_of_block(4, 4);
     T Y_xx(0.), Y_xy(0.), Y_yy(0.);
     if (loaded) {
       load_pin(m, index, w);
@@ -95,8 +97,8 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
         gain(S, P1, Cols(Gc * E0 + Gy * E1));
       }
       if (rows_on_modes) { // the port is accelerated by columns, as by other ports in ports.h
-        Cols B0 = body.gram_of_block(planar::Body::TILT, 3) * multipliers,
-             B1 = body.gram_of_block(planar::Body::TILT, 4) * multipliers;
+        Cols B0 = s.gram_of_block(planar::Body::TILT, 3) * multipliers,
+             B1 = s.gram_of_block(planar::Body::TILT, 4) * multipliers;
         B0.add(0, beta_x), B1.add(0, beta_y);
         lose(S, B0, E0), lose(S, B1, E1);
         if (loaded)
@@ -109,7 +111,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
       E0.add(0, Y_xx * beta_x + Y_xy * beta_y), E1.add(0, Y_xy * beta_x + Y_yy * beta_y);
     T *answer = w.answer.data() + node.port_slot(0) * stride;
     E0.write(answer), E1.write(answer + stride);
-    const double x0 = constants.T[0][0], x1 = constants.T[0][1], y0 = constants.T[1][0], y1 = constants.T[1][1];
+    const T x0 = s.X_of_block(0, 0), x1 = s.X_of_block(0, 1), y0 = s.X_of_block(1, 0), y1 = s.X_of_block(1, 1);
     H[0] = x0 * E0 + y0 * E1, H[1] = x1 * E0 + y1 * E1, H[2] = X_xa * E0 + X_ya * E1;
     if (loaded) {
       const T p0 = x0 * Y_xx + y0 * Y_xy, p1 = x1 * Y_xx + y1 * Y_xy, p2 = X_xa * Y_xx + X_ya * Y_xy;
@@ -122,10 +124,10 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   H[0].add(0, I.bx), H[1].add(0, I.by), H[2].add(0, I.ba);
   if (rows_on_modes) {
     for (int r = 0; r < 3; ++r)
-      H[r] += body.gram_of_block(planar::Body::TILT, r) * multipliers;
+      H[r] += s.gram_of_block(planar::Body::TILT, r) * multipliers;
     if (body.has_more)
       H[2] += s.WH[planar::Body::TILT] * multipliers;
-    Cols turned = body.gram_of_block(planar::Body::TILT, planar::Body::TILT) * multipliers;
+    Cols turned = s.gram_of_block(planar::Body::TILT, planar::Body::TILT) * multipliers;
     turned.add(0, s.Q[planar::Body::TILT]);
     gain(S, multipliers, turned);
   }
@@ -189,13 +191,13 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
   s.A[0] = Ax, s.A[1] = Ay, s.A[2] = Aa;
   constexpr int tilt = planar::Body::TILT;
   const bool rows_on_modes = W > 1 && body.is_tilted && node.has_rows;
-  const T on_modes = rows_on_modes ? (multiplier_forces<T, W>(m, node, 0, w) * y).sum() : T(0.); // by multipliers
+  const T on_modes = rows_on_modes ? multiplier_force<T, W>(m, node, 0, w, y) : T(0.); // by multipliers
   T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), T(0.), by_multipliers ? on_modes : s.on_modes + on_modes, T(0.)};
   if (node.outboard) {
     const planar::Port &constants = body.ports[0];
     PortWork<Planar, T> &port = w.ports[node.first_port];
-    const T Xx = constants.T[0][0] * Ax + constants.T[0][1] * Ay + port.X_xa * Aa;
-    const T Xy = constants.T[1][0] * Ax + constants.T[1][1] * Ay + port.X_ya * Aa;
+    const T Xx = s.X_of_block(0, 0) * Ax + s.X_of_block(0, 1) * Ay + port.X_xa * Aa;
+    const T Xy = s.X_of_block(1, 0) * Ax + s.X_of_block(1, 1) * Ay + port.X_ya * Aa;
     T fx = -answer<Planar, T, W>(w, node.port_slot(0), y), fy = -answer<Planar, T, W>(w, node.port_slot(0) + 1, y);
     if (m.children[node.first_port] >= 0) // Y beta is among the columns
       fx -= port.Y_xx * Xx + port.Y_xy * Xy, fy -= port.Y_xy * Xx + port.Y_yy * Xy;
@@ -204,17 +206,17 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
     port.A[0] = by_multipliers ? Xx : Xx + port.beta_x, port.A[1] = by_multipliers ? Xy : Xy + port.beta_y;
     T rotation = Aa;
     if (rows_on_modes) {
-      port.A[0] += body.gram_of_block(tilt, 3) * on_modes, port.A[1] += body.gram_of_block(tilt, 4) * on_modes;
-      rotation += body.gram_of_block(tilt, 5) * on_modes;
+      port.A[0] += s.gram_of_block(tilt, 3) * on_modes, port.A[1] += s.gram_of_block(tilt, 4) * on_modes;
+      rotation += s.gram_of_block(tilt, 5) * on_modes;
     }
     if (constants.is_soft) {
-      const double Gx = body.gram_of_block(3, 3), Gc = body.gram_of_block(3, 4), Gy = body.gram_of_block(4, 4);
+      const T Gx = s.gram_of_block(3, 3), Gc = s.gram_of_block(3, 4), Gy = s.gram_of_block(4, 4);
       port.A[0] += Gx * fx + Gc * fy, port.A[1] += Gc * fx + Gy * fy;
       if (constants.turns) {
         if (!by_multipliers)
           rotation += s.Q[5];
-        rotation += body.gram_of_block(5, 3) * fx + body.gram_of_block(5, 4) * fy - body.gram_of_block(5, 0) * Ax -
-                    body.gram_of_block(5, 1) * Ay - body.gram_of_block(5, 2) * Aa;
+        rotation += s.gram_of_block(5, 3) * fx + s.gram_of_block(5, 4) * fy - s.gram_of_block(5, 0) * Ax -
+                    s.gram_of_block(5, 1) * Ay - s.gram_of_block(5, 2) * Aa;
         if (body.has_more)
           rotation -= s.WH[5] * Aa;
       }
@@ -222,10 +224,10 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
     port.A[2] = rotation;
   }
   if (body.is_tilted) {
-    a[node.v] += body.gram_of_block(tilt, 3) * z[3] + body.gram_of_block(tilt, 4) * z[4] -
-                 body.gram_of_block(tilt, 0) * Ax - body.gram_of_block(tilt, 1) * Ay - body.gram_of_block(tilt, 2) * Aa;
+    a[node.v] += s.gram_of_block(tilt, 3) * z[3] + s.gram_of_block(tilt, 4) * z[4] - s.gram_of_block(tilt, 0) * Ax -
+                 s.gram_of_block(tilt, 1) * Ay - s.gram_of_block(tilt, 2) * Aa;
     if (rows_on_modes)
-      a[node.v] += body.gram_of_block(tilt, tilt) * on_modes;
+      a[node.v] += s.gram_of_block(tilt, tilt) * on_modes;
     if (!by_multipliers)
       a[node.v] += s.Q[tilt];
     if (body.has_more)

@@ -9,23 +9,9 @@
 
 namespace ffrobot::recursion::spatial {
 
-// 1/2 p^T K p, p^T K p_dot, p_dot^T K p_dot; K p leaves the row. s.b and s.h_change[0] are used in between.
-template <class T> struct Curve {
-  T half, rate, bending;
-};
-template <class T> FFROBOT_APART Curve<T> curve(const ModeMatrix &K, int n, State<T> &s, T *row) {
-  if (K.kind == ModeMatrix::Kind::zero)
-    return {T(0.), T(0.), T(0.)};
-  T *K_p = s.b.data(), *K_v = s.h_change[0].data();
-  multiply<2, T>(K, n, {s.p.data(), s.v.data()}, {K_p, K_v});
-  Curve<T> to{T(0.), T(0.), T(0.)};
-  for (int k = 0; k < n; ++k) {
-    to.half += 0.5 * s.p[k] * K_p[k];
-    to.rate += s.v[k] * K_p[k];
-    to.bending += s.v[k] * K_v[k];
-    row[k] -= K_p[k];
-  }
-  return to;
+// s.b and s.h_change[0] are used in between.
+template <class T> inline Curve<T> curve(const ModeMatrix &K, int n, State<T> &s, T *row) {
+  return curve<T>(K, n, s.p.data(), s.v.data(), s.b.data(), s.h_change[0].data(), row, 1);
 }
 
 // F(p), and g with its rate, of the linear body and with terms of second order

@@ -15,7 +15,7 @@
 
 #include "core/recursion/model.h"
 #include "core/recursion/small.h"
-#include "core/recursion/spatial/mode_matrix.h"
+#include "core/recursion/mode_matrix.h"
 #include "core/recursion/spatial/stiffening.h"
 
 #include <memory>

@@ -15,7 +15,7 @@
 #pragma once
 
 #include "core/recursion/model.h"
-#include "core/recursion/spatial/mode_matrix.h"
+#include "core/recursion/mode_matrix.h"
 
 #include <Eigen/Core>
 

@@ -1,6 +1,6 @@
-#include "core/recursion/spatial/mode_matrix.h"
+#include "core/recursion/mode_matrix.h"
 
-namespace ffrobot::recursion::spatial {
+namespace ffrobot::recursion {
 
 // Full where its columns, three instructions for eight entries, cost less than its entries one by one, five for each
 // and five for a row.
@@ -32,4 +32,4 @@ ModeMatrix::ModeMatrix(const Eigen::MatrixXd &M) {
   first.push_back(static_cast<int>(column.size()));
 }
 
-} // namespace ffrobot::recursion::spatial
+} // namespace ffrobot::recursion

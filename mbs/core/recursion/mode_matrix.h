@@ -11,7 +11,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace ffrobot::recursion::spatial {
+namespace ffrobot::recursion {
 
 constexpr int lanes = 8; // that rows of six take in memory
 constexpr int modes_at_once = 8;
@@ -127,4 +127,25 @@ FFROBOT_INLINE void multiply(const ModeMatrix &M, int n, const T *const (&x)[cou
   }
 }
 
-} // namespace ffrobot::recursion::spatial
+// 1/2 p^T K p, p^T K v, v^T K v of a symmetric K
+template <class T> struct Curve {
+  T half, rate, bending;
+};
+
+// These, with p and v padded, as K_p and K_v become; K p leaves the row, whose numbers lie `stride` apart
+template <class T>
+FFROBOT_APART Curve<T> curve(const ModeMatrix &K, int n, const T *p, const T *v, T *K_p, T *K_v, T *row, int stride) {
+  if (K.kind == ModeMatrix::Kind::zero)
+    return {T(0.), T(0.), T(0.)};
+  multiply<2, T>(K, n, {p, v}, {K_p, K_v});
+  Curve<T> to{T(0.), T(0.), T(0.)};
+  for (int k = 0; k < n; ++k) {
+    to.half += 0.5 * p[k] * K_p[k];
+    to.rate += v[k] * K_p[k];
+    to.bending += v[k] * K_v[k];
+    row[k * stride] -= K_p[k];
+  }
+  return to;
+}
+
+} // namespace ffrobot::recursion

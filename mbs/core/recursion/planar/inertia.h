@@ -1,0 +1,133 @@
+// The inertia of a planar body with its modes eliminated, the forces on it, and its modes by what acts on them.
+#pragma once
+
+#include "core/recursion/planar/bent.h"
+
+namespace ffrobot::recursion::planar {
+
+// Forces that the common case has not, in `more`, with J beyond J + p.p and its rate in s.p_p, s.p_v; change of row h
+template <class T> void modal_forces(const Body &b, const T *p, const T *v, State<T> &s) {
+  const T w = s.omega, ww = w * w;
+  const int n = b.n;
+  for (int i = 0; i < n; ++i)
+    s.more[i] = T(0.), s.h[i] = T(0.);
+  if (b.m_xy.size()) {
+    s.p_p = s.p_v = T(0.);
+    for (int i = 0; i < n; ++i) {
+      T x(0.);
+      for (int k = 0; k < n; ++k)
+        x += b.m_xy(k, i) * p[k];
+      s.more[i] += ww * (x - p[i]);
+      s.p_p += x * p[i], s.p_v += x * v[i];
+    }
+  }
+  for (int i = 0; i < b.j.size(); ++i) {
+    s.more[i] += b.j[i] * ww;
+    s.p_p += (2 * b.j[i]) * p[i], s.p_v += b.j[i] * v[i];
+  }
+  if (b.S_tilde.size())
+    for (int i = 0; i < n; ++i)
+      for (int k = 0; k < n; ++k) {
+        s.more[i] += (2 * b.S_tilde(i, k)) * (w * v[k]);
+        s.h[i] += b.S_tilde(k, i) * p[k];
+      }
+  if (b.D_full.size())
+    for (int i = 0; i < n; ++i)
+      for (int k = 0; k < n; ++k)
+        s.more[i] -= b.D_full(i, k) * v[k];
+}
+
+// … and what they are to rows of W
+template <class T> void more_forces(const Body &b, const T *p, const T *v, State<T> &s) {
+  modal_forces(b, p, v, s);
+  const T ww = s.omega * s.omega;
+  const int n = b.n;
+  for (int r = 0; r < b.width(); ++r) {
+    T Q(0.), WH(0.);
+    for (int i = 0; i < n; ++i) {
+      const double W = b.columns[i * b.width() + r];
+      Q += W * s.more[i], WH += W * s.h[i];
+    }
+    s.Q[r] += Q, s.WH[r] = WH;
+  }
+  for (int i = 0; i < n; ++i)
+    s.Q[Body::H] += s.h[i] * (ww * p[i] - s.elastic[i] + s.more[i]);
+}
+
+// M_rr - m m^T and -(Q_r - m Q_f)
+template <class T> FFROBOT_INLINE Inertia<T> inertia(const Body &b, const T *p, const T *v, State<T> &s) {
+  Inertia<T> M;
+  const T ww = s.omega * s.omega, w2 = 2. * s.omega;
+  const int width = b.width();
+  if constexpr (std::is_same_v<T, double>)
+    for (int r = 0; r < width; r += 8)
+      (ww * Eight::load(s.u.data() + r) - Eight::load(s.Q.data() + r)).store(s.Q.data() + r);
+  else
+    for (int r = 0; r < width; ++r)
+      s.Q[r] = ww * s.u[r] - s.Q[r];
+  const T *u = s.u.data(), *Q = s.Q.data();
+  T p_p = s.p_p;
+  M.xa = b.residual[0][2] - u[Body::Sy], M.ya = b.residual[1][2] + u[Body::Sx];
+  if (b.has_more) {
+    if (b.stiffening) {
+      modal_forces(b, p, v, s);
+      return bent_inertia(b, p, v, s);
+    }
+    more_forces(b, p, v, s);
+    p_p = s.p_p - 2. * s.WH[Body::H];
+    for (int i = 0; i < b.n; ++i)
+      p_p -= s.h[i] * s.h[i];
+    M.xa -= s.WH[Body::Sx], M.ya -= s.WH[Body::Sy];
+  }
+  const T sx = b.sx + u[Body::Sx], sy = b.sy + u[Body::Sy];
+  M.bx = Q[Body::Sx] - (ww * sx + w2 * s.u_dot[Body::Sy]), M.by = Q[Body::Sy] - (ww * sy - w2 * s.u_dot[Body::Sx]);
+  M.ba = Q[Body::H] + w2 * s.p_v;
+  M.xx = T(b.residual[0][0]), M.xy = T(b.residual[0][1]), M.yy = T(b.residual[1][1]);
+  M.aa = b.residual[2][2] + p_p;
+  return M;
+}
+
+// p_ddot = Q_f - m^T A + sum of P^T f, by multipliers without Q_f; z holds, by rows of W, -A and forces on ports, zeros
+// elsewhere (and becomes another with geometric stiffening)
+template <bool by_multipliers>
+FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, double *z, State<double> &s, double *a) {
+  if (b.has_more && b.stiffening)
+    return bent_accelerations<by_multipliers>(b, z, s, a);
+  const double ww = s.omega * s.omega;
+  const int n = b.n, stride = b.padded, width = b.width();
+  for (int i = 0; i < n; i += 8) {
+    const int left = n - i;
+    const double *W = b.rows.data() + i;
+    Eight sum = Eight::zero();
+    if (!by_multipliers)
+      sum = ww * (left >= 8 ? Eight::load(p + i) : load_part(p + i, left)) - Eight::load(s.elastic.data() + i);
+    Eight sum2 = Eight::zero();
+    for (int r = 0; r < width; r += 2, W += 2 * stride)
+      sum += z[r] * Eight::load(W), sum2 += z[r + 1] * Eight::load(W + stride);
+    if (b.has_more) {
+      sum += z[2] * Eight::load(s.h.data() + i);
+      if (!by_multipliers)
+        sum += Eight::load(s.more.data() + i);
+    }
+    sum += sum2;
+    left >= 8 ? sum.store(a + i) : store_part(a + i, sum, left);
+  }
+}
+
+template <bool by_multipliers, class T>
+inline void modal_accelerations(const Body &b, const T *p, T *z, State<T> &s, T *a) {
+  if (b.has_more && b.stiffening)
+    return bent_accelerations<by_multipliers>(b, z, s, a);
+  const T ww = s.omega * s.omega;
+  for (int i = 0; i < b.n; ++i) {
+    T sum = by_multipliers ? T(0.) : T(ww * p[i] - s.elastic[i]);
+    for (int r = 0; r < b.width(); ++r)
+      if (const double w = b.columns[i * b.width() + r]; w != 0)
+        sum += w * z[r];
+    if (b.has_more)
+      sum += by_multipliers ? s.h[i] * z[2] : s.more[i] + s.h[i] * z[2];
+    a[i] = sum;
+  }
+}
+
+} // namespace ffrobot::recursion::planar
