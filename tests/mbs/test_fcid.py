@@ -81,6 +81,15 @@ def test_motor_and_modal_forces_are_those_of_the_velocity_transformation(name, m
         assert relative(np.concatenate([outcome.tau[k], outcome.F_p[k]]), force) < 1e-11
 
 
+@pytest.mark.parametrize("name", ["mixed backwards", "four-bar", "stiffened, driven"])
+def test_forces_at_any_time_are_those_at_outputs(name):
+    """Replays ask for them at times that go to and fro."""
+    _, outcome = solved(name)
+    tau, F_p = outcome.details.actuation_source(outcome).sample(TIMES[[3, 0, 4, 1]].tolist())
+    assert relative(tau, outcome.tau[[3, 0, 4, 1]]) < 1e-11
+    assert relative(F_p, outcome.F_p[[3, 0, 4, 1]]) < 1e-11
+
+
 @pytest.mark.parametrize("name", ["chain of 2", "mixed", "slider-crank", "loaded", "stiffened, driven"])
 def test_the_shape_of_a_free_vibration_takes_no_force(name):
     """p(t) as PCID finds it: FCID then gives the same λ, and nothing is needed to hold the shape."""

@@ -262,4 +262,3 @@ def test_rows_in_several_blocks():
     supported = [ritz_link(f"b{k}", "simply-supported", 0.5, 0.4, modes=1) for k in range(1, 35)]
     compare(driven_chain(supported, gravity=(1.0, -9.81)))
     compare(driven_chain(zoo.clouds(np.random.default_rng(0), 18)))
-

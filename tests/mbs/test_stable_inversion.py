@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import zoo
 from links import TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, relative, revolute
 from numpy.polynomial import Polynomial
 
 from ffrobot.common.errors import InputError, SolveError
+from ffrobot.mbs import _core
+from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase, path_error, run_motors_only
 from ffrobot.mbs.analysis.replay import ActuatorSet
@@ -189,6 +192,37 @@ def test_shorter_pre_actuation_starts_off_rest_as_told(two_links, carried):
     assert short.status == "completed"
     assert 1e-4 < short.details.inversion.off_rest < 1.0
     assert np.abs(path_error(short.details.inversion, short.time, short.q)).max() < 1e-12
+
+
+@pytest.mark.parametrize("motors", ["section", "frame"])
+@pytest.mark.parametrize("name", ["mixed backwards", "loaded", "four-bar", "slider-crank"])
+def test_motors_of_a_redefined_output_are_those_of_less_deflection(name, motors):
+    """The motors' coordinates are those on the path with a p + p_e; r is what the oracle finds unbalanced on modes."""
+    factor, rng = 0.6, np.random.default_rng(4)
+    servo = make_servo(zoo.build(name, motors=motors), 0.2, factor)
+    n, times = len(servo.scale), np.array([0.0, 0.1])
+    servo = servo.with_offset(tuple(TimeFunction.constant(float(p)) for p in 0.01 * rng.standard_normal(n)))
+    offset = np.array([function(0.0)[0] for function in servo.offset])
+    p, v, a = (size * rng.standard_normal((2, n)) for size in (0.01, 0.1, 1.0))
+    run = servo.motion.outputs(times.tolist(), p, v, a, servo.near[0])
+    path = _core.PrescribedMotion(servo.path_tree.both, servo.near[0])
+    seen = path.outputs(times.tolist(), factor * p + offset, factor * v, factor * a, servo.near[0])
+    driven, on_path = oracle_of(servo.driven), oracle_of(servo.path)
+    measures = servo.path.model.motors.values()
+    held = np.zeros(driven.size)
+    modes = np.setdiff1d(np.arange(driven.size), servo.driven.frame_coordinates)
+    r = servo.residuals(times, p, v, a)
+    for k, t in enumerate(times):
+        of_motors, expected = (
+            [mechanism.row(measure, q, q_dot).value for measure in measures]
+            for mechanism, q, q_dot in ((driven, run.q[k], run.v[k]), (on_path, seen.q[k], seen.v[k]))
+        )
+        np.testing.assert_allclose(of_motors, expected, atol=1e-12)
+        C_q = np.array([row.gradient for row in driven.rows(run.q[k], run.v[k])])
+        Q = driven.forces(t, run.q[k], run.v[k])
+        held[modes] = r[k]
+        needed = driven.mass_matrix(run.q[k]) @ run.a[k] + C_q.T @ run.multipliers[k]
+        assert relative(needed, Q + held, np.abs(Q).max()) < 1e-11
 
 
 def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
