@@ -69,11 +69,6 @@ LACKS = (
         "ffrobot.mbs.model.spatial_model",
     ),
     Lack(
-        "more rows of paths and cut loops than the core takes (`MOST_ROWS`)",
-        "fewer loops",
-        "ffrobot.mbs.model.spatial_system",
-    ),
-    Lack(
         "forward motions with geometric stiffening as FMUs",
         "`geometric_stiffening = false`",
         "ffrobot.exchange.fmu.forward_model",

@@ -4,8 +4,7 @@
 
 The wheel `example-robot-data` (pip download, 131 MB) unpacked is such a folder. One line for each file: moments equal
 (to what part of the largest), or why it is not imported. Of robots with more than 15 joints these are drawn at random
-and the others welded: scenes in space have no more rows of paths. Exit code 1 where moments differ or there is a
-traceback.
+and the others welded, which keeps runs short. Exit code 1 where moments differ or there is a traceback.
 """
 
 import argparse

@@ -91,7 +91,16 @@ def differences(function, n, h):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_derivatives_are_those_of_evaluations(name):
-    tree = tree_of(assemble(zoo.build(name)))
+    check_derivatives(tree_of(assemble(zoo.build(name))))
+
+
+def test_derivatives_with_rows_in_several_blocks():
+    tree = tree_of(assemble(zoo.chain(np.random.default_rng(0), 8)), free=True)
+    assert len(tree.rows) == 18
+    check_derivatives(tree)
+
+
+def check_derivatives(tree):
     model, rng = tree.model, np.random.default_rng(5)
     q, v = 0.1 * rng.standard_normal(model.n_q) + 0.5, rng.standard_normal(model.n_v)
     target, force = rng.standard_normal(len(tree.rows)), rng.standard_normal(model.n_v)

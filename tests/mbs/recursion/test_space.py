@@ -21,11 +21,13 @@ def test_each_joint_at_the_ground_and_between_bodies(joint, modes, clamped):
 
 
 def test_rows_in_several_blocks():
-    """Six bodies, free in the tree, that 18 rows of points, one of them along an axis that turns, hold to each other."""
+    """Six bodies, free in the tree, that 18 rows of points hold to each other, one along an axis that turns."""
     rng = np.random.default_rng(3)
     bodies = [random_body(rng, 3, J.revolute if k == 4 else J.free, parent=-1 if k < 4 else 3) for k in range(6)]
     rows = [
-        row(r.RowKind.point, (k - 1, 1), (k, 2), axis, name=f"{k}") for k in range(6) for axis in np.eye(3)[: 3 if k else 2]
+        row(r.RowKind.point, (k - 1, 1), (k, 2), axis, name=f"{k}")
+        for k in range(6)
+        for axis in np.eye(3)[: 3 if k else 2]
     ]
     rows.append(row(r.RowKind.slide, (-1, 0), (5, 1), (0.6, 0.8, 0.0)))
     check_balance(Mechanism(bodies, ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows]), rng)

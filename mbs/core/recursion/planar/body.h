@@ -5,7 +5,7 @@
 //     W = [S_bar_x; S_bar_y; h; Phi_x, Phi_y, Phi_rotation of port 0; of port 1; ...]
 // and G = W W^T, both constant (but for h where S_tilde is not zero, and with geometric stiffening: bent.h). They lie
 // in blocks of eight: the frame's three and port 0, ports 1 and 2, ports 3 and 4 … Where modes turn the section of a
-// pin (pins.h), that rotation is row TILT of the first block.
+// pin (pins.h), that rotation is row TILT of the first block; FORCE is a row of zeros, but in bent.h.
 #pragma once
 
 #include "core/recursion/planar/stiffening.h"
@@ -19,8 +19,8 @@ namespace ffrobot::recursion::planar {
 struct Port {
   double x = 0, y = 0, angle = 0; // undeformed, body axes
   int row = 3;                    // its first in W
-  bool is_soft = false;           // some row of Phi is not zero
-  bool turns = false;             // Phi_rotation is not zero
+  bool is_soft = false;           // modes move it
+  bool turns = false;             // … and turn it
 };
 
 struct Body {
