@@ -16,6 +16,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_list
 from .. import _core
+from ..model.model import Model
 from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause
@@ -164,7 +165,7 @@ def _integrated(
     return _core.run_sampled(**common, **more)
 
 
-def motion_of(assembly: MechanismSystem, run: _core.Run | _core.FcidOutputs, times: Array) -> Motion:
+def motion_of(assembly: MechanismSystem, run: _core.Run, times: Array) -> Motion:
     """The motion of a run of the core, as far as it got."""
     reached, held = len(run.q), len(assembly.constraints)
     return Motion(times[:reached], run.q, run.v, run.a, run.multipliers[:, :held], run.residual)
@@ -199,9 +200,13 @@ def initial_state(assembly: MechanismSystem) -> State:
     return start
 
 
+def motors_fit(model: Model) -> bool:
+    """Whether there is a path, and its forces can be told as those of the motors and on modes."""
+    return bool(model.trajectories) and len(model.motors) == model.degrees_of_freedom
+
+
 def resolver_of(assembly: MechanismSystem) -> _core.ActuatorForces | None:
     """What turns trajectory forces into motor and modal forces; None where the motors do not fit the mechanism."""
-    model = assembly.model
-    if not model.trajectories or len(model.motors) != model.degrees_of_freedom:
+    if not motors_fit(assembly.model):
         return None
     return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)

@@ -20,14 +20,16 @@ from ..fields.references import Reference
 from ..fields.waypoints import spline
 from ..model.model import ZERO, Model
 from ..model.planar_body import PlanarBody
+from ..model.planar_tree import PlanarTree, told_in_joints
 from ..model.spatial_body import SpatialBody
 from ..model.system import MechanismSystem
 from ..scene.analysis import Check, Need, TimedAnalysis
 from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
+from ..solve.quasi_static import quasi_static_shape
 from ..solve.reach import check_reach
 from .context import Context
-from .drive import motion_of, resolver_of
+from .drive import motion_of, motors_fit
 from .elastic_joints import add_transmission
 from .outcome import Details, Forces, Outcome, Statistics
 
@@ -94,10 +96,9 @@ class PrescribedShape(Details):
 
     def actuation_source(self, outcome: Outcome) -> _core.ActuationSource:
         """Everything is algebraic: it is solved for again at any time."""
-        assembly = outcome.assembly
-        return _core.FullyConstrainedActuation(
-            assembly.system, self.functions, outcome.q[0], assembly.is_trajectory, outcome.resolver()
-        )
+        tree = _tree(outcome.assembly, has_motors=outcome.tau is not None)
+        posture = tree.motion(outcome.q[0], outcome.v[0], outcome.a[0])[0]
+        return _core.PrescribedActuation(_core.PrescribedMotion(tree.both, posture), self.functions, posture)
 
 
 def run_fcid(model: Model, analysis: Fcid) -> Outcome:
@@ -117,15 +118,19 @@ def run_fcid(model: Model, analysis: Fcid) -> Outcome:
     start = undeformed_state(assembly)
     check_smooth(assembly, analysis.end)
     check_reach(assembly, start, analysis.times)
-    resolver = resolver_of(assembly)
+    has_motors = motors_fit(model)
+    tree = _tree(assembly, has_motors=has_motors)
+    posture = tree.motion(start.q, start.v, 0 * start.v)[0]
+    motion = _core.PrescribedMotion(tree.both, posture)
     if analysis.shape != "zero":
         import scipy.interpolate  # noqa: F401, loading takes longer than solving
     began = time.perf_counter()
-    shape = prescribed_shape(assembly, analysis, start.q, resolver)
-    run = _core.fully_constrained(assembly.system, as_list(analysis.times), shape, start.q, resolver)
+    shape = prescribed_shape(model, analysis, motion, posture)
+    p, p_dot, p_ddot = sampled(shape, analysis.times)
+    run = motion.outputs(as_list(analysis.times), p, p_dot, p_ddot, posture)
     seconds = time.perf_counter() - began
-    if not run.completed:
-        t = analysis.times[run.reached]
+    if len(run.q) < len(analysis.times):
+        t = analysis.times[len(run.q)]
         raise SolveError(
             f'{model.scene.path}: analysis "{analysis.name}": no position was found at t = {t:g} s: the'
             " prescribed shape takes the trajectory out of reach"
@@ -134,39 +139,48 @@ def run_fcid(model: Model, analysis: Fcid) -> Outcome:
         analysis=analysis,
         assembly=assembly,
         motion=motion_of(assembly, run, analysis.times),
-        forces=Forces(run.tau, run.F_p) if resolver else Forces(),
+        forces=Forces(run.tau, run.F_p) if has_motors else Forces(),
         statistics=Statistics(wall_seconds=seconds),
         details=PrescribedShape(shape, run.shape_force),
     )
 
 
-def prescribed_shape(
-    assembly: MechanismSystem, analysis: Fcid, guess: Array, resolver: _core.ActuatorForces | None
-) -> Shape:
-    """p(t) of every body, with its derivatives."""
-    bodies = assembly.model.bodies
+def prescribed_shape(model: Model, analysis: Fcid, motion: _core.PrescribedMotion, posture: Array) -> Shape:
+    """p(t) of every body, with its derivatives; `posture` (n_q,) of the tree at the start."""
     if analysis.shape == "given":
-        return given_shape(assembly.model.scene.path, bodies, analysis)
+        return given_shape(model.scene.path, model.bodies, analysis)
     if analysis.shape == "static":
-        return _static(assembly, analysis, guess, resolver)
-    return [[ZERO] * body.n_modes for body in bodies]
+        return _static(model, analysis, motion, posture)
+    return [[ZERO] * body.n_modes for body in model.bodies]
 
 
-def _static(assembly: MechanismSystem, analysis: Fcid, guess: Array, resolver: _core.ActuatorForces | None) -> Shape:
+def _static(model: Model, analysis: Fcid, motion: _core.PrescribedMotion, posture: Array) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
-    nodes = shape_nodes(analysis)
-    p = _core.static_shape(assembly.system, as_list(nodes), guess, resolver)
-    if len(p) < len(nodes):
+
+    def left_on_modes(at: Array, p: Array, near: Array | None) -> tuple[Array, Array]:
+        return motion.left_on_modes(as_list(at), p, 0 * p, 0 * p, posture[None] if near is None else near)
+
+    nodes, stiffness = shape_nodes(analysis), np.concatenate([body.stiffness for body in model.bodies])
+    p = quasi_static_shape(left_on_modes, stiffness, nodes)
+    is_found = np.isfinite(p).all(axis=1)
+    if not is_found.all():
         raise SolveError(
-            f'{assembly.model.scene.path}: analysis "{analysis.name}": no static shape was found at'
-            f" t = {nodes[len(p)]:g} s: the links are too soft for their loads there"
+            f'{model.scene.path}: analysis "{analysis.name}": no static shape was found at'
+            f" t = {nodes[is_found.argmin()]:g} s: the links are too soft for their loads there"
         )
-    return _by_body(assembly.model.bodies, spline(nodes, p))
+    return _by_body(model.bodies, spline(nodes, p))
 
 
 def shape_nodes(analysis: Fcid) -> Array:
     """Times (T,), s, between which shapes are splines."""
     return as_floats(np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1)))
+
+
+def sampled(shape: Shape, times: Array) -> Array:
+    """p, ṗ and p̈ (3, T, n) of all bodies."""
+    functions = [function for of_body in shape for function in of_body]
+    samples = np.array([function.sample(times) for function in functions]).reshape(len(functions), 3, len(times))
+    return np.ascontiguousarray(np.moveaxis(samples, 0, -1))
 
 
 def given_shape(scene_path: Path, bodies: Sequence[PlanarBody | SpatialBody], analysis: Fcid) -> Shape:
@@ -190,6 +204,10 @@ def given_shape(scene_path: Path, bodies: Sequence[PlanarBody | SpatialBody], an
             p = np.column_stack([function.sample(nodes)[0] for function in functions])
             shape.append(spline(nodes, np.linalg.lstsq(body.modal_transform, p.T, rcond=None)[0].T))
     return shape
+
+
+def _tree(assembly: MechanismSystem, *, has_motors: bool) -> PlanarTree:
+    return told_in_joints(assembly, "fcid", assembly.model.motors.values() if has_motors else ())
 
 
 def _by_body(bodies: Sequence[PlanarBody], functions: list[TimeFunction]) -> Shape:

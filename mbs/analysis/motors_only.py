@@ -17,7 +17,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError
 from ...common.numbers import MOST_OUTPUTS
 from .. import _core
@@ -28,18 +28,20 @@ from ..joints.measure import Measure
 from ..model.model import Model
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
-from ..solve.internal_dynamics import Output
-from ..solve.servo import SINGULAR, Servo, is_unstable, make_servo
+from ..solve.internal_dynamics import Output, is_unstable
+from ..solve.servo import Servo, make_servo
 from ..solve.stable_inversion import Inversion, Linearisation, S, invert, linearise
 from .context import Context
 from .drive import Progress, motion_of
 from .elastic_joints import add_transmission
+from .fcid import sampled
 from .outcome import Details, Forces, Outcome, Statistics
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
 FACTOR_STEP = 0.02  # of the search for the largest factor
 MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
 GROWTH = 1.0  # ln of what a motion of the zero dynamics may grow by along a path and count as bounded
+SINGULAR = 1e-13  # of M of the internal dynamics, scaled
 REST = 1e-9  # speed of a path at rest, relative to its mean speed
 
 
@@ -241,8 +243,10 @@ def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> Outco
     inversion, servo = found.inversion, found.inversion.servo
     times = output_times(analysis.end, analysis.output_step, found.pre_actuation, found.post_actuation)
     inside = times <= inversion.curve.x[-1] + 1e-9 * analysis.end  # what an integration reached
-    run = servo.core().outputs(times[inside].tolist(), inversion.shape, servo.resolver())
-    rows = slice(run.reached)
+    p, p_dot, p_ddot = sampled(inversion.shape, times[inside])
+    run = servo.motion.outputs(as_list(times[inside]), p, p_dot, p_ddot, servo.near[0])
+    reached = len(run.q)
+    rows = slice(reached)
     how = "two-point problem" if is_unstable(inversion.linearisation.zeros[0]).any() else "integrated forward"
     outcome = Outcome(
         analysis=analysis,
@@ -255,11 +259,11 @@ def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> Outco
             steps=len(inversion.curve.x) - 1,
             evaluations=inversion.iterations,
             wall_seconds=seconds,
-            time_reached=None if run.reached else float(inversion.curve.x[0]),
+            time_reached=None if reached else float(inversion.curve.x[0]),
             cause=cause_of(inversion),
         ),
         details=found,
     )
-    if not run.reached:  # an iteration that left the numbers: no motion to keep
+    if not reached:  # an iteration that left the numbers: no motion to keep
         outcome.check_completed()
     return outcome

@@ -14,10 +14,10 @@ from ..model.model import ZERO
 from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel
 from ..solve.spatial_posture import check_path, mobility, undeformed_posture
-from ..solve.spatial_prescribed import prescribed_motion, quasi_static_shape
+from ..solve.spatial_prescribed import prescribed_motion, spatial_quasi_static_shape
 from ..solve.spatial_redundancy import resolved
 from ..solve.state import State
-from .fcid import Fcid, Shape, given_shape, shape_nodes
+from .fcid import Fcid, Shape, given_shape, sampled, shape_nodes
 from .spatial_run import SpatialContext, SpatialRun
 
 
@@ -47,7 +47,7 @@ def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
 def _run(
     model: SpatialModel, analysis: Fcid, shape: Shape, start: State, times: Array, warnings: tuple[str, ...] = ()
 ) -> SpatialRun:
-    found = prescribed_motion(model, _sampled(shape, times), times, start)
+    found = prescribed_motion(model, sampled(shape, times), times, start)
 
     def again(others: Array) -> SpatialRun:
         return _run(model, analysis, shape, start, others)
@@ -58,13 +58,6 @@ def _run(
     )  # fmt: skip
 
 
-def _sampled(shape: Shape, times: Array) -> Array:
-    """p, ṗ and p̈ (3, T, n) of all bodies."""
-    functions = [function for of_body in shape for function in of_body]
-    samples = np.array([function.sample(times) for function in functions]).reshape(len(functions), 3, len(times))
-    return np.moveaxis(samples, 0, -1)
-
-
 def _shape(model: SpatialModel, analysis: Fcid, start: State, *, by_motors: bool) -> Shape:
     """p(t) of every body of the tree, with its derivatives: of static ones a spline, as in the plane."""
     bodies = [node.body for node in model.tree.nodes]
@@ -72,6 +65,6 @@ def _shape(model: SpatialModel, analysis: Fcid, start: State, *, by_motors: bool
         return given_shape(model.scene.path, bodies, analysis)
     if analysis.shape == "static":
         nodes = shape_nodes(analysis)
-        functions = iter(spline(nodes, quasi_static_shape(model, nodes, start, by_motors=by_motors)))
+        functions = iter(spline(nodes, spatial_quasi_static_shape(model, nodes, start, by_motors=by_motors)))
         return [[next(functions) for _ in range(body.n_modes)] for body in bodies]
     return [[ZERO] * body.n_modes for body in bodies]

@@ -13,7 +13,7 @@ from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel, row_values, without_paths
 from ..scene.analysis import output_times
 from ..solve.integrators import Choice
-from ..solve.servo import is_unstable
+from ..solve.internal_dynamics import is_unstable
 from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import Inversion, invert
 from .motors_only import MotorsOnly, cause_of, check_rest, choose_output, durations

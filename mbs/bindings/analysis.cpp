@@ -5,5 +5,5 @@
 void bind_analysis(nanobind::module_ &m) {
   bind_run(m);
   bind_sampled(m);
-  bind_inverse(m);
+  bind_replay(m);
 }

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.errors import InputError
 from .. import _core
 from .._core import TimeFunction
 from ..joints.measure import Marker, Measure
@@ -260,6 +261,16 @@ class PlanarTree:
         for index in self._rotors.keys() & coordinates:
             body.rotor_inertia, body.gear_ratio = self._rotors[index]
         return body
+
+
+def told_in_joints(assembly: MechanismSystem, kind: str, motors: Iterable[Measure] = ()) -> PlanarTree:
+    """The tree of an analysis that knows no other coordinates. Raises `InputError` for what cannot be told in it."""
+    try:
+        return PlanarTree(assembly, motors)
+    except NotInTreeError as why:
+        raise InputError(
+            f'{assembly.model.scene.path}: expected for kind = "{kind}" what joint coordinates can tell, found {why}'
+        ) from None
 
 
 def _shares(measure: Measure) -> Iterator[Share]:

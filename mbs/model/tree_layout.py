@@ -104,26 +104,18 @@ class Layout:
         """The coordinate of the tree that a measure is; None of others."""
         return self._coordinates.get(_key(measure))
 
-    def motor(self, measure: Measure) -> tuple[int, float, Array] | None:
-        """Number and sign of the coordinate along which a motor acts, and (n_v,) what modes add to its measure.
+    def motor(self, measure: Measure) -> tuple[int, float, bool] | None:
+        """Number and sign of the coordinate along which a motor acts, and whether it turns frames in place of sections.
 
-        None of those at joints where loops are cut. Frames turn as sections do, less what modes turn these.
-        Raises `NotInTreeError` where that is not linear in p.
+        None of those at joints where loops are cut.
         """
         if (coordinate := self.coordinate(measure)) is not None:
-            return *coordinate, np.zeros(0)
+            return *coordinate, False
         for node in self.nodes:
-            if node.joint is None or node.joint.coordinate("frame") != measure:
-                continue
-            of_sections = node.joint.coordinate("section")
-            assert of_sections is not None
-            on_modes = np.zeros(self.size)
-            for marker, sign in ((of_sections.a, 1.0), (of_sections.b, -1.0)):
-                if marker.body is not None:
-                    turning = self._turning(marker)
-                    first = self.nodes[self._index[marker.body]].modes
-                    on_modes[first : first + len(turning)] += sign * turning
-            return *self._coordinates[_key(of_sections)], on_modes
+            if node.joint is not None and node.joint.coordinate("frame") == measure:
+                of_sections = node.joint.coordinate("section")
+                assert of_sections is not None
+                return *self._coordinates[_key(of_sections)], True
         return None
 
     def section_angle(self, marker: Marker) -> Array:

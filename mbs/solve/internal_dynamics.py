@@ -1,44 +1,26 @@
-"""What stable inversion asks of a path under motors, in the plane or in space: r(t, p, ṗ, p̈) = 0 and what it is of."""
+"""Internal dynamics of a path under motors alone, in the plane and in space: r(t, p, ṗ, p̈) = 0, and its zeros.
+
+With p(t) given the joints follow from the path, and r, the modal forces that motors do not supply, is what has to
+vanish: the zero dynamics about a path that is held (Blajer and Kolodziejczyk 2004; Seifried 2014, ch. 4).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol, Self
 
-from ...common.arrays import Array
+import numpy as np
+
+from ...common.arrays import Array, Booleans, ComplexArray
+from ...common.errors import SolveError
 from .._core import TimeFunction
 
-
-class Derivatives(Protocol):
-    """Of r at N nodes, each of n² numbers a node."""
-
-    @property
-    def M(self) -> Array:
-        """By p̈."""
-        ...
-
-    @property
-    def D(self) -> Array:
-        """By ṗ."""
-        ...
-
-    @property
-    def K(self) -> Array:
-        """By p."""
-        ...
-
-
-class Evaluator(Protocol):
-    """Forces r (N, n) on modes that nobody supplies, at `times`, p, ṗ and p̈ (N, n); NaN out of reach."""
-
-    def residuals(self, times: list[float], p: Array, v: Array, a: Array, /) -> Array:
-        """R (N, n)."""
-        ...
-
-    def derivatives(self, times: list[float], p: Array, v: Array, a: Array, /) -> Derivatives:
-        """∂r/∂p̈, ∂r/∂ṗ, ∂r/∂p."""
-        ...
+DIFFERENCE = 1e-6  # of √J, by which a mode bends its link by about its length
+MOST_ITERATIONS = 50
+TOLERANCE = 1e-12  # of an equilibrium's last Newton step
+CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped
 
 
 class Target(NamedTuple):
@@ -63,6 +45,11 @@ class Output(Protocol):
         ...
 
     @property
+    def mode_sizes(self) -> Array:
+        """√J of the bodies of all modes (n,), m·√kg: coordinates that bend a link by about its length."""
+        ...
+
+    @property
     def scene_path(self) -> Path:
         """Of the scene, for messages."""
         ...
@@ -72,8 +59,8 @@ class Output(Protocol):
         """By body."""
         ...
 
-    def core(self) -> Evaluator:
-        """The evaluator of r."""
+    def residuals(self, times: Array, p: Array, v: Array, a: Array, /) -> Array:
+        """Forces r (N, n) on modes that nobody supplies, at `times` (N,), p, ṗ and p̈ (N, n); NaN out of reach."""
         ...
 
     def targets(self) -> Iterator[Target]:
@@ -87,3 +74,79 @@ class Output(Protocol):
     def with_offset(self, offset: tuple[TimeFunction, ...]) -> Self:
         """The same with what is expected of the deflections that the output leaves out."""
         ...
+
+
+@dataclass(frozen=True)
+class LinearDynamics:
+    """M δp̈ + D δṗ + K δp = 0 of the internal dynamics at `times` (N,): each (N, n, n)."""
+
+    times: Array
+    M: Array
+    D: Array
+    K: Array
+
+    def __call__(self, times: Array) -> tuple[Array, Array, Array]:
+        """M, D, K at any times, straight lines between those that are known."""
+        right = np.clip(np.searchsorted(self.times, times), 1, len(self.times) - 1)
+        left = right - 1
+        width = self.times[right] - self.times[left]
+        share = np.clip((times - self.times[left]) / width, 0.0, 1.0)[:, None, None]
+        M, D, K = ((1 - share) * x[left] + share * x[right] for x in (self.M, self.D, self.K))
+        return M, D, K
+
+
+def linear_dynamics(servo: Output, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
+    """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n).
+
+    By central differences; r is quadratic in ṗ and linear in p̈, so that these are exact there.
+    """
+    n = p.shape[1]
+    modes, at, found = np.array([p, v, a]), np.repeat(times, 2 * n), []
+    for k, step in enumerate((DIFFERENCE * servo.mode_sizes, np.ones(n), np.ones(n))):
+        moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
+        moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
+        r = servo.residuals(at, *moved.reshape(3, -1, n)).reshape(-1, 2, n, n)
+        found.append(((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1))
+    K, D, M = found
+    return LinearDynamics(times, M, D, K)
+
+
+def equilibrium(servo: Output, t: float) -> Array:
+    """Shape p (n,) at rest under path and loads as at time t. Raises `SolveError` where there is none."""
+    p: Array = np.zeros((1, len(servo.scale)))
+    rest, now = np.zeros_like(p), np.array([t])
+    for _ in range(MOST_ITERATIONS):
+        r = servo.residuals(now, p, rest, rest)[0]
+        K = linear_dynamics(servo, now, p, rest, rest).K[0]
+        if not (np.all(np.isfinite(r)) and np.all(np.isfinite(K))):
+            break
+        step = np.linalg.solve(K, r)
+        p = p - step
+        if np.linalg.norm(step) <= TOLERANCE * (np.linalg.norm(p) + 1e-12):
+            return np.asarray(p[0])
+    raise SolveError(
+        f"{servo.scene_path}: no equilibrium under the motors was found at t = {t:g} s: the links are too"
+        " soft for their loads there"
+    )
+
+
+def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:
+    """Matrix (2n, 2n) of ẏ = 𝒜 y for y = (ω p, ṗ), at node k."""
+    n = len(scale)
+    A = np.zeros((2 * n, 2 * n))
+    A[:n, n:] = np.diag(scale)
+    A[n:, :n] = -np.linalg.solve(dynamics.M[k], dynamics.K[k] / scale)
+    A[n:, n:] = -np.linalg.solve(dynamics.M[k], dynamics.D[k])
+    return A
+
+
+def zeros(dynamics: LinearDynamics, scale: Array) -> ComplexArray:
+    """Zeros (N, 2n) from motors to path, 1/s, of the equations frozen at each node; the slowest first."""
+    s = np.linalg.eigvals(np.array([first_order(dynamics, k, scale) for k in range(len(dynamics.times))]))
+    found: ComplexArray = np.take_along_axis(s, np.argsort(np.abs(s), axis=1, kind="stable"), axis=1)
+    return found
+
+
+def is_unstable(s: ComplexArray) -> Booleans:
+    """Zeros in the right half plane, beyond rounding."""
+    return s.real > CENTRE * np.abs(s)

@@ -12,12 +12,11 @@ from ..model.spatial_accelerations import Accelerated, row_accelerations
 from ..model.spatial_inverse import required_forces
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import split_forces
+from .quasi_static import quasi_static_shape
 from .spatial_posture import BoolArray, solve_postures
 from .state import State
 
 ONE_BY_ONE = 50  # groups of neighbours, each looked for from the last posture of the one before it
-MOST_ITERATIONS = 100
-SETTLED = 1e-13  # steps of a static shape, of its size
 
 
 class Prescribed(NamedTuple):
@@ -80,29 +79,26 @@ def _moved(model: SpatialModel, modes: Array, times: Array, q: Array) -> tuple[A
     return q, v, a, C_v
 
 
-def quasi_static_shape(model: SpatialModel, times: Array, start: State, *, by_motors: bool) -> Array:
+def spatial_quasi_static_shape(model: SpatialModel, times: Array, start: State, *, by_motors: bool) -> Array:
     """Of all bodies p (T, n) at `times` (T,), with which motors alone move the robot along its paths, ṗ = p̈ = 0.
 
-    Without `by_motors`, with which the forces on the paths do. By p ← p − F_p/K until nothing changes.
-    Raises `SolveError` where that does not converge: links too soft for their loads.
+    Without `by_motors`, with which the forces on the paths do. Raises `SolveError` where links are too soft.
     """
-    joints, p = model.tree.joint_columns, np.zeros((3, len(times), int(np.count_nonzero(~model.tree.joint_columns))))
-    K = np.concatenate([node.body.stiffness for node in model.tree.nodes])
-    for _ in range(MOST_ITERATIONS):
-        found = prescribed_motion(model, p, times, start)
+
+    def left_on_modes(at: Array, p: Array, near: Array | None) -> tuple[Array, Array]:
+        found = prescribed_motion(model, np.array([p, 0 * p, 0 * p]), at, start, near)
         frames = model.tree.frames(found.q)
-        C_v = row_values(model, found.q, times, frames)[1]
+        C_v = row_values(model, found.q, at, frames)[1]
         if by_motors:
             left = split_forces(model, found.q, frames, C_v, found.required).left
         else:
             left = found.required + np.einsum("tij,ti->tj", C_v, found.multipliers)
-        step = left[:, ~joints] / K
-        p[0] -= step
-        if not np.all(np.isfinite(p)):
-            break
-        if np.all(np.linalg.norm(step, axis=1) <= SETTLED * np.linalg.norm(p[0], axis=1)):
-            shape: Array = p[0]
-            return shape
+        return found.q, left[:, ~model.tree.joint_columns]
+
+    K = np.concatenate([node.body.stiffness for node in model.tree.nodes])
+    shape = quasi_static_shape(left_on_modes, K, times)
+    if np.isfinite(shape).all():
+        return shape
     raise SolveError(
         f"{model.scene.path}: no static shape was found between t = {times[0]:g} and {times[-1]:g} s: the links are too"
         " soft for their loads there"

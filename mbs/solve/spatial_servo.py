@@ -1,9 +1,4 @@
-"""A path in space whose force enters through the joint motors alone: its internal dynamics, as `servo` in the plane.
-
-With p(t) given the joints follow from the path and loops, and r(t, p, ṗ, p̈) = F_p, the modal forces that motors leave,
-is what has to vanish (Blajer and Kolodziejczyk 2004; Seifried 2014, ch. 4). It is quadratic in ṗ and linear in p̈, so
-that differences are exact there.
-"""
+"""A path in space whose force enters through the joint motors alone, as `servo` in the plane: `internal_dynamics`."""
 
 from __future__ import annotations
 
@@ -28,16 +23,7 @@ from .spatial_posture import BoolArray, mobility, solve_posture, undeformed_post
 from .spatial_prescribed import modal_places, motion_near
 
 POSTURES = 201  # along the path, from which others are looked for
-DIFFERENCE = 1e-6  # of √J, by which a mode bends its link by about its length
 MOST_STATES = 4000  # that are evaluated at once
-
-
-class Derivatives(NamedTuple):
-    """∂r/∂p̈, ∂r/∂ṗ and ∂r/∂p, each (N, n, n)."""
-
-    M: Array
-    D: Array
-    K: Array
 
 
 class ServoMotion(NamedTuple):
@@ -64,15 +50,18 @@ class SpatialServo:
     near: Array
     offset: tuple[TimeFunction, ...] = ()
 
-    def core(self) -> SpatialServo:
-        """The evaluator of r(t, p, ṗ, p̈)."""
-        return self
-
     @cached_property
     def scale(self) -> Array:
         """Frequencies ω of all modes (n,), rad/s."""
         omega: Array = np.sqrt(np.concatenate([node.body.stiffness for node in self.model.tree.nodes]))
         return omega
+
+    @property
+    def mode_sizes(self) -> Array:
+        """√J of the bodies of all modes (n,), m·√kg."""
+        nodes = self.model.tree.nodes
+        largest = [np.linalg.eigvalsh(node.body.inertia)[-1] for node in nodes]
+        return np.concatenate([np.full(node.body.n_modes, J**0.5) for node, J in zip(nodes, largest, strict=True)])
 
     @property
     def scene_path(self) -> Path:
@@ -115,27 +104,11 @@ class SpatialServo:
         split = split_forces(model, q, frames, row_values(model, q, times, frames)[1], required)
         return ServoMotion(q, v, a, required, split), is_met
 
-    def residuals(self, times: list[float], p: Array, v: Array, a: Array) -> Array:
+    def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
         """Modal forces r (N, n) that motors do not supply; NaN where no posture is found."""
-        at, modes = np.array(times), np.array([p, v, a])
-        parts = range(0, len(at), MOST_STATES)
-        return np.concatenate([self._left(at[k : k + MOST_STATES], modes[:, k : k + MOST_STATES]) for k in parts])
-
-    def derivatives(self, times: list[float], p: Array, v: Array, a: Array) -> Derivatives:
-        """By central differences; of ṗ and p̈, which r is quadratic and linear in, these are exact."""
-        n = p.shape[1]
-        lengths = [np.full(node.body.n_modes, np.sqrt(np.linalg.eigvalsh(node.body.inertia)[-1]))
-                   for node in self.model.tree.nodes]  # fmt: skip
-        steps = (DIFFERENCE * np.concatenate(lengths), np.ones(n), np.ones(n))
-        modes, at = np.array([p, v, a]), np.repeat(np.array(times), 2 * n)
-        found = []
-        for k, step in enumerate(steps):
-            moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
-            moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
-            r = self.residuals(list(at), *moved.reshape(3, -1, n)).reshape(-1, 2, n, n)
-            found.append(((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1))
-        K, D, M = found
-        return Derivatives(M, D, K)
+        modes = np.array([p, v, a])
+        parts = range(0, len(times), MOST_STATES)
+        return np.concatenate([self._left(times[k : k + MOST_STATES], modes[:, k : k + MOST_STATES]) for k in parts])
 
     def _left(self, times: Array, modes: Array) -> Array:
         found, is_met = self.motion(times, modes)

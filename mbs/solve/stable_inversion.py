@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, as_floats, as_list
+from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import SolveError
 from .. import _core
 from .collocation import GAUSS, Boundary, Found, Problem, collocate
-from .internal_dynamics import Evaluator, Output
-from .servo import LinearDynamics, equilibrium, first_order, is_unstable, linear_dynamics, zeros
+from .internal_dynamics import LinearDynamics, Output, equilibrium, first_order, is_unstable, linear_dynamics, zeros
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -87,13 +86,13 @@ def linearise(servo: Output, end: float) -> Linearisation:
 
     Raises `SolveError` where they are too soft for that.
     """
-    core, times = servo.core(), as_floats(np.linspace(0.0, end, SAMPLES))
+    times = as_floats(np.linspace(0.0, end, SAMPLES))
     rest: Array = np.zeros((SAMPLES, len(servo.scale)))
     p = rest
-    K = linear_dynamics(core, times, rest, rest, rest).K
+    K = linear_dynamics(servo, times, rest, rest, rest).K
     for _ in range(SHAPE_ITERATIONS):
-        p = p - np.linalg.solve(K, core.residuals(as_list(times), p, rest, rest)[:, :, None])[:, :, 0]
-    dynamics = linear_dynamics(core, times, p, rest, rest)
+        p = p - np.linalg.solve(K, servo.residuals(times, p, rest, rest)[:, :, None])[:, :, 0]
+    dynamics = linear_dynamics(servo, times, p, rest, rest)
     lost = ~np.isfinite(dynamics.M.sum(axis=(1, 2)) + dynamics.D.sum(axis=(1, 2)) + dynamics.K.sum(axis=(1, 2)))
     if lost.any():
         raise SolveError(
@@ -110,15 +109,15 @@ def invert(
 
     Raises `SolveError` where there is no equilibrium to start from or to end in, or where zeros change sides.
     """
-    core, end = servo.core(), float(linear.times[-1])
-    start, finish = _boundary(servo, core, -pre, unstable=False), _boundary(servo, core, end + post, unstable=True)
+    end = float(linear.times[-1])
+    start, finish = _boundary(servo, -pre, unstable=False), _boundary(servo, end + post, unstable=True)
     if len(start.rows) + len(finish.rows) != 2 * len(servo.scale):
         raise SolveError(
             f"{servo.scene_path}: stable inversion needs as many zeros in the right half plane before the"
             f" path as after it, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}"
         )
     problem = Problem(
-        lambda t, p, v, a: core.residuals(as_list(t), p, v, a), linear.dynamics, servo.scale,
+        servo.residuals, linear.dynamics, servo.scale,
         max(TINY, float(np.abs(servo.scale * linear.shape).max())), start, finish,
     )  # fmt: skip
     force = max(TINY, float(np.abs(servo.scale**2 * linear.shape).max()))
@@ -129,7 +128,7 @@ def invert(
 
         def about(times: Array, p: Array, v: Array) -> LinearDynamics:
             one = np.ones((len(times), 1))
-            return linear_dynamics(core, times, one * p, one * v, 0 * one * p)
+            return linear_dynamics(servo, times, one * p, one * v, 0 * one * p)
 
         solver.march(_breaks(pre, end, post, RESOLVED / float(np.abs(linear.zeros).max())), about)
     return Inversion(
@@ -197,7 +196,7 @@ class _Solver:
         return largest
 
 
-def _boundary(servo: Output, core: Evaluator, t: float, unstable: bool) -> Boundary:
+def _boundary(servo: Output, t: float, unstable: bool) -> Boundary:
     """No part of y − y_rest in the unstable subspace of the equilibrium at time t, or none in the rest.
 
     An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ. Undamped motions count as
@@ -205,8 +204,8 @@ def _boundary(servo: Output, core: Evaluator, t: float, unstable: bool) -> Bound
     """
     from scipy.linalg import schur
 
-    p, rest = equilibrium(servo, core, t), np.zeros((1, len(servo.scale)))
-    A = first_order(linear_dynamics(core, np.array([t]), p[None], rest, rest), 0, servo.scale)
+    p, rest = equilibrium(servo, t), np.zeros((1, len(servo.scale)))
+    A = first_order(linear_dynamics(servo, np.array([t]), p[None], rest, rest), 0, servo.scale)
     _, U, count = schur(A.T, sort=lambda re, im: bool(is_unstable(np.asarray(complex(re, im)))) == unstable)
     rows = U[:, :count].T * np.concatenate([servo.scale, np.ones_like(servo.scale)])
     return Boundary(rows, np.concatenate([p, rest[0]]))

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
+from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
 from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.fields.field_types import Vector2
 from ffrobot.mbs.joints.joints import JOINT_TYPES, Joint
@@ -46,13 +47,14 @@ class SceneWithSlots(Scene):
     joint: tuple[Annotated[get_args(Joint)[0] | SlotJoint, Field(discriminator="type")], ...] = ()
 
 
-def scene_with(joint):
+def scene_with(joint, trajectory=()):
     point = {"mass": 2.0, "inertia": 0.5, "center": [0.0, 0.0], "points": {"pin": [0.0, 0.0]}}
     keys = {
         "name": "slot",
         "gravity": [0.0, -9.81],
         "body": [{"name": "a", "rigid": point}],
         "joint": [joint],
+        "trajectory": list(trajectory),
         "initial": {"rates": {"a": 3.0}},
         "analysis": [{"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.1}],
         "path": "slot.toml",
@@ -70,6 +72,15 @@ def test_a_pin_slides_in_an_inclined_slot_and_turns():
     distance = 0.25 * 9.81 * outcome.time**2
     expected = np.column_stack([distance * 3.0**0.5 / 2, -distance / 2, 3.0 * outcome.time])
     assert relative(outcome.q, expected) < 1e-8
+
+
+def test_what_knows_joint_coordinates_alone_refuses_it_by_name():
+    paths = [{"name": "turn", "angle": "a", "value": "t**2"}, {"name": "slide", "point": "a.pin", "x": "t**2"}]
+    slot = {"name": "S", "type": "slot", "between": ["ground", "a.pin"], "way": [1.0, 0.0]}
+    scene = scene_with(slot, paths)
+    model = build_model(scene, [from_rigid_body("a", scene.body[0].rigid)])
+    with pytest.raises(InputError, match=r'kind = "fcid" what joint coordinates can tell, found joint "S", slot'):
+        run_fcid(model, Fcid(name="held", kind="fcid", shape="zero", end=1.0, output_step=0.1))
 
 
 def test_its_keys_are_checked():

@@ -2,18 +2,21 @@
 
 import numpy as np
 import pytest
+import zoo
 from links import TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import always, forward, make_model, oracle_of, relative, revolute
 from numpy.polynomial import Polynomial
 
 from ffrobot.common.errors import InputError, SolveError
+from ffrobot.mbs import _core
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase, path_error, run_motors_only
 from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.mbs.solve import stable_inversion
-from ffrobot.mbs.solve.servo import equilibrium, is_unstable, linear_dynamics, make_servo, zeros
+from ffrobot.mbs.solve.internal_dynamics import equilibrium, is_unstable, linear_dynamics, zeros
+from ffrobot.mbs.solve.servo import make_servo
 
 C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
 
@@ -34,11 +37,10 @@ def single_link(path, modes=4, damping_ratio=0.0, **keys):
 
 
 def at_rest(model, factor=1.0):
-    """The equations of motors only with the robot at rest at t = 0: evaluator, scale, M, D and K."""
+    """The equations of motors only with the robot at rest at t = 0: output, M, D and K."""
     servo = make_servo(model, 1.0, factor)
-    core = servo.core()
-    p, rest = equilibrium(servo, core, 0.0), np.zeros((1, len(servo.scale)))
-    return servo, linear_dynamics(core, np.zeros(1), p[None], rest, rest)
+    p, rest = equilibrium(servo, 0.0), np.zeros((1, len(servo.scale)))
+    return servo, linear_dynamics(servo, np.zeros(1), p[None], rest, rest)
 
 
 def exact_forward(model, outcome, **keys):
@@ -74,9 +76,8 @@ def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
     """M of r is Lᵀ M Z: Z keeps C_m and C_s, L C_m and the motors' coordinates (docs/theory.md, Motors alone)."""
     model = arm()
     servo, dynamics = at_rest(model)
-    p = iter(equilibrium(servo, servo.core(), 0.0))
-    shape = [[TimeFunction.constant(next(p)) for _ in body.stiffness] for body in model.bodies]
-    q = servo.core().outputs([0.0], shape, servo.resolver()).q[0]
+    p = equilibrium(servo, 0.0)[None]
+    q = servo.motion.outputs([0.0], p, 0 * p, 0 * p, servo.near[0]).q[0]
     modes = np.setdiff1d(np.arange(len(q)), servo.path.frame_coordinates)
 
     def keeps(assembly):
@@ -191,6 +192,37 @@ def test_shorter_pre_actuation_starts_off_rest_as_told(two_links, carried):
     assert short.status == "completed"
     assert 1e-4 < short.details.inversion.off_rest < 1.0
     assert np.abs(path_error(short.details.inversion, short.time, short.q)).max() < 1e-12
+
+
+@pytest.mark.parametrize("motors", ["section", "frame"])
+@pytest.mark.parametrize("name", ["mixed backwards", "loaded", "four-bar", "slider-crank"])
+def test_motors_of_a_redefined_output_are_those_of_less_deflection(name, motors):
+    """The motors' coordinates are those on the path with a p + p_e; r is what the oracle finds unbalanced on modes."""
+    factor, rng = 0.6, np.random.default_rng(4)
+    servo = make_servo(zoo.build(name, motors=motors), 0.2, factor)
+    n, times = len(servo.scale), np.array([0.0, 0.1])
+    servo = servo.with_offset(tuple(TimeFunction.constant(float(p)) for p in 0.01 * rng.standard_normal(n)))
+    offset = np.array([function(0.0)[0] for function in servo.offset])
+    p, v, a = (size * rng.standard_normal((2, n)) for size in (0.01, 0.1, 1.0))
+    run = servo.motion.outputs(times.tolist(), p, v, a, servo.near[0])
+    path = _core.PrescribedMotion(servo.path_tree.both, servo.near[0])
+    seen = path.outputs(times.tolist(), factor * p + offset, factor * v, factor * a, servo.near[0])
+    driven, on_path = oracle_of(servo.driven), oracle_of(servo.path)
+    measures = servo.path.model.motors.values()
+    held = np.zeros(driven.size)
+    modes = np.setdiff1d(np.arange(driven.size), servo.driven.frame_coordinates)
+    r = servo.residuals(times, p, v, a)
+    for k, t in enumerate(times):
+        of_motors, expected = (
+            [mechanism.row(measure, q, q_dot).value for measure in measures]
+            for mechanism, q, q_dot in ((driven, run.q[k], run.v[k]), (on_path, seen.q[k], seen.v[k]))
+        )
+        np.testing.assert_allclose(of_motors, expected, atol=1e-12)
+        C_q = np.array([row.gradient for row in driven.rows(run.q[k], run.v[k])])
+        Q = driven.forces(t, run.q[k], run.v[k])
+        held[modes] = r[k]
+        needed = driven.mass_matrix(run.q[k]) @ run.a[k] + C_q.T @ run.multipliers[k]
+        assert relative(needed, Q + held, np.abs(Q).max()) < 1e-11
 
 
 def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):

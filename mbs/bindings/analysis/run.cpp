@@ -90,6 +90,7 @@ void bind_outputs(nb::module_ &m) {
       .def_prop_ro("multipliers", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.lambda; })
       .def_prop_ro("tau", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.tau; })
       .def_prop_ro("F_p", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.F_p; })
+      .def_prop_ro("shape_force", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.shape_force; })
       .def_prop_ro("residual", [](const Run &r) -> const RowMajorMatrix & { return r.outputs.residual; });
 }
 

@@ -51,7 +51,7 @@ double violation_of(const SystemOnTree &both, double t, const VectorXd &q, const
   motion.evaluate(t, q.data(), v.data(), solved.data());
   recursion::NewtonEuler forces(both.tree);
   forces.accelerate(q.data(), a.data(), motion.workspace());
-  return acceleration_residual(both, t, a.data(), forces, motion.workspace());
+  return acceleration_residual(both, recursion::targets_at(both.scene, t), a.data(), forces, motion.workspace());
 }
 
 Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
@@ -153,11 +153,11 @@ void bind_reactions(nb::module_ &m) {
           "constraint"_a, "value"_a, "The multiplier of a constraint that holds a rotor against gravity; N.")
       .def(
           "add_motor",
-          [](ReactionsOnTree &r, int coordinate, double sign, const VectorXd &on_modes) {
-            r.motors.push_back({coordinate, sign, on_modes});
+          [](ReactionsOnTree &r, int coordinate, double sign, bool turns_frames) {
+            r.motors.push_back({coordinate, sign, turns_frames});
           },
-          "coordinate"_a, "sign"_a, "on_modes"_a,
-          "A motor along `sign` v[coordinate] + on_modes . v; on_modes (n_v,), or () for zeros.");
+          "coordinate"_a, "sign"_a, "turns_frames"_a,
+          "A motor along `sign` v[coordinate], or between the frames of the bodies there.");
 }
 
 void make_actuation(TreeActuation *made, const SystemOnTree &both, const Recording &recording) {
@@ -178,6 +178,7 @@ void bind_system_run(nb::module_ &m) {
            "bodies: number in the system of each of the tree's.")
       .def("acceleration_violation", &violation_of, "t"_a, "q"_a, "v"_a, "a"_a,
            "Largest violation of C_ddot = 0 by accelerations a (n_v) of the tree, relative to the terms that cancel.");
+  bind_prescribed(m);
   nb::class_<TreeActuation, ActuationSource>(m, "TreeActuation", "From the dense output of a recorded run of a tree.")
       .def("__init__", &make_actuation, "both"_a, "recording"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
   m.def("run_tree", &run_tree, "both"_a, nb::kw_only(), "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,

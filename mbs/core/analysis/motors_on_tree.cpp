@@ -1,9 +1,12 @@
 #include "core/analysis/motors_on_tree.h"
 
+#include "core/recursion/planar/bent.h"
+
 namespace ffrobot {
 
 using Eigen::Index;
 using Eigen::VectorXd;
+namespace planar = recursion::planar;
 
 MotorsOnTree::MotorsOnTree(const SystemOnTree &both)
     : both_(both), forces_(both.tree), lambda_(VectorXd::Zero(static_cast<Index>(both.tree.rows.size()))),
@@ -20,9 +23,6 @@ MotorsOnTree::MotorsOnTree(const SystemOnTree &both)
 void MotorsOnTree::project(const double *q, const TreeWorkspace &w, Eigen::Ref<VectorXd> Q) {
   forces_.load(lambda_.data(), nullptr, w);
   forces_.project(q, w, Q.data());
-  for (std::size_t r = 0; r < both_.tree.rows.size(); ++r)
-    if (const recursion::Row &row = both_.tree.rows[r]; row.node >= 0)
-      Q[both_.tree.nodes[static_cast<std::size_t>(row.node)].v + row.freedom] -= lambda_[static_cast<Index>(r)];
 }
 
 void MotorsOnTree::resolve(const double *q, const double *lambda, const TreeWorkspace &w) {
@@ -33,10 +33,34 @@ void MotorsOnTree::resolve(const double *q, const double *lambda, const TreeWork
   if (!cuts_.empty())
     close_loops(q, w);
   for (std::size_t k = 0; k < both_.reactions.motors.size(); ++k) {
-    const auto &[coordinate, sign, on_modes] = both_.reactions.motors[k];
-    const double tau = tau_[static_cast<Index>(k)] = sign * Q_[coordinate];
-    if (on_modes.size() > 0)
-      Q_ -= tau * on_modes;
+    const auto &[coordinate, sign, turns_frames] = both_.reactions.motors[k];
+    const double along = Q_[coordinate];
+    tau_[static_cast<Index>(k)] = sign * along;
+    if (turns_frames)
+      turn_frames(coordinate, along, w);
+  }
+}
+
+// Of a moment between the frames of bodies in place of their sections: what it does less on modes, F_p does more.
+void MotorsOnTree::turn_frames(int coordinate, double moment, const TreeWorkspace &w) {
+  const auto &nodes = both_.tree.nodes;
+  const auto add = [&](std::size_t i, int row, double size) { // of the section's turn, in W
+    const auto &node = nodes[i];
+    Q_.segment(node.p_v(), node.n()) += size * planar::rows_of(node.body, w.bodies[i]).row(row).transpose();
+  };
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const auto &node = nodes[i];
+    if (coordinate < node.v || coordinate >= node.p_v())
+      continue;
+    if (node.inboard >= 0)
+      add(i, node.body.ports[static_cast<std::size_t>(node.inboard)].row + 2, moment);
+    else if (node.body.is_tilted)
+      add(i, planar::Body::TILT, moment);
+    if (node.parent < 0)
+      return;
+    const auto inner = static_cast<std::size_t>(node.parent);
+    const auto port = static_cast<std::size_t>(node.parent_port - nodes[inner].first_port);
+    add(inner, nodes[inner].body.ports[port].row + 2, -moment);
   }
 }
 

@@ -29,6 +29,7 @@ private:
   // Of rows with -lambda, into Q (n_v)
   void project(const double *q, const TreeWorkspace &w, Eigen::Ref<Eigen::VectorXd> Q);
   void close_loops(const double *q, const TreeWorkspace &w);
+  void turn_frames(int coordinate, double moment, const TreeWorkspace &w);
 
   const SystemOnTree &both_;
   recursion::NewtonEuler forces_;

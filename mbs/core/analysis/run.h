@@ -14,10 +14,11 @@ using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eig
 
 // One row per output time that was reached.
 struct Outputs {
-  RowMajorMatrix q, v, a;  // (T, n_q), (T, n_v), (T, n_v)
-  RowMajorMatrix lambda;   // (T, constraints, then rotors)
-  RowMajorMatrix tau, F_p; // (T, motors) and (T, modes of all bodies); empty without actuator forces
-  RowMajorMatrix residual; // (T, 3) of C, C_dot, C_ddot: relative to the size of their terms
+  RowMajorMatrix q, v, a;     // (T, n_q), (T, n_v), (T, n_v)
+  RowMajorMatrix lambda;      // (T, constraints, then rotors)
+  RowMajorMatrix tau, F_p;    // (T, motors) and (T, modes of all bodies); empty without actuator forces
+  RowMajorMatrix shape_force; // (T, modes of all bodies) -lambda_p; empty where no shape is prescribed
+  RowMajorMatrix residual;    // (T, 3) of C, C_dot, C_ddot: relative to the size of their terms
 };
 
 // Where a run has stopped.

@@ -41,11 +41,8 @@ void SystemOnTree::check() const {
     check_index("constraint", constraint, constraints), check_index("node", node, count);
   for (const auto &[constraint, value] : reactions.weights)
     check_index("constraint", constraint, constraints);
-  for (const auto &motor : reactions.motors) {
+  for (const auto &motor : reactions.motors)
     check_index("coordinate of a motor", motor.coordinate, tree.n_v);
-    if (motor.on_modes.size() != 0 && motor.on_modes.size() != tree.n_v)
-      throw std::invalid_argument("on_modes: expected as many as velocities, or none");
-  }
 }
 
 namespace {

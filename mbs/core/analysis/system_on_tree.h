@@ -48,7 +48,7 @@ struct ReactionsOnTree {
   struct Motor {
     int coordinate; // in v
     double sign;
-    Eigen::VectorXd on_modes; // (n_v) what its measure changes by with modes where the coordinate stays; empty: nothing
+    bool turns_frames; // in place of the sections, which modes turn against these
   };
   std::vector<OfRow> rows;
   std::vector<OfJoint> joints;

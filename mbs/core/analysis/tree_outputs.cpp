@@ -8,15 +8,13 @@ namespace ffrobot {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-double acceleration_residual(const SystemOnTree &both, double t, const double *a, const recursion::NewtonEuler &forces,
+double acceleration_residual(const SystemOnTree &both, const std::vector<Jet> &targets, const double *a,
+                             const recursion::NewtonEuler &forces,
                              const recursion::Workspace<recursion::Planar, double> &w) {
   double worst = 0;
   for (std::size_t r = 0; r < both.tree.rows.size(); ++r) {
-    const recursion::Row &row = both.tree.rows[r];
-    const double target = both.scene.targets[r](t).acceleration;
-    auto [value, size] = forces.of_row(r, w);
-    if (row.node >= 0)
-      value = a[both.tree.nodes[static_cast<std::size_t>(row.node)].v + row.freedom], size = std::abs(value);
+    const double target = targets[r].acceleration;
+    const auto [value, size] = forces.of_row(r, a, w);
     worst = std::max(worst, std::abs(value - target) / (1 + std::abs(target) + size));
   }
   return worst;
@@ -43,10 +41,14 @@ TreeOutputs::TreeOutputs(const SystemOnTree &both, std::size_t count, double t, 
 }
 
 void TreeOutputs::evaluate(double t, const double *state) {
+  motion_.evaluate(t, state, state + both_.tree.n_q, a_.data());
+  find_accelerations(state, motion_.workspace());
+}
+
+void TreeOutputs::find_accelerations(const double *state, TreeWorkspace &w) {
   const double *q = state, *v = state + both_.tree.n_q;
-  motion_.evaluate(t, q, v, a_.data());
-  forces_.accelerate(q, a_.data(), motion_.workspace());
-  absolute_.accelerations(recursion::frame_motions(both_.tree, q, v, motion_.workspace()), a_.data(), system_a_.data());
+  forces_.accelerate(q, a_.data(), w);
+  absolute_.accelerations(recursion::frame_motions(both_.tree, q, v, w), a_.data(), system_a_.data());
 }
 
 const VectorXd &TreeOutputs::accelerations(double t, const double *state) {
@@ -55,12 +57,11 @@ const VectorXd &TreeOutputs::accelerations(double t, const double *state) {
 }
 
 void TreeOutputs::project(std::size_t output, double t) {
-  const Index n_q = both_.tree.n_q, n_v = both_.tree.n_v, i = static_cast<Index>(output);
+  const Index n_q = both_.tree.n_q;
   motion_.evaluate(t, state_.data(), state_.data() + n_q, a_.data());
   motion_.project(t, state_.data(), state_.data() + n_q);
   motion_.constraint_values(t, state_.data(), value_.data(), rate_.data());
-  outputs_.residual(i, 0) = value_.lpNorm<Eigen::Infinity>() / (1 + state_.head(n_q).lpNorm<Eigen::Infinity>());
-  outputs_.residual(i, 1) = rate_.lpNorm<Eigen::Infinity>() / (1 + state_.tail(n_v).lpNorm<Eigen::Infinity>());
+  write_violation(static_cast<Index>(output), value_, rate_);
 }
 
 void TreeOutputs::operator()(std::size_t output, double t, const double *state) {
@@ -69,15 +70,39 @@ void TreeOutputs::operator()(std::size_t output, double t, const double *state) 
   if (!both_.tree.rows.empty())
     project(output, t);
   evaluate(t, state_.data());
-  outputs_.residual(i, 2) = acceleration_residual(both_, t, a_.data(), forces_, motion_.workspace());
-  const VectorXd &absolute = absolute_(state_.data(), motion_.workspace().frames);
+  write(i, targets_at(both_.scene, t), motion_.workspace(), motion_.wrenches());
+}
+
+void TreeOutputs::operator()(std::size_t output, PrescribedMotion &motion) {
+  const auto i = static_cast<Index>(output);
+  state_ = motion.state();
+  a_ = motion.a();
+  write_violation(i, motion.values(), motion.rates());
+  find_accelerations(state_.data(), motion.workspace());
+  write(i, motion.targets(), motion.workspace(), motion.wrenches());
+  if (outputs_.shape_force.size() == 0)
+    outputs_.shape_force.resize(outputs_.q.rows(), both_.system.n_modes());
+  outputs_.shape_force.row(i) = motion.shape_force().transpose();
+  if (motors_)
+    outputs_.F_p.row(i) += outputs_.shape_force.row(i);
+}
+
+void TreeOutputs::write_violation(Index i, const VectorXd &value, const VectorXd &rate) {
+  const Index n_q = both_.tree.n_q, n_v = both_.tree.n_v;
+  outputs_.residual(i, 0) = value.lpNorm<Eigen::Infinity>() / (1 + state_.head(n_q).lpNorm<Eigen::Infinity>());
+  outputs_.residual(i, 1) = rate.lpNorm<Eigen::Infinity>() / (1 + state_.tail(n_v).lpNorm<Eigen::Infinity>());
+}
+
+void TreeOutputs::write(Index i, const std::vector<Jet> &targets, const TreeWorkspace &w, const double *wrenches) {
+  outputs_.residual(i, 2) = acceleration_residual(both_, targets, a_.data(), forces_, w);
+  const VectorXd &absolute = absolute_(state_.data(), w.frames);
   outputs_.q.row(i) = absolute.head(both_.system.n_q()).transpose();
   outputs_.v.row(i) = absolute.tail(both_.system.n_v()).transpose();
   outputs_.a.row(i) = system_a_.transpose();
-  write_multipliers(i);
+  write_multipliers(i, w, wrenches);
   if (!motors_)
     return;
-  motors_->resolve(state_.data(), motion_.workspace().lambda.data(), motion_.workspace());
+  motors_->resolve(state_.data(), w.lambda.data(), w);
   outputs_.tau.row(i) = motors_->tau().transpose();
   Index column = 0;
   for (std::size_t b = 0; b < both_.system.bodies.size(); ++b) {
@@ -88,15 +113,14 @@ void TreeOutputs::operator()(std::size_t output, double t, const double *state) 
 }
 
 // Those of joints are, with their signs, components of what these transmit.
-void TreeOutputs::write_multipliers(Index i) {
-  const auto &w = motion_.workspace();
+void TreeOutputs::write_multipliers(Index i, const TreeWorkspace &w, const double *wrenches) {
   for (const auto &[constraint, row, sign, is_trajectory] : both_.reactions.rows)
     outputs_.lambda(i, constraint) = sign * w.lambda[static_cast<std::size_t>(row)];
   for (const auto &[constraint, value] : both_.reactions.weights)
     outputs_.lambda(i, constraint) = value;
   if (both_.reactions.joints.empty())
     return;
-  forces_.load(w.lambda.data(), motion_.wrenches(), w);
+  forces_.load(w.lambda.data(), wrenches, w);
   forces_.transmit(w);
   for (const auto &[constraint, node, component, backwards] : both_.reactions.joints) {
     const auto at = static_cast<std::size_t>(node);
@@ -121,7 +145,7 @@ void TreeOutputs::write_multipliers(Index i) {
 
 Outputs TreeOutputs::take(std::size_t reached) {
   const auto T = static_cast<Index>(reached);
-  for (auto *x : {&outputs_.q, &outputs_.v, &outputs_.a, &outputs_.lambda, &outputs_.residual})
+  for (auto *x : {&outputs_.q, &outputs_.v, &outputs_.a, &outputs_.lambda, &outputs_.residual, &outputs_.shape_force})
     x->conservativeResize(T, Eigen::NoChange);
   if (motors_)
     for (auto *x : {&outputs_.tau, &outputs_.F_p})

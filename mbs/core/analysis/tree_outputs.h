@@ -3,15 +3,17 @@
 #pragma once
 
 #include "core/analysis/motors_on_tree.h"
+#include "core/analysis/prescribed_motion.h"
 #include "core/analysis/run.h"
 
 #include <optional>
 
 namespace ffrobot {
 
-// Largest violation of C_ddot = 0 by accelerations of the tree, a (n_v), relative to the terms that cancel in it.
-// Computed from a alone, not from the elimination that made it: after the accelerate() of a, with its workspace.
-double acceleration_residual(const SystemOnTree &both, double t, const double *a, const recursion::NewtonEuler &forces,
+// Largest violation of C_ddot = `targets` by accelerations of the tree, a (n_v), relative to the terms that cancel in
+// it. Computed from a alone, not from the elimination that made it: after the accelerate() of a, with its workspace.
+double acceleration_residual(const SystemOnTree &both, const std::vector<Jet> &targets, const double *a,
+                             const recursion::NewtonEuler &forces,
                              const recursion::Workspace<recursion::Planar, double> &w);
 
 class TreeOutputs {
@@ -21,6 +23,7 @@ public:
               ExternalLoads *external_loads);
 
   void operator()(std::size_t i, double t, const double *state); // (q, v) of the tree
+  void operator()(std::size_t i, PrescribedMotion &motion);
   Outputs take(std::size_t reached);
 
   // Accelerations of the system's coordinates at a state of the tree
@@ -28,9 +31,15 @@ public:
   AbsoluteState &absolute() { return absolute_; }
 
 private:
+  using TreeWorkspace = recursion::Workspace<recursion::Planar, double>;
+
   void project(std::size_t output, double t); // state_, with what rows leave of it
   void evaluate(double t, const double *state);
-  void write_multipliers(Eigen::Index i);
+  void write_violation(Eigen::Index i, const Eigen::VectorXd &value, const Eigen::VectorXd &rate);
+  void find_accelerations(const double *state, TreeWorkspace &w);
+  // Of state_ and a_, w having multipliers and accelerations of frames
+  void write(Eigen::Index i, const std::vector<Jet> &targets, const TreeWorkspace &w, const double *wrenches);
+  void write_multipliers(Eigen::Index i, const TreeWorkspace &w, const double *wrenches);
 
   const SystemOnTree &both_;
   std::optional<SteeredTree> steering_;

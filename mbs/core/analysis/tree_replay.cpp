@@ -9,43 +9,35 @@ namespace ffrobot {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-namespace {
-
-TreeMotion motion_of(const SystemOnTree &both, const Recording &recording) {
-  const double *state = recording.states.data();
-  return {both.tree, both.scene, recording.times.front(), state, state + both.tree.n_q};
-}
-
-} // namespace
-
-TreeActuation::TreeActuation(const SystemOnTree &both, const Recording &recording)
-    : ActuationSource(both.system), both_(both), steps_(motion_of(both, recording)),
-      motion_(motion_of(both, recording)), recorded_(steps_, recording), absolute_(both), workspace_(both.system),
-      a_(both.tree.n_v) {
+TreeSource::TreeSource(const SystemOnTree &both)
+    : ActuationSource(both.system), both_(both), absolute_(both), workspace_(both.system), shape_force_(modal_force_) {
   const auto &rows = both.reactions.rows;
   trajectory_force_ = VectorXd::Zero(std::ranges::count_if(rows, [](const auto &row) { return row.is_trajectory; }));
   if (!both.reactions.motors.empty())
     motors_.emplace(both);
 }
 
-void TreeActuation::find(double t) {
-  state_ = Eigen::Map<const VectorXd>(recorded_.state(t), both_.state_size());
-  const double *q = state_.data();
-  motion_.evaluate(t, q, q + both_.tree.n_q, a_.data());
-  const auto &w = motion_.workspace();
-  Index k = 0;
+void TreeSource::take(const double *state, const recursion::Workspace<recursion::Planar, double> &w,
+                      const VectorXd &shape_force) {
+  state_ = Eigen::Map<const VectorXd>(state, both_.state_size());
+  Index k = 0, column = 0;
   for (const auto &[constraint, row, sign, is_trajectory] : both_.reactions.rows)
     if (is_trajectory)
       trajectory_force_[k++] = -sign * w.lambda[static_cast<std::size_t>(row)];
+  if (shape_force.size() > 0)
+    for (VectorXd &of_body : shape_force_) {
+      of_body = shape_force.segment(column, of_body.size());
+      column += of_body.size();
+    }
   if (!motors_)
     return;
-  motors_->resolve(q, w.lambda.data(), w);
+  motors_->resolve(state, w.lambda.data(), w);
   tau_ = motors_->tau();
   for (std::size_t b = 0; b < modal_force_.size(); ++b)
-    modal_force_[b] = motors_->modal_force(b);
+    modal_force_[b] = motors_->modal_force(b) + shape_force_[b];
 }
 
-ActuationSource::OnBody TreeActuation::on_body(std::size_t body) {
+ActuationSource::OnBody TreeSource::on_body(std::size_t body) {
   const System &system = both_.system;
   const VectorXd &y = absolute_(state_.data());
   update_kinematics(system, y.data(), y.data() + system.n_q(), workspace_);
@@ -58,11 +50,41 @@ ActuationSource::OnBody TreeActuation::on_body(std::size_t body) {
       workspace_.lambda[row.constraint] = -trajectory_force_[k++];
       ffrobot::evaluate(system.rows[r], workspace_.bodies, workspace_.rows[r]);
     }
-  const Index n = system.bodies[body].modes();
-  OnBody found{y.segment(system.first_coordinate[body], 3 + n), {}};
+  OnBody found{y.segment(system.first_coordinate[body], 3 + system.bodies[body].modes()), {}};
   driving_force(
-      system, workspace_, [&](std::size_t r) { return is_trajectory[r]; }, VectorXd::Zero(n), body, found.Q_a);
+      system, workspace_, [&](std::size_t r) { return is_trajectory[r]; }, shape_force_[body], body, found.Q_a);
   return found;
+}
+
+namespace {
+
+TreeMotion motion_of(const SystemOnTree &both, const Recording &recording) {
+  const double *state = recording.states.data();
+  return {both.tree, both.scene, recording.times.front(), state, state + both.tree.n_q};
+}
+
+} // namespace
+
+TreeActuation::TreeActuation(const SystemOnTree &both, const Recording &recording)
+    : TreeSource(both), steps_(motion_of(both, recording)), motion_(motion_of(both, recording)),
+      recorded_(steps_, recording), a_(both.tree.n_v) {}
+
+void TreeActuation::find(double t) {
+  state_ = Eigen::Map<const VectorXd>(recorded_.state(t), both_.state_size());
+  motion_.evaluate(t, state_.data(), state_.data() + both_.tree.n_q, a_.data());
+  take(state_.data(), motion_.workspace());
+}
+
+PrescribedActuation::PrescribedActuation(PrescribedMotion &motion, std::vector<ModalShape> shape, const VectorXd &q)
+    : TreeSource(motion.both()), motion_(motion), shape_(std::move(shape)) {
+  motion_.start_at(q);
+}
+
+void PrescribedActuation::find(double t) {
+  // was found at all output times before; a failure in between shows as a step that is refused
+  if (motion_.move(t, modes_at(shape_, t)))
+    motion_.balance();
+  take(motion_.q(), motion_.workspace(), motion_.shape_force());
 }
 
 } // namespace ffrobot

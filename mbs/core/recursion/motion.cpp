@@ -32,6 +32,13 @@ Load::Load(const VectorXd &direction, TimeFunction magnitude_) : magnitude(std::
       along.emplace_back(static_cast<int>(i), direction[i]);
 }
 
+std::vector<Jet> targets_at(const Scene &scene, double t) {
+  std::vector<Jet> found;
+  for (const Target &target : scene.targets)
+    found.push_back(target(t));
+  return found;
+}
+
 template <class Space>
 RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
                                         const double *q, const double *v, const HeldForces *held, Steering *steering)
@@ -74,8 +81,7 @@ template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
   target_time_ = t;
 }
 
-template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
-  update_targets(t);
+template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, const double *q, const double *v) {
   Forces<double> forces;
   if (has_given_) {
     force_.setZero();
@@ -108,7 +114,12 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
   }
   if (steering_)
     steering_->add(t, force_.data(), wrench_.data());
-  accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
+  return forces;
+}
+
+template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
+  update_targets(t);
+  accelerations(mechanism_, q, v, act(t, q, v), target_.data(), workspace_, a);
 }
 
 template <class Space> void RecursiveMotion<Space>::act_at_points(double t, const double *q, const double *v) {

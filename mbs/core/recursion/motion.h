@@ -112,6 +112,8 @@ struct Scene {
   std::vector<double> most_bent; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
 
+std::vector<Jet> targets_at(const Scene &scene, double t); // of all rows
+
 // What a motion remembers of its steps: with it another one of the same mechanism goes on as if it had taken them.
 struct MotionHistory {
   NormPeaks peaks;
@@ -156,6 +158,8 @@ public:
   // At a state y = (q, v): accelerations (n_v); multipliers are in
   // workspace().lambda
   void evaluate(double t, const double *q, const double *v, double *a);
+  // What the scene does there beside gravity, elasticity and damping of modes; valid until the next call
+  Forces<double> act(double t, const double *q, const double *v);
   // Moves q (n_q) and v (n_v) onto the rows at time t; the largest residual
   // left, relative to 1 m, 1 rad, 1 m/s
   double project(double t, double *q, double *v);

@@ -62,12 +62,4 @@ VectorXd FrameSystem::solve(const VectorXd &b) const {
   return sparse_lu_->solve(b);
 }
 
-VectorXd FrameSystem::solve_transposed(const VectorXd &b) const {
-  if (is_dense_)
-    return lu_.transpose().solve(b);
-  if (sparse_lu_->info() != Eigen::Success)
-    return VectorXd::Constant(b.size(), std::numeric_limits<double>::quiet_NaN());
-  return sparse_lu_->transpose().solve(b);
-}
-
 } // namespace ffrobot

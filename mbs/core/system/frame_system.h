@@ -21,9 +21,8 @@ public:
                   const std::vector<PlanarBodyState> &bodies);
   void factorise();
 
-  // x of (columns) x = b, and of its transpose; NaN where the system is singular
+  // x of (columns) x = b; NaN where the system is singular
   Eigen::VectorXd solve(const Eigen::VectorXd &b) const;
-  Eigen::VectorXd solve_transposed(const Eigen::VectorXd &b) const;
 
 private:
   using SparseMatrix = Eigen::SparseMatrix<double>;

@@ -87,8 +87,19 @@ Vector in_port_axes_of(const Mechanism<Planar> &m, const Mechanism<Planar>::Acti
 
 NewtonEuler::NewtonEuler(const Mechanism<Planar> &mechanism)
     : mechanism_(mechanism), ports_(static_cast<std::size_t>(mechanism.ports)), on_ports_(ports_), with_joints_(ports_),
-      terms_(ports_.size()), inertia_(mechanism.nodes.size()), rotor_(inertia_.size()), of_joint_(inertia_),
-      in_global_axes_(inertia_), at_section_(inertia_), about_inner_(rotor_) {}
+      terms_(ports_.size()), frames_(mechanism.nodes.size()), inertia_(frames_), rotor_(inertia_.size()),
+      on_coordinates_(VectorXd::Zero(mechanism.n_v)), of_joint_(inertia_), in_global_axes_(inertia_),
+      at_section_(inertia_), about_inner_(rotor_) {}
+
+void NewtonEuler::prepare(const double *q, const double *v, const double *generalized,
+                          Workspace<Planar, double> &w) const {
+  kinematics(mechanism_, q, v, Forces<double>{generalized, nullptr}, w);
+  locate(mechanism_, q, w);
+  for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
+    const Node<Planar> &node = mechanism_.nodes[i];
+    inertia(node.body, q + node.p_q(), v + node.p_v(), w.bodies[i]);
+  }
+}
 
 void NewtonEuler::accelerate(const double *q, const double *a, const Workspace<Planar, double> &w) {
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
@@ -99,7 +110,7 @@ void NewtonEuler::accelerate(const double *q, const double *a, const Workspace<P
     Vector A;
     hinge.turn.back((node.parent < 0 ? ground : ports_[static_cast<std::size_t>(node.parent_port)]).data(), A.data());
     if (node.rotor_inertia > 0)
-      rotor_[i] = node.rotor_turns * node.rotor_inertia * (node.rotor_turns * A[2] + node.gear_ratio * a[node.v]);
+      rotor_[i] = node.rotor_inertia * (node.rotor_turns * A[2] + node.gear_ratio * a[node.v]);
     Turn::shift(hinge.r, A.data());
     Vector along{};
     for (int k = 0; k < node.shape.freedoms.count; ++k)
@@ -130,18 +141,28 @@ void NewtonEuler::accelerate(const double *q, const double *a, const Workspace<P
       terms_[at] = std::abs(modal[0]) + std::abs(modal[1]) + std::abs(modal[2]);
     }
     inertia_[i] = inertia_force(node.body, s, A, a + node.p_v(), u_ddot);
+    frames_[i] = A;
   }
+}
+
+void NewtonEuler::leave_frames(Workspace<Planar, double> &w) const {
+  for (std::size_t i = 0; i < frames_.size(); ++i)
+    std::copy_n(frames_[i].data(), 3, w.bodies[i].A);
 }
 
 void NewtonEuler::load(const double *lambda, const double *wrench, const Workspace<Planar, double> &w) {
   std::fill(on_ports_.begin(), on_ports_.end(), Vector{});
   for (const auto &actions : mechanism_.actions)
     for (const Action &action : actions.list) {
-      const double size = action.row < 0 ? 1 : -lambda[action.row];
-      if (action.row < 0 ? wrench != nullptr : size != 0)
+      const double size = action.row < 0 ? wrench != nullptr : lambda ? -lambda[action.row] : 0;
+      if (size != 0)
         add(in_port_axes_of(mechanism_, actions, action, wrench, w),
             on_ports_[static_cast<std::size_t>(actions.global_port)], size);
     }
+  on_coordinates_.setZero();
+  for (std::size_t r = 0; lambda && r < mechanism_.rows.size(); ++r)
+    if (const Row &row = mechanism_.rows[r]; row.node >= 0)
+      on_coordinates_[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom] -= lambda[r];
 }
 
 void NewtonEuler::transmit(const Workspace<Planar, double> &w) { inward(true, w); }
@@ -171,40 +192,85 @@ void NewtonEuler::inward(bool with_inertia, const Workspace<Planar, double> &w) 
     if (node.parent < 0)
       continue;
     if (with_inertia)
-      on_inner[2] += rotor_[i];
+      on_inner[2] += node.rotor_turns * rotor_[i];
     w.hinges[i].turn.apply(on_inner.data(), turned.data());
     add(turned, with_joints_[static_cast<std::size_t>(node.parent_port)], -1);
   }
+}
+
+// Of what joint i transmits, by its free components
+NewtonEuler::Vector NewtonEuler::along_joint(std::size_t i, const double *q) const {
+  const Node<Planar> &node = mechanism_.nodes[i];
+  Vector along = of_joint_[i], found{};
+  if (node.shape.in_inner_axes)
+    to_inner_axes(node, q + node.q, of_joint_[i].data(), along.data());
+  for (std::size_t k = 0; k < static_cast<std::size_t>(node.shape.freedoms.count); ++k)
+    found[k] = along[static_cast<std::size_t>(node.shape.freedoms.component[k])];
+  return found;
+}
+
+// By rows of W: forces on the ports of body i, and what its joint does to the section that modes move against the frame
+void NewtonEuler::collect_ports(std::size_t i, VectorXd &z) const {
+  const Node<Planar> &node = mechanism_.nodes[i];
+  const auto put = [&](int port, const Vector &f) {
+    for (Index k = 0; k < 3; ++k)
+      z[node.body.ports[static_cast<std::size_t>(port)].row + k] += f[static_cast<std::size_t>(k)];
+  };
+  for (int k = 0; k < node.outboard; ++k)
+    put(k, with_joints_[static_cast<std::size_t>(node.first_port + k)]);
+  if (node.inboard >= 0)
+    put(node.inboard, at_section_[i]);
+  else if (node.body.is_tilted)
+    z[Body::TILT] = at_section_[i][2];
 }
 
 void NewtonEuler::project(const double *q, const Workspace<Planar, double> &w, double *Q) {
   inward(false, w);
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Planar> &node = mechanism_.nodes[i];
-    Vector along = of_joint_[i];
-    if (node.shape.in_inner_axes)
-      to_inner_axes(node, q + node.q, of_joint_[i].data(), along.data());
+    const Vector along = along_joint(i, q);
     for (int k = 0; k < node.shape.freedoms.count; ++k)
-      Q[node.v + k] = -along[static_cast<std::size_t>(node.shape.freedoms.component[k])];
+      Q[node.v + k] = on_coordinates_[node.v + k] - along[static_cast<std::size_t>(k)];
     if (node.n() == 0)
       continue;
-    VectorXd z = VectorXd::Zero(node.body.width()); // forces by rows of W
-    const auto put = [&](int port, const Vector &f) {
-      for (Index k = 0; k < 3; ++k)
-        z[node.body.ports[static_cast<std::size_t>(port)].row + k] += f[static_cast<std::size_t>(k)];
-    };
-    for (int k = 0; k < node.outboard; ++k)
-      put(k, with_joints_[static_cast<std::size_t>(node.first_port + k)]);
-    if (node.inboard >= 0)
-      put(node.inboard, at_section_[i]);
-    else if (node.body.is_tilted)
-      z[Body::TILT] = at_section_[i][2];
+    VectorXd z = VectorXd::Zero(node.body.width());
+    collect_ports(i, z);
     Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) = planar::rows_of(node.body, w.bodies[i]).transpose() * z;
   }
 }
 
-NewtonEuler::RowAcceleration NewtonEuler::of_row(std::size_t r, const Workspace<Planar, double> &w) const {
+void NewtonEuler::require(const double *q, const double *a, Workspace<Planar, double> &w, double *f) {
+  inward(true, w);
+  for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
+    const Node<Planar> &node = mechanism_.nodes[i];
+    const Vector along = along_joint(i, q);
+    for (int k = 0; k < node.shape.freedoms.count; ++k)
+      f[node.v + k] = along[static_cast<std::size_t>(k)] - on_coordinates_[node.v + k];
+    if (node.rotor_inertia > 0)
+      f[node.v] += node.gear_ratio * rotor_[i];
+    if (node.n() == 0)
+      continue;
+    VectorXd z = VectorXd::Zero(node.body.width()), by_forces(node.n());
+    for (std::size_t k = 0; k < 3; ++k)
+      z[static_cast<Index>(k)] = -frames_[i][k];
+    collect_ports(i, z);
+    modal_accelerations<false>(node.body, q + node.p_q(), z.data(), w.bodies[i], by_forces.data());
+    const VectorXd beside = Eigen::Map<const VectorXd>(a + node.p_v(), node.n()) - by_forces;
+    Eigen::Map<VectorXd> modal(f + node.p_v(), node.n());
+    if (node.body.stiffening)
+      modal = bent_mass(node.body, w.bodies[i]) * beside;
+    else
+      modal = beside;
+  }
+}
+
+NewtonEuler::RowAcceleration NewtonEuler::of_row(std::size_t r, const double *a,
+                                                 const Workspace<Planar, double> &w) const {
   const Row &row = mechanism_.rows[r];
+  if (row.node >= 0) {
+    const double along = a[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom];
+    return {along, std::abs(along)};
+  }
   RowMotion<double> motion;
   row_motion(mechanism_, row, w, row.moves, motion);
   const double along = mechanism_.gravity[0] * motion.force[0] + mechanism_.gravity[1] * motion.force[1];

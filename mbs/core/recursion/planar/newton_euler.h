@@ -18,12 +18,16 @@ public:
 
   explicit NewtonEuler(const Mechanism<Planar> &mechanism); // which must outlive this
 
-  // Outward: accelerations of frames and ports by those of coordinates, a (n_v), and the forces that bodies and rotors
-  // take. `w` is that of an accelerations() at this state, nothing else having been done with it.
-  void accelerate(const double *q, const double *a, const Workspace<Planar, double> &w);
+  // What accelerations() leaves in `w` of a state, accelerations and multipliers aside. generalized (n_v) may be null.
+  void prepare(const double *q, const double *v, const double *generalized, Workspace<Planar, double> &w) const;
 
-  // What acts on ports beside joints: rows by their multipliers, with -lambda, and wrenches (wrenches, 3; may be null).
-  // `w` has kinematics, and frames where directions of rows move.
+  // Outward: accelerations of frames and ports by those of coordinates, a (n_v), and the forces that bodies and rotors
+  // take. `w` is that of an accelerations() or prepare() at this state, nothing else having been done with it.
+  void accelerate(const double *q, const double *a, const Workspace<Planar, double> &w);
+  void leave_frames(Workspace<Planar, double> &w) const; // their accelerations, as accelerations() does
+
+  // What acts beside joints: rows by their multipliers, with -lambda (may be null), and wrenches (wrenches, 3; may be
+  // null). `w` has kinematics, and frames where directions of rows move.
   void load(const double *lambda, const double *wrench, const Workspace<Planar, double> &w);
 
   // Inward: what joints do to their outer sections, so that the loads and what bodies take are balanced.
@@ -32,11 +36,15 @@ public:
   // Inward: generalized forces Q (n_v) of the loads.
   void project(const double *q, const Workspace<Planar, double> &w, double *Q);
 
+  // Inward, after accelerate() and load(): M a - Q (n_v), with Q of gravity, elasticity, damping, the loads, and the
+  // generalized forces on modes of prepare(), not those along joints.
+  void require(const double *q, const double *a, Workspace<Planar, double> &w, double *f);
+
   // Second derivative of the value of a row by these accelerations, and the size of the terms that cancel in it.
   struct RowAcceleration {
     double value, size;
   };
-  RowAcceleration of_row(std::size_t row, const Workspace<Planar, double> &w) const;
+  RowAcceleration of_row(std::size_t row, const double *a, const Workspace<Planar, double> &w) const;
 
   // After transmit(), of the joint of node i: force on the outer section, with its moment about the origin of that
   // section, in axes of the joint; in global axes; the same moment about the origin of the inner section.
@@ -46,12 +54,16 @@ public:
 
 private:
   void inward(bool with_inertia, const Workspace<Planar, double> &w);
+  Vector along_joint(std::size_t i, const double *q) const;
+  void collect_ports(std::size_t i, Eigen::VectorXd &z) const;
 
   const Mechanism<Planar> &mechanism_;
   std::vector<Vector> ports_, on_ports_, with_joints_; // of all ports: accelerations; loads; loads and what hangs there
   std::vector<double> terms_;                          // of all ports: what modes accelerate by
+  std::vector<Vector> frames_;                         // of bodies: accelerations, axes of the body
   std::vector<Vector> inertia_;                        // of bodies: (force, moment) at the frame, axes of the body
-  std::vector<double> rotor_;                          // moment that the rotor on the inner section takes from it
+  std::vector<double> rotor_;                          // rate of spin of the rotor on the inner section, times inertia
+  Eigen::VectorXd on_coordinates_;                     // (n_v) what rows that are joint coordinates do to these
   std::vector<Vector> of_joint_, in_global_axes_, at_section_; // by nodes; at_section_: in axes of the body
   std::vector<double> about_inner_;
 };
