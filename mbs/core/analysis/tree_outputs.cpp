@@ -15,8 +15,10 @@ double acceleration_residual(const SystemOnTree &both, double t, const double *a
     const recursion::Row &row = both.tree.rows[r];
     const double target = both.scene.targets[r](t).acceleration;
     auto [value, size] = forces.of_row(r, w);
-    if (row.node >= 0)
-      value = a[both.tree.nodes[static_cast<std::size_t>(row.node)].v + row.freedom], size = std::abs(value);
+    if (row.node >= 0) {
+      const double along = a[both.tree.nodes[static_cast<std::size_t>(row.node)].v + row.freedom];
+      value += row.share * along, size += std::abs(along);
+    }
     worst = std::max(worst, std::abs(value - target) / (1 + std::abs(target) + size));
   }
   return worst;

@@ -43,7 +43,7 @@ FFROBOT_INLINE Pack<T, W> multiplier_forces(const Mechanism<Space> &m, const Nod
     for (std::size_t r = 0; r < w.active.size(); ++r) {
       const Row &row = m.rows[w.active[r]];
       if (row.node >= 0 && &m.nodes[row.node] == &node && row.freedom == freedom)
-        forces.set(static_cast<int>(r) + 1, T(-1.));
+        forces.set(static_cast<int>(r) + 1, T(-row.share));
     }
   return forces;
 }
