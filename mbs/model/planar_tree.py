@@ -19,7 +19,7 @@ from ..joints.measure import Marker, Measure
 from ..joints.transmission import Friction
 from .model import ZERO, Constraint
 from .system import MechanismSystem
-from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError
+from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError, angle_between
 
 COMPONENTS = {_core.MeasureKind.x: 0, _core.MeasureKind.y: 1, _core.MeasureKind.angle: 2, _core.MeasureKind.gear: 2}
 """Of a planar wrench, of the force along a measure whose direction is that of the ground."""
@@ -48,9 +48,10 @@ class PlanarTree:
         core: bodies, joints, rows.
         scene: what rows follow, loads, friction.
         drives: where those drives of the system act whose forces are set from outside.
-        bodies: number in the system of each body of the tree.
+        bodies: number in the system of each body of the tree; after these it has what rotors turn beside it.
         both: the system and the tree, with what is one in the other.
-        constraints: of the system that are rows of `core`: trajectories, and joints that close loops.
+        constraints: of the system that are rows of `core`: trajectories, and joints that close loops. After these come
+            those of rotors beside the tree.
     """
 
     def __init__(self, assembly: MechanismSystem, motors: Iterable[Measure] = (), *, is_forced: bool = False) -> None:
@@ -59,8 +60,9 @@ class PlanarTree:
         `is_forced`: forces from outside act along all joints. Raises `NotInTreeError`.
         """
         model, self._assembly, self._layout = assembly.model, assembly, Layout(assembly.model)
-        self.bodies = [assembly.index[node.body.name] for node in self._layout.nodes]
-        modes = {number: node.modes for number, node in zip(self.bodies, self._layout.nodes, strict=True)}
+        of_bodies = [node for node in self._layout.nodes if node.beside is None]
+        self.bodies = [assembly.index[node.body.name] for node in of_bodies]
+        modes = {number: node.modes for number, node in zip(self.bodies, of_bodies, strict=True)}
         self.scene, self.drives = _core.TreeScene(), _core.DrivesOnTree([modes[k] for k in range(len(modes))])
         self._wrenches: dict[Marker, int] = {}
         self._along: list[tuple[Array, TimeFunction]] = []
@@ -70,6 +72,8 @@ class PlanarTree:
         loops = self._layout.loops
         self.constraints = tuple(c for c in assembly.constraints if c.is_trajectory or c.owner in loops)
         rows = [self._row(constraint) for constraint in self.constraints]
+        self._beside = {len(rows) + k: node for k, node in enumerate(self._layout.nodes[len(of_bodies) :])}
+        rows += [self._turned(node) for node in self._beside.values()]
         self._add_loads()
         self._add_what_joints_have()
         self.scene.is_strict = True
@@ -89,14 +93,14 @@ class PlanarTree:
         Raises `NotInTreeError` where trajectories and loops depend on each other there.
         """
         found = self.motion(q, v, np.zeros_like(v))
-        if len(self.core.keep_independent_rows(found[0], found[1])) < len(self.constraints):
+        if len(self.core.keep_independent_rows(found[0], found[1])) < len(self.constraints) + len(self._beside):
             raise NotInTreeError("trajectories and loops that depend on each other")
         return found[0], found[1]
 
     def motion(self, q: Array, v: Array, a: Array) -> Array:
         """Coordinates of the tree, their rates and accelerations (3, n_v), for those of the system (coordinates,)."""
         found = np.zeros((3, self._layout.size))
-        for number, node in zip(self.bodies, self._layout.nodes, strict=True):
+        for number, node in zip(self.bodies, self._layout.nodes, strict=False):
             first, n = int(self._assembly.first[number]), node.body.n_modes
             for of_tree, of_system in zip(found, (q, v, a), strict=True):
                 of_tree[node.modes : node.modes + n] = of_system[first + 3 : first + 3 + n]
@@ -107,6 +111,9 @@ class PlanarTree:
         readings = _core.Sensing(self._assembly.system, along, []).read(q[None], v[None], a[None])
         indices, signs = [c.number for c in coordinates], np.array([c.sign for c in coordinates])
         found[:, indices] = signs * readings[0].reshape(3, -1)
+        for row, node in self._beside.items():  # what is left of it where the rotor has not turned; linear
+            turned, rate = self.core.measure(found[0], found[1])
+            found[:, node.first] = turned[row], rate[row], self.core.measure(found[0], found[2])[1][row]
         return found
 
     @property
@@ -159,6 +166,16 @@ class PlanarTree:
             found.kind = _core.RowKind.rotation if component == 2 else _core.RowKind.point
             found.f = np.eye(3)[component]
         found.a, found.b = self._layout.place(measure.a), self._layout.place(measure.b, -measure.offset)
+        return found
+
+    def _turned(self, node: Node) -> _core.RowModel:
+        """What a rotor beside the tree turns by is the angle that it measures."""
+        assert node.beside is not None
+        found = _core.RowModel()
+        found.name, found.kind, found.coordinate = node.beside.label, _core.RowKind.rotation, node.first
+        found.f = np.array([0.0, 0.0, 1.0])
+        found.a, found.b = self._layout.place(node.beside.a), self._layout.place(node.beside.b)
+        self.scene.add_target(ZERO, 1.0)
         return found
 
     def _add_loads(self) -> None:
@@ -224,7 +241,7 @@ class PlanarTree:
             self.scene.add_joint_force(index, index, 0.0, 0.0, friction.viscous, friction.coulomb, friction.speed)
         for measure, inertia in model.rotors:
             is_gear = measure.kind == _core.MeasureKind.gear
-            turned = measure if not is_gear else _angle_between(measure)
+            turned = measure if not is_gear else angle_between(measure)
             index, sign = self._in_tree(turned, "a rotor")
             # it sits on the first side and spins with N Ω_second − (N − 1) Ω_first
             N = measure.gear_ratios[0] if is_gear else 1.0
@@ -281,8 +298,3 @@ def _shares(measure: Measure) -> Iterator[Share]:
     for marker, size in ((measure.b, of_b), (measure.a, -of_a)):
         if marker.body is not None:
             yield Share(marker, COMPONENTS[measure.kind], size)
-
-
-def _angle_between(measure: Measure) -> Measure:
-    """The angle of the second side of a gear on its first."""
-    return Measure(measure.label, _core.MeasureKind.angle, measure.a, measure.b)

@@ -15,9 +15,10 @@ from .. import _core
 from ..joints.joint import JointRecord
 from ..joints.measure import FRAME, GROUND_FRAME, Marker, Measure
 from ..joints.transmission import ElasticGear
+from ..scene.bodies import RigidBody
 from ..scene.topology import Carrier, Edge, Topology, spanning_forest
 from .model import Model
-from .planar_body import PlanarBody, core_arguments
+from .planar_body import PlanarBody, core_arguments, from_rigid_body
 
 
 class JointInTree(NamedTuple):
@@ -52,8 +53,9 @@ class Coordinate(NamedTuple):
 class Node(NamedTuple):
     """A body, the joint that carries it from section `inner` to `outer`, first indices of both in v.
 
-    `joint`: None of one that nothing carries, and of the output of a `gear` that gives, a body of no inertia whose
-    `body` is the rotor of the system. `backwards`: `inner` is the second side of the joint.
+    `joint`: None of one that nothing carries, and of bodies of no inertia that turn with a rotor: the output of a
+    `gear` that gives, whose `body` is the rotor of the system, and what a rotor `beside` the tree turns, the angle
+    between two markers that no coordinate is. `backwards`: `inner` is the second side of the joint.
     """
 
     body: PlanarBody
@@ -65,6 +67,12 @@ class Node(NamedTuple):
     joint: JointRecord | None = None
     backwards: bool = False
     gear: ElasticGear | None = None
+    beside: Measure | None = None
+
+    @property
+    def is_weightless(self) -> bool:
+        """Whether it has no inertia but that of a rotor."""
+        return self.gear is not None or self.beside is not None
 
 
 class Layout:
@@ -73,7 +81,8 @@ class Layout:
     Raises `NotInTreeError` for a type of joint that the core does not know.
 
     Attributes:
-        nodes: each after the one that carries it; outputs of gears that give come last.
+        nodes: each after the one that carries it; after them outputs of gears that give, then rotors beside the tree,
+            which are no bodies of the system.
         loops: names of the joints that close loops.
         size: of q and of v.
     """
@@ -93,6 +102,7 @@ class Layout:
             joint = None if carrier is None else model.scene.joint[carrier.joint]
             self.nodes.append(self._node(body, joint, carrier))
         self.nodes += [self._output(gear) for gear in model.gears]
+        self.nodes += [self._beside(*rotor) for rotor in model.rotors if self._is_beside(rotor[0])]
 
     def place(self, marker: Marker, turn: float = 0.0) -> _core.MarkerAt:
         """A marker, its axes turned by `turn` (rad) against its section or the ground."""
@@ -153,7 +163,7 @@ class Layout:
         """Constants of a body with all markers that were placed on it; terms that vanish are left empty."""
         body, found = self._bodies[number], _core.PlanarData()
         of_core = core_arguments(body, [], [])
-        if self.nodes[number].gear is None:
+        if not self.nodes[number].is_weightless:
             for key in ("mass", "inertia", "first_moment"):
                 setattr(found, key, of_core[key])
         if body.n_modes:
@@ -193,6 +203,23 @@ class Layout:
         self.size += count
         body = self._bodies[self._index[gear.rotor]]
         return Node(body, kind, self.place(a), self.place(b), first, first + count, gear=gear)
+
+    def _is_beside(self, rotor: Measure) -> bool:
+        return rotor.carries_moment and self.coordinate(angle_between(rotor)) is None
+
+    def _beside(self, measure: Measure, inertia: float) -> Node:
+        """It turns on the first side of the measure as the second does, which a row says."""
+        first, turned = self.size, angle_between(measure)
+        J = inertia * measure.gear_ratios[0] ** 2
+        body = from_rigid_body(measure.label, RigidBody(mass=J, inertia=J, center=(0.0, 0.0)))  # at 1 m: of no effect
+        self._index[body.name] = len(self._bodies)
+        self._bodies.append(body)
+        self._markers.append({})
+        self._coordinates[_key(turned)] = Coordinate(first, 1.0)
+        kind, count = JOINTS["revolute"]
+        self.size += count
+        sides = self.place(measure.a), self.place(Marker(body.name))
+        return Node(body, kind, *sides, first, first + count, beside=turned)
 
     def _sides(self, body: PlanarBody, joint: JointRecord | None) -> list[tuple[Marker, float]]:
         """Markers of a joint on its first and second side, and how their axes are turned: alike where it keeps these.
@@ -254,6 +281,11 @@ def _forest(model: Model) -> Topology:
 
     edges = [Edge(joint.between, rank(joint)) for joint in scene.joint]
     return spanning_forest([body.name for body in scene.body], edges)
+
+
+def angle_between(measure: Measure) -> Measure:
+    """The angle of the second side of a measure on its first."""
+    return Measure(measure.label, _core.MeasureKind.angle, measure.a, measure.b)
 
 
 def _key(measure: Measure) -> tuple[object, ...]:

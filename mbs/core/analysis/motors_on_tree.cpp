@@ -11,9 +11,12 @@ namespace planar = recursion::planar;
 MotorsOnTree::MotorsOnTree(const SystemOnTree &both)
     : both_(both), forces_(both.tree), lambda_(VectorXd::Zero(static_cast<Index>(both.tree.rows.size()))),
       tau_(VectorXd::Zero(static_cast<Index>(both.reactions.motors.size()))), Q_(VectorXd::Zero(both.tree.n_v)) {
+  std::vector<bool> is_trajectory(both.tree.rows.size(), false);
   for (const auto &row : both.reactions.rows)
-    if (!row.is_trajectory)
-      cuts_.push_back(row.row);
+    is_trajectory[static_cast<std::size_t>(row.row)] = row.is_trajectory;
+  for (std::size_t r = 0; r < is_trajectory.size(); ++r)
+    if (!is_trajectory[r])
+      cuts_.push_back(static_cast<int>(r));
   for (const auto &node : both.tree.nodes)
     for (int k = 0; k < node.shape.v_count; ++k)
       joint_coordinates_.push_back(node.v + k);

@@ -21,7 +21,7 @@ void check_index(const char *name, Index got, Index count) {
 void SystemOnTree::check() const {
   const auto count = static_cast<Index>(system.bodies.size()), drive_count = static_cast<Index>(system.drives.size());
   const auto constraints = static_cast<Index>(system.n_bilateral());
-  bool fits = bodies.size() == tree.nodes.size() && bodies.size() == system.bodies.size() &&
+  bool fits = bodies.size() <= tree.nodes.size() && bodies.size() == system.bodies.size() &&
               static_cast<Index>(drives.modes.size()) == count;
   for (std::size_t i = 0; fits && i < bodies.size(); ++i)
     fits = bodies[i] < system.bodies.size() && system.bodies[bodies[i]].modes() == tree.nodes[i].n() &&
@@ -65,7 +65,7 @@ const VectorXd &AbsoluteState::operator()(const double *state) {
 const VectorXd &AbsoluteState::operator()(const double *state, const std::vector<recursion::Pose<double>> &frames) {
   const System &system = both_.system;
   const double *q = state, *v = state + both_.tree.n_q;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
+  for (std::size_t i = 0; i < both_.bodies.size(); ++i) {
     const auto &node = both_.tree.nodes[i];
     const auto &[r, r_dot, omega, R, angle] = frames[i];
     const double x = node.origin[0], y = node.origin[1]; // of the body's frame, in axes of the tree's
@@ -87,7 +87,7 @@ const VectorXd &AbsoluteState::operator()(const double *state, const std::vector
 
 void AbsoluteState::accelerations(const std::vector<recursion::FrameMotion> &frames, const double *a_tree,
                                   double *a) const {
-  for (std::size_t i = 0; i < frames.size(); ++i) {
+  for (std::size_t i = 0; i < both_.bodies.size(); ++i) {
     const auto &node = both_.tree.nodes[i];
     double *of_body = a + both_.system.first_coordinate[both_.bodies[i]];
     if (node.is_weightless) {

@@ -60,7 +60,7 @@ struct SystemOnTree {
   const System &system;
   const PlanarTree &tree;
   const recursion::Scene &scene;
-  std::vector<std::size_t> bodies; // numbers in the system of the nodes
+  std::vector<std::size_t> bodies; // numbers in the system of the first nodes; those after them are no bodies of it
   DrivesOnTree drives;
   ReactionsOnTree reactions;
 

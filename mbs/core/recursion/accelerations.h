@@ -96,14 +96,16 @@ void measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space,
   locate(m, q, w);
   for (std::size_t r = 0; r < m.rows.size(); ++r) {
     const Row &row = m.rows[r];
-    if (row.model.kind == RowKind::coordinate) {
-      const Node<Space> &node = m.nodes[row.node];
-      value[r] = q[node.q + row.freedom], rate[r] = v[node.v + row.freedom];
-      continue;
+    value[r] = rate[r] = T(0.);
+    if (row.model.kind != RowKind::coordinate) {
+      RowMotion<T> motion;
+      row_motion(m, row, w, true, motion);
+      value[r] = motion.value, rate[r] = motion.rate;
     }
-    RowMotion<T> motion;
-    row_motion(m, row, w, true, motion);
-    value[r] = motion.value, rate[r] = motion.rate;
+    if (row.node >= 0) {
+      const Node<Space> &node = m.nodes[row.node];
+      value[r] += row.share * q[node.q + row.freedom], rate[r] += row.share * v[node.v + row.freedom];
+    }
   }
 }
 

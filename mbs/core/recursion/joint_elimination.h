@@ -34,13 +34,13 @@ template <class F, int d, class T> FFROBOT_INLINE void both_sides(const F &chang
   }
 }
 
-// Whether a row is the coordinate of a freedom of the node's joint
+// Whether a row has the coordinate of a freedom of the node's joint
 template <class Space>
 FFROBOT_INLINE bool is_along(const Mechanism<Space> &m, const Row &row, const Node<Space> &node, int freedom) {
   return row.node >= 0 && &m.nodes[row.node] == &node && row.freedom == freedom;
 }
 
-// What unit multipliers do along a freedom of the node's joint, by columns: rows that are this coordinate take it away.
+// What unit multipliers do along a freedom of the node's joint, by columns: rows that have this coordinate.
 template <class T, int W, class Space>
 FFROBOT_INLINE Pack<T, W> multiplier_forces(const Mechanism<Space> &m, const Node<Space> &node, int freedom,
                                             const Workspace<Space, T> &w) {
@@ -48,7 +48,7 @@ FFROBOT_INLINE Pack<T, W> multiplier_forces(const Mechanism<Space> &m, const Nod
   if (node.has_rows)
     for (std::size_t r = 0; r < w.active.size(); ++r)
       if (is_along(m, m.rows[w.active[r]], node, freedom))
-        forces.set(static_cast<int>(r) + 1, T(-1.));
+        forces.set(static_cast<int>(r) + 1, T(-m.rows[w.active[r]].share));
   return forces;
 }
 
@@ -61,7 +61,7 @@ FFROBOT_INLINE T multiplier_force(const Mechanism<Space> &m, const Node<Space> &
       T sum(0.);
       for (std::size_t r = 0; r < w.active.size(); ++r)
         if (is_along(m, m.rows[w.active[r]], node, freedom))
-          sum -= w.y[r + 1];
+          sum -= m.rows[w.active[r]].share * w.y[r + 1];
       return sum;
     }
   return (multiplier_forces<T, W>(m, node, freedom, w) * y).sum();

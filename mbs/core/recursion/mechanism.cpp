@@ -175,6 +175,8 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     }
   }
   for (const RowModel &model : row_models) {
+    if (model.coordinate >= 0 && model.kind != RowKind::coordinate && model.kind != RowKind::rotation)
+      refuse("row " + model.name + ": coordinate: expected one of a rotation alone, got one of another kind of row");
     Row row{model, {}, {}, -1, 0};
     if (model.kind != RowKind::coordinate)
       row.a = attach(model.a, used), row.b = attach(model.b, used);
@@ -193,7 +195,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
   for (BodyModel<Data> &body : bodies) {
     const int own = Space::shape(body.joint).v_count;
     for (const Row &row : rows)
-      if (row.model.kind == RowKind::coordinate && row.model.coordinate >= first && row.model.coordinate < first + own)
+      if (row.model.coordinate >= first && row.model.coordinate < first + own)
         body.driven = true;
     first += own + static_cast<int>(body.data.modes());
     if (body.parent >= 0 && (body.joint != JointKind::revolute || body.driven || body.rotor_inertia > 0))
@@ -216,9 +218,9 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     node.rotor_turns = model.joint == JointKind::revolute ? 1 : 0;
     node.q = n_q, node.v = n_v;
     for (Row &row : rows)
-      if (row.model.kind == RowKind::coordinate && row.model.coordinate >= n_v &&
-          row.model.coordinate < n_v + node.shape.v_count) {
+      if (row.model.coordinate >= n_v && row.model.coordinate < n_v + node.shape.v_count) {
         row.node = static_cast<int>(i), row.freedom = row.model.coordinate - n_v;
+        row.share = row.model.kind == RowKind::coordinate ? 1 : -1;
         node.has_rows = true;
       }
     const bool asked = model.driven || model.of_section || model.rotor_inertia > 0;
@@ -256,7 +258,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
       refuse("row " + row.model.name + ": expected a coordinate of a joint with rotations or one slide, got one of a " +
              "planar or free joint: use rows between markers");
   for (const Row &row : rows)
-    if (row.model.kind == RowKind::coordinate && row.node < 0)
+    if ((row.model.kind == RowKind::coordinate || row.model.coordinate >= 0) && row.node < 0)
       refuse("row " + row.model.name + ": expected a joint coordinate, got " + std::to_string(row.model.coordinate) +
              " of " + std::to_string(n_v) + " velocities");
 

@@ -61,7 +61,8 @@ struct Action {
 struct Row {
   RowModel model;
   Attachment a, b;
-  int node = -1, freedom = 0; // of a row that is a joint coordinate
+  int node = -1, freedom = 0; // of a row that has a joint coordinate
+  double share = 0;           // of that: 1 where the row is nothing else, -1 where it is taken off
   bool moves = false;         // its direction does
   bool follows = false;       // a side is a marker of the ground that turns
   double lift = 0;            // what it measures of gravity, one end being on the ground

@@ -201,8 +201,8 @@ template <class Space> void NewtonPosture<Space>::find_gradients(const Workspace
       acting_[static_cast<std::size_t>(node.parent_port)].noalias() += body.to_section.transpose() * on_frame;
   }
   for (std::size_t r = 0; r < mechanism_.rows.size(); ++r)
-    if (const Row &row = mechanism_.rows[r]; row.model.kind == RowKind::coordinate)
-      C_(static_cast<Index>(r), mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom) = 1;
+    if (const Row &row = mechanism_.rows[r]; row.node >= 0)
+      C_(static_cast<Index>(r), mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom) += row.share;
 }
 
 template <class Space> void NewtonPosture<Space>::take(const double *q, Workspace<Space, double> &w) {

@@ -162,7 +162,7 @@ void NewtonEuler::load(const double *lambda, const double *wrench, const Workspa
   on_coordinates_.setZero();
   for (std::size_t r = 0; lambda && r < mechanism_.rows.size(); ++r)
     if (const Row &row = mechanism_.rows[r]; row.node >= 0)
-      on_coordinates_[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom] -= lambda[r];
+      on_coordinates_[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom] -= row.share * lambda[r];
 }
 
 void NewtonEuler::transmit(const Workspace<Planar, double> &w) { inward(true, w); }
@@ -267,15 +267,14 @@ void NewtonEuler::require(const double *q, const double *a, Workspace<Planar, do
 NewtonEuler::RowAcceleration NewtonEuler::of_row(std::size_t r, const double *a,
                                                  const Workspace<Planar, double> &w) const {
   const Row &row = mechanism_.rows[r];
-  if (row.node >= 0) {
-    const double along = a[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom];
-    return {along, std::abs(along)};
-  }
+  const double along_joint =
+      row.node < 0 ? 0 : row.share * a[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom];
   RowMotion<double> motion;
   row_motion(mechanism_, row, w, row.moves, motion);
   const double along = mechanism_.gravity[0] * motion.force[0] + mechanism_.gravity[1] * motion.force[1];
   const double lift = ((row.a.node < 0) - (row.b.node < 0)) * along;
-  RowAcceleration found{motion.bias + lift, std::abs(motion.bias) + std::abs(lift)};
+  RowAcceleration found{along_joint + motion.bias + lift,
+                        std::abs(along_joint) + std::abs(motion.bias) + std::abs(lift)};
   for (const auto &actions : mechanism_.actions)
     for (const Action &action : actions.list)
       if (action.row == static_cast<int>(r)) {
