@@ -20,8 +20,6 @@ UNITS = "they take the same steps in any units of measure there"
 OTHERS = {"radau": UNITS, "generalized-alpha": UNITS}
 """Integrators that a run does not begin with in joint coordinates, and why: docs/recursion.md."""
 
-LOOPS = "closed loops stop there where they are singular"
-
 ALONE = "a body that is joined to no other"  # errors of forces are judged between bodies, not on the ground
 
 
@@ -50,8 +48,6 @@ def tree_start(
         return "as the run that it goes on with"
     if integrator.name in OTHERS:
         return OTHERS[integrator.name]
-    if assembly.model.scene.topology.loop_joints:
-        return LOOPS
     scene = assembly.model.scene
     joined = {body for joint in scene.joint if GROUND not in joint.bodies for body in joint.bodies}
     if any(body.name not in joined for body in assembly.model.links):

@@ -76,7 +76,7 @@ class PlanarTree:
         rows += [self._turned(node) for node in self._beside.values()]
         self._add_loads()
         self._add_what_joints_have()
-        self.scene.is_strict = True
+        self.scene.is_strict, self.scene.has_loops = True, bool(loops)
         self.scene.most_bent = [node.body.inertia for node in self._layout.nodes]
         wrenches = [self._layout.place(marker) for marker in self._wrenches]
         bodies = [self._body(number, node) for number, node in enumerate(self._layout.nodes)]

@@ -272,6 +272,7 @@ void bind_tree_motion(nb::module_ &m) {
           },
           "is_path"_a, "length"_a,
           "Watch how well the joints can follow the rows of the path; the run diverges where they cannot at all.")
+      .def_rw("has_loops", &Scene::has_loops, "Whether rows close loops: the run ends where these are singular.")
       .def_rw("is_strict", &Scene::is_strict, "Whether steps are limited and errors judged as in planar scenes.")
       .def_rw("most_bent", &Scene::most_bent, "(bodies) kg m^2: largest p^T p of each that makes sense; empty: any.")
       .def(

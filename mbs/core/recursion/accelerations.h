@@ -73,14 +73,17 @@ void accelerations(const Mechanism<Space> &m, const T *q, const T *v, const Forc
   with_columns<Space, T>(w.columns, [&](auto W) { run<Space, T, W>(m, q, v, forces, target, w, a); });
 }
 
-template <class Space, class T>
-void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq) {
+// Of rows, those that are active, into w.y
+template <class Space, class T> void put_active(const T *of_rows, Workspace<Space, T> &w) {
   std::fill(w.y.begin(), w.y.end(), T(0.));
   for (std::size_t r = 0; r < w.active.size(); ++r)
-    w.y[r + 1] = residual[w.active[r]];
+    w.y[r + 1] = of_rows[w.active[r]];
+}
+
+// What the multipliers in w.y do
+template <class Space, class T> void respond(const Mechanism<Space> &m, const T *q, Workspace<Space, T> &w, T *dq) {
   if (!w.blocks.empty())
-    return respond_in_blocks(m, q, w, dq);
-  solve_again(w.factor.data(), w.columns - 1, w.y.data() + 1);
+    return release_blocks<true>(m, q, w, dq);
   with_columns<Space, T>(w.columns, [&](auto W) {
     const auto y = Pack<T, W>::read(w.y.data());
     if constexpr (W == most_columns)
@@ -88,6 +91,19 @@ void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspac
     else
       release_all<true, Space, T, W>(m, q, y, w, dq);
   });
+}
+
+template <class Space, class T>
+void respond(const Mechanism<Space> &m, const T *q, const T *lambda, Workspace<Space, T> &w, T *dq) {
+  put_active(lambda, w);
+  respond(m, q, w, dq);
+}
+
+template <class Space, class T>
+void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq) {
+  put_active(residual, w);
+  solve_again(w.factor.data(), w.factored(), w.y.data() + 1);
+  respond(m, q, w, dq);
 }
 
 template <class Space, class T>

@@ -98,11 +98,4 @@ void run_in_blocks(const Mechanism<Space> &m, const T *q, const T *v, const Forc
   ++w.evaluations;
 }
 
-// `response` to w.y
-template <class Space, class T>
-void respond_in_blocks(const Mechanism<Space> &m, const T *q, Workspace<Space, T> &w, T *dq) {
-  solve_again(w.factor.data(), static_cast<int>(w.active.size()), w.y.data() + 1);
-  release_blocks<true>(m, q, w, dq);
-}
-
 } // namespace ffrobot::recursion

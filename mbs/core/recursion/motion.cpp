@@ -59,6 +59,10 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   keep_independent_rows(mechanism, q, v, workspace_);
   newton_.keep(workspace_.active);
   find_stiff_terms();
+  if (scene.has_loops && !workspace_.active.empty()) {
+    accelerations(mechanism, q, v, Forces<double>(), target_.data(), workspace_, unused_.data());
+    loops_.emplace(mechanism, workspace_);
+  }
   for (const GearSpring &gear : scene_.gears)
     for (const Node<Space> &node : mechanism.nodes)
       if (node.v == gear.a.v)
@@ -150,6 +154,8 @@ template <class Space> void RecursiveMotion<Space>::slope(double t, const double
   local().rate(z, z_dot);
   const double *q = local().state(z);
   evaluate(t, q, z + n_v(), z_dot + n_v());
+  if (loops_ && !loops_->has_begun())
+    loops_->begin_at(q, workspace_, newton_);
   std::copy_n(q, mechanism_.n_q, evaluated_.data());
   std::copy_n(z + n_v(), n_v(), rates_.data());
   posture_is_old_ = true;
@@ -208,6 +214,8 @@ template <class Space> double RecursiveMotion<Space>::error_size(double t, const
   norm_.observe(workspace_);
   if (!norm_.observes())
     return size;
+  if (loops_ && !(loops_->cosine(local().state(z), workspace_) > 0)) // shorter steps end before that posture
+    return std::numeric_limits<double>::infinity();
   // Forces amplify errors of the state (stiffness times the error of a fast mode): measure what e does to them. Where
   // it is small, in a difference that rounding of forces does not disturb.
   const double stretch = size > 0 ? std::max(1.0, least_shift / size) : 1;
@@ -225,6 +233,8 @@ double RecursiveMotion<Space>::change_size(const double *, const double *change,
 template <class Space> void RecursiveMotion<Space>::accepted(double t, const double *z, const double *z_dot) {
   if (accepted_ == 0)
     norm_.observe(workspace_);
+  if (loops_ && loops_->is_far())
+    loops_->begin_at(local().state(z), workspace_, newton_);
   norm_.take(z, z_dot, scene_.is_strict && has_given_ ? force_.data() : nullptr, workspace_);
   if (accepted_ % steps_between_postures_ == 0)
     watch_posture(t, local().state(z));

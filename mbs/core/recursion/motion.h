@@ -10,6 +10,7 @@
 #include "core/recursion/cut.h"
 #include "core/recursion/frame_motor.h"
 #include "core/recursion/held_forces.h"
+#include "core/recursion/loop_watch.h"
 #include "core/recursion/motion_norm.h"
 #include "core/recursion/newton.h"
 #include "core/recursion/posture.h"
@@ -105,6 +106,7 @@ struct Scene {
   std::vector<CutLoad> cut_loads;
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;
+  bool has_loops = false; // closed by rows: steps do not lead across postures in which all rows depend on each other
   // As scenes in the plane have it: steps are limited where functions of time bend (OdeSystem::prescribe), errors of
   // forces between bodies count twice, and those of links that given forces hold straight are compared with what these
   // would bend them.
@@ -212,6 +214,8 @@ private:
   Eigen::VectorXd singular_posture_;
   unsigned long accepted_ = 0, steps_between_postures_ = 1; // many where steps follow vibrations
   double watched_at_ = 0, determinant_ = 0;                 // of the posture before
+
+  std::optional<LoopWatch<Space>> loops_; // where the scene has some
 
   Eigen::VectorXd stiffness_, damping_; // diagonals (n_v, then cut joints); of friction as at the last factorisation
   std::vector<Eigen::Index> turned_;    // stiff coordinates along pins whose section modes turn

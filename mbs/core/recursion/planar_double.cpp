@@ -9,6 +9,7 @@ using W = Workspace<Planar, double>;
 template struct Workspace<Planar, double>;
 template void accelerations(const M &, const double *, const double *, const Forces<double> &, const double *, W &,
                             double *);
+template void respond(const M &, const double *, const double *, W &, double *);
 template void response(const M &, const double *, const double *, W &, double *);
 template void measure(const M &, const double *, const double *, W &, double *, double *);
 template void cut_rates(const M &, const std::vector<CutJoint> &, const double *, const double *, W &, double *);

@@ -86,7 +86,7 @@ template <class Space, class T> struct Workspace {
   Aligned<T> z;                   // of the widest body
   Aligned<T> schur;               // (all rows)^2 C M^-1 C^T of active ones
   bool keeps_schur = false;       // asked for
-  Aligned<T> factor;              // (columns - 1, or all rows)^2, L and 1/D of it
+  Aligned<T> factor;              // factored()^2, L and 1/D of it
   std::vector<int> active;        // rows that are kept; others depend on them
   std::vector<int> column;        // of each row; 0: not kept, or not in the block at hand
   std::vector<Block<T>> blocks;   // of active rows where they are more than columns; else none
@@ -97,6 +97,7 @@ template <class Space, class T> struct Workspace {
   unsigned long evaluations = 0;
 
   void keep(std::vector<int> rows); // these alone
+  int factored() const { return blocks.empty() ? columns - 1 : static_cast<int>(active.size()); }
 };
 
 // Forces beside gravity, elasticity and damping
@@ -110,8 +111,12 @@ template <class Space, class T>
 void accelerations(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
                    Workspace<Space, T> &w, T *a);
 
-// What the multipliers that answer a residual do to a system at rest: dq (n_v) = -M^-1 C^T (C M^-1 C^T)^-1 residual
-// (rows), with the factors of the last accelerations(), at whose state q is.
+// What multipliers (rows) do to a system at rest: dq (n_v) = -M^-1 C^T lambda, those of active rows, with the columns
+// of the last accelerations(), at whose state q is. Motions and forces at ports in `w` are those of dq afterwards.
+template <class Space, class T>
+void respond(const Mechanism<Space> &m, const T *q, const T *lambda, Workspace<Space, T> &w, T *dq);
+
+// The same with the multipliers that answer a residual: dq = -M^-1 C^T (C M^-1 C^T)^-1 residual (rows).
 template <class Space, class T>
 void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq);
 
