@@ -26,34 +26,47 @@ public:
     if (count == 0)
       return;
     response_ = rows.transpose().template cast<Scalar>();
-    for (Eigen::Index r = 0; r < count; ++r)
-      tree_.solve(response_.col(r).data());
-    Matrix S = rows.template cast<Scalar>() * response_;
-    S.bottomRows(extra).array().colwise() *= E_extra.array();
-    S.diagonal().tail(extra).array() += Scalar(1);
+    nu_.resize(count);
+    Matrix S(count, count);
+    for (Eigen::Index r = 0; r < count; ++r) {
+      tree_.solve(&response_(0, r));
+      along_rows(&response_(0, r), &S(0, r));
+      S(r, r) += r < count - extra ? 0. : 1.;
+    }
     schur_.factorise(std::move(S));
   }
 
   // x (n_v): B^T r in, the solution out; c of the kept rows, or null for zero
   void solve(const Scalar *c, Scalar *x) {
     tree_.solve(x);
-    const Eigen::Index count = rows_->rows(), extra = E_extra_.size(), kept = count - extra;
+    const Eigen::Index count = rows_->rows(), kept = count - E_extra_.size();
     if (count == 0)
       return;
+    along_rows(x, nu_.data());
+    for (Eigen::Index r = 0; c && r < kept; ++r)
+      nu_[r] -= c[r];
+    schur_.solve(nu_.data());
     Eigen::Map<Vector> x_(x, rows_->cols());
-    Vector nu = *rows_ * x_;
-    if (c)
-      nu.head(kept) -= Eigen::Map<const Vector>(c, kept);
-    nu.tail(extra).array() *= E_extra_.array();
-    schur_.solve(nu.data());
-    x_.noalias() -= response_ * nu;
+    for (Eigen::Index r = 0; r < count; ++r)
+      x_ -= nu_[r] * response_.col(r);
   }
 
 private:
+  // y (rows): C_q x, and E_e B_e x
+  void along_rows(const Scalar *x, Scalar *y) const {
+    const Eigen::Index count = rows_->rows(), kept = count - E_extra_.size();
+    for (Eigen::Index r = 0; r < count; ++r) {
+      Scalar sum(0);
+      for (Eigen::Index i = 0; i < rows_->cols(); ++i)
+        sum += (*rows_)(r, i) * x[i];
+      y[r] = r < kept ? sum : E_extra_[r - kept] * sum;
+    }
+  }
+
   NewtonTree<Space, Scalar> tree_;
   const Eigen::MatrixXd *rows_ = nullptr;
-  Matrix response_; // (n_v, rows) N_0^-1 of them, transposed
-  Vector E_extra_;
+  Matrix response_;     // (n_v, rows) N_0^-1 of them, transposed
+  Vector E_extra_, nu_; // (rows) multipliers
   Lu<Scalar> schur_;
 };
 
