@@ -32,6 +32,9 @@ PrescribedMotion::PrescribedMotion(const SystemOnTree &both, const VectorXd &q)
   if (rows != static_cast<Index>(joints_.size()))
     throw std::invalid_argument("rows: expected " + std::to_string(joints_.size()) +
                                 ", as many as joints have coordinates, got " + std::to_string(rows));
+  if (q.size() != both.tree.n_q)
+    throw std::invalid_argument("q: expected " + std::to_string(both.tree.n_q) + " coordinates, got " +
+                                std::to_string(q.size()));
   lambda_ = value_ = rate_ = VectorXd::Zero(rows);
   C_v_.resize(rows, both.tree.n_v);
   targets_.resize(both.tree.rows.size());
@@ -174,7 +177,12 @@ VectorXd PrescribedMotion::left() {
 
 RedefinedMotion::RedefinedMotion(const SystemOnTree &driven, const SystemOnTree &path, const VectorXd &q, double factor,
                                  std::vector<TimeFunction> offset)
-    : PrescribedMotion(driven, q), path_(path, q), factor_(factor), offset_(std::move(offset)) {}
+    : PrescribedMotion(driven, q), path_(path, q), factor_(factor), offset_(std::move(offset)) {
+  const auto count = static_cast<Index>(offset_.size());
+  if (count != 0 && count != driven.system.n_modes())
+    throw std::invalid_argument("offset: expected " + std::to_string(driven.system.n_modes()) +
+                                " functions, one for each mode, or none, got " + std::to_string(count));
+}
 
 bool RedefinedMotion::move(double t, const ModalMotion &modes) {
   ModalMotion seen{factor_ * modes.p, factor_ * modes.p_dot, factor_ * modes.p_ddot};
