@@ -12,13 +12,8 @@ from ..joints.measure import Measure
 from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
 from ..model.tree_layout import NotInTreeError
-from ..solve.integrators import Choice
 from ..solve.state import State
 from .outcome import EarlierRun
-
-UNITS = "they take the same steps in any units of measure there"
-OTHERS = {"radau": UNITS, "generalized-alpha": UNITS}
-"""Integrators that a run does not begin with in joint coordinates, and why: docs/recursion.md."""
 
 LOOPS = "closed loops stop there where they are singular"
 
@@ -37,7 +32,6 @@ class TreeStart:
 def tree_start(
     assembly: MechanismSystem,
     start: State,
-    integrator: Choice,
     earlier: EarlierRun | None,
     motors: Iterable[Measure],
 ) -> TreeStart | str:
@@ -48,8 +42,6 @@ def tree_start(
     """
     if earlier is not None and isinstance(earlier.continuation.checkpoint, _core.Checkpoint):
         return "as the run that it goes on with"
-    if integrator.name in OTHERS:
-        return OTHERS[integrator.name]
     if assembly.model.scene.topology.loop_joints:
         return LOOPS
     scene = assembly.model.scene
