@@ -15,6 +15,7 @@ from ...common.arrays import Array
 from .. import _core
 from .._core import TimeFunction
 from ..joints.measure import Marker, Measure
+from ..joints.transmission import Friction
 from .model import ZERO, Constraint
 from .system import MechanismSystem
 from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError
@@ -181,7 +182,7 @@ class PlanarTree:
             self.scene.add_point_force(self._wrench(marker), function)
         for load in self._assembly.model.modal_loads:
             node = next(node for node in self._layout.nodes if node.body.name == load.body)
-            direction = np.zeros(self._layout.size)
+            direction: Array = np.zeros(self._layout.size)
             direction[node.modes : node.modes + node.body.n_modes] = load.vector
             self._along.append((direction, load.magnitude))
         for direction, magnitude in self._along:
@@ -218,7 +219,10 @@ class PlanarTree:
         """Friction, rotors, gears that give."""
         model = self._assembly.model
         for measure, friction in model.frictions:
-            index, _ = self._in_tree(measure, "friction")
+            if (coordinate := self._layout.coordinate(measure)) is None:
+                self._resist_between(measure, friction)
+                continue
+            index = coordinate.number
             self._driven.add(index)
             self.scene.add_joint_force(index, index, 0.0, 0.0, friction.viscous, friction.coulomb, friction.speed)
         for measure, inertia in model.rotors:
@@ -234,6 +238,13 @@ class PlanarTree:
             self._driven |= {motor, joint}
             self._rotors[motor] = gear.inertia, gear.ratio
             self.scene.add_gear((motor, motor), (joint, joint), sign, gear.stiffness, gear.damping)
+
+    def _resist_between(self, measure: Measure, friction: Friction) -> None:
+        """Friction on the motion of two markers that is no coordinate of the tree."""
+        turns = measure.carries_moment
+        axis = np.array([0.0, 0.0, 1.0] if turns else [*measure.direction, 0.0])
+        sides = self._wrench(measure.a), self._wrench(measure.b)
+        self.scene.add_cut_joint(*sides, turns, axis, friction.viscous, friction.coulomb, friction.speed)
 
     def _in_tree(self, measure: Measure, what: str) -> Coordinate:
         coordinate = self._layout.coordinate(measure)

@@ -223,11 +223,24 @@ class Layout:
 
 
 def _forest(model: Model) -> Topology:
-    """Loops with revolute joints are cut at one of these: angles are linear in coordinates of the tree."""
+    """Loops are cut at revolute joints, whose angles are linear in coordinates of the tree, where nothing acts, if any.
+
+    Else where friction does; where a motor, a rotor or a path is only if all of a loop have one.
+    """
     scene = model.scene
     if scene.topology.is_open_chain:
         return scene.topology
-    edges = [Edge(joint.between, int(joint.type == "revolute")) for joint in scene.joint]
+    needed = {joint.name for joint in (*scene.motor_joints, *(j for j in scene.joint if j.rotor("section")))}
+    needed |= {trajectory.joint for trajectory in scene.trajectory if trajectory.joint is not None}
+
+    def rank(joint: JointRecord) -> int:
+        if joint.type != "revolute":
+            return 0
+        if joint.name in needed:
+            return 1
+        return 2 if joint.friction else 3
+
+    edges = [Edge(joint.between, rank(joint)) for joint in scene.joint]
     return spanning_forest([body.name for body in scene.body], edges)
 
 

@@ -24,7 +24,7 @@ NOT_IN_TREE = {
     "stiffened, driven": "geometric stiffening",
     "stiffened, as built": "geometric stiffening",
     "driven, as built": "geometric stiffening",
-    "slider-crank, as built": r'friction along a coordinate that is none of the tree \(joint "j3"',
+    "slider-crank, as built": r'a rotor along a coordinate that is none of the tree \(rotor of joint "j3"',
 }
 
 
@@ -32,7 +32,7 @@ RESOLVED = [
     *("chain of 2", "chain of 3", "chain of 6", "backwards", "mixed", "mixed backwards", "tree", "loaded"),
     *("four-bar", "slider-crank"),
 ]
-AS_BUILT = [("mixed, as built", "section")]  # friction on frames that links turn against sections is not in the tree
+AS_BUILT = [("mixed, as built", "section")]  # rotors on frames that links turn against sections are not in the tree
 
 
 def bent_state(assembly, seed=1):
@@ -113,11 +113,14 @@ def test_what_stays_in_absolute_coordinates(name):
         PlanarTree(assemble(zoo.build(name)))
 
 
-def test_friction_where_a_loop_is_cut():
+@pytest.mark.parametrize("motors", ["section", "frame"])
+def test_friction_in_all_joints_of_a_loop(motors):
     joints = [joint.model_dump(exclude_unset=True) for joint in zoo.build("four-bar").scene.joint]
-    joints[3] |= {"viscous_friction": 0.1}
-    with pytest.raises(NotInTreeError, match=r'that is none of the tree .joint "j4", angle'):
-        PlanarTree(assemble(zoo.four_bar(np.random.default_rng(0), joint=joints)))
+    for k, joint in enumerate(joints):
+        joint |= {"viscous_friction": 0.1 + 0.05 * k, "coulomb_friction": 0.02, "friction_speed": 0.5}
+    model = zoo.four_bar(np.random.default_rng(0), joint=joints, motors=motors)
+    tree = compare(assemble(model))
+    assert len(tree.layout.loops) == 1
 
 
 @pytest.mark.parametrize("motors", ["section", "frame"])
@@ -198,12 +201,16 @@ def test_motor_and_modal_forces(name, motors):
     assert relative(found.F_p, expected.F_p) < 1e-11
 
 
-def test_motor_where_a_loop_is_cut():
+@pytest.mark.parametrize("driven", range(4))
+def test_loops_are_cut_where_no_motor_is(driven):
     joints = [joint.model_dump(exclude_unset=True) for joint in zoo.build("four-bar").scene.joint]
-    joints[0]["motor"], joints[3]["motor"] = False, True
+    for k, joint in enumerate(joints):
+        joint["motor"] = k == driven
     assembly = assemble(zoo.four_bar(np.random.default_rng(0), joint=joints))
-    with pytest.raises(NotInTreeError, match=r'a motor along a coordinate that is none of the tree .joint "j4", angle'):
-        PlanarTree(assembly, assembly.model.motors.values())
+    forces = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
+    tree, found, expected = both_at_one_state(assembly, assembly.model.motors.values(), actuator_forces=forces)
+    assert tree.layout.loops.isdisjoint(assembly.model.motors)
+    assert relative(found.tau, expected.tau) < 1e-11
 
 
 @pytest.mark.parametrize("name", ["chain of 2", "mixed", "mixed backwards", "four-bar", "slider-crank", "tree"])
