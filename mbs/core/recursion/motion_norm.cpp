@@ -217,9 +217,9 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
       peak_[size_.size() + g] = std::max(peak_[size_.size() + g], force);
       if constexpr (Space::dim == 3) // rates of modes as parts of the velocity of a link that turns
         if (is_strict_) {
+          const double turns = std::max(std::abs(w.bodies[i].omega), pace_[0]);
           double &of_modes = peak_[pace_.size() + g];
-          of_modes =
-              std::max(of_modes, std::sqrt(mass) * sizes_.reach()[i] * std::max(std::abs(w.bodies[i].omega), pace_[0]));
+          of_modes = std::max(of_modes, std::sqrt(mass) * sizes_.reach()[i] * turns);
         }
     }
   }
