@@ -171,7 +171,7 @@ def test_radau_damps_away_what_rings_below_the_tolerance():
     model = arm(arm_links(EI=300.0, modes=12, extra=2), initial={"angles": ANGLES, "state": "static"})
     exact = inverse(model, tolerance=1e-6, integrator="dop853")
     outcome = inverse(model, tolerance=1e-4, integrator="radau")
-    assert outcome.statistics.steps < 2700
+    assert outcome.statistics.steps < 2800
     assert relative(outcome.lambda_, exact.lambda_) < 1e-4
 
 

@@ -138,7 +138,7 @@ def test_replay(apply, in_absolute):
 
 
 @pytest.mark.parametrize(("integrator", "tolerance"), [("radau", 1e-8), ("dopri5", 1e-8), ("generalized-alpha", 3e-3)])
-@pytest.mark.parametrize("name", ["chain of 2", "mixed backwards", "loaded", "mixed, as built"])
+@pytest.mark.parametrize("name", ["chain of 2", "mixed backwards", "loaded", "loaded, frame motors", "mixed, as built"])
 def test_every_integrator(name, integrator, tolerance, in_absolute):
     """Within what the tolerance leaves to both."""
     model, keys = zoo.build(name), KEYS | {"integrator": integrator, "tolerance": tolerance}
