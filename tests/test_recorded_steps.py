@@ -49,7 +49,7 @@ def arm():
             {"name": "tool", "angle": "hand", "value": "-45*deg"},
         ],
         analysis=[
-            {"name": "inverse", "kind": "pcid", "end": 3.0, "output_step": 0.002},
+            {"name": "inverse", "kind": "pcid", "integrator": "radau", "end": 3.0, "output_step": 0.002},
             {"name": "replay", "kind": "forward", "actuation": "inverse", "apply": "joints", "end": 0.01,
              "output_step": 0.002},
         ],

@@ -99,7 +99,7 @@ def drive(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
     wanted = list(assembly.model.motors.values()) if resolver is not None else []
-    tree = tree_start(assembly, start, integrator, earlier, wanted)
+    tree = tree_start(assembly, start, earlier, wanted)
     point = _core.TreeCheckpoint() if isinstance(tree, TreeStart) else _core.Checkpoint()
     continuation = Continuation(point, recording)
     if earlier is not None:  # with the same candidates, and what they have become since

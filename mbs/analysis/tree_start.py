@@ -12,13 +12,9 @@ from ..joints.measure import Measure
 from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
 from ..model.tree_layout import NotInTreeError
-from ..solve.integrators import Choice
 from ..solve.state import State
 from .outcome import EarlierRun
 
-UNITS = "they take the same steps in any units of measure there"
-OTHERS = {"radau": UNITS, "generalized-alpha": UNITS}
-"""Integrators that a run does not begin with in joint coordinates, and why: docs/recursion.md."""
 
 ALONE = "a body that is joined to no other"  # errors of forces are judged between bodies, not on the ground
 
@@ -35,7 +31,6 @@ class TreeStart:
 def tree_start(
     assembly: MechanismSystem,
     start: State,
-    integrator: Choice,
     earlier: EarlierRun | None,
     motors: Iterable[Measure],
 ) -> TreeStart | str:
@@ -46,8 +41,6 @@ def tree_start(
     """
     if earlier is not None and isinstance(earlier.continuation.checkpoint, _core.Checkpoint):
         return "as the run that it goes on with"
-    if integrator.name in OTHERS:
-        return OTHERS[integrator.name]
     scene = assembly.model.scene
     joined = {body for joint in scene.joint if GROUND not in joint.bodies for body in joint.bodies}
     if any(body.name not in joined for body in assembly.model.links):

@@ -54,6 +54,8 @@ public:
   void solve(const Complex *, Complex *x) override { std::fill_n(x, 3, Complex(0)); }
   void constrain(const double *, double *) override {}
   void constraint_values(double, const double *, double *, double *) override {}
+  double value_size(const double *, const VectorXd &) const override { return 0; }
+  double rate_size(const double *, const VectorXd &) const override { return 0; }
   double change_size(const double *, const double *change, double) const override {
     return Eigen::Map<const VectorXd>(change, 6).lpNorm<Eigen::Infinity>();
   }

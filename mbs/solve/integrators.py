@@ -25,10 +25,10 @@ METHODS = {
 
 # What the rule is made of, measured on the two-link case (26 coordinates; tests/benchmarks): step size times frequency
 # at which DOP853 is stable, and at which both resolve a vibration to a tolerance of 1e-4; time of a step of Radau IIA
-# in steps of DOP853, alone and where a replay of actuation is most of an evaluation; parts of the tolerance below which
-# both need not resolve a vibration, Radau since it damps it away; steps that Radau takes before they have found their
-# size. DOPRI5 never wins by more than clocks scatter: undamped, its steps have to be five times as short as those of
-# DOP853 (it is stable up to 1.0), damped nearly three.
+# in steps of DOP853, alone (2.6 with three modes a link, 1.9 with ten) and where a replay of actuation is most of an
+# evaluation; parts of the tolerance below which both need not resolve a vibration, Radau since it damps it away; steps
+# that Radau takes before they have found their size. DOPRI5 never wins by more than clocks scatter: undamped, its steps
+# have to be five times as short as those of DOP853 (it is stable up to 1.0), damped nearly three.
 STABLE = 4.8
 RESOLVED_DOP853, RESOLVED_RADAU = 1.25, 0.30
 STEPS_TO_START = 100

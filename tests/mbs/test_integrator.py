@@ -142,9 +142,13 @@ def test_errors_fall_with_the_order_in_the_number_of_steps(tight, integrator, or
 
 
 def test_newton_s_method_of_radau_hardly_iterates_and_keeps_its_matrix():
-    """Three slopes an iteration, two for the step's end: under 13 a step are little more than three iterations."""
+    """Three slopes an iteration, two for the step's end: under 13 a step are little more than three iterations.
+
+    What is rejected are two or three of the first steps, whose size is sought from the distance of outputs down, here
+    as at any tolerance from 1e-3 to 1e-6; none after the first 5 ms.
+    """
     outcome = inverse(arm(initial={"angles": ANGLES, "state": "static"}), tolerance=1e-4, integrator="radau")
-    assert outcome.statistics.rejected <= 2
+    assert outcome.statistics.rejected <= 3
     assert outcome.statistics.evaluations < 13 * outcome.statistics.steps
 
 
@@ -162,12 +166,12 @@ def test_stiff_links_at_rest_do_not_hold_implicit_steps(integrator):
 def test_radau_damps_away_what_rings_below_the_tolerance():
     """A path whose jerk jumps at the start: vibrations up to 85 krad/s, those above 2 krad/s below the tolerance.
 
-    4 929 steps; resolved at their frequency they would be 250 000.
+    2 418 steps; resolved at their frequency they would be 250 000.
     """
     model = arm(arm_links(EI=300.0, modes=12, extra=2), initial={"angles": ANGLES, "state": "static"})
     exact = inverse(model, tolerance=1e-6, integrator="dop853")
     outcome = inverse(model, tolerance=1e-4, integrator="radau")
-    assert outcome.statistics.steps < 5500
+    assert outcome.statistics.steps < 2800
     assert relative(outcome.lambda_, exact.lambda_) < 1e-4
 
 

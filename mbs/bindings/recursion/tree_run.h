@@ -123,6 +123,7 @@ TreeRun integrated(const Model<Space> &model, RecursiveMotion<Space> &motion, Re
                    const Breaks *breaks, TreeCheckpoint *checkpoint) {
   TreeRun run(model, times.size());
   run.last << q, v;
+  motion.plan(times.back() - times.front());
   run.report = integrate(
       motion, times, run.last, controls,
       [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },

@@ -60,7 +60,9 @@ namespace {
 
 TreeMotion motion_of(const SystemOnTree &both, const Recording &recording) {
   const double *state = recording.states.data();
-  return {both.tree, both.scene, recording.times.front(), state, state + both.tree.n_q};
+  TreeMotion motion(both.tree, both.scene, recording.times.front(), state, state + both.tree.n_q);
+  motion.plan(recording.times.back() - recording.times.front());
+  return motion;
 }
 
 } // namespace

@@ -6,6 +6,7 @@ Run run(TreeMotion &motion, const std::vector<double> &times, Eigen::VectorXd st
         const IntegrationControls &controls, TreeOutputs &outputs, const std::function<bool(double)> &carry_on,
         Recording *recording, const Breaks *breaks, IntegrationCheckpoint *checkpoint) {
   Run result;
+  motion.plan(times.back() - times.front());
   result.report = integrate(
       motion, times, state, controls, [&](std::size_t i, double t, const double *y) { outputs(i, t, y); }, carry_on,
       recording, breaks, checkpoint);

@@ -76,7 +76,7 @@ bool GeneralizedAlpha::step(double t, const double *y, double h, double toleranc
     next_a_ += change_.tail(n_);
     c_ = h * beta_ / gamma_ * rate_ - value_;
     // Once a step, and again only where it matters: rounding would move stiff modes, and their forces, for ever.
-    const bool moved = c_.size() > 0 && (iteration == 0 || !(c_.lpNorm<Eigen::Infinity>() <= 1e-9));
+    const bool moved = c_.size() > 0 && (iteration == 0 || !(system_.value_size(end_.data(), c_) <= 1e-9));
     x_.setZero();
     if (moved) {
       force_.setZero();

@@ -18,7 +18,7 @@ public:
   bool correct(double t) override { return project_(t, end_.data()); }
   void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 3; }
-  double error_share(double fraction) const override { return 2 * fraction; }
+  double error_share(double fraction) const override { return fraction; }
   void accept(double h) override;
   void restart() override {
     started_ = false;

@@ -18,9 +18,10 @@ public:
 private:
   using VectorMap = Eigen::Map<Eigen::VectorXd>;
 
-  // Newton steps on x, the positions or velocities in y, until `residual` vanishes; move(step) takes a step off them.
-  template <class Move>
-  bool settle(double t, const double *y, const VectorMap &x, const Eigen::VectorXd &residual, const Move &move);
+  // Newton steps on the positions or velocities in y until the size() of `residual` vanishes; move(step) takes a step
+  // off them.
+  template <class Size, class Move>
+  bool settle(double t, const double *y, const Eigen::VectorXd &residual, const Size &size, const Move &move);
 
   ImplicitSystem &system_;
   Eigen::VectorXd none_, value_, rate_, correction_;

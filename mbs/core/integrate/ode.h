@@ -87,6 +87,10 @@ public:
   // C and C_dot, both (constraints)
   virtual void constraint_values(double t, const double *z, double *value, double *rate) = 0;
 
+  // Largest of them (constraints) at z, relative to natural sizes: rounding leaves some 1e-15, in any units.
+  virtual double value_size(const double *z, const Eigen::VectorXd &value) const = 0;
+  virtual double rate_size(const double *z, const Eigen::VectorXd &rate) const = 0;
+
 private:
   Eigen::MatrixXd uncoupled_;
 };

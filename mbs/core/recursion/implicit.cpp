@@ -136,6 +136,14 @@ void RecursiveMotion<Space>::constraint_values(double t, const double *z, double
   Eigen::Map<VectorXd>(rate, rate_.size()) = rate_;
 }
 
+template <class Space> double RecursiveMotion<Space>::value_size(const double *z, const VectorXd &value) const {
+  return norm_.sizes().of_values(value, local().state(z));
+}
+
+template <class Space> double RecursiveMotion<Space>::rate_size(const double *z, const VectorXd &rate) const {
+  return norm_.sizes().of_rates(rate, z + n_v());
+}
+
 #define FFROBOT_IMPLICIT(Space)                                                                                        \
   template void RecursiveMotion<Space>::find_stiff_terms();                                                            \
   template void RecursiveMotion<Space>::find_coupling();                                                               \
@@ -146,6 +154,8 @@ void RecursiveMotion<Space>::constraint_values(double t, const double *z, double
   template void RecursiveMotion<Space>::solve(const double *, const double *, double *);                               \
   template void RecursiveMotion<Space>::solve(const Complex *, Complex *);                                             \
   template void RecursiveMotion<Space>::constrain(const double *, double *);                                           \
+  template double RecursiveMotion<Space>::value_size(const double *, const VectorXd &) const;                          \
+  template double RecursiveMotion<Space>::rate_size(const double *, const VectorXd &) const;                           \
   template void RecursiveMotion<Space>::constraint_values(double, const double *, double *, double *)
 
 FFROBOT_IMPLICIT(Planar);

@@ -181,10 +181,8 @@ template <class Space> double RecursiveMotion<Space>::project(double t, double *
   double left = 0, previous = std::numeric_limits<double>::infinity();
   for (int i = 0; i < most_iterations; ++i) {
     residuals(t, q, v);
-    const double scale_q = 1 + Eigen::Map<VectorXd>(q, mechanism_.n_q).template lpNorm<Eigen::Infinity>();
-    const double scale_v = 1 + v_.template lpNorm<Eigen::Infinity>();
-    const double position = value_.template lpNorm<Eigen::Infinity>() / scale_q;
-    left = std::max(position, rate_.template lpNorm<Eigen::Infinity>() / scale_v);
+    const double position = norm_.sizes().of_values(value_, q);
+    left = std::max(position, norm_.sizes().of_rates(rate_, v));
     if (!(left > tolerance) || (left < 1e-11 && left > 0.2 * previous)) // done, at the rounding floor, or NaN
       break;
     previous = left;

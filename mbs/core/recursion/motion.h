@@ -18,6 +18,7 @@
 #include "core/space/configuration_space.h"
 #include "core/time_function/functions_of_time.h"
 
+#include <algorithm>
 #include <optional>
 
 namespace ffrobot::recursion {
@@ -134,6 +135,8 @@ public:
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
                   const HeldForces *held = nullptr, Steering *steering = nullptr);
 
+  void plan(double duration) { norm_.plan(duration); } // s, of the run to come
+
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
   double error_size(double t, const double *z, const double *e) override;
@@ -142,7 +145,7 @@ public:
   bool is_sensible(const double *z) const override;
   Eigen::Index prescribed() const override; // of the scene's loads and targets, where these limit steps
   void prescribe(double t, double *f) override;
-  double initial_step() const override { return 0.1 / fastest_; }
+  double initial_step() const override { return 0.1 / std::max(fastest_, norm_.sizes().pace()); }
   unsigned long evaluations() const override { return workspace_.evaluations; }
 
   // implicit.cpp
@@ -156,14 +159,15 @@ public:
   void solve(const Complex *r, Complex *x) override;
   void constrain(const double *x, double *c) override;
   void constraint_values(double t, const double *z, double *value, double *rate) override;
+  double value_size(const double *z, const Eigen::VectorXd &value) const override;
+  double rate_size(const double *z, const Eigen::VectorXd &rate) const override;
 
   // At a state y = (q, v): accelerations (n_v); multipliers are in
   // workspace().lambda
   void evaluate(double t, const double *q, const double *v, double *a);
   // What the scene does there beside gravity, elasticity and damping of modes; valid until the next call
   Forces<double> act(double t, const double *q, const double *v);
-  // Moves q (n_q) and v (n_v) onto the rows at time t; the largest residual
-  // left, relative to 1 m, 1 rad, 1 m/s
+  // Moves q (n_q) and v (n_v) onto the rows at time t; the largest residual left, as the norm compares these
   double project(double t, double *q, double *v);
 
   // Of the scene's watch, which looks at some of the accepted steps and where it is told to: the smallest ratio of
@@ -206,7 +210,7 @@ private:
   FunctionsOfTime laws_; // of the scene's targets
   std::vector<Jet> jets_;
   double target_time_;
-  double fastest_ = 1; // 1/s
+  double fastest_ = 0; // 1/s, of modes
   MotionNorm<Space> norm_;
   Eigen::VectorXd shifted_, unused_;
   // the worst posture along the path, and when

@@ -16,41 +16,22 @@ namespace {
 constexpr double small_force = 2e-4; // of the largest: forces below count like this one
 constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
-constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
-constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
-constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
-constexpr double nothing = 1e-12;
+constexpr double slow = 3e-4;        // of the natural pace: rates of joints below, times the peak of what they are of,
+constexpr double slow_if_strict = 0.01; // likewise, as in absolute coordinates (core/system/error_norm.*)
+constexpr double small_bend = 1e-3;     // of what a body's acceleration would do to its softest mode
+constexpr double small_twist = 1e-5;    // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
+constexpr double nothing = std::numeric_limits<double>::min(); // of groups without members
 
 double square(double x) { return x * x; }
-
-template <class Space> bool is_moment(const Mechanism<Space> &m, const Row &row) {
-  if (row.model.kind != RowKind::coordinate)
-    return row.model.kind == RowKind::rotation || row.model.kind == RowKind::dot;
-  return m.nodes[static_cast<std::size_t>(row.node)].shape.freedoms.component[row.freedom] >= Space::linear;
-}
-
-double farthest(const planar::Body &b) {
-  double r = 0;
-  for (const planar::Port &port : b.ports)
-    r = std::max(r, std::hypot(port.x, port.y));
-  return r;
-}
-double farthest(const spatial::Body &b) {
-  double r = 0;
-  for (const spatial::Port &port : b.ports)
-    r = std::max(r, std::hypot(port.r[0], port.r[1], port.r[2]));
-  return r;
-}
 
 } // namespace
 
 template <class Space>
 MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
-    : mechanism_(mechanism), pace_{slow, slow} {
+    : mechanism_(mechanism), is_strict_(is_strict), sizes_(mechanism), pace_{0, 0} {
   const auto n = static_cast<std::size_t>(mechanism.n_v);
   group_.assign(2 * n, 0), radian_.assign(n, 0);
   for (const Node<Space> &node : mechanism.nodes) {
-    length_ = std::max(length_, farthest(node.body));
     for (int k = 0; k < node.shape.freedoms.count; ++k)
       group_[static_cast<std::size_t>(node.v + k)] = node.shape.freedoms.component[k] < Space::linear ? 0 : 1;
     double lowest = std::numeric_limits<double>::infinity();
@@ -64,7 +45,6 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
     if (node.n() > 0)
       pace_.push_back(lowest);
   }
-  length_ = length_ > 0 ? length_ : 1;
   for (std::size_t i = 0; i < n; ++i)
     group_[n + i] = group_[i] + static_cast<int>(pace_.size());
   size_ = by_forces_ = by_given_ = std::vector<double>(2 * pace_.size(), 0.0);
@@ -94,13 +74,26 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
     }
   if (is_strict)
     levers_ = is_moment_.size();
+  find_pace();
   force_now_ = force_error_ = force_peak_ = std::vector<double>(is_moment_.size(), 0.0);
   observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
 }
 
+template <class Space> void MotionNorm<Space>::plan(double duration) {
+  sizes_.plan(duration);
+  find_pace();
+}
+
+template <class Space> void MotionNorm<Space>::find_pace() {
+  const double part = is_strict_ ? slow_if_strict : slow;
+  pace_[0] = part * sizes_.pace(), pace_[1] = std::max(pace_[0], pace_of_springs_);
+  slow_acceleration_ = part * sizes_.acceleration();
+}
+
 template <class Space> void MotionNorm<Space>::add_spring(double stiffness, double inertia) {
   of_springs_ = std::max(of_springs_, small_twist * stiffness);
-  pace_[1] = std::max(pace_[1], small_twist * std::sqrt(stiffness / inertia));
+  pace_of_springs_ = std::max(pace_of_springs_, small_twist * std::sqrt(stiffness / inertia));
+  find_pace();
 }
 
 // size_: of all groups
@@ -154,10 +147,10 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
   double force = inertial_, moment = 0, worst = 0; // the largest of all
   for (std::size_t g = 0; g < is_moment_.size(); ++g)
     (is_moment_[g] ? moment : force) = std::max(is_moment_[g] ? moment : force, force_peak_[g]);
-  force = std::max(force, moment / length_), moment = std::max(moment, small_arm * length_ * force);
+  force = std::max(force, moment / sizes_.length()), moment = std::max(moment, small_arm * sizes_.length() * force);
   for (std::size_t g = 0; g < is_moment_.size(); ++g) {
     const double least = small_force * (is_moment_[g] ? moment : force);
-    const double of_springs = is_moment_[g] ? of_springs_ : of_springs_ / length_;
+    const double of_springs = is_moment_[g] ? of_springs_ : of_springs_ / sizes_.length();
     const double scale = std::max({force_peak_[g], force_now_[g], least, of_springs, nothing});
     const double size = (g < levers_ ? leverage : 1) * force_error_[g] / scale;
     if (!(size <= worst))
@@ -194,7 +187,7 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const double 
     peak_[size_.size() + g] = std::max(peak_[size_.size() + g], std::sqrt(of_rates_[g]));
   take_accelerations(w);
   // Rotation vectors start at zero in every step: an angle is compared with one radian at least, a way with a length.
-  peak_[0] = std::max(peak_[0], length_), peak_[1] = std::max(peak_[1], 1.0);
+  peak_[0] = std::max(peak_[0], sizes_.length()), peak_[1] = std::max(peak_[1], 1.0);
   // At rest, as in equilibrium, all rates are zero: their errors are then compared with rates that would be slow.
   for (std::size_t g = 0; g < pace_.size(); ++g)
     peak_[pace_.size() + g] = std::max(peak_[pace_.size() + g], pace_[g] * peak_[g]);
@@ -205,7 +198,8 @@ void MotionNorm<Space>::take(const double *z, const double *z_dot, const double 
 
 template <class Space> void MotionNorm<Space>::take_accelerations(const Workspace<Space, double> &w) {
   double inertial = 0, &of_ways = peak_[size_.size()], &of_angles = peak_[size_.size() + 1];
-  of_ways = std::max(of_ways, mechanism_.gravity.norm());
+  const double least = std::max(mechanism_.gravity.norm(), slow_acceleration_);
+  of_ways = std::max(of_ways, least);
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
     const auto &A = w.bodies[i].A;
@@ -213,17 +207,23 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
     for (int k = 0; k < Space::linear; ++k)
       sum += square(A[k]);
     const double acceleration = std::sqrt(sum), mass = node.body.mass;
-    inertial += mass * acceleration;
+    inertial += mass * std::max(acceleration, slow_acceleration_);
     of_ways = std::max(of_ways, acceleration);
     if (node.n() > 0) {
       // where nothing has happened yet, or what acts holds the link straight
       const auto g = static_cast<std::size_t>(group_[static_cast<std::size_t>(node.p_v())]);
-      const double force = std::sqrt(mass) * std::max(acceleration, mechanism_.gravity.norm());
+      const double force = std::sqrt(mass) * std::max(acceleration, least);
       peak_[g] = std::max(peak_[g], small_bend * force / (pace_[g] * pace_[g]));
       peak_[size_.size() + g] = std::max(peak_[size_.size() + g], force);
+      if constexpr (Space::dim == 3) // rates of modes as parts of the velocity of a link that turns
+        if (is_strict_) {
+          const double turns = std::max(std::abs(w.bodies[i].omega), pace_[0]);
+          double &of_modes = peak_[pace_.size() + g];
+          of_modes = std::max(of_modes, std::sqrt(mass) * sizes_.reach()[i] * turns);
+        }
     }
   }
-  of_angles = std::max(of_angles, of_ways / length_);
+  of_angles = std::max(of_angles, of_ways / sizes_.length());
   inertial_ = std::max(inertial_, inertial);
 }
 

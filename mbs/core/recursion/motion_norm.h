@@ -1,7 +1,7 @@
 // What the tolerance of a run in joint coordinates bounds: errors relative to the largest so far of what is alike.
 #pragma once
 
-#include "core/recursion/workspace.h"
+#include "core/recursion/natural_sizes.h"
 
 namespace ffrobot::recursion {
 
@@ -16,8 +16,13 @@ struct NormPeaks {
 // Errors e and states z are local coordinates (space/local_coordinates.h).
 template <class Space> class MotionNorm {
 public:
-  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed.
+  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed; rates are judged as
+  // in absolute coordinates (core/system/error_norm.*), where those of modes are parts of a body's velocity.
   explicit MotionNorm(const Mechanism<Space> &mechanism, bool is_strict = false);
+
+  // The run will last `duration` s. Rates are slow, and accelerations small, beside the natural pace.
+  void plan(double duration);
+  const NaturalSizes<Space> &sizes() const { return sizes_; }
 
   // Of a spring in front of which an inertia swings (N m/rad, kg m^2): moments and rates of a small twist are small,
   // too. At rest, where nothing else acts, they are rounding.
@@ -42,15 +47,19 @@ public:
   void set_peaks(const NormPeaks &peaks); // throws std::invalid_argument where they are those of another mechanism
 
 private:
+  void find_pace();
   void add_squares(const double *z) const;
   void forces(const Workspace<Space, double> &w, Eigen::VectorXd &values) const;
   void take_accelerations(const Workspace<Space, double> &w);
   void sizes_of_forces(const Eigen::VectorXd &values, std::vector<double> &size) const;
 
   const Mechanism<Space> &mechanism_;
-  double length_ = 0;      // m, of a body
-  std::vector<int> group_; // of each of 2 n_v entries of z; those of rates follow those of what they are of
-  struct Run {             // entries side by side of one group
+  bool is_strict_;
+  NaturalSizes<Space> sizes_;
+  double pace_of_springs_ = 0;   // 1/s, what a small twist makes
+  double slow_acceleration_ = 0; // m/s^2: smaller ones count like this one
+  std::vector<int> group_;       // of each of 2 n_v entries of z; those of rates follow those of what they are of
+  struct Run {                   // entries side by side of one group
     Eigen::Index first, count;
     std::size_t group;
   };

@@ -44,6 +44,13 @@ public:
   void solve(const Complex *r, Complex *x) override { complex_->solve(r, nullptr, x); }
   void constrain(const double *x, double *c) override { real_->constrain(x, c); }
   void constraint_values(double t, const double *z, double *value, double *rate) override;
+  // R, in the units of values, is among the coordinates, and its rates are.
+  double value_size(const double *z, const Eigen::VectorXd &value) const override {
+    return relative_size(value, Eigen::Map<const Eigen::VectorXd>(z, n_v()));
+  }
+  double rate_size(const double *z, const Eigen::VectorXd &rate) const override {
+    return relative_size(rate, Eigen::Map<const Eigen::VectorXd>(z + n_v(), n_v()));
+  }
   double change_size(const double *z, const double *change, double rate) const override {
     return norm_.of_change(z, change, rate);
   }
@@ -53,6 +60,10 @@ public:
   ErrorNorm &norm() { return norm_; }
 
 private:
+  static double relative_size(const Eigen::VectorXd &residual, const Eigen::Map<const Eigen::VectorXd> &x) {
+    return residual.lpNorm<Eigen::Infinity>() / (1 + x.lpNorm<Eigen::Infinity>());
+  }
+
   const System &system_;
   Workspace workspace_;
   ErrorNorm norm_;
