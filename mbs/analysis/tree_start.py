@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from ...common.arrays import Array
 from .. import _core
-from ..fields.field_types import GROUND
 from ..joints.measure import Measure
 from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
@@ -21,8 +20,6 @@ OTHERS = {"radau": UNITS, "generalized-alpha": UNITS}
 """Integrators that a run does not begin with in joint coordinates, and why: docs/recursion.md."""
 
 LOOPS = "closed loops stop there where they are singular"
-
-ALONE = "a body that is joined to no other"  # errors of forces are judged between bodies, not on the ground
 
 
 @dataclass(frozen=True)
@@ -52,10 +49,6 @@ def tree_start(
         return OTHERS[integrator.name]
     if assembly.model.scene.topology.loop_joints:
         return LOOPS
-    scene = assembly.model.scene
-    joined = {body for joint in scene.joint if GROUND not in joint.bodies for body in joint.bodies}
-    if any(body.name not in joined for body in assembly.model.links):
-        return ALONE
     try:
         tree = PlanarTree(assembly, motors)
         return TreeStart(tree, *tree.state(start.q, start.v))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import zoo
-from links import arm
+from links import arm, ritz_link
 from mechanisms import always, forward, make_model, pcid, relative, revolute
 from rods import rod
 
@@ -174,3 +174,27 @@ def test_runs_go_on_in_the_coordinates_in_which_they_were_stopped(stopped_in, in
     for name in ("q", "v", "a", "lambda_", "tau"):
         assert np.array_equal(getattr(again, name), getattr(whole, name)), name
     assert np.array_equal(again.continuation.recording.states, whole.continuation.recording.states)
+
+
+LONE = {
+    "rail": {"type": "prismatic", "axis": (0.6, 0.8)},
+    "weld": {"type": "weld"},
+    "hinge": {"type": "revolute"},
+}
+
+
+@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+@pytest.mark.parametrize("kind", LONE)
+def test_forces_on_the_ground_of_a_link_alone(kind, condition):
+    """They follow from nothing else that is judged: unobserved, they erred by up to 4.8 tolerances."""
+    joint = {"name": "O", "between": ("ground", "beam.root"), **LONE[kind]}
+    load = [{"point": "beam.tip", "y": "20+3*sin(9*t)"}]
+    model = make_model([ritz_link("beam", condition, modes=6, mass=2.0, EI=50.0)], joint=[joint], load=load)
+    runs = [
+        run_forward(model, forward(**KEYS | {"end": 0.3, "tolerance": tolerance}), None, ActuatorSet(), always)
+        for tolerance in (1e-6, 1e-10)
+    ]
+    found, exact = runs
+    assert found.statistics.coordinates == "joint"
+    for name in ("q", "v", "lambda_"):
+        assert relative(getattr(found, name), getattr(exact, name)) < 0.4e-6, name

@@ -14,7 +14,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double small_force = 2e-4; // of the largest: forces below count like this one
-constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them
+constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them;
+                                     // and where nothing else tells of the forces of fast modes
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
 constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
 constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
@@ -83,17 +84,20 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
       is_moment_.push_back(key.second);
     force_group_.push_back(at->second);
   }
-  levers_ = is_moment_.size();
+  leverage_.assign(is_moment_.size(), leverage);
+  const auto add_joint = [&](std::vector<std::size_t> &to, std::size_t at, double counts) {
+    const int force = static_cast<int>(is_moment_.size());
+    to.push_back(at);
+    is_moment_.insert(is_moment_.end(), {false, true}), leverage_.insert(leverage_.end(), 2, counts);
+    for (int i = 0; i < Space::dim; ++i)
+      force_group_.push_back(i < Space::linear ? force : force + 1);
+  };
   for (std::size_t port = 0; port < mechanism.children.size(); ++port)
-    if (mechanism.children[port] >= 0) {
-      const int force = static_cast<int>(is_moment_.size());
-      carriers_.push_back(port);
-      is_moment_.insert(is_moment_.end(), {false, true});
-      for (int i = 0; i < Space::dim; ++i)
-        force_group_.push_back(i < Space::linear ? force : force + 1);
-    }
-  if (is_strict)
-    levers_ = is_moment_.size();
+    if (mechanism.children[port] >= 0)
+      add_joint(carriers_, port, is_strict ? leverage : 1);
+  for (std::size_t i = 0; i < mechanism.nodes.size(); ++i)
+    if (mechanism.nodes[i].is_alone)
+      add_joint(alone_, i, leverage);
   force_now_ = force_error_ = force_peak_ = std::vector<double>(is_moment_.size(), 0.0);
   observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
 }
@@ -132,9 +136,15 @@ template <class Space> double MotionNorm<Space>::of_change(const double *change,
 template <class Space> void MotionNorm<Space>::forces(const Workspace<Space, double> &w, VectorXd &values) const {
   const auto rows = static_cast<Index>(mechanism_.rows.size());
   values.head(rows) = Eigen::Map<const VectorXd>(w.lambda.data(), rows);
-  for (std::size_t i = 0; i < carriers_.size(); ++i)
-    values.segment<Space::dim>(rows + static_cast<Index>(i) * Space::dim) =
-        Eigen::Map<const Eigen::Matrix<double, Space::dim, 1>>(w.ports[carriers_[i]].f);
+  Index first = rows;
+  const auto add = [&](const double *f) {
+    values.segment<Space::dim>(first) = Eigen::Map<const Eigen::Matrix<double, Space::dim, 1>>(f);
+    first += Space::dim;
+  };
+  for (const std::size_t port : carriers_)
+    add(w.ports[port].f);
+  for (const std::size_t node : alone_)
+    add(w.hinges[node].f);
 }
 
 template <class Space>
@@ -159,7 +169,7 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
     const double least = small_force * (is_moment_[g] ? moment : force);
     const double of_springs = is_moment_[g] ? of_springs_ : of_springs_ / length_;
     const double scale = std::max({force_peak_[g], force_now_[g], least, of_springs, nothing});
-    const double size = (g < levers_ ? leverage : 1) * force_error_[g] / scale;
+    const double size = leverage_[g] * force_error_[g] / scale;
     if (!(size <= worst))
       worst = size; // keeps NaN
   }

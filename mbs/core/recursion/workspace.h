@@ -28,6 +28,7 @@ template <class Space, class T> struct Hinge {
   T D_inverse[d];
   T A[packed<T, d>] = {}; // of the section
   T pin[2];               // U/D of a pin, in place of all that
+  T f[packed<T, d>] = {}; // on the ground, in axes of the section, of a body that is alone
   T spin;                 // rad/s of its rotor about z
   T gyro[2]; // moment on the inner section about x, y by which the rotor resists turning with it, opposite sign
 };
