@@ -238,11 +238,14 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
 }
 
 template <class Space> void MotionNorm<Space>::set_peaks(const NormPeaks &peaks) {
-  const bool without_accelerations = peaks.state.size() == size_.size(); // as before 0.2.0
-  if ((peaks.state.size() != peak_.size() && !without_accelerations) || peaks.force.size() != force_peak_.size())
+  // both as before 0.2.0: without accelerations, without forces on the ground
+  const bool is_state = peaks.state.size() == peak_.size() || peaks.state.size() == size_.size();
+  const std::size_t on_ground = 2 * alone_.size(), forces = force_peak_.size();
+  if (!is_state || (peaks.force.size() != forces && peaks.force.size() + on_ground != forces))
     throw std::invalid_argument("peaks: expected those of the same mechanism, found those of another one");
   std::copy(peaks.state.begin(), peaks.state.end(), peak_.begin());
-  force_peak_ = peaks.force, inertial_ = peaks.inertial;
+  std::copy(peaks.force.begin(), peaks.force.end(), force_peak_.begin());
+  inertial_ = peaks.inertial;
 }
 
 template class MotionNorm<Planar>;
