@@ -39,9 +39,11 @@ inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<
                 Workspace<Space, T> &w, T *a) {
   using Cols = Pack<T, W>;
   constexpr int stride = stride_of(W);
-  kinematics(m, q, v, forces, w);
-  if (m.needs_positions)
-    locate(m, q, w);
+  if (!forces.is_placed) {
+    kinematics(m, q, v, forces, w);
+    if (m.needs_positions)
+      locate(m, q, w);
+  }
   Cols S[W], gamma = Cols::zero();
   for (int r = 0; r < W; ++r)
     S[r] = Cols::zero();
@@ -114,9 +116,14 @@ void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspac
 }
 
 template <class Space, class T>
-void measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate) {
-  kinematics(m, q, v, Forces<T>(), w);
+void place_all(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, Workspace<Space, T> &w) {
+  kinematics(m, q, v, forces, w);
   locate(m, q, w);
+}
+
+template <class Space, class T>
+void measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate) {
+  place_all(m, q, v, Forces<T>(), w);
   for (std::size_t r = 0; r < m.rows.size(); ++r) {
     const Row &row = m.rows[r];
     if (row.model.kind == RowKind::coordinate) {

@@ -91,39 +91,37 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
     wrench_.setZero();
     for (const PointLoad &load : scene_.point_loads)
       wrench_[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
-    if (!scene_.point_forces.empty())
-      act_at_points(t, q, v);
-    if (!scene_.cut_joints.empty())
-      act_along_cuts(t, q, v);
+    if (steering_)
+      steering_->add(t, force_.data(), wrench_.data());
+    if (!scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
+      place_all(mechanism_, q, v, forces, workspace_), forces.is_placed = true;
+      act_at_points(t), act_along_cuts(t);
+    }
     forces.wrench = wrench_.data();
   }
-  if (steering_)
-    steering_->add(t, force_.data(), wrench_.data());
   accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
 }
 
-template <class Space> void RecursiveMotion<Space>::act_at_points(double t, const double *q, const double *v) {
-  if constexpr (Space::dim == 3) {
-    frame_poses(mechanism_, q, v, measured_);
+template <class Space> void RecursiveMotion<Space>::act_at_points(double t) {
+  if constexpr (Space::dim == 3)
     for (const PointForce &force : scene_.point_forces) {
-      const Pose<double> at = wrench_pose(mechanism_, static_cast<std::size_t>(force.wrench), measured_);
+      const Pose<double> at = wrench_pose(mechanism_, static_cast<std::size_t>(force.wrench), workspace_);
       const double position[] = {at.r[0], at.r[1], at.angle}, rate[] = {at.v[0], at.v[1], at.omega[2]};
       Eigen::Vector3d wrench = Eigen::Vector3d::Zero();
       force.function.call(t, position, rate, wrench.data());
       wrench_.template segment<3>(3 * force.wrench) += wrench;
     }
-  }
 }
 
-template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t, const double *q, const double *v) {
-  cut_rates(mechanism_, scene_.cut_joints, q, v, measured_, along_cuts_.data());
+template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t) {
+  cut_rates(mechanism_, scene_.cut_joints, workspace_, along_cuts_.data());
   for (std::size_t k = 0; k < scene_.cut_joints.size(); ++k) {
     double &along = along_cuts_[static_cast<Index>(k)];
     along = -scene_.cut_joints[k].friction.resistance(along);
   }
   for (const CutLoad &load : scene_.cut_loads)
     along_cuts_[load.joint] += load.share * load.magnitude(t).value;
-  add_along_cuts(mechanism_, scene_.cut_joints, along_cuts_.data(), measured_, wrench_.data());
+  add_along_cuts(mechanism_, scene_.cut_joints, along_cuts_.data(), workspace_, wrench_.data());
 }
 
 template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {

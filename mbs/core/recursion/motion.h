@@ -127,8 +127,8 @@ template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
   // The mechanism and the scene must outlive this. Rows that depend on others
   // at time t and (q, v) are left out of the equations from there on; they are
-  // to be consistent. What acts beside the scene's loads may be null, and must outlive this: `held`, which may change
-  // between steps, and `steering`.
+  // to be consistent. What acts beside the scene's loads may be null, and must outlive this:
+  // `held`, which may change between steps, and `steering`.
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
                   const HeldForces *held = nullptr, Steering *steering = nullptr);
 
@@ -180,8 +180,8 @@ public:
 private:
   void update_targets(double t);
   void residuals(double t, const double *q, const double *v);
-  void act_at_points(double t, const double *q, const double *v);  // adds to wrench_
-  void act_along_cuts(double t, const double *q, const double *v); // adds to wrench_
+  void act_at_points(double t);  // after place_all(); adds to wrench_
+  void act_along_cuts(double t); // after place_all(); adds to wrench_
   void find_stiff_terms();
   void take_posture();
   void find_coupling();
