@@ -41,7 +41,10 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
                !scene_.frame_motors.empty() || !scene_.gears.empty();
   update_targets(t);
-  keep_independent_rows(mechanism, q, v, workspace_);
+  if (scene.is_strict)
+    evaluate(t, q, v, correction_.data()); // projections need its factors
+  else
+    keep_independent_rows(mechanism, q, v, workspace_);
   newton_.keep(workspace_.active);
   find_stiff_terms();
   for (const GearSpring &gear : scene_.gears)

@@ -109,7 +109,7 @@ struct Scene {
   std::optional<PostureWatch> watch;
   // As scenes in the plane have it: steps are limited where functions of time bend (OdeSystem::prescribe), errors of
   // forces between bodies count twice, and those of links that given forces hold straight are compared with what these
-  // would bend them.
+  // would bend them. No rows depend on others: who makes the scene has refused those that do.
   bool is_strict = false;
   std::vector<double> most_bent; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
@@ -127,7 +127,7 @@ template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
   // The mechanism and the scene must outlive this. Rows that depend on others
   // at time t and (q, v) are left out of the equations from there on; they are
-  // to be consistent. What acts beside the scene's loads may be null, and must outlive this:
+  // to be consistent. Strict scenes have none. What acts beside the scene's loads may be null, and must outlive this:
   // `held`, which may change between steps, and `steering`.
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
                   const HeldForces *held = nullptr, Steering *steering = nullptr);
