@@ -1,5 +1,7 @@
 #include "core/analysis/fcid.h"
 
+#include "core/actuation/side_by_side.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -154,16 +156,6 @@ void FullyConstrained::balance(double t) {
 }
 
 namespace {
-
-VectorXd joined(const std::vector<VectorXd> &parts, Index size) {
-  VectorXd whole(size);
-  Index i = 0;
-  for (const auto &part : parts) {
-    whole.segment(i, part.size()) = part;
-    i += part.size();
-  }
-  return whole;
-}
 
 VectorXd modal_stiffness(const System &system) {
   std::vector<VectorXd> stiffness;

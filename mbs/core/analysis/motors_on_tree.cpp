@@ -7,7 +7,8 @@ using Eigen::VectorXd;
 
 MotorsOnTree::MotorsOnTree(const SystemOnTree &both)
     : both_(both), forces_(both.tree), lambda_(VectorXd::Zero(static_cast<Index>(both.tree.rows.size()))),
-      tau_(VectorXd::Zero(static_cast<Index>(both.reactions.motors.size()))), Q_(VectorXd::Zero(both.tree.n_v)) {
+      tau_(VectorXd::Zero(static_cast<Index>(both.reactions.motors.size()))), Q_(VectorXd::Zero(both.tree.n_v)),
+      modal_force_(both.system.bodies.size()) {
   for (const auto &row : both.reactions.rows)
     if (!row.is_trajectory)
       cuts_.push_back(row.row);
@@ -38,6 +39,8 @@ void MotorsOnTree::resolve(const double *q, const double *lambda, const TreeWork
     if (on_modes.size() > 0)
       Q_ -= tau * on_modes;
   }
+  for (std::size_t b = 0; b < modal_force_.size(); ++b)
+    modal_force_[b] = Q_.segment(both_.drives.modes[b], both_.system.bodies[b].modes());
 }
 
 // Takes what the cuts do off Q, so that nothing is left of it along joint coordinates without a motor.
@@ -56,10 +59,6 @@ void MotorsOnTree::close_loops(const double *q, const TreeWorkspace &w) {
   }
   lu_.compute(columns(joint_coordinates_, Eigen::all));
   Q_ -= cut_columns_ * lu_.solve(Q_(joint_coordinates_)).head(cuts);
-}
-
-Eigen::Map<const VectorXd> MotorsOnTree::modal_force(std::size_t body) const {
-  return {Q_.data() + both_.drives.modes[body], both_.system.bodies[body].modes()};
 }
 
 } // namespace ffrobot

@@ -40,9 +40,7 @@ void TreeActuation::find(double t) {
   if (!motors_)
     return;
   motors_->resolve(q, w.lambda.data(), w);
-  tau_ = motors_->tau();
-  for (std::size_t b = 0; b < modal_force_.size(); ++b)
-    modal_force_[b] = motors_->modal_force(b);
+  tau_ = motors_->tau(), modal_force_ = motors_->modal_force();
 }
 
 ActuationSource::OnBody TreeActuation::on_body(std::size_t body) {
