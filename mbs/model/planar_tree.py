@@ -181,7 +181,7 @@ class PlanarTree:
             self.scene.add_point_force(self._wrench(marker), function)
         for load in self._assembly.model.modal_loads:
             node = next(node for node in self._layout.nodes if node.body.name == load.body)
-            direction = np.zeros(self._layout.size)
+            direction: Array = np.zeros(self._layout.size)
             direction[node.modes : node.modes + node.body.n_modes] = load.vector
             self._along.append((direction, load.magnitude))
         for direction, magnitude in self._along:

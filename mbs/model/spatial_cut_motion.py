@@ -38,7 +38,8 @@ def _guesses(model: SpatialModel) -> Iterator[float]:
     """The coordinates as [initial] gives them, else 0."""
     given = model.scene.initial.joints
     for joint in model.tree.loops:
-        yield from np.atleast_1d(np.array(given.get(joint.name, np.zeros(len(joint.along))), dtype=float)).tolist()
+        of_joint = np.atleast_1d(np.array(given.get(joint.name, np.zeros(len(joint.along))), dtype=float))
+        yield from (float(value) for value in of_joint)
 
 
 def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> Array:

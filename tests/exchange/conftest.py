@@ -3,12 +3,24 @@
 from functools import partial
 
 import pytest
+from other_codes import pinocchio_dynamics as dynamics
 from other_codes import pinocchio_moments, python_with_pinocchio
 
 
 @pytest.fixture(scope="session")
-def pinocchio(pytestconfig, tmp_path_factory):
-    """Motor moments by Pinocchio of (urdf, names, motion); kept in pytest's cache if there is one."""
+def python_of_pinocchio(pytestconfig, tmp_path_factory):
+    """Its interpreter; the environment is kept in pytest's cache if there is one."""
     cache = getattr(pytestconfig, "cache", None)
-    folder = tmp_path_factory.mktemp("pinocchio") if cache is None else cache.mkdir("pinocchio")
-    return partial(pinocchio_moments, python_with_pinocchio(folder))
+    return python_with_pinocchio(tmp_path_factory.mktemp("pinocchio") if cache is None else cache.mkdir("pinocchio"))
+
+
+@pytest.fixture(scope="session")
+def pinocchio(python_of_pinocchio):
+    """Motor moments by Pinocchio of (urdf, names, motion)."""
+    return partial(pinocchio_moments, python_of_pinocchio)
+
+
+@pytest.fixture(scope="session")
+def pinocchio_dynamics(python_of_pinocchio):
+    """Accelerations, moments and mass matrices by Pinocchio of (urdf, names, motion)."""
+    return partial(dynamics, python_of_pinocchio)

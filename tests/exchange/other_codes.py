@@ -1,5 +1,6 @@
 """Pinocchio in a virtual environment of its own: that of the user or of an earlier run, else made from PyPI."""
 
+import json
 import os
 import subprocess
 import sys
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 PACKAGE = "pin==2.6.20"  # of the Python versions that this program runs on; with NumPy below 2
-SCRIPT = Path(__file__).with_name("pinocchio_moments.py")
+MOMENTS, DYNAMICS = (Path(__file__).with_name(f"pinocchio_{what}.py") for what in ("moments", "dynamics"))
 PATIENCE = 600  # s for a download of 100 MB
 
 
@@ -43,5 +44,14 @@ def _make(folder, python):
 def pinocchio_moments(python, urdf, names, motion):
     """Motor moments of the joints `names` of the URDF file at q, v, a, which are dicts by name (rad, m, s)."""
     numbers = [repr(values[name]) for values in motion for name in names]
-    done = subprocess.run([python, SCRIPT, urdf, *names, *numbers], capture_output=True, text=True, check=True)
+    done = subprocess.run([python, MOMENTS, urdf, *names, *numbers], capture_output=True, text=True, check=True)
     return np.array(done.stdout.split(), dtype=float)
+
+
+def pinocchio_dynamics(python, urdf, names, motion):
+    """What `pinocchio_dynamics.py` answers for q, v, a and tau (T, n) of a `motion` of the joints `names`."""
+    request = {"names": names} | {key: values.tolist() for key, values in motion._asdict().items()}
+    done = subprocess.run(
+        [python, DYNAMICS, urdf], input=json.dumps(request), capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stdout)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ..figures.palette import COLORS
 from ..figures.style import legend
 from .diagrams import Bars, Series
@@ -26,7 +26,7 @@ def draw_bars(diagram: Bars) -> Figure:
     axes.set_title(diagram.title, loc="left")
     height = 0.8 / count
     for k, series in enumerate(diagram.series):
-        at = np.arange(len(labels)) + (k - 0.5 * (count - 1)) * height
+        at = as_floats(np.arange(len(labels)) + (k - 0.5 * (count - 1)) * height)
         _label(axes, _bars(axes, diagram, series, at, height, COLORS[k]), series, "+" if diagram.signed else "")
     axes.margins(x=ROOM)
     axes.locator_params(axis="x", nbins=7)

@@ -1,0 +1,75 @@
+"""Equations of motion of rigid trees against Pinocchio's algorithms: accelerations, required moments, mass matrices."""
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from rigid_robots import ROBOTS, random_urdf
+
+from ffrobot.mbs.model.spatial_accelerations import Accelerated
+from ffrobot.mbs.model.spatial_inverse import required_forces
+from ffrobot.mbs.model.spatial_model import build_spatial_model
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.run.spatial_bodies import load_spatial_bodies
+from ffrobot.scene.spatial import load_spatial_scene
+
+STATES = 5
+CLOSE = 1e-12  # of the largest
+
+
+class Motion(NamedTuple):
+    """Of the joints of a tree, (STATES, n) each; moments of motors beside a."""
+
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    tau: np.ndarray
+
+
+@pytest.fixture(scope="module", params=["ur5", "panda", *range(20)])
+def robot(request, tmp_path_factory, ffrobot):
+    """The file of a robot or of a random tree, its scene, and random motions."""
+    folder, urdf = tmp_path_factory.mktemp("robot"), ROBOTS / f"{request.param}.urdf"
+    rng = np.random.default_rng(7)
+    if isinstance(request.param, int):
+        rng, urdf = np.random.default_rng(request.param), folder / "random.urdf"
+        urdf.write_text(random_urdf(rng))
+    done = ffrobot("import", urdf, "-o", folder / "out")
+    assert done.returncode == 0, done.stderr
+    path = folder / "out" / "scene.toml"
+    text = re.sub(r"^(viscous|coulomb)_friction = .*\n", "", path.read_text(), flags=re.MULTILINE)
+    path.write_text(
+        text + '[[analysis]]\nname = "falls"\nkind = "forward"\nend = 1.0\noutput_step = 1.0\ntolerance = 1e-6\n'
+    )
+    scene = load_spatial_scene(path)
+    model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
+    motion = Motion(*rng.uniform(-1, 1, (4, STATES, model.tree.n_v)))
+    return urdf, SpatialSystem(model), motion
+
+
+def close(found, expected):
+    """Relative to the largest of each state."""
+    found, expected = np.asarray(found), np.asarray(expected)
+    scale = np.abs(expected).reshape(STATES, -1).max(axis=1).reshape(STATES, *[1] * (expected.ndim - 1))
+    np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=CLOSE)
+
+
+def test_accelerations_moments_and_mass_matrices(robot, pinocchio_dynamics):
+    urdf, system, motion = robot
+    tree = system.model.tree
+    names = [node.joint.name for node in sorted(tree.nodes, key=lambda node: node.v.start)]
+    assert len(names) == tree.n_v
+    expected = pinocchio_dynamics(urdf, names, motion)
+
+    def accelerations(q, v, force):
+        return system.core.evaluate(q, v, np.zeros(0), force, None)[0]
+
+    close([accelerations(q, v, tau) for q, v, _, tau in zip(*motion, strict=True)], expected["aba"])
+    moving = Accelerated(tree, motion.q, motion.v, motion.a, tree.frames(motion.q))
+    close(required_forces(system.model, moving, np.zeros(STATES)), expected["rnea"])
+    for q, v, M in zip(motion.q, motion.v, expected["crba"], strict=True):
+        free = accelerations(q, v, np.zeros(tree.n_v))
+        inverse = np.array([accelerations(q, v, unit) - free for unit in np.eye(tree.n_v)])
+        condition = np.linalg.cond(M)
+        np.testing.assert_allclose(inverse @ M, np.eye(tree.n_v), rtol=0, atol=CLOSE * condition)
