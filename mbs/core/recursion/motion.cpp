@@ -41,10 +41,10 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
                !scene_.frame_motors.empty() || !scene_.gears.empty();
   update_targets(t);
-  if (scene.is_strict)
-    evaluate(t, q, v, correction_.data()); // projections need its factors
-  else
+  if (!scene.is_strict)
     keep_independent_rows(mechanism, q, v, workspace_);
+  else if (!mechanism.rows.empty())
+    evaluate(t, q, v, correction_.data()); // projections need its factors
   newton_.keep(workspace_.active);
   find_stiff_terms();
   for (const GearSpring &gear : scene_.gears)

@@ -18,8 +18,9 @@ constexpr double leverage = 2;       // of multipliers: motors' moments follow f
                                      // and where nothing else tells of the forces of fast modes
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
 constexpr double slow = 1e-3;        // 1/s: of joints, times the peak of what the rate is of
-constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
-constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
+constexpr double slow_if_strict = 0.01; // likewise, as in absolute coordinates (core/system/error_norm.*)
+constexpr double small_bend = 1e-3;     // of what a body's acceleration would do to its softest mode
+constexpr double small_twist = 1e-5;    // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
 constexpr double nothing = 1e-12;
 
 double square(double x) { return x * x; }
@@ -47,7 +48,7 @@ double farthest(const spatial::Body &b) {
 
 template <class Space>
 MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
-    : mechanism_(mechanism), pace_{slow, slow} {
+    : mechanism_(mechanism), pace_(2, is_strict ? slow_if_strict : slow) {
   const auto n = static_cast<std::size_t>(mechanism.n_v);
   group_.assign(2 * n, 0), radian_.assign(n, 0);
   for (const Node<Space> &node : mechanism.nodes) {
