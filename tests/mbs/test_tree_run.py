@@ -221,3 +221,14 @@ def test_rows_that_hardly_differ_at_the_start_are_all_kept(in_absolute):
     assert found.statistics.status == expected.statistics.status == "step underflow"
     assert "singular" in found.statistics.cause
     assert relative(found.lambda_[0], expected.lambda_[0]) < 1e-4
+
+
+def test_a_load_that_has_no_value_any_more_ends_the_run():
+    """Errors that are no numbers, of one group of many, are not taken for small ones: it went on past the end."""
+    rods = [rod("link1", 1.0, 1.0), rod("link2", 1.0, 1.0)]
+    model = arm(rods, trajectory=[], load=[{"joint": "O", "moment": "sqrt(0.5-t)"}])
+    found = run_forward(model, forward(end=1.0, output_step=0.01), None, ActuatorSet(), always)
+    assert found.statistics.coordinates == "joint"
+    assert found.statistics.status == "step underflow"
+    assert 'joint "O", angle has no finite value' in found.statistics.cause
+    assert found.statistics.time_reached <= 0.5

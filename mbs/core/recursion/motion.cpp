@@ -195,7 +195,7 @@ template <class Space> double RecursiveMotion<Space>::error_size(double t, const
   shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + stretch * Eigen::Map<const VectorXd>(e, 2 * n_v());
   evaluate(t, local().state(shifted_.data()), shifted_.data() + n_v(), unused_.data());
   const double of_forces = norm_.of_observed(workspace_) / stretch;
-  return of_forces <= size ? size : of_forces; // keeps NaN
+  return of_forces <= size || std::isnan(size) ? size : of_forces; // keeps NaN
 }
 
 template <class Space>

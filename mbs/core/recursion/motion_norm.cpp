@@ -25,6 +25,9 @@ constexpr double nothing = 1e-12;
 
 double square(double x) { return x * x; }
 
+// The larger one; NaN where one is, as past the end of a load that has no value from there on
+double larger(double x, double y) { return x >= y || std::isnan(x) ? x : y; }
+
 template <class Space> bool is_moment(const Mechanism<Space> &m, const Row &row) {
   if (row.model.kind != RowKind::coordinate)
     return row.model.kind == RowKind::rotation || row.model.kind == RowKind::dot;
@@ -119,8 +122,7 @@ template <class Space> double MotionNorm<Space>::of_state(const double *e) const
   add_squares(e);
   double worst = 0;
   for (std::size_t g = 0; g < size_.size(); ++g)
-    if (const double size = std::sqrt(size_[g]) / std::max(peak_[g], nothing); !(size <= worst))
-      worst = size; // keeps NaN
+    worst = larger(worst, std::sqrt(size_[g]) / std::max(peak_[g], nothing));
   return worst;
 }
 
@@ -128,9 +130,7 @@ template <class Space> double MotionNorm<Space>::of_change(const double *change,
   const std::size_t groups = pace_.size();
   double worst = of_state(change);
   for (std::size_t g = 0; g < groups; ++g)
-    if (const double size = rate * std::sqrt(size_[groups + g]) / std::max(peak_[2 * groups + g], nothing);
-        !(size <= worst))
-      worst = size; // keeps NaN
+    worst = larger(worst, rate * std::sqrt(size_[groups + g]) / std::max(peak_[2 * groups + g], nothing));
   return worst;
 }
 
@@ -170,9 +170,7 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
     const double least = small_force * (is_moment_[g] ? moment : force);
     const double of_springs = is_moment_[g] ? of_springs_ : of_springs_ / length_;
     const double scale = std::max({force_peak_[g], force_now_[g], least, of_springs, nothing});
-    const double size = leverage_[g] * force_error_[g] / scale;
-    if (!(size <= worst))
-      worst = size; // keeps NaN
+    worst = larger(worst, leverage_[g] * force_error_[g] / scale);
   }
   return worst;
 }
